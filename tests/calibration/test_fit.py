@@ -91,7 +91,7 @@ def test_gains_are_found_and_not_written() -> None:
     found = calibrate(true.robot, true.q, true.T, tip="tool0", base="base", fit=["gains"])
     np.testing.assert_allclose(found.values, true.truth, atol=1e-14)
     assert found.written.text == true.robot.urdf.encode()
-    assert any(line.startswith("a URDF has no gains: ") for line in doubts(found))
+    assert any(line.startswith("a URDF cannot store gains: ") for line in doubts(found))
 
 
 @pytest.mark.parametrize("convention", list(Convention))
@@ -142,7 +142,7 @@ def test_the_covariance_and_the_noise_are_what_they_are_said_to_be() -> None:
     assert abs(stated.fitted.ratio - 1.0) < 4.0 * stated.fitted.spread
     assert not doubts(stated)
     wrong = calibrate(true.robot, true.q, T, tip="tool0", base="base", noise=(4e-5, 4e-5))
-    assert re.match(r"2\.[3-7]\d* times the noise that was stated is left", doubts(wrong)[0])
+    assert re.match(r"the residuals are 2\.[3-7]\d* times the stated noise", doubts(wrong)[0])
 
 
 @pytest.mark.slow
@@ -153,45 +153,45 @@ def test_odd_poses_are_told_and_left_out_only_if_that_is_wanted() -> None:
     T[40, 0, 3] -= 4e-3
     found = calibrate(true.robot, true.q, T, tip="tool0", base="base")
     assert found.odd == (17, 40)
-    assert "poses 17, 40 do not belong to the others" in doubts(found)[0]
+    assert "poses 17, 40 are outliers: the rms error is " in doubts(found)[0]
     assert found.fitted is not None
     assert len(found.fitted.errors) == 60
     clean = calibrate(true.robot, true.q, T, tip="tool0", base="base", drop_odd=True)
     assert clean.fitted is not None
     assert len(clean.fitted.errors) == 58
     assert clean.fitted.noise.metres < 1.2e-4 < found.fitted.noise.metres
-    assert doubts(clean) == ["poses 17, 40 are left out"]
+    assert doubts(clean) == ["poses 17, 40 are excluded as outliers"]
 
 
 def test_as_many_numbers_as_parameters_leave_nothing_to_judge_by() -> None:
     true = bench("ur5", ("origins",), "tool0", "base", poses=5)
     T = true.noisy(1e-4, 1e-4, 0)
-    with pytest.raises(InputError, match="nothing is left to judge the fit by"):
+    with pytest.raises(InputError, match="the fit cannot be checked"):
         calibrate(true.robot, true.q, T, tip="tool0", base="base")
     found = calibrate(true.robot, true.q, T, tip="tool0", base="base", force=True)
     assert found.identification.rank == 30
     assert found.written_parameters == ()
     out = io.StringIO()
     print_calibration(found, Console(file=out, width=200))
-    assert "noise: unknown, no number is left to estimate it from" in out.getvalue()
+    assert "noise: unknown, there are no redundant measurements" in out.getvalue()
     assert not np.isfinite(found.deviations[list(found.identification.kept)]).any()
-    assert any("no number is left to judge by" in line for line in doubts(found))
+    assert any("the fit cannot be checked" in line for line in doubts(found))
 
 
 @pytest.mark.parametrize(
     ("change", "words"),
     [
         ({"poses": np.zeros((3, 2))}, "positions (n, 3)"),
-        ({"poses": np.zeros((2, 4, 4))}, "a pose is a rotation"),
+        ({"poses": np.zeros((2, 4, 4))}, "a pose must be a rotation"),
         ({"poses": np.zeros((2, 3))}, "each pose needs its configuration"),
         ({"q": np.zeros((0, 6)), "poses": np.zeros((0, 3))}, "no poses"),
-        ({"poses": None}, "q and poses are given together"),
-        ({"q": np.eye(3, 6), "poses": 1e3 * np.eye(3)}, "say --unit mm"),
-        ({"noise": (0.0, 1.0)}, "noise is more than nothing"),
-        ({"noise": 1.0}, "noise is two numbers"),
-        ({"fit": []}, "nothing is to be fitted"),
-        ({"fit": "origins"}, "must be a list of names"),
-        ({"tip": 5}, "tip must be a name"),
+        ({"poses": None}, "q and poses must be given together"),
+        ({"q": np.eye(3, 6), "poses": 1e3 * np.eye(3)}, "add --unit mm"),
+        ({"noise": (0.0, 1.0)}, "noise must be positive"),
+        ({"noise": 1.0}, "noise must be two numbers"),
+        ({"fit": []}, "no parameters to fit"),
+        ({"fit": "origins"}, "are a list of names"),
+        ({"tip": 5}, "tip is a name"),
     ],
 )
 def test_bad_input_is_told(change: dict[str, object], words: str) -> None:

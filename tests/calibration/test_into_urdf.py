@@ -77,7 +77,7 @@ def test_a_follower_that_cannot_follow_is_no_reason_to_refuse() -> None:
 
 
 def test_what_has_errors_or_no_such_joint_is_not_edited() -> None:
-    with pytest.raises(InputError, match="a text with errors is not edited"):
+    with pytest.raises(InputError, match="a URDF with errors is not edited"):
         with_origins(b"<robot>", {})
     with pytest.raises(InputError, match="no such joint"):
         with_origins(BRANCHED.encode(), {"five": np.eye(4)})

@@ -89,9 +89,7 @@ def test_rows_of_q_that_are_shifted_are_named(name: str, by: int, complete: bool
     said = reason(name, np.roll(arm(name).q, by, axis=0), complete=complete)
     rows = "one row" if abs(by) == 1 else "2 rows"
     way = "later" if by > 0 else "earlier"
-    assert said.startswith(
-        f"q is shifted by {rows} against the poses; the q of each pose stands {rows} {way}"
-    )
+    assert said.startswith(f"q is shifted by {rows} against the poses; the q of each pose is {rows} {way}")
 
 
 @pytest.mark.slow
@@ -137,7 +135,7 @@ def test_sliding_joints_in_millimetres_are_named() -> None:
     name = "through the trunk"
     slides = [joint == "two" for joint in arm(name).robot.coordinate_names]
     assert reason(name, np.where(slides, 1e3 * arm(name).q, arm(name).q)).startswith(
-        "sliding joints are in mill"
+        "prismatic joints are in mill"
     )
 
 

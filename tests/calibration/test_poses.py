@@ -66,7 +66,7 @@ def test_positions_alone_are_positions_alone(tmp_path: Path) -> None:
         ("a,b,x,y,z,qw", "no qx, qy, qz"),
         ("a,b,x,y,z,roll", "unknown: roll"),
         ("a,b,x,y,z,qx,qy,qz,qw", "length 2"),
-        ("a,b,T00,T01,T02,T03,T10,T11,T12,T13,T20,T21,T22,T23", "a pose is a rotation"),
+        ("a,b,T00,T01,T02,T03,T10,T11,T12,T13,T20,T21,T22,T23", "a pose must be a rotation"),
     ],
 )
 def test_what_is_wrong_with_columns_is_told(header: str, words: str, tmp_path: Path) -> None:
@@ -78,7 +78,7 @@ def test_what_is_wrong_with_columns_is_told(header: str, words: str, tmp_path: P
 
 def test_what_is_wrong_with_arrays_is_told(tmp_path: Path) -> None:
     np.savez(tmp_path / "x.npz", q=Q, T=T, p=T[:, :3, 3])
-    with pytest.raises(InputError, match="q with T, with p, or with p and quat: found q, T, p"):
+    with pytest.raises(InputError, match="q with T, q with p, or q with p and quat: found q, T, p"):
         read_poses(tmp_path / "x.npz", NAMES, NAMES)
 
 

@@ -8,9 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from urdfkin.calibration.like import calibrate_like, distance, universal_robots
 from urdfkin.calibration.parameters import elementary
-from urdfkin.calibration.universal_robots import LINKS, calibrated_tree, read_calibration
+from urdfkin.calibration.universal_robots import (
+    LINKS,
+    calibrated_tree,
+    distance,
+    read_calibration,
+    universal_robots,
+)
 from urdfkin.dh.rows import table_from_rows
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UnknownNameError
@@ -159,35 +164,28 @@ def test_the_older_descriptions_frames_stay_near_where_they_were(file: Path) -> 
     assert max(shift for shift, _ in found.moved.values()) < 0.06
 
 
-@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
-def test_the_controllers_own_table_is_taken_as_well() -> None:
-    found = calibrate_like("ur10", controller(), tip="tool0", base="base")
-    written = load(found.written.text)
-    q = written.sample(20)
-    T = written.placement(q, ["base", "tool0"])
-    assert np.abs(np.linalg.solve(T[:, 0], T[:, 1]) - controller().placement(q)).max() < ROUNDING
-
-
 @pytest.mark.slow
-def test_a_model_with_other_joints_is_refused() -> None:
-    with pytest.raises(InputError, match="not as many coordinates: found 6 and 7"):
-        calibrate_like("ur5", "panda", tip="tool0")
-    with pytest.raises(InputError, match="no origins make the one model of the other"):
-        calibrate_like("ur5", load("ur5").urdf.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 -1"/>'))
+def test_an_arm_with_other_joints_is_refused(file: Path) -> None:
+    urdf = load("ur5").urdf
+    with pytest.raises(InputError, match="no origins make the robot move like the calibrated arm"):
+        universal_robots(urdf.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 -1"/>'), file)
+    seventh = urdf.replace('"wrist_3_link-tool0_fixed_joint" type="fixed"', '"flange" type="continuous"')
+    with pytest.raises(InputError, match="not as many coordinates as the calibrated arm: found 7 and 6"):
+        universal_robots(seventh, file)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("a: [", "no YAML"),
-        ("joints: 1", "no calibration of a Universal Robots arm"),
+        ("a: [", "not a YAML file"),
+        ("joints: 1", "not a calibration of a Universal Robots arm"),
         ("kinematics: {shoulder: 1}", "no shoulder"),
         ("kinematics: {shoulder: {x: ten}}", "shoulder x"),
         ("kinematics: {shoulder: {x: .nan}}", "shoulder x"),
         ("kinematics: {shoulder: {y: 0}}", "shoulder x: not a finite number: found NoneType"),
         (BOMB, "shoulder x: not a finite number: found list"),
-        ("kinematics: " + "[" * 5000, "no YAML"),
+        ("kinematics: " + "[" * 5000, "not a YAML file"),
     ],
 )
 def test_another_file_is_told(text: str, words: str, tmp_path: Path) -> None:
@@ -198,7 +196,7 @@ def test_another_file_is_told(text: str, words: str, tmp_path: Path) -> None:
 
 
 def test_another_robot_and_another_order_are_told(file: Path) -> None:
-    with pytest.raises(InputError, match="the robot is no Universal Robots arm"):
+    with pytest.raises(InputError, match="the robot is not a Universal Robots arm"):
         universal_robots("panda", file)
     with pytest.raises(UnknownNameError, match="driver"):
         universal_robots("ur5", file, "drivers")

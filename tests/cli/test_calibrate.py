@@ -32,7 +32,7 @@ def test_measured_poses_become_a_urdf_and_data(tmp_path: Path) -> None:
     assert np.abs(T - true.T).max() < 1e-13
     assert "measured on the bench" in out.read_text()
     shown = urdfkin(*words)
-    assert "14 of 18 parameters can be told, 4 stand still" in shown.text
+    assert "14 of 18 parameters identifiable, 4 fixed" in shown.text
     assert "verified by Pinocchio" in shown.text
 
 
@@ -80,11 +80,11 @@ def test_a_tables_file_becomes_a_table(tmp_path: Path) -> None:
     [
         (["--noise", "1,1"], "--noise does nothing without --poses"),
         (["--drop-odd"], "--drop-odd does nothing without --poses"),
-        (["-o", "x.urdf"], "does nothing without --poses, --like and --ur"),
+        (["-o", "x.urdf"], "does nothing without --poses and --ur"),
         (["--order", "urdf"], "--order does nothing without --ur"),
         (["--ur", "x.yaml", "--tip", "tool0"], "--tip does nothing with --ur"),
-        (["--like", "ur5", "--fit", "base"], "--fit does nothing with --like"),
-        (["--like", "ur5", "--ur", "x"], "one model at a time"),
+        (["--ur", "x.yaml", "--fit", "base"], "--fit does nothing with --ur"),
+        (["--poses", "x.csv", "--ur", "x.yaml"], "give only one source of calibration"),
         (["--poses", "x.csv", "--positions"], "--positions does nothing with --poses"),
         (["--poses", "none.csv"], "none.csv"),
         (["--fit", "origin"], "did you mean origins"),

@@ -1,3 +1,3 @@
-"""Which numbers of a model measured poses determine, what they are then, and the model with them in it."""
+"""Calibrate a robot from measured poses, and write the result back into its own file."""
 
 from __future__ import annotations

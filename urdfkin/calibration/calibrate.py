@@ -1,7 +1,8 @@
-"""A model fitted to measured poses: what they tell, what the parameters are then, and what to doubt.
+"""Calibrate a robot: fit its parameters to measured poses, and report their uncertainty and warnings.
 
-A fit that is not plausible (`plausible.py`) is refused. Of a plausible one the parameters are written that
-moved by more than two standard deviations; the others stay as they were, and the rest is fitted anew.
+A fit that is not plausible (`plausible.py`) is refused. Of a plausible fit, only parameters that moved by
+more than two standard deviations are written. The other parameters keep their values, and the written ones
+are fitted again.
 """
 
 from __future__ import annotations
@@ -44,46 +45,46 @@ from urdfkin.robot import Robot
 from urdfkin.urdf.sources import Source
 from urdfkin.verify.certificate import Certificate
 
-#: Configurations that show what could be found, whatever was measured.
+#: Number of random configurations that show which parameters are identifiable in principle.
 _GENERAL = 40
-#: Standard deviations that what is left is off the stated noise by, and nobody wonders.
+#: Standard deviations of the residual noise from the stated noise; more is a warning.
 _UNLIKELY = 4.0
-#: How many times as uncertain as general configurations leave a parameter: less is no reason to warn.
+#: Ratio of a parameter's uncertainty to that with random configurations; more is a warning.
 _WEAK = 10.0
-#: Seed of the general configurations that a parameter's certainty is held against: not those of `general`.
+#: Seed of the random configurations for that ratio; not the seed of `general`.
 _OTHERS = 1
-#: Of the largest entry of R: a column whose own is no larger is one of those before it.
+#: Share of the largest entry of R; a column with a smaller diagonal entry depends on those before it.
 _DEPENDENT = 1e-12
-#: By what a robot's size is divided for the x, y and z of a target that is at no special place.
+#: Divisors of the robot's size that give x, y and z of a target in general position.
 _ASIDE = {"x": 5.0, "y": 6.0, "z": 7.0}
-#: Times `Way.rounding`: Pinocchio goes to the base and to the tip, through origins that were written anew.
+#: Factor on `ParametricChain.rounding`: Pinocchio computes base and tip, from origins that were rewritten.
 _READ_BACK = 4.0
-#: Parameters or poses that a doubt names.
+#: Number of parameters or poses that a warning names.
 _NAMED = 6
-#: Where no correction makes a fit plausible.
+#: Text for a refused fit that no correction makes plausible.
 _NO_REASON = "degrees, shifted rows of q and reversed signs of joints do not explain it"
 
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """A model after its calibration; make one with `urdfkin.calibrate`.
+    """A calibrated model; the result of `urdfkin.calibrate`.
 
     Attributes:
-        robot: The robot as it was.
-        model: What was fitted of it.
-        identification: Which parameters the poses tell.
-        general: Which general configurations would tell.
-        fitted: The fit; None where there are no poses.
-        before: The same numbers for the robot as it was, base and tool fitted where they are unknown.
-        odd: Numbers of the poses that do not belong to the others.
-        without_odd: The fit without these.
-        weak: Kept parameters that the poses hardly tell, each with how many times as uncertain it is as
-            as many general configurations would leave it.
-        certificate: What Pinocchio said of what was written.
+        robot: The robot before the calibration.
+        model: The model with the parameters to fit.
+        identification: The parameters that are identifiable from the measured poses.
+        general: The parameters that are identifiable from random poses.
+        fitted: The fit; None without poses.
+        before: The fit of base and tool alone, with the robot's original parameters.
+        odd: Indices of the outliers among the poses.
+        without_odd: The fit without the outliers.
+        weak: Poorly observable parameters, each with the ratio of its uncertainty to that with as many random
+            configurations.
+        certificate: Pinocchio's check of the written model.
         stated: Whether the noise was stated.
-        written_fit: The fit of the parameters that are written alone; `fitted` where all are.
-        significant: Numbers of the parameters in that fit.
-        plausibility: Why the fit is refused, if it is.
+        written_fit: The fit of only the written parameters; `fitted` if all are written.
+        significant: Indices of the parameters in that fit.
+        plausibility: The objections to the fit; empty for a plausible one.
     """
 
     robot: Robot
@@ -103,37 +104,37 @@ class Calibration:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """All that were to be fitted."""
+        """All parameters of the model."""
         return self.model.way.parameters
 
     @cached_property
     def values(self) -> FloatArray:
-        """(p,) by how much each parameter moved, m and rad; 0 for those that stand still."""
+        """(p,) change of each parameter, m and rad; 0 for fixed parameters."""
         return (
             np.zeros(len(self.parameters)) if self.fitted is None else self.fitted.at - self.model.way.start
         )
 
     @cached_property
     def writable(self) -> frozenset[int]:
-        """Numbers of the parameters that a file has a place for: a URDF has none for ends and gains."""
+        """Indices of the parameters that the file can store; a URDF cannot store base, tool and gains."""
         is_table = isinstance(self.model.source, DHTable)
         pairs = enumerate(self.parameters)
         return frozenset(k for k, p in pairs if p.what != "gain" and (is_table or not p.end))
 
     @property
     def written_parameters(self) -> tuple[int, ...]:
-        """Numbers of the parameters that are written."""
+        """Indices of the parameters that are written."""
         return tuple(k for k in self.significant if k in self.writable)
 
     @cached_property
     def written_values(self) -> FloatArray:
-        """(p,) by how much each parameter moves in the fit that is written."""
+        """(p,) change of each parameter in the written fit, m and rad."""
         found = self.written_fit
         return np.zeros(len(self.parameters)) if found is None else found.at - self.model.way.start
 
     @cached_property
     def deviations(self) -> FloatArray:
-        """(p,) standard deviations; 0 for those that stand still."""
+        """(p,) standard deviations, m and rad; 0 for fixed parameters."""
         found = np.zeros(len(self.parameters))
         if self.fitted is not None:
             found[list(self.identification.kept)] = np.sqrt(np.diag(self.fitted.covariance))
@@ -141,32 +142,32 @@ class Calibration:
 
     @property
     def origins(self) -> dict[str, FloatArray]:
-        """(4, 4) by joint: the new origins of those that moved."""
+        """The new origins (4, 4) by joint, for joints that moved."""
         return {} if self.written_fit is None else self.model.origins(self.written_fit.at)
 
     @property
     def base(self) -> FloatArray | None:
-        """(4, 4) of the robot's base in the instrument's frame; None where it was not asked for."""
+        """(4, 4) pose of the robot's base in the instrument's frame; None if it was not fitted."""
         return None if self.written_fit is None else self.model.end("base", self.written_fit.at)
 
     @property
     def tool(self) -> FloatArray | None:
-        """(4, 4) of the target in the tip's frame; None where it was not asked for."""
+        """(4, 4) pose of the target in the tip's frame; None if it was not fitted."""
         return None if self.written_fit is None else self.model.end("tool", self.written_fit.at)
 
     @property
     def table(self) -> DHTable | None:
-        """The calibrated table; None where a URDF was calibrated."""
+        """The calibrated table; None for a URDF."""
         return None if self.written_fit is None else self.model.table(self.written_fit.at)
 
     @cached_property
     def written(self) -> Rewritten:
-        """The URDF's own text with the new origins in it, and what that moves."""
+        """The URDF's own text with the new origins, and the effect of the changes."""
         return Rewritten(self.robot, self.origins)
 
 
 class ImplausibleError(InputError):
-    """A fit that is not plausible: the measured data or the model have a gross mistake.
+    """Error for a fit that is not plausible: the measured data or the model contain a gross mistake.
 
     Attributes:
         calibration: The refused calibration.
@@ -199,32 +200,35 @@ def calibrate(
     force: bool = False,
     every: bool = False,
 ) -> Calibration:
-    """The model with which a robot, or a table, comes closest to measured poses.
+    """Fit the parameters of a robot or a table to measured poses.
 
-    What is written is loaded anew, and its tip held against Pinocchio's at the measured configurations.
+    The written model is loaded again, and its tip is compared with Pinocchio's at the measured
+    configurations.
 
     Args:
-        source: A robot, what `load` takes, or a Denavit-Hartenberg table.
-        q: (s, nq) configurations; of a table (s, coordinates). None: only what could be found is told.
-        poses: (s, 4, 4) of the tip in the base, or (s, 3) positions alone, m.
+        source: A robot, a source for `load`, or a Denavit-Hartenberg table.
+        q: (s, nq) configurations, rad and m; for a table (s, coordinates). None: only report which parameters
+            are identifiable.
+        poses: (s, 4, 4) poses of the tip in the base, or (s, 3) positions alone, m.
         tip: A link's or joint's name; the robot's tip when None.
-        base: Likewise; the robot's base frame when None.
-        fit: Of "base" (where the instrument stands), "tool" (the target on the tip), "offsets" (the joints'
-            zeros), "origins" (the six of each joint of the path; all cells of a table), "gains".
-        noise: Standard deviations of what was measured: m of a coordinate, rad of a turn about an axis. None:
-            estimated from what is left.
-        drop_odd: Whether poses that do not belong to the others are left out; they are told in any case.
-        complete: Without poses: whether poses will be measured, or positions alone.
-        radians: Whether joint angles beyond a turn, which look like degrees, are radians.
-        force: Whether a fit that is not plausible is returned, with the objections in `plausibility`.
-        every: Whether all fitted parameters are written, also those within two standard deviations of 0.
+        base: A link's or joint's name; the robot's base frame when None.
+        fit: Sets of parameters: "base" (pose of the instrument), "tool" (pose of the target on the tip),
+            "offsets" (joint zeros), "origins" (six numbers of each joint of the path; all cells of a table),
+            "gains" (scale factors of joint values).
+        noise: Standard deviations of the measurements: m of a coordinate, rad of a rotation about an axis.
+            None: estimated from the residuals.
+        drop_odd: Whether to exclude outlier poses; they are reported in any case.
+        complete: Without poses: whether full poses will be measured, not positions alone.
+        radians: Whether joint angles above one turn, which look like degrees, are radians.
+        force: Whether to return a fit that is not plausible, with the objections in `plausibility`.
+        every: Whether to write all fitted parameters, also those within two standard deviations of 0.
 
     Raises:
-        InputError: shapes, fewer poses than tell anything, positions that can be no metres.
+        InputError: wrong shapes, too few poses, or positions that are not in metres.
         ImplausibleError: the fit is not plausible; the message names the likeliest reason.
-        UnknownNameError: a frame or a set of parameters that does not exist.
-        UrdfError, SourceError: as `load`.
-        VerificationError: Pinocchio computes something else of what was written.
+        UnknownNameError: a frame or a set of parameters does not exist.
+        UrdfError, SourceError: as for `load`.
+        VerificationError: Pinocchio computes another result for the written model.
 
     Example:
         >>> import urdfkin
@@ -246,7 +250,7 @@ def calibrate(
         every=as_bool(every, "every"),
     )
     if found.plausibility.objections and not as_bool(force, "force"):
-        raise ImplausibleError(found, "force=True returns the fit all the same")
+        raise ImplausibleError(found, "force=True returns the fit anyway")
     return found
 
 
@@ -265,7 +269,22 @@ def fitted_model(
     every: bool = True,
     judged: bool = True,
 ) -> Calibration:
-    """As `calibrate`, which refuses what is not plausible; `judged` says whether that is asked at all."""
+    """Fit as `calibrate` does, but return implausible fits too.
+
+    Args:
+        source: As for `calibrate`.
+        q: As for `calibrate`.
+        poses: As for `calibrate`.
+        tip: As for `calibrate`.
+        base: As for `calibrate`.
+        fit: As for `calibrate`.
+        noise: As for `calibrate`.
+        drop_odd: As for `calibrate`.
+        complete: As for `calibrate`.
+        radians: As for `calibrate`.
+        every: As for `calibrate`.
+        judged: Whether to check that the fit is plausible.
+    """
     robot = source if isinstance(source, Robot) else load(source)
     names = tuple(as_str(name, "each of fit") for name in as_names(fit, "fit"))
     model = (
@@ -280,24 +299,26 @@ def fitted_model(
     )
     drop_odd, complete = as_bool(drop_odd, "drop_odd"), as_bool(complete, "complete")
     if (q is None) != (poses is None):
-        raise InputError("q and poses are given together", found="one of the two")
-    given = None if q is None or poses is None else _measured(robot, model, q, poses)
+        raise InputError("q and poses must be given together", found="only one of the two")
+    given = None if q is None or poses is None else _check_measured(robot, model, q, poses)
     if given is not None:
         complete = given[1].complete
     general = _values(model, robot, robot.sample(_GENERAL))
     if given is None:
-        could = identify(model, general, complete=complete, at=_somewhere(model))
+        could = identify(model, general, complete=complete, at=_general_target(model))
         return Calibration(robot, model, could, could)
     path_q, measured = given
-    ended, found = _calibrated(robot, model, path_q, measured, noise, drop_odd, every=every)
+    ended, found = _fit(robot, model, path_q, measured, noise, drop_odd, every=every)
     found = replace(found, general=identify(model, general, complete=complete, at=ended.fitted.at))
     if judged:
         found = replace(found, plausibility=judge(model, ended, radians=radians))
-    return replace(found, certificate=_held(found, measured, np.atleast_2d(np.asarray(q, dtype=np.float64))))
+    return replace(
+        found, certificate=_verify_written(found, measured, np.atleast_2d(np.asarray(q, dtype=np.float64)))
+    )
 
 
-def _somewhere(model: Model) -> FloatArray:
-    """(p,) the model as it is, with a target that is fitted at no special place: it may be anywhere."""
+def _general_target(model: Model) -> FloatArray:
+    """Return the model's parameters (p,), with a fitted target in general position."""
     at = model.way.start.copy()
     for k, parameter in enumerate(model.way.parameters):
         if parameter.end and parameter.where == "tool" and parameter.unit == "m":
@@ -309,8 +330,10 @@ def _values(model: Model, robot: Robot, q: FloatArray) -> FloatArray:
     return model.coupling.values(model.coupling.select(robot.tree, q))
 
 
-def _measured(robot: Robot, model: Model, q: ArrayLike, poses: ArrayLike) -> tuple[FloatArray, Measured]:
-    """(s, c) coordinates of the path, and what was measured there."""
+def _check_measured(
+    robot: Robot, model: Model, q: ArrayLike, poses: ArrayLike
+) -> tuple[FloatArray, Measured]:
+    """Return the coordinates (s, c) of the path, and the measurements there."""
     T = checked_poses(poses)
     if isinstance(model.source, DHTable):
         path_q = model.coupling.checked(q, "q")
@@ -322,13 +345,13 @@ def _measured(robot: Robot, model: Model, q: ArrayLike, poses: ArrayLike) -> tup
             "each pose needs its configuration", found=f"{len(T)} poses, q of shape {np.shape(q)}"
         )
     if not len(T):
-        raise InputError("no poses", remedy="one is needed at least, and more than there are parameters")
+        raise InputError("no poses", remedy="give more measured numbers than there are parameters")
     measured = Measured(values, T[:, :3, 3], T[:, :3, :3]) if T.ndim == 3 else Measured(values, T)
     demand_plausible(model, measured)
     return path_q, measured
 
 
-def _calibrated(
+def _fit(
     robot: Robot,
     model: Model,
     q: FloatArray,
@@ -338,12 +361,12 @@ def _calibrated(
     *,
     every: bool,
 ) -> tuple[Ended, Calibration]:
-    stated, start = None if noise is None else _stated(noise), starting(model, measured)
+    stated, start = None if noise is None else _parse_noise(noise), starting(model, measured)
     identification = identify(model, measured.values, complete=measured.complete, at=start)
     ends = [k for k in identification.kept if model.way.parameters[k].end]
     before = best_fit(model, measured, ends, stated, start)
     found = best_fit(model, measured, identification.kept, stated, before.at)
-    identification, found = _more(model, measured, identification, stated, found)
+    identification, found = _add_identifiable(model, measured, identification, stated, found)
     odd, clean = odd_poses(model, measured, identification.kept, stated, found)
     if drop_odd and odd:
         chosen = np.ones(len(measured), dtype=bool)
@@ -371,7 +394,7 @@ def _calibrated(
 
 
 def _significant(model: Model, ended: Ended, stated: Noise | None) -> tuple[tuple[int, ...], Fit]:
-    """The parameters that are written, and their fit; base and tool always are in it."""
+    """Return the parameters to write, and their fit; base and tool are always among them."""
     kept, found = ended.identification.kept, ended.fitted
     fixed = [model.way.parameters[k].end for k in kept]
     moved = found.at[list(kept)] - model.way.start[list(kept)]
@@ -388,13 +411,13 @@ def _significant(model: Model, ended: Ended, stated: Noise | None) -> tuple[tupl
     return chosen, best_fit(model, ended.measured, chosen, stated, at)
 
 
-def _more(
+def _add_identifiable(
     model: Model, measured: Measured, identification: Identification, stated: Noise | None, found: Fit
 ) -> tuple[Identification, Fit]:
-    """With what can be told where the fit ended, if that explains more than chance would.
+    """Add parameters that become identifiable at the fit, if they explain more than chance would.
 
-    A model as it was drawn is more special than the robot: a tip on the last axis does not show how far that
-    is turned, one beside it does.
+    A nominal model is often a special case. For example, a tip on the last axis does not show the angle of
+    the last joint. A tip beside the axis does.
     """
     again = identify(model, measured.values, complete=measured.complete, at=found.at)
     more = again.rank - identification.rank
@@ -406,21 +429,19 @@ def _more(
     return (again, trial) if explained > quantile(1.0 - WRONGLY, more) else (identification, found)
 
 
-def _stated(noise: tuple[float, float]) -> Noise:
+def _parse_noise(noise: tuple[float, float]) -> Noise:
     if not isinstance(noise, tuple | list) or len(noise) != 2:
-        raise InputError("noise is two numbers, metres and radians", found=safe_repr(noise))
+        raise InputError("noise must be two numbers, metres and radians", found=safe_repr(noise))
     metres, radians = (real_number(one, "noise") for one in noise)
     if min(metres, radians) <= 0.0:
-        raise InputError(
-            "noise is more than nothing", found=str(noise), remedy="leave it out: it is estimated"
-        )
+        raise InputError("noise must be positive", found=str(noise), remedy="omit it: it is then estimated")
     return Noise(metres, radians)
 
 
 def _weak(
     robot: Robot, model: Model, measured: Measured, kept: Sequence[int], at: FloatArray
 ) -> dict[int, float]:
-    """Kept parameters that as many general configurations would tell much better."""
+    """Return the parameters that as many random configurations would determine much better."""
     general = _values(model, robot, robot.sample(len(measured), seed=_OTHERS))
     sizes = []
     for values in (measured.values, general):
@@ -433,10 +454,10 @@ def _weak(
     return {k: float(ratio) for k, ratio in zip(kept, ratios, strict=True) if ratio > _WEAK}
 
 
-def _held(found: Calibration, measured: Measured, q: ArrayLike) -> Certificate | None:
-    """Hold what is written against Pinocchio, at the measured configurations.
+def _verify_written(found: Calibration, measured: Measured, q: ArrayLike) -> Certificate | None:
+    """Compare the written model with Pinocchio at the measured configurations.
 
-    A URDF holds neither the ends nor gains; a table is held by `load`.
+    A URDF contains neither base, tool nor gains, so these are 0 in the comparison. `load` checks a table.
     """
     model, fitted = found.model, found.written_fit
     if fitted is None:
@@ -444,7 +465,7 @@ def _held(found: Calibration, measured: Measured, q: ArrayLike) -> Certificate |
     at = fitted.at.copy()
     at[[p.end or p.what == "gain" for p in found.parameters]] = 0.0
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # what there is to warn of was warned of when it was loaded
+        warnings.simplefilter("ignore")  # the first load gave these warnings
         if (table := found.table) is not None:
             made = load(table)
             made.placement(made.neutral(), made.tip_frame)
@@ -455,15 +476,16 @@ def _held(found: Calibration, measured: Measured, q: ArrayLike) -> Certificate |
     bound = _READ_BACK * model.way.rounding(measured.values)
     if away[:, :3, 3].max() > bound or away[:, :3, :3].max() > bound / model.way.size:
         raise UrdfkinError(
-            "the URDF that was written is not what was fitted",
+            "the written URDF disagrees with the fit",
             where=f"{found.robot.name}, {model.base} to {model.tip}",
             found=f"{float(away.max()):.3g}, where rounding explains {bound:.3g}",
+            remedy="please report this as an error of urdfkin, with the robot and the poses",
         )
     return found.written.loaded.certificate()
 
 
 def doubts(found: Calibration) -> list[str]:
-    """What to doubt, a line each."""
+    """Return the warnings about a calibration, one line each."""
     return list(_doubts(found))
 
 
@@ -473,43 +495,46 @@ def _doubts(found: Calibration) -> Iterator[str]:
         return
     lost = found.general.rank - found.identification.rank
     if lost > 0:
-        untold = [k for k in found.general.kept if k not in found.identification.kept]
+        others = [k for k in found.general.kept if k not in found.identification.kept]
         yield (
-            f"these poses tell {found.identification.rank} numbers, general ones would tell {lost} more: "
-            f"{_listed(name[k] for k in untold)} stand still"
+            f"{found.identification.rank} parameters are identifiable from these poses; more varied poses "
+            f"would identify {lost} more: {_list(name[k] for k in others)}"
         )
     if found.weak:
         worst = sorted(found.weak.items(), key=lambda one: -one[1])
         yield (
-            "these poses hardly tell "
-            + _listed(f"{name[k]} ({ratio:.0f} times as uncertain)" for k, ratio in worst)
-            + "; in brackets: as general configurations of their number would leave it"
+            "poorly observable: "
+            + _list(f"{name[k]} ({ratio:.0f} times as uncertain)" for k, ratio in worst)
+            + "; in brackets: compared with as many random configurations"
         )
     if not fitted.is_judged:
-        yield "no number is left to judge by: there are as many parameters as measured numbers"
+        yield "the fit cannot be checked: there are as many parameters as measured numbers"
     elif fitted.freedom < len(found.identification.kept):
-        yield f"{fitted.freedom:.0f} numbers are left to judge {len(found.identification.kept)} parameters by"
+        yield (
+            f"only {fitted.freedom:.0f} redundant measured numbers for "
+            f"{len(found.identification.kept)} parameters"
+        )
     if found.stated and abs(fitted.ratio - 1.0) > _UNLIKELY * fitted.spread:
         yield (
-            f"{fitted.ratio:.3g} times the noise that was stated is left: "
-            "it is another, or the model is too simple"
+            f"the residuals are {fitted.ratio:.3g} times the stated noise: "
+            "the noise differs, or the model is too simple"
         )
     if found.odd and found.without_odd is not None:
         one = len(found.odd) == 1
-        poses = f"pose{'' if one else 's'} {_listed(map(str, found.odd))} "
+        poses = f"pose{'' if one else 's'} {_list(map(str, found.odd))} "
         if len(fitted.errors) == len(found.without_odd.errors):
-            yield poses + f"{'is' if one else 'are'} left out"
+            yield poses + f"{'is' if one else 'are'} excluded as {'an outlier' if one else 'outliers'}"
         else:
             ours, theirs = (length(each.rms()[0]) for each in (fitted, found.without_odd))
             yield (
-                poses + f"{'does' if one else 'do'} not belong to the others: without "
-                f"{'it' if one else 'them'} {theirs} are left of {ours} (rms)"
+                poses + f"{'is an outlier' if one else 'are outliers'}: the rms error is {theirs} without "
+                f"{'it' if one else 'them'}, {ours} with {'it' if one else 'them'}"
             )
     gains = [k for k in found.identification.kept if found.parameters[k].what == "gain"]
     if gains:
-        yield f"a URDF has no gains: {_listed(name[k] for k in gains)} are not written"
+        yield f"a URDF cannot store gains: {_list(name[k] for k in gains)} are not written"
 
 
-def _listed(names: Iterable[str]) -> str:
+def _list(names: Iterable[str]) -> str:
     every = list(names)
     return ", ".join(every[:_NAMED]) + (f" and {len(every) - _NAMED} more" if len(every) > _NAMED else "")

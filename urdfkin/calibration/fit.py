@@ -1,43 +1,38 @@
-"""Which parameters a set of configurations can tell apart, which stand still for that, and why.
+"""Identify and fit the parameters of a model from measured poses.
 
-A change of parameters that moves no measured number cannot be found: it lies in the null space of the stacked
-Jacobian. Its rank is how many numbers can be found, and is decided by what the columns are known to:
-a singular value counts when its lower bound (`urdfkin.verify.singular_values`: Weyl, with what the columns
-may be off by and what the decomposition leaves) is above 0. There is no tolerance to choose.
+**Identifiability.** A change of parameters without effect on the measurements cannot be identified. It lies
+in the null space of the stacked Jacobian. The rank of this Jacobian is the number of identifiable parameters.
+A singular value counts if its lower bound is above 0 (`urdfkin.verify.singular_values`: Weyl's inequality,
+with the errors of the columns and of the decomposition). There is no tolerance to choose.
 
-A turning joint's frame may slide along its axis and turn about it, a sliding joint's be shifted anywhere and
-turn about its direction, if the next frame undoes it: of six for each of n joints and six for the tip, 4 for
-each turning and 2 for each sliding joint and 6 can be found (Everett, Driels and Mooring, 1987), of positions
-alone 3 fewer, for where the tool points is not seen.
+The frame of a revolute joint may slide along its axis and turn about it, if the next frame compensates. The
+frame of a prismatic joint may be shifted anywhere and turn about its direction. So 4 of the 6 parameters of
+each revolute joint are identifiable, 2 of each prismatic joint, and 6 of the tip (Everett, Driels and
+Mooring, 1987). From positions alone it is 3 fewer, because the tool's orientation is not measured.
 
-What stands still is chosen place by place, base to tip, by orthogonal elimination: of columns that are nearly
-as independent of those kept as the most independent one, the first in the model's order is kept. So no kept
-parameter need be large to make up for one that stands still: that is what four parameters of nearly parallel
-axes do, hundreds of metres that cancel.
+The other parameters are fixed. They are chosen joint by joint, from base to tip, by orthogonal elimination.
+Among the columns that are nearly as independent as the most independent one, the first in the model's order
+is kept. So no fitted parameter becomes large to compensate for a fixed one. Without this rule, four
+parameters of nearly parallel axes would become hundreds of metres that cancel.
 
+**Fit.** Damped Gauss-Newton (Levenberg, 1944; Marquardt, 1963) minimizes the tip's errors, each divided by
+its noise. At the minimum, let J be the weighted Jacobian and r the weighted residuals. Then
 
-The parameters with which a model comes closest to measured poses, and how well they are known.
+    C = (J^T J)^-1       is the covariance of the parameters,
+    H = J C J^T          is the hat matrix; 1 - H_ii is the redundancy of measurement i.
 
-Damped Gauss-Newton (Levenberg, 1944; Marquardt, 1963) on the tip's errors, each divided by its noise s. At
-the minimum, with J the Jacobian of what is divided so and r what is left of it,
+Noise that is not stated is estimated from the residuals, separately for positions and rotations. It is the
+sum of their squares over the sum of their redundancies, iterated (Foerstner's variance components).
 
-    C = (J^T J)^-1       the covariance of the parameters,
-    H = J C J^T          what of each measurement the fit follows; 1 - H_ii of it is left to judge by.
+A pose is an **outlier** if r_i^T (1 - H_ii)^-1 r_i is too large. For a good pose this is chi^2 distributed,
+with 3 or 6 degrees of freedom. The limit is exceeded in one of a hundred data sets without an outlier. The
+largest outlier is removed and the others are fitted again, until there is none: one bad pose hides another.
 
-Noise that nobody states is estimated from what is left, of positions and of turns apart: the sum of their
-squares over the sum of their 1 - H_ii (Foerstner's variance components), until it stays.
-
-A pose is **odd** when r_i^T (1 - H_ii)^-1 r_i, which is distributed as chi^2 with as many degrees of freedom
-as it has numbers, is larger than the largest of so many good ones is in a hundred campaigns but one. The
-largest is taken out and the rest fitted anew, until none is odd: one bad pose hides another.
-
-
-Where the instrument stands and where its target is, from poses alone, before anything is fitted.
-
-With T_i the robot's poses, M_i the measured ones, B the base and X the tool: M_i = B T_i X. The rotations are
-linear in the two unknown ones together, R_B^T R_Mi = R_i R_X, and found as the null vector of all of these
-(Shah, 2013); the positions are linear in the rest, p_Mi = R_B (R_i x + p_i) + b. Of positions alone base and
-target are found in turns: each is a linear problem when the other is known.
+**Start values.** Base and tool are computed from the poses before the fit. With the robot's poses T_i, the
+measured poses M_i, the base B and the tool X, M_i = B T_i X. The equations R_B^T R_Mi = R_i R_X are linear in
+the two unknown rotations, which are their common null vector (Shah, 2013). The positions are linear in the
+other unknowns, p_Mi = R_B (R_i x + p_i) + b. From positions alone, base and target are computed alternately:
+each is a linear problem if the other is known.
 """
 
 from __future__ import annotations
@@ -57,20 +52,20 @@ from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singular_values import singular_values
 
-#: Of the most independent column: what is as good.
+#: Share of the most independent column's size from which a column is as good.
 _AS_GOOD = 0.5
-#: How many parameters a reason names, and which share of what stands still one does at least.
+#: Number of parameters that a reason names, and the smallest share of the fixed column that counts.
 _NAMED, _SHARE = 3, 1e-6
 
 
 @dataclass(frozen=True)
 class Identification:
-    """What can be found.
+    """The identifiable and the fixed parameters.
 
     Attributes:
-        kept: Numbers of the parameters that are fitted: the minimal set.
-        still: Those that stand still, each with the reason.
-        numbers: How many measured numbers there are.
+        kept: Indices of the fitted parameters: the minimal set.
+        still: Indices of the fixed parameters, each with the reason.
+        numbers: Number of measured numbers.
     """
 
     kept: tuple[int, ...]
@@ -79,18 +74,18 @@ class Identification:
 
     @property
     def rank(self) -> int:
-        """How many numbers can be found."""
+        """The number of identifiable parameters."""
         return len(self.kept)
 
 
 def stacked(model: Model, values: FloatArray, *, complete: bool, at: FloatArray | None = None) -> FloatArray:
-    """(rows, p) Jacobian of all that was measured, in metres: angles count at the distance `way.size`.
+    """Return the Jacobian (rows, p) of all measured numbers, in metres; angles are multiplied by `way.size`.
 
     Args:
         model: The model.
         values: (s, n) joint values.
-        complete: Whether poses were measured, or positions alone.
-        at: (p,) where; the model as it is when None.
+        complete: Whether full poses are measured, not positions alone.
+        at: (p,) parameters; the model's own when None.
     """
     L = model.way.size
     _, columns = model.way.columns(values, at)
@@ -103,13 +98,13 @@ def stacked(model: Model, values: FloatArray, *, complete: bool, at: FloatArray 
 def identify(
     model: Model, values: FloatArray, *, complete: bool = True, at: FloatArray | None = None
 ) -> Identification:
-    """What configurations tell of a model.
+    """Determine which parameters of a model are identifiable from some configurations.
 
     Args:
         model: The model.
         values: (s, n) joint values.
-        complete: Whether poses are measured, or positions alone.
-        at: (p,) parameters where this is asked; the model as it is when None.
+        complete: Whether full poses are measured, not positions alone.
+        at: (p,) parameters at which to determine it; the model's own when None.
     """
     J = stacked(model, values, complete=complete, at=at)
     error = np.full_like(J, model.way.rounding(values))
@@ -145,7 +140,7 @@ def _most_independent(J: FloatArray, kept: Sequence[int], group: Sequence[int], 
 def _reason(model: Model, J: FloatArray, error: FloatArray, kept: Sequence[int], k: int) -> str:
     column = J[:, k]
     if np.linalg.norm(column) <= np.linalg.norm(error[:, k]):
-        return "moves nothing that is measured"
+        return "no effect on the measured numbers"
     shares = np.linalg.lstsq(J[:, list(kept)], column, rcond=None)[0] * np.linalg.norm(
         J[:, list(kept)], axis=0
     )
@@ -153,37 +148,37 @@ def _reason(model: Model, J: FloatArray, error: FloatArray, kept: Sequence[int],
     order = [i for i in np.argsort(-shares, kind="stable") if shares[i] > _SHARE]
     names = [str(model.way.parameters[kept[i]]) for i in order[:_NAMED]]
     more = f" and {len(order) - _NAMED} more" if len(order) > _NAMED else ""
-    return f"does what {', '.join(names)}{more} {'do together' if len(order) > 1 else 'does'}"
+    return f"same effect as {', '.join(names)}{more}{' together' if len(order) > 1 else ''}"
 
 
 _ROUNDS = 100
-#: Of the largest singular value: where damping starts, and ends.
+#: Initial and largest damping, as shares of the largest singular value.
 _DAMPING, _MOST = 1e-4, 1e3
-#: Below what there is none, and where it starts again then.
+#: Minimum damping, below which it is 0; reset value after that.
 _UNDAMPED, _AGAIN = _DAMPING**3, _DAMPING**2
-#: What a success leaves of the damping, and how much more of it there is after a failure.
+#: Factors on the damping after a successful and after a failed step.
 _EASING, _HARDER = 0.03, 10.0
-#: Of the squared errors: what is no gain any more.
+#: Share of the squared errors below which a step is no gain.
 _NOTHING = 1e-13
-#: For each measured number, in eps: what of their sum of squares changes by rounding alone.
+#: Change of the sum of squares by rounding, in eps for each measured number.
 _ROUNDED = 4.0
-#: Counted numbers: fewer than half of one is none.
+#: Redundancy below which there is none.
 _ONE_OR_MORE = 0.5
-#: Of a pose's largest share that is left to judge by: a direction with less is followed by the fit.
+#: Share of a pose's largest redundancy; a direction with less is fully absorbed by the fit.
 _FOLLOWED = 1e-9
-#: How often noise is estimated, and by what share it may still change.
+#: Largest number of noise estimates, and the relative change at which they end.
 _ESTIMATES, _STAYS = 20, 1e-3
-#: In how many campaigns without an odd pose one is called so.
+#: Probability that a data set without outliers is reported with one.
 WRONGLY = 0.01
 #: Standard deviations: a parameter that moved by less is not written.
 SIGMAS = 2.0
-#: Of all poses: more than these are no odd ones.
+#: Largest share of outliers among all poses.
 _MOST_ODD = 0.25
 
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """What was measured.
+    """Measured poses or positions.
 
     Attributes:
         values: (s, n) joint values of the path, rad or m.
@@ -197,44 +192,44 @@ class Measured:
 
     @property
     def complete(self) -> bool:
-        """Whether orientations are there."""
+        """Whether orientations were measured."""
         return self.R is not None
 
     def __len__(self) -> int:
         return len(self.p)
 
     def some(self, which: NDArray[np.bool_]) -> Measured:
-        """Those that `which` (s,) chooses."""
+        """Return the measurements selected by the mask `which` (s,)."""
         return Measured(self.values[which], self.p[which], None if self.R is None else self.R[which])
 
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Standard deviations of each number that is measured.
+    """Standard deviations of the measured numbers.
 
     Attributes:
-        metres: Of a coordinate of a position.
-        radians: Of a turn about an axis.
+        metres: Standard deviation of a coordinate of a position.
+        radians: Standard deviation of a rotation about an axis.
     """
 
     metres: float
     radians: float
 
     def of(self, complete: bool) -> FloatArray:
-        """(6,) or (3,), for one pose."""
+        """Return the standard deviations of one pose, (6,), or of one position, (3,)."""
         return np.array([self.metres] * 3 + ([self.radians] * 3 if complete else []))
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """The end of a fit.
+    """The result of a fit.
 
     Attributes:
-        at: (p,) all parameters.
-        errors: (s, 6) or (s, 3): measured minus computed, in the base, m and rad.
-        noise: What it was weighted by.
-        covariance: (k, k) of the kept parameters, in their units; inf where nothing is left to judge by.
-        left: (s, 6) or (s, 3): which share of each number is left to judge by, 1 - H_ii.
+        at: (p,) values of all parameters.
+        errors: (s, 6) or (s, 3) residuals: measured minus computed, in the base, m and rad.
+        noise: The noise used as weight.
+        covariance: (k, k) of the fitted parameters, in their units; inf without redundancy.
+        left: (s, 6) or (s, 3) redundancy of each number, 1 - H_ii.
         odd: (s,) chi^2 of each pose.
     """
 
@@ -247,17 +242,17 @@ class Fit:
 
     @property
     def freedom(self) -> float:
-        """How many numbers more were measured than fitted."""
+        """The redundancy: number of measured numbers minus number of fitted parameters."""
         return float(self.left.sum())
 
     @property
     def is_judged(self) -> bool:
-        """Whether there are numbers to judge by."""
+        """Whether the redundancy is positive, so that the fit can be checked."""
         return self.freedom >= _ONE_OR_MORE
 
     @property
     def ratio(self) -> float:
-        """The noise that is left by that which was stated: 1 but for 1/sqrt(2 freedom) or so."""
+        """The ratio of the residual noise to the stated noise: 1, give or take 1/sqrt(2 freedom)."""
         if not self.is_judged:
             return math.nan
         whitened = self.errors / self.noise.of(self.errors.shape[1] == 6)
@@ -269,13 +264,13 @@ class Fit:
         return 1.0 / math.sqrt(2.0 * max(self.freedom, _ONE_OR_MORE))
 
     def rms(self) -> tuple[float, float | None]:
-        """Of positions (the vector's length, m) and of turns (rad)."""
+        """Return the rms error of positions (length of the vector, m) and of orientations (rad)."""
         position, turn = (np.sqrt((x**2).sum(axis=1).mean()) for x in np.hsplit(self.errors, [3]))
         return float(position), float(turn) if self.errors.shape[1] == 6 else None
 
 
 def errors(model: Model, measured: Measured, at: FloatArray) -> FloatArray:
-    """(s, 6) or (s, 3) measured minus computed, [position; turn] in the base."""
+    """Return the residuals (s, 6) or (s, 3): measured minus computed, [position; rotation] in the base."""
     T = model.way.poses(measured.values, at)
     away = measured.p - T[:, :3, 3]
     if measured.R is None:
@@ -286,36 +281,36 @@ def errors(model: Model, measured: Measured, at: FloatArray) -> FloatArray:
 def best_fit(
     model: Model, measured: Measured, kept: Sequence[int], noise: Noise | None, at: FloatArray
 ) -> Fit:
-    """The best fit.
+    """Fit a model to measurements by least squares.
 
     Args:
-        model: What is fitted.
-        measured: To what.
-        kept: Numbers of the parameters that may move.
-        noise: As it is known; None: to be estimated.
-        at: (p,) where to begin.
+        model: The model.
+        measured: The measurements.
+        kept: Indices of the parameters to fit.
+        noise: The known noise; None: estimate it.
+        at: (p,) start values.
     """
     weights = noise or Noise(1.0, 1.0 / model.way.size)
     for _ in range(1 if noise else _ESTIMATES):
-        at = _descended(model, measured, kept, weights, at)
-        found = _ended(model, measured, kept, weights, at)
+        at = _minimize(model, measured, kept, weights, at)
+        found = _evaluate(model, measured, kept, weights, at)
         if noise or not found.is_judged:
             break
-        estimated = _estimated(found, model, measured)
+        estimated = _estimate_noise(found, model, measured)
         stays = abs(estimated.metres - weights.metres) <= _STAYS * weights.metres and (
             not measured.complete or abs(estimated.radians - weights.radians) <= _STAYS * weights.radians
         )
         weights = estimated
         if stays:
             break
-    found = _ended(model, measured, kept, weights, at)
+    found = _evaluate(model, measured, kept, weights, at)
     if noise is None and not found.is_judged:
         found = replace(found, covariance=np.full_like(found.covariance, np.inf))
     return found
 
 
-def _estimated(found: Fit, model: Model, measured: Measured) -> Noise:
-    """Noise from what is left; no less than rounding, or there would be nothing to divide by."""
+def _estimate_noise(found: Fit, model: Model, measured: Measured) -> Noise:
+    """Estimate the noise from the residuals; at least rounding, since residuals are divided by it."""
     rounding = model.way.rounding(measured.values)
 
     def of(part: slice, least: float, former: float) -> float:
@@ -332,7 +327,7 @@ def _estimated(found: Fit, model: Model, measured: Measured) -> Noise:
 def _whitened(
     model: Model, measured: Measured, kept: Sequence[int], noise: Noise, at: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Errors (rows,) and columns (rows, k), divided by the noise."""
+    """Return residuals (rows,) and columns (rows, k), divided by the noise."""
     scale = noise.of(measured.complete)
     _, columns = model.way.columns(measured.values, at)
     J = columns[:, : len(scale), list(kept)] / scale[:, np.newaxis]
@@ -340,7 +335,7 @@ def _whitened(
     return r, J.reshape(r.size, len(kept))
 
 
-def _descended(
+def _minimize(
     model: Model, measured: Measured, kept: Sequence[int], noise: Noise, at: FloatArray
 ) -> FloatArray:
     scale, damping = noise.of(measured.complete), _DAMPING
@@ -371,7 +366,7 @@ def _descended(
     return at
 
 
-def _ended(model: Model, measured: Measured, kept: Sequence[int], noise: Noise, at: FloatArray) -> Fit:
+def _evaluate(model: Model, measured: Measured, kept: Sequence[int], noise: Noise, at: FloatArray) -> Fit:
     r, J = _whitened(model, measured, kept, noise, at)
     k = noise.of(measured.complete).size
     units = np.linalg.norm(J, axis=0)
@@ -389,9 +384,9 @@ def _ended(model: Model, measured: Measured, kept: Sequence[int], noise: Noise, 
 def odd_poses(
     model: Model, measured: Measured, kept: Sequence[int], noise: Noise | None, found: Fit
 ) -> tuple[tuple[int, ...], Fit]:
-    """Numbers of the poses that do not belong to the others, and the fit without them."""
+    """Return the indices of the outliers, and the fit without them."""
     out = list[int]()
-    # No fewer numbers may be left than there are parameters, and a quarter is no exception any more.
+    # More numbers than parameters must remain, and at most a quarter of the poses are outliers.
     most = min(int(_MOST_ODD * len(measured)), len(measured) - 1 - -(-len(kept) // found.errors.shape[1]))
     clean = found
     while len(out) < most:
@@ -407,15 +402,16 @@ def odd_poses(
 
 
 def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]) -> NDArray[np.bool_]:
-    """(k,) which parameters moved by more than `SIGMAS` standard deviations, by backward elimination.
+    """Select the parameters that moved by more than `SIGMAS` standard deviations, by backward elimination.
 
-    The least significant is put back to where it was, which moves the others by their covariance with it,
-    until all that are left are significant: of two that are known together only, one stays.
+    The least significant parameter is reset to its old value. This moves the others by their covariance with
+    it. The elimination ends when all remaining parameters are significant. Of two parameters of which only a
+    combination is known, one remains.
 
     Args:
-        moved: (k,) by how much each moved.
-        covariance: (k, k) of these; inf where nothing is known of it.
-        fixed: (k,) those that are in any case.
+        moved: (k,) change of each parameter.
+        covariance: (k, k) covariance of the changes; inf where it is unknown.
+        fixed: (k,) whether a parameter is selected in any case.
 
     >>> significant(np.array([3.0, 1.0]), np.eye(2), [False, False]).tolist()
     [True, False]
@@ -437,19 +433,19 @@ def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]
 
 
 def quantile(share: float, freedom: int) -> float:
-    """Of chi^2 (Wilson and Hilferty, 1931): right to a few per cent, also far out."""
+    """Return the quantile of chi^2 (Wilson and Hilferty, 1931), within a few per cent, also in the tail."""
     step = 2.0 / (9.0 * freedom)
     return freedom * (1.0 - step + NormalDist().inv_cdf(share) * math.sqrt(step)) ** 3
 
 
-#: Turns that base and target take at most, and by what share of its way the target may still move.
+#: Largest number of alternations of base and target, and the relative change of the target at their end.
 _TURNS, _FIXED_END = 200, 1e-9
-#: How many times as far as the robot's tip goes measured positions may be spread: millimetres are a thousand.
+#: Largest ratio of the spread of measured positions to that of the robot's tip; millimetres give 1000.
 _FARTHER = 100.0
 
 
 def starting(model: Model, measured: Measured) -> FloatArray:
-    """(p,) parameters of the model as it is, with base and tool as the poses have them."""
+    """Return the model's parameters (p,), with base and tool computed from the poses."""
     at = model.way.start.copy()
     places = {parameter.where for parameter in model.way.parameters if parameter.end}
     if not places:
@@ -457,7 +453,9 @@ def starting(model: Model, measured: Measured) -> FloatArray:
     T = model.way.poses(measured.values)
     free = "base" in places, "tool" in places
     B, X = (
-        _complete(T, measured.p, measured.R, *free) if measured.R is not None else _seen(T, measured.p, *free)
+        _from_poses(T, measured.p, measured.R, *free)
+        if measured.R is not None
+        else _from_positions(T, measured.p, *free)
     )
     for which, end in (("base", B), ("tool", X)):
         six = [*end[:3, 3], *euler_of("XYZ", end[:3, :3])]
@@ -467,7 +465,7 @@ def starting(model: Model, measured: Measured) -> FloatArray:
     return at
 
 
-def _complete(
+def _from_poses(
     T: FloatArray, p: FloatArray, R: FloatArray, base: bool, tool: bool
 ) -> tuple[FloatArray, FloatArray]:
     B, X = np.eye(4), np.eye(4)
@@ -477,26 +475,26 @@ def _complete(
         B[:3, :3] = _rotation(np.einsum("sij,skj->ik", R, T[:, :3, :3]))
     else:
         X[:3, :3] = _rotation(np.einsum("sji,sjk->ik", T[:, :3, :3], R))
-    B[:3, 3], X[:3, 3] = _shifts(T, p, B[:3, :3], base, tool)
+    B[:3, 3], X[:3, 3] = _translations(T, p, B[:3, :3], base, tool)
     return B, X
 
 
-def _seen(T: FloatArray, p: FloatArray, base: bool, tool: bool) -> tuple[FloatArray, FloatArray]:
-    """Base and target from positions alone."""
+def _from_positions(T: FloatArray, p: FloatArray, base: bool, tool: bool) -> tuple[FloatArray, FloatArray]:
+    """Compute base and target from positions alone."""
     B, X = np.eye(4), np.eye(4)
     for _ in range(_TURNS if base and tool else 1):
         if base:
             points = T[:, :3, :3] @ X[:3, 3] + T[:, :3, 3]
             B[:3, :3] = _rotation((p - p.mean(axis=0)).T @ (points - points.mean(axis=0)))
         before = X[:3, 3].copy()
-        B[:3, 3], X[:3, 3] = _shifts(T, p, B[:3, :3], base, tool)
+        B[:3, 3], X[:3, 3] = _translations(T, p, B[:3, :3], base, tool)
         if np.linalg.norm(X[:3, 3] - before) <= _FIXED_END * np.linalg.norm(X[:3, 3]):
             break
     return B, X
 
 
 def _rotations(R: FloatArray, M: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """R_B and R_X of R_B^T M_i = R_i R_X: M_i^T R_B - R_X^T R_i^T = 0, vectors by rows."""
+    """Solve R_B^T M_i = R_i R_X for R_B and R_X: M_i^T R_B - R_X^T R_i^T = 0, matrices as rows."""
     unit = np.eye(3)
     left = np.einsum("sab,cd->sacbd", M.swapaxes(-1, -2), unit).reshape(-1, 9)
     right = np.einsum("ab,scd->sacbd", unit, R).reshape(-1, 9)
@@ -507,17 +505,17 @@ def _rotations(R: FloatArray, M: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _rotation(M: FloatArray) -> FloatArray:
-    """The rotation nearest to any matrix."""
+    """Return the rotation nearest to a matrix."""
     U, _, Vt = np.linalg.svd(M)
     if np.linalg.det(U @ Vt) < 0.0:
         U[:, 2] *= -1.0
     return np.asarray(U @ Vt)
 
 
-def _shifts(
+def _translations(
     T: FloatArray, p: FloatArray, R_B: FloatArray, base: bool, tool: bool
 ) -> tuple[FloatArray, FloatArray]:
-    """The vectors b and x of p_Mi = R_B R_i x + R_B p_i + b."""
+    """Solve p_Mi = R_B R_i x + R_B p_i + b for the vectors b and x."""
     rest = (p - T[:, :3, 3] @ R_B.T).ravel()
     parts = []
     if base:
@@ -530,10 +528,10 @@ def _shifts(
 
 
 def demand_plausible(model: Model, measured: Measured) -> None:
-    """Raise InputError where positions can be no metres: they spread much farther than the robot's.
+    """Check that measured positions are in metres.
 
     Raises:
-        InputError: as said.
+        InputError: the positions spread more than 100 times as far as the robot's tip.
     """
     T = model.way.poses(measured.values)
     ours, theirs = (
@@ -541,7 +539,7 @@ def demand_plausible(model: Model, measured: Measured) -> None:
     )
     if ours > 0.0 and theirs > _FARTHER * ours:
         raise InputError(
-            "measured positions spread farther than the robot's",
-            found=f"{theirs:.4g} m, where the robot's tip goes {ours:.4g} m",
-            remedy="say --unit mm, unit='mm', if that is what they are in",
+            "measured positions spread much farther than the robot's tip",
+            found=f"{theirs:.4g} m, where the robot's tip moves {ours:.4g} m",
+            remedy="if they are in millimetres, add --unit mm (in Python, multiply them by 0.001)",
         )

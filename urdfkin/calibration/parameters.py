@@ -1,29 +1,27 @@
-"""The way from a base to a tip as elementary motions, of which some are parameters and some are joints.
+"""Parametric models of a path: a URDF's origins or a table's cells as parameters, with their Jacobian.
 
-Every model here is a product of constants and of motions about or along a coordinate axis of the frame that
-they are met in,
+A model is a product of constants C and of elementary motions E. Each elementary motion is a rotation about,
+or a translation along, a coordinate axis of the current frame:
 
     T_base_tip = C_0 E_1 C_1 E_2 C_2 ...,      E_k = R_x(phi), T_x(s), R_y(phi), ...
 
-a URDF's origins as well as the rows of a Denavit-Hartenberg table. A motion by the parameter p moves the tip
-by a twist, like a joint's: with e the axis and O its origin, both in the base,
+Both a URDF's origins and the rows of a Denavit-Hartenberg table have this form. The derivative of the tip by
+a parameter p is a twist, like that of a joint. With the axis e and its origin O, both in the base,
 
-    turning   dp_tip/dp = e x (p_tip - O),   w = e;       sliding   dp_tip/dp = e,   w = 0
+    rotation   dp_tip/dp = e x (p_tip - O),   w = e;       translation   dp_tip/dp = e,   w = 0
 
-which is a column of 7.85. A joint that turns (1 + g) times as far as it says has g for a parameter, and its
-column is the joint's times the joint's value.
+which is a column of 7.85. The gain g of a joint scales its value by (1 + g). The column of g is the joint's
+column times the joint's value.
 
+**URDF.** Each joint of the path has six parameters of its origin. Let A be the rotation that maps the z axis
+to the joint's axis. The new origin is  T . A . Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry) Rz(rz) . A^-1. So z slides
+along the joint's axis, and rz is the joint's zero, whatever axis the file uses. The other four move the axis.
+The gain is a seventh parameter, which a URDF cannot store. `base` and `tool` have six parameters each, before
+the first constant and after the last one. They are the poses of the instrument and of the target.
 
-A URDF's path and a Denavit-Hartenberg table as ways with parameters, and what they are when these move.
-
-**Of a URDF** each joint of the path has the six of its origin: with A the turn that makes its axis z, the
-origin becomes  T . A . Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry) Rz(rz) . A^-1. So z slides along the joint's axis and
-rz turns about it, which is the joint's zero, whatever axis the file gives it; the four others move the axis.
-A joint's gain, the seventh, is no number of a URDF. `base` and `tool` are six likewise, before the first
-constant and after the last: where the instrument stands and what it looks at.
-
-**Of a table** each row has its cells, and beta where its axis is parallel to the next within `PARALLEL`
-(Hayati's fifth number: there d says nothing, and alpha alone cannot tilt the axis both ways).
+**Table.** Each row has its cells. A row whose axis is parallel to the next within `PARALLEL` also has beta,
+Hayati's fifth parameter. There d has no separate effect, and alpha alone cannot tilt the axis in both
+directions.
 """
 
 from __future__ import annotations
@@ -49,13 +47,13 @@ from urdfkin.model.tree import FloatArray, Joint, KinematicTree
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One number of a model.
+    """One parameter of a model.
 
     Attributes:
         where: "base", "tool", or the name of a joint.
-        what: "x", "rx" and so on of an origin, "gain"; or a cell of a table: "theta", "d", ...
+        what: "x", "rx" and so on of an origin, "gain", or a cell of a table: "theta", "d", ...
         unit: "m", "rad", or "" for a gain.
-        end: Whether `where` is one of the ends, and no joint of that name.
+        end: Whether `where` is the base or the tool, not a joint of that name.
     """
 
     where: str
@@ -69,14 +67,14 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """A turn about, or a slide along, a coordinate axis of the frame in which it is met.
+    """An elementary rotation about, or translation along, a coordinate axis of the current frame.
 
     Attributes:
-        axis: 0, 1 or 2.
-        turns: Whether it turns.
-        parameter: Which parameter it is; of a joint, which one its gain is. None: neither.
-        joint: Which joint it is; None for a parameter.
-        sense: -1 where it is passed backwards, or a row counts the other way.
+        axis: The axis: 0, 1 or 2.
+        turns: Whether it is a rotation.
+        parameter: Index of the parameter, or of the joint's gain; None if there is none.
+        joint: Index of the joint; None for a parameter.
+        sense: -1 if the path passes the joint backwards, or if the table's row has the opposite sense.
     """
 
     axis: int
@@ -88,12 +86,12 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class ParametricChain:
-    """A model as it depends on its parameters and on its joints' values.
+    """The pose of a tip as a function of parameters and joint values.
 
     Attributes:
-        steps: (4, 4) constants and motions, base to tip.
-        parameters: What can be moved, each once in the steps.
-        start: (p,) their values in the model as it is.
+        steps: Constants (4, 4) and elementary motions, from base to tip.
+        parameters: The parameters; each occurs once in the steps.
+        start: (p,) values of the parameters in the original model.
     """
 
     steps: tuple[FloatArray | Motion, ...]
@@ -102,7 +100,7 @@ class ParametricChain:
 
     @property
     def size(self) -> float:
-        """Metres: all lengths of the model added up, 1 if there are none: what a radian counts as much as."""
+        """Sum of all lengths of the model, metres; 1 if there are none. It converts radians to metres."""
         lengths = [float(np.linalg.norm(step[:3, 3])) for step in self.steps if not isinstance(step, Motion)]
         slides = sum(
             abs(self.start[k]) for k, parameter in enumerate(self.parameters) if parameter.unit == "m"
@@ -110,12 +108,12 @@ class ParametricChain:
         return sum(lengths) + float(slides) or 1.0
 
     def poses(self, values: FloatArray, at: FloatArray | None = None) -> FloatArray:
-        """(s, 4, 4) of the tip in the base for joint values (s, n), the parameters at `at` (p,)."""
-        return self._walked(values, self.start if at is None else at)[0]
+        """Return poses (s, 4, 4) of the tip in the base for joint values (s, n) and parameters `at` (p,)."""
+        return self._forward(values, self.start if at is None else at)[0]
 
     def columns(self, values: FloatArray, at: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
-        """Poses (s, 4, 4), and (s, 6, p): how the tip [linear; angular] moves with each parameter."""
-        T, origins, axes, factors = self._walked(values, self.start if at is None else at)
+        """Return poses (s, 4, 4) and the Jacobian (s, 6, p), [linear; angular], by the parameters."""
+        T, origins, axes, factors = self._forward(values, self.start if at is None else at)
         columns = np.zeros((len(values), 6, len(self.parameters)))
         for k, turns in self._turning.items():
             linear, angular = axes[k], np.zeros_like(axes[k])
@@ -132,10 +130,10 @@ class ParametricChain:
             if isinstance(step, Motion) and step.parameter is not None
         }
 
-    def _walked(
+    def _forward(
         self, values: FloatArray, at: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Tip poses; then origins and axes (p, s, 3) and factors (p, s, 1) of the parameters' motions."""
+        """Return tip poses, and origins and axes (p, s, 3) and factors (p, s, 1) of the parameters."""
         p, s = len(self.parameters), len(values)
         origins, axes, factors = np.zeros((p, s, 3)), np.zeros((p, s, 3)), np.ones((p, s, 1))
         T = np.broadcast_to(np.eye(4), (s, 4, 4)).copy()
@@ -147,11 +145,11 @@ class ParametricChain:
             if (k := step.parameter) is not None:
                 origins[k], axes[k], factors[k] = T[:, :3, 3], T[:, :3, step.axis], amount[:, np.newaxis]
                 amount = amount * (at[k] if step.joint is None else 1.0 + at[k])
-            T = _moved(T, step, amount)
+            T = _apply(T, step, amount)
         return T, origins, axes, factors
 
     def rounding(self, values: FloatArray) -> float:
-        """How far (m; divided by `size`, rad) rounding may put a number of `columns`, two factors each."""
+        """Bound the rounding error of a number of `columns`, metres; divided by `size`, radians."""
         slid = max((float(np.abs(values[:, j]).max(initial=0.0)) for j in self._slides), default=0.0)
         return 2.0 * ROUNDINGS * (len(self.steps) + 1) * EPS * (self.size + slid * len(self._slides))
 
@@ -164,7 +162,7 @@ class ParametricChain:
         ]
 
 
-def _moved(T: FloatArray, step: Motion, amount: FloatArray) -> FloatArray:
+def _apply(T: FloatArray, step: Motion, amount: FloatArray) -> FloatArray:
     if step.turns:
         turned = T.copy()
         turned[:, :3, :3] = T[:, :3, :3] @ coordinate_rotation(step.axis, amount)
@@ -174,17 +172,17 @@ def _moved(T: FloatArray, step: Motion, amount: FloatArray) -> FloatArray:
     return slid
 
 
-#: Radians within which two axes of a table count as parallel: assembled arms are some mrad off, and where a
-#: common normal is used, its foot is a link's length over this angle away.
+#: Radians within which two axes of a table count as parallel. Axes of real arms are off by some mrad. The
+#: foot of the common normal of two axes is about a link's length divided by their angle away.
 PARALLEL = math.radians(5.0)
 
-#: What can be fitted.
+#: Names of the sets of parameters.
 FITTED = ("base", "tool", "offsets", "origins", "gains")
-#: An origin's six as they act: what each is called, whether it turns, and its axis.
+#: The six parameters of an origin, in the order of multiplication: name, whether a rotation, axis.
 SIX = (("x", False, 0), ("y", False, 1), ("z", False, 2), ("rx", True, 0), ("ry", True, 1), ("rz", True, 2))
 _ALL = tuple(what for what, *_ in SIX)
-#: The order in which they are kept where some do what others do, of a joint that turns and of one that
-#: slides: the joint's zero, what moves its axis, what only moves its frame.
+#: Order of preference among parameters with the same effect, for a rotation and for a translation: the
+#: joint's zero, then parameters that move its axis, then those that only move its frame.
 _KEPT = {True: ("rz", "x", "y", "rx", "ry", "z", "gain"), False: ("z", "rx", "ry", "x", "y", "rz", "gain")}
 _ROW = (("theta", True, 2), ("d", False, 2), ("a", False, 0), ("alpha", True, 0), ("beta", True, 1))
 _KEPT_CELLS = ("theta", "a", "alpha", "beta", "d", "gain")
@@ -192,15 +190,15 @@ _KEPT_CELLS = ("theta", "a", "alpha", "beta", "d", "gain")
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A way, and which of its parameters belong together.
+    """A parametric chain with the groups of its parameters.
 
     Attributes:
-        way: Base to tip.
-        groups: Numbers of the parameters of each place, in the order in which they are kept.
-        coupling: From the path's coordinates to its joints' values.
-        base: The frame where it starts.
-        tip: The frame where it ends.
-        source: What it was made of: tree, or table.
+        way: The chain from base to tip.
+        groups: Indices of the parameters of each joint, base or tool, in order of preference.
+        coupling: The map from the path's coordinates to joint values.
+        base: Name of the base frame.
+        tip: Name of the tip frame.
+        source: The tree or table of the model.
     """
 
     way: ParametricChain
@@ -211,13 +209,13 @@ class Model:
     source: KinematicTree | DHTable
 
     def end(self, which: str, at: FloatArray) -> FloatArray | None:
-        """(4, 4) of the base or tool at parameters (p,); None where it is none of them."""
+        """Return the pose (4, 4) of the base or tool at parameters (p,); None if it is not fitted."""
         if not any(parameter.end and parameter.where == which for parameter in self.way.parameters):
             return None
         return self._push(which, at, end=True)
 
     def origins(self, at: FloatArray) -> dict[str, FloatArray]:
-        """(4, 4) new origins of the URDF's joints that moved, by name."""
+        """Return the new origins (4, 4) of the URDF's joints that moved, by name."""
         found: dict[str, FloatArray] = {}
         if not isinstance(self.source, KinematicTree):
             return found
@@ -230,7 +228,7 @@ class Model:
         return found
 
     def table(self, at: FloatArray) -> DHTable | None:
-        """The table with its parameters at `at`; None for a URDF's model."""
+        """Return the table with its parameters at `at`; None for a URDF's model."""
         if not isinstance(self.source, DHTable):
             return None
         cells = {(p.where, p.what): float(at[k]) for k, p in enumerate(self.way.parameters) if not p.end}
@@ -245,7 +243,7 @@ class Model:
         return replace(self.source, rows=tuple(rows), base=T_base, tool=T_tool, snap=None)
 
     def _push(self, where: str, at: FloatArray, *, end: bool = False) -> FloatArray:
-        """(4, 4) what the six of a place, those that are there, do together."""
+        """Return the combined motion (4, 4) of a joint's, base's or tool's six parameters."""
         parameters = enumerate(self.way.parameters)
         values = {p.what: float(at[k]) for k, p in parameters if (p.where, p.end) == (where, end)}
         push = np.eye(4)
@@ -256,14 +254,14 @@ class Model:
 
 
 class _Maker:
-    """Collects steps and parameters on the way from base to tip."""
+    """Builder of a model: collects steps and parameters from base to tip."""
 
     def __init__(self, fit: Collection[str]) -> None:
         for name in fit:
             if name not in FITTED:
                 raise UnknownNameError("set of parameters", name, FITTED)
         if not fit:
-            raise InputError("nothing is to be fitted", remedy=f"there are {', '.join(FITTED)}")
+            raise InputError("no parameters to fit", remedy=f"choose among {', '.join(FITTED)}")
         self.fit = fit
         self.steps: list[FloatArray | Motion] = []
         self.parameters: list[Parameter] = []
@@ -275,12 +273,12 @@ class _Maker:
         return len(self.parameters) - 1
 
     def end(self, which: str) -> None:
-        """The six of the base or the tool, where they are wanted."""
+        """Add the six parameters of the base or the tool, if they are to be fitted."""
         if which in self.fit:
             self.push(which, _ALL, end=True)
 
     def push(self, where: str, only: Collection[str], *, backwards: bool = False, end: bool = False) -> None:
-        """The six of a place, or some of them."""
+        """Add the six parameters of a joint, base or tool, or some of them."""
         moves = [
             Motion(axis, turns, self.parameter(where, what, "rad" if turns else "m", end=end))
             for what, turns, axis in SIX
@@ -299,9 +297,9 @@ class _Maker:
         ends: tuple[str, str],
         kept: Mapping[str, tuple[str, ...]],
     ) -> Model:
-        """All of it; `kept` says by place in which order its parameters are."""
+        """Return the model; `kept` is the order of preference of the parameters, by joint."""
         at = {(p.where, p.end, p.what): k for k, p in enumerate(self.parameters)}
-        # Of the ends nothing is known, of the joints nearly everything: the ends take what they can.
+        # Base and tool come first: they are unknown, while the joints are nearly known.
         places = dict.fromkeys((p.where, p.end) for p in self.parameters)
         groups = tuple(
             tuple(at[*place, what] for what in kept.get(place[0], _KEPT[True]) if (*place, what) in at)
@@ -312,14 +310,14 @@ class _Maker:
 
 
 def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -> Model:
-    """The path of a URDF, with what is to be fitted of it.
+    """Make the model of a URDF's path with the parameters to fit.
 
-    The fixed joint that is the last before the tip has an origin as well; other fixed joints stand still:
-    what they could do the moving ones next to them do.
+    The last fixed joint before the tip has parameters, too. Other fixed joints have none, because the moving
+    joints beside them have the same effect.
 
     Raises:
-        UnknownNameError: no such frame, or no such set of parameters.
-        InputError: a planar or floating joint on the way.
+        UnknownNameError: a frame or a set of parameters does not exist.
+        InputError: the path has a planar or floating joint.
     """
     path: FrameChain = chain(tree, tip, base)
     maker, number = _Maker(fit), 0
@@ -329,7 +327,7 @@ def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -
     ending = {len(steps) - 1} if last < len(steps) - 1 else set()
     for i, (joint, backwards) in enumerate(steps):
         A = turned(joint)
-        wanted = _wanted(fit, joint, ending=i in ending)
+        wanted = _parameters_to_fit(fit, joint, ending=i in ending)
         if backwards:
             maker.steps.append(A)
             if joint.kind.has_axis:
@@ -348,7 +346,7 @@ def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -
     return maker.model(tree, path, (base, tip), kept)
 
 
-def _wanted(fit: Collection[str], joint: Joint, *, ending: bool) -> Collection[str]:
+def _parameters_to_fit(fit: Collection[str], joint: Joint, *, ending: bool) -> Collection[str]:
     if "origins" in fit and (joint.kind.has_axis or ending):
         return _ALL
     own = "rz" if joint.kind.turns else "z"
@@ -356,10 +354,10 @@ def _wanted(fit: Collection[str], joint: Joint, *, ending: bool) -> Collection[s
 
 
 def table_model(table: DHTable, fit: Collection[str]) -> Model:
-    """A table, with what is to be fitted of it: "origins" are all cells, "offsets" those beside the values.
+    """Make the model of a table: "origins" are all cells, "offsets" the cells that the joint values add to.
 
     Raises:
-        UnknownNameError: no such set of parameters.
+        UnknownNameError: a set of parameters does not exist.
     """
     maker = _Maker(fit)
     maker.end("base")
@@ -388,7 +386,7 @@ def table_model(table: DHTable, fit: Collection[str]) -> Model:
 
 
 def elementary(turns: bool, axis: int, value: float) -> FloatArray:
-    """(4, 4) a turn about, or a slide along, a coordinate axis."""
+    """Return the rotation about, or translation along, a coordinate axis as a matrix (4, 4)."""
     return (
         pose(coordinate_rotation(axis, np.array(value)))
         if turns

@@ -1,9 +1,10 @@
-"""Whether a fit is plausible, and the likeliest mistake in the measured data where it is not.
+"""Check whether a fit is plausible, and find the likeliest mistake in the measured data if it is not.
 
-A fit always ends somewhere, also with joint angles in degrees, rows of q that belong to other poses, or the
-sign of a joint reversed. A fit is refused when it leaves a large share of the robot's reach, hardly improves
-on the model as it was, turns a joint's axis about, or has nothing left to judge it by. Each common mistake is
-then corrected on trial: the one whose fit is plausible is the likeliest.
+A fit always ends with some result. This is so even if joint angles are in degrees, rows of q belong to other
+poses, or the sign of a joint is reversed. A fit is refused in four cases: its residuals are a large share of
+the robot's reach, it hardly improves the original model, it tilts a joint's axis far, or it has no
+redundancy. Then each common mistake is corrected on trial. The correction with a plausible fit is the
+likeliest mistake.
 """
 
 from __future__ import annotations
@@ -29,38 +30,39 @@ from urdfkin.calibration.parameters import Model, Parameter
 from urdfkin.comparison.result import angle, length
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree
 
-#: Shares of the reach that a fit leaves (rms): more than the first is refused; the others as said below.
+#: Limits of the rms position error as shares of the reach. Above the first, a fit is refused. The second and
+#: third apply with `_UNEXPLAINED` and `_HARDLY_BELOW`. Above the last, mistakes are tried.
 _MISSED, _CLOSE_BY, _NO_BETTER, _SUSPECT = 0.05, 0.01, 0.03, 0.002
-#: Of the spread of the measured positions: more is refused beyond `_CLOSE_BY` of the reach.
+#: Share of the spread of measured positions; a larger error above `_CLOSE_BY` of the reach is refused.
 _UNEXPLAINED = 0.25
-#: Of what was left before the fit: more is refused beyond `_NO_BETTER` of the reach.
+#: Share of the error before the fit; a larger error above `_NO_BETTER` of the reach is refused.
 _HARDLY_BELOW = 0.7
-#: Radians (rms) that a fit leaves: more is refused; from how many on mistakes are tried.
+#: Limits of the rms orientation error, radians: above the first refused, above the second mistakes are tried.
 _MISTURNED, _SUSPECT_TURN = 0.2, 0.005
-#: Radians: more than a turn, with what industrial wrists turn farther (400 degrees).
+#: Largest plausible joint angle, radians: more than one turn, since some industrial wrists turn 400 degrees.
 _TURN = 2.5 * math.pi
-#: Beyond a joint's limits: radians or metres at least, and of their range.
+#: Smallest excess over a joint's limits that counts: radians or metres, and share of the range.
 _OUTSIDE, _OF_RANGE = 0.5, 0.25
-#: Radians that a joint's axis may be off, and by what share a joint may go farther than it says.
+#: Largest plausible tilt of a joint's axis, radians, and largest plausible gain.
 _TILTED, _GAINED = 0.5, 0.5
 #: Joint values (rad, m) that differ by less are one configuration.
 _ONE_CONFIGURATION = 1e-6
-#: Standard deviations that are taken off first: a target near an axis hardly shows how that is tilted.
+#: Standard deviations subtracted from a change: the tilt of an axis near the target is poorly observable.
 _UNCERTAIN = 5.0
-#: Of what the fit leaves: a correction that leaves less is the reason; one for a refused fit.
+#: Largest ratio of a correction's error to the fit's error: for an accepted fit, and for a refused one.
 _BETTER, _NOT_WORSE = 0.25, 1.5
-#: How many corrections are fitted in full, the most promising first; rows that q may be shifted by.
+#: Number of corrections that are fitted, the most promising first; row shifts of q that are tried.
 _FITTED, _SHIFTS = 4, (1, -1, 2, -2)
-#: Joints that an objection names.
+#: Number of joints that an objection names.
 _NAMED = 4
 
 
 @dataclass(frozen=True)
 class Plausibility:
-    """The judgement of a fit.
+    """The objections to a fit.
 
     Attributes:
-        objections: Why the fit is refused; empty for a plausible one.
+        objections: Reasons why the fit is refused; empty for a plausible one.
         reason: The likeliest mistake and its remedy; None where no correction makes the fit plausible.
     """
 
@@ -75,9 +77,9 @@ class Ended:
     Attributes:
         q: (s, c) coordinates of the path.
         measured: The poses there.
-        identification: Which parameters are identifiable.
+        identification: The identifiable and the fixed parameters.
         before: The fit of base and tool alone.
-        fitted: The fit.
+        fitted: The fit of all identifiable parameters.
     """
 
     q: FloatArray
@@ -88,15 +90,15 @@ class Ended:
 
 
 def judge(model: Model, ended: Ended, *, radians: bool) -> Plausibility:
-    """Judge a fit, and find the likeliest mistake where it is refused.
+    """Check whether a fit is plausible, and find the likeliest mistake if it is not.
 
     Args:
-        model: What was fitted.
+        model: The model.
         ended: The fit with its data.
         radians: Whether large joint angles are known to be radians.
     """
     few = _too_few(ended)
-    misfits = [*_misfits(model, ended), *_strained(model, ended)]
+    misfits = [*_misfits(model, ended), *_extreme_parameters(model, ended)]
     ranges = [*_out_of_range(model, ended.q, radians=radians, misfit=bool(misfits or few))]
     objections = [*ranges, *misfits, *few]
     reach, fitted = _reach(model, ended), ended.fitted
@@ -110,10 +112,12 @@ def judge(model: Model, ended: Ended, *, radians: bool) -> Plausibility:
     if better is None:
         return Plausibility(tuple(objections))
     if not objections:
-        turned = f"the fit turns the zero of joint {_listed(zeros)}; " if zeros else ""
-        objections = [f"{turned}{_rms(fitted)} (rms) are left, and {_rms(better.ended.fitted)} otherwise"]
+        turned = f"a zero turned by half a turn, joint {_list(zeros)}; " if zeros else ""
+        objections = [
+            f"{turned}an rms error of {_rms(fitted)}, and of {_rms(better.ended.fitted)} with a correction"
+        ]
     return Plausibility(
-        tuple(objections), f"{better.correction.reason} ({_rms(better.ended.fitted)} are left then)"
+        tuple(objections), f"{better.correction.reason} (the rms error is then {_rms(better.ended.fitted)})"
     )
 
 
@@ -129,12 +133,12 @@ def _too_few(ended: Ended) -> list[str]:
     among = f" among {len(steps)} poses" if distinct < len(steps) else ""
     return [
         f"{distinct} distinct configuration{'s' * (distinct != 1)}{among} give {distinct * each} numbers "
-        f"for {rank} parameters: nothing is left to judge the fit by"
+        f"for {rank} parameters: the fit cannot be checked"
     ]
 
 
 def _reach(model: Model, ended: Ended) -> float:
-    """Metres: how far the tip is from the base or from a joint's axis at most, in the model as it is."""
+    """Return the tip's largest distance (m) from the base or a joint's axis, in the original model."""
     T, columns = model.way.columns(ended.measured.values)
     turning = [k for k, p in enumerate(model.way.parameters) if p.what in ("rz", "theta")]
     levers = np.linalg.norm(columns[:, :3, turning], axis=1).max(initial=0.0)
@@ -143,7 +147,7 @@ def _reach(model: Model, ended: Ended) -> float:
 
 
 def _misfits(model: Model, ended: Ended) -> Iterator[str]:
-    """Why what is left is too much."""
+    """Yield objections to residuals that are too large."""
     reach = _reach(model, ended)
     (metres, turn), (metres_before, _) = ended.fitted.rms(), ended.before.rms()
     p = ended.measured.p
@@ -152,40 +156,40 @@ def _misfits(model: Model, ended: Ended) -> Iterator[str]:
     unexplained = metres > _CLOSE_BY * reach and metres > _UNEXPLAINED * spread
     if metres > _MISSED * reach or no_better or unexplained:
         yield (
-            f"{length(metres)} (rms) are left, {metres / reach:.0%} of the reach of {length(reach)}, "
-            f"and {length(metres_before)} before the fit"
+            f"an rms error of {length(metres)}, {metres / reach:.0%} of the reach of {length(reach)} "
+            f"(before the fit {length(metres_before)})"
         )
     if turn is not None and turn > _MISTURNED:
-        yield f"{angle(turn)} (rms) of the orientations are left"
+        yield f"an rms error of the orientations of {angle(turn)}"
 
 
-def _strained(model: Model, ended: Ended) -> Iterator[str]:
-    """Parameters that went where no built robot is."""
+def _extreme_parameters(model: Model, ended: Ended) -> Iterator[str]:
+    """Yield objections to parameters far from those of any real robot."""
     tilted, gained = dict[str, str](), dict[str, str]()
-    for parameter, moved, surely in _moved(model, ended):
+    for parameter, moved, surely in _changes(model, ended):
         if parameter.what in ("rx", "ry", "alpha", "beta") and surely > _TILTED:
             tilted.setdefault(parameter.where, f"{parameter.where!r} by {angle(abs(moved))}")
         if parameter.what == "gain" and surely > _GAINED:
-            gained[parameter.where] = f"{parameter.where!r} {1.0 + moved:.3g} times"
+            gained[parameter.where] = f"{parameter.where!r} by {1.0 + moved:.3g}"
     if tilted:
-        yield f"the fit tilts the axis of joint {_listed(tilted.values())}"
+        yield f"a tilted axis, joint {_list(tilted.values())}"
     if gained:
-        yield f"the fit moves joint {_listed(gained.values())} as far as its values say"
+        yield f"scaled values, joint {_list(gained.values())}"
 
 
 def _turned_zeros(model: Model, ended: Ended) -> list[str]:
-    """Joints whose zero is half a turn off, which does what a reversed sign of the joint beside it does."""
+    """Return joints whose zero moved by half a turn: the effect of a reversed sign of the next joint."""
     return [
         f"{parameter.where!r} by {angle(abs(moved))}"
-        for parameter, moved, surely in _moved(model, ended)
+        for parameter, moved, surely in _changes(model, ended)
         if parameter.what in ("rz", "theta") and surely > _TILTED and abs(abs(moved) - math.pi) < _TILTED
     ]
 
 
-def _moved(model: Model, ended: Ended) -> Iterator[tuple[Parameter, float, float]]:
-    """Each fitted parameter of a joint that moves, by how much it moved, and by how much surely.
+def _changes(model: Model, ended: Ended) -> Iterator[tuple[Parameter, float, float]]:
+    """Yield each fitted parameter of a moving joint, its change, and the change minus its uncertainty.
 
-    Of positions alone nothing is sure of a joint whose axis passes near the tip of the model as it is.
+    For positions alone, joints are skipped whose axis passes near the tip of the original model.
     """
     kept, fitted = ended.identification.kept, ended.fitted
     near = set[str]()
@@ -204,7 +208,7 @@ def _moved(model: Model, ended: Ended) -> Iterator[tuple[Parameter, float, float
 
 
 def _out_of_range(model: Model, q: FloatArray, *, radians: bool, misfit: bool) -> Iterator[str]:
-    """Values that look like degrees or millimetres."""
+    """Yield objections to joint values that look like degrees or millimetres."""
     largest = dict(zip(model.coupling.names, np.abs(q).max(axis=0, initial=0.0).tolist(), strict=True))
     turned, outside = dict[str, str](), dict[str, str]()
     for name, is_turning, lower, upper in _coordinates(model):
@@ -217,13 +221,13 @@ def _out_of_range(model: Model, q: FloatArray, *, radians: bool, misfit: bool) -
         elif far:
             outside[name] = f"{name!r} ({largest[name]:.4g}, limits {lower:.4g} to {upper:.4g})"
     if turned and not radians:
-        yield f"values beyond a turn look like degrees: joint {_listed(turned.values())}"
+        yield f"values beyond a turn look like degrees: joint {_list(turned.values())}"
     if outside and misfit:
-        yield f"values far outside the limits: joint {_listed(outside.values())}"
+        yield f"values far outside the limits: joint {_list(outside.values())}"
 
 
 def _coordinates(model: Model) -> Iterator[tuple[str, bool, float, float]]:
-    """Name, whether it turns, lower and upper limit of each coordinate of the path."""
+    """Yield each coordinate of the path: name, whether it is an angle, lower and upper limit."""
     kinds = dict(zip(model.coupling.joints, model.coupling.kinds, strict=True))
     for name in model.coupling.names:
         lower, upper = -math.inf, math.inf
@@ -241,7 +245,7 @@ def _coordinates(model: Model) -> Iterator[tuple[str, bool, float, float]]:
 
 @dataclass(frozen=True, eq=False)
 class _Correction:
-    """Data without one supposed mistake."""
+    """Data with one possible mistake corrected."""
 
     reason: str
     q: FloatArray
@@ -259,13 +263,13 @@ def _corrections(model: Model, q: FloatArray) -> Iterator[_Correction]:
         if turning.any():
             yield _Correction("all joint values are multiplied by 180/pi; undo it", np.radians(q))
         yield _Correction(
-            "sliding joints are in millimetres; convert them to metres", np.where(turning, q, 1e-3 * q)
+            "prismatic joints are in millimetres; convert them to metres", np.where(turning, q, 1e-3 * q)
         )
     for by in _SHIFTS:
         if len(q) > abs(by) + 1:
             rows = "one row" if abs(by) == 1 else f"{abs(by)} rows"
             way = "later" if by > 0 else "earlier"
-            reason = f"q is shifted by {rows} against the poses; the q of each pose stands {rows} {way}"
+            reason = f"q is shifted by {rows} against the poses; the q of each pose is {rows} {way}"
             if by > 0:
                 yield _Correction(reason, q[by:], 0, len(q) - by)
             else:
@@ -277,11 +281,11 @@ def _corrections(model: Model, q: FloatArray) -> Iterator[_Correction]:
 def _sign(names: Sequence[str]) -> str:
     if len(names) == 1:
         return f"the sign of joint {names[0]!r} is wrong; negate its values or its axis"
-    return f"the signs of joints {_listed(map(repr, names))} are wrong; negate their values or their axes"
+    return f"the signs of joints {_list(map(repr, names))} are wrong; negate their values or their axes"
 
 
 def _likeliest(model: Model, ended: Ended, limit: float, reach: float) -> _Trial | None:
-    """The correction whose fit is plausible and leaves less than the limit."""
+    """Return the correction whose fit is plausible and has an error below the limit; else None."""
     trials = [_Trial(model, ended, correction, reach) for correction in _corrections(model, ended.q)]
     trials.sort(key=lambda trial: trial.left_before)
     for trial in trials[:_FITTED]:
@@ -292,7 +296,7 @@ def _likeliest(model: Model, ended: Ended, limit: float, reach: float) -> _Trial
 
 
 def _several_signs(model: Model, ended: Ended, reach: float) -> _Trial | None:
-    """Two or more reversed signs: each reversal that leaves less before the fit, the best one first."""
+    """Try two or more reversed signs: add the best reversal while it reduces the error before the fit."""
     names, signs = model.coupling.names, np.ones(ended.q.shape[1])
     best, least = None, math.inf
     for _ in names:
@@ -311,7 +315,7 @@ def _several_signs(model: Model, ended: Ended, reach: float) -> _Trial | None:
 
 
 class _Trial:
-    """A correction, and what a fit leaves of it."""
+    """A correction and its fit."""
 
     def __init__(self, model: Model, ended: Ended, correction: _Correction, reach: float) -> None:
         self.model, self.correction, self.reach = model, correction, reach
@@ -322,41 +326,41 @@ class _Trial:
         )
         self.weights = Noise(1.0, 1.0 / reach)
         self.start = starting(model, self.measured)
-        #: What is left of a number where base and tool alone are found, m.
+        #: Error of a number (m) with base and tool alone fitted.
         self.left_before = _size(errors(model, self.measured, self.start), reach) / math.sqrt(
             len(self.measured)
         )
-        self.told = ended.identification
+        self.identification = ended.identification
 
     @cached_property
     def ended(self) -> Ended:
         """The fit of all identifiable parameters."""
         model, measured = self.model, self.measured
-        ends = [k for k in self.told.kept if model.way.parameters[k].end]
+        ends = [k for k in self.identification.kept if model.way.parameters[k].end]
         before = best_fit(model, measured, ends, self.weights, self.start)
-        told = identify(model, measured.values, complete=measured.complete, at=self.start)
-        fit = best_fit(model, measured, told.kept, self.weights, before.at)
-        return Ended(self.correction.q, measured, told, before, fit)
+        found = identify(model, measured.values, complete=measured.complete, at=self.start)
+        fit = best_fit(model, measured, found.kept, self.weights, before.at)
+        return Ended(self.correction.q, measured, found, before, fit)
 
     def is_plausible(self, limit: float) -> bool:
-        """Whether the fit is plausible and leaves less than the limit."""
+        """Return whether the fit is plausible and has an error below the limit."""
         try:
             ended = self.ended
         except np.linalg.LinAlgError:
             return False
         if not ended.fitted.is_judged or _left(ended, self.reach) > limit:
             return False
-        strange = [*_misfits(self.model, ended), *_strained(self.model, ended)]
+        strange = [*_misfits(self.model, ended), *_extreme_parameters(self.model, ended)]
         return not strange and not _turned_zeros(self.model, ended)
 
 
 def _size(left: FloatArray, reach: float) -> float:
-    """What is left (s, 6) or (s, 3) of all numbers, metres; turns count at the reach."""
+    """Return the norm of residuals (s, 6) or (s, 3), metres; angles are multiplied by the reach."""
     return float(np.linalg.norm(left * ([1.0] * 3 + [reach] * (left.shape[1] - 3))))
 
 
 def _left(ended: Ended, reach: float) -> float:
-    """What is left of a number, metres, for each that is left to judge by."""
+    """Return the residual standard deviation of a number, metres."""
     return _size(ended.fitted.errors, reach) / math.sqrt(max(ended.fitted.freedom, 1.0))
 
 
@@ -365,6 +369,6 @@ def _rms(fit: Fit) -> str:
     return length(metres) if turn is None else f"{length(metres)}, {angle(turn)}"
 
 
-def _listed(names: Iterable[str]) -> str:
+def _list(names: Iterable[str]) -> str:
     every = list(names)
     return ", ".join(every[:_NAMED]) + (f" and {len(every) - _NAMED} more" if len(every) > _NAMED else "")

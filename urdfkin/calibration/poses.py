@@ -1,8 +1,9 @@
-"""Measured poses from files: CSV with named columns, or the arrays of an .npz file.
+"""Read measured poses from a CSV file with named columns, or from the arrays of an .npz file.
 
-In a CSV file a coordinate's name holds q; x, y, z hold the position; qx, qy, qz, qw the orientation, which
-may be missing; or T00 ... T33, T23 at least, hold the matrix, as `urdfkin placement --format csv` writes it.
-In an .npz file these are q (n, nq), p (n, 3) and quat (n, 4), scalar last, or T (n, 4, 4).
+A CSV file has a column for each coordinate, named like it. The columns x, y, z are the position. The columns
+qx, qy, qz, qw are the orientation, which is optional. Instead of both, the columns T00 to T23, or to T33, are
+the matrix, as `urdfkin placement --format csv` writes it. An .npz file has q (n, nq) and either T (n, 4, 4)
+or p (n, 3) and optionally quat (n, 4), scalar last.
 """
 
 from __future__ import annotations
@@ -20,29 +21,29 @@ from urdfkin.motion.columns import read_columns
 from urdfkin.motion.trajectory import read_arrays
 from urdfkin.system.files import MOST_DATA, read_text
 
-#: By how much written digits may leave a matrix, or a quaternion's length, off what it should be.
+#: Largest deviation of a matrix from a rotation, or of a quaternion's length from 1, by rounded digits.
 _WRITTEN = 1e-3
 _POSITION, _QUATERNION = ("x", "y", "z"), ("qx", "qy", "qz", "qw")
 _MATRIX = tuple(f"T{i}{j}" for i in range(3) for j in range(4))
 _LAST_ROW = tuple(f"T3{j}" for j in range(4))
-#: Metres.
+#: Units of positions, metres.
 UNITS = {"m": 1.0, "mm": 1e-3}
 
 
 def read_poses(
     path: Path, coordinates: tuple[str, ...], needed: tuple[str, ...], unit: str = "m"
 ) -> tuple[FloatArray, FloatArray]:
-    """(s, nq) configurations, and (s, 4, 4) poses or (s, 3) positions, m.
+    """Read configurations (s, nq), and poses (s, 4, 4) or positions (s, 3), metres.
 
     Args:
-        path: The file; its ending says which of the two it is.
-        coordinates: Names of the numbers of q.
-        needed: Those that must be there; what others are is neutral.
-        unit: Of the positions: "m" or "mm".
+        path: The file; .npz by its suffix, else CSV.
+        coordinates: Names of the coordinates of q.
+        needed: Names of the required columns; the other coordinates are neutral if they are missing.
+        unit: Unit of the positions: "m" or "mm".
 
     Raises:
         SourceError: the file cannot be read.
-        InputError: a column or array that is missing or unknown, a number that is none, no orientation.
+        InputError: a column or array is missing or unknown, a number is invalid, or an orientation is wrong.
     """
     found = (
         _archive(path, len(coordinates))
@@ -75,11 +76,11 @@ def _table(
     part = [name for name in _QUATERNION if name in data]
     if 0 < len(part) < len(_QUATERNION):
         missing = ", ".join(name for name in _QUATERNION if name not in part)
-        raise InputError("a quaternion has four numbers", where=where, found=f"no {missing}")
+        raise InputError("a quaternion needs four columns", where=where, found=f"no {missing}")
     if kind is _MATRIX:
         rows = np.stack([data[name] for name in _MATRIX], axis=-1).reshape(s, 3, 4)
         T = np.concatenate([rows, np.broadcast_to([[0.0, 0.0, 0.0, 1.0]], (s, 1, 4))], axis=1)
-        return q, _posed(T, where)
+        return q, _with_exact_rotations(T, where)
     p = np.stack([data[name] for name in _POSITION], axis=-1)
     return q, p if not part else _with_quaternions(
         p, np.stack([data[n] for n in _QUATERNION], axis=-1), where
@@ -91,10 +92,10 @@ def _archive(path: Path, nq: int) -> tuple[FloatArray, FloatArray]:
     if ("T" in data) == ("p" in data) or ("quat" in data and "p" not in data):
         found = ", ".join(data)
         raise InputError(
-            "measured poses are q with T, with p, or with p and quat", where=str(path), found=found
+            "measured poses must be q with T, q with p, or q with p and quat", where=str(path), found=found
         )
     if "T" in data:
-        return data["q"], _posed(data["T"], str(path))
+        return data["q"], _with_exact_rotations(data["T"], str(path))
     return data["q"], data["p"] if "quat" not in data else _with_quaternions(
         data["p"], data["quat"], str(path)
     )
@@ -105,7 +106,7 @@ def _with_quaternions(p: FloatArray, quat: FloatArray, where: str) -> FloatArray
     off = np.abs(lengths - 1.0)
     if off.size and off.max() > _WRITTEN:
         raise InputError(
-            "an orientation is a quaternion of length 1, scalar last",
+            "an orientation must be a quaternion of length 1, scalar last",
             where=f"{where}, pose {int(off.argmax())}",
             found=f"length {float(lengths[off.argmax(), 0]):.6g}",
         )
@@ -114,14 +115,14 @@ def _with_quaternions(p: FloatArray, quat: FloatArray, where: str) -> FloatArray
     return T
 
 
-def _posed(T: FloatArray, where: str) -> FloatArray:
-    """Poses whose rotations are as good as the digits they were written with, made good."""
+def _with_exact_rotations(T: FloatArray, where: str) -> FloatArray:
+    """Return the poses with exact rotations; their digits may be rounded."""
     R = T[:, :3, :3]
     off = np.abs(R.swapaxes(-1, -2) @ R - np.eye(3)).max(axis=(-2, -1), initial=0.0)
     bad = (off > _WRITTEN) | (np.linalg.det(R) < 0.0)
     if bad.any():
         raise InputError(
-            "a pose is a rotation and a translation",
+            "a pose must be a rotation and a translation",
             where=f"{where}, pose {int(bad.argmax())}",
             found=str(T[bad.argmax()].tolist()),
         )
@@ -132,10 +133,10 @@ def _posed(T: FloatArray, where: str) -> FloatArray:
 
 
 def checked_poses(poses: ArrayLike) -> FloatArray:
-    """(s, 4, 4) or (s, 3) as numbers; raises InputError for anything else."""
+    """Return poses (s, 4, 4) or positions (s, 3) as an array; raise InputError for another shape."""
     array = scalars(poses, "poses")
     if array.ndim == 2 and array.shape[1] == 3:
         return array
     if array.ndim == 3 and array.shape[1:] == (4, 4):
-        return _posed(array, "poses")
-    raise InputError("poses are (n, 4, 4), or positions (n, 3)", found=f"shape {array.shape}")
+        return _with_exact_rotations(array, "poses")
+    raise InputError("poses must be (n, 4, 4), or positions (n, 3)", found=f"shape {array.shape}")

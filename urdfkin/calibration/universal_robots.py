@@ -1,32 +1,41 @@
-"""What a Universal Robots arm was calibrated to in the factory, from the YAML that its ROS driver writes.
+"""Apply the factory calibration of a Universal Robots arm, from the YAML file of its ROS driver.
 
-The controller keeps Denavit-Hartenberg parameters: of two axes a milliradian from parallel, so that d is
-hundreds of metres and the next d takes them back. `ur_calibration` draws the links in along their axes and
-writes what is left as x, y, z, roll, pitch, yaw of each joint in the one before.
+The controller stores Denavit-Hartenberg parameters. Two axes are a milliradian from parallel, so one d is
+hundreds of metres, and the next d compensates it. The driver's tool `ur_calibration` shifts the links back
+along their axes. It writes the pose of each joint relative to the previous one: x, y, z, roll, pitch, yaw.
 
-Two orders of turns are met there. The driver takes the angles from R = Rx(roll) Ry(pitch) Rz(yaw) (Eigen's
-`eulerAngles(0, 1, 2)`), the robot description hands them to a URDF, which reads Rz(yaw) Ry(pitch) Rx(roll).
-Where one angle is a quarter of a turn and another small, the two differ by the small one, 1e-5 to 1e-4 rad.
-"driver" is what the robot's controller computes, "urdf" what the ROS description makes of the same file.
+The order of the rotations is ambiguous. The driver computes the angles from R = Rx(roll) Ry(pitch) Rz(yaw)
+(Eigen's `eulerAngles(0, 1, 2)`). The ROS description copies them into a URDF, where they mean
+Rz(yaw) Ry(pitch) Rx(roll). If one angle is a quarter turn and another is small, the two rotations differ by
+the small one, 1e-5 to 1e-4 rad. The order "driver" agrees with the robot's controller. The order "urdf"
+agrees with the ROS description of the same file.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
 
+from urdfkin.calibration.calibrate import fitted_model
+from urdfkin.calibration.write_back import Rewritten
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.errors.numbers import parse_float
 from urdfkin.kinematics.rotation import rotation_from_euler
+from urdfkin.loading import load
+from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, build_tree
+from urdfkin.robot import Robot
 from urdfkin.system.files import read_text
+from urdfkin.urdf.sources import Source
+from urdfkin.verify.certificate import Certificate
 
-#: The links of the file in the order of the arm, and the joint that each hangs from.
+#: The links of the file in the order of the arm, and the parent joint of each.
 LINKS = {
     "shoulder": "shoulder_pan_joint",
     "upper_arm": "shoulder_lift_joint",
@@ -35,35 +44,45 @@ LINKS = {
     "wrist_2": "wrist_2_joint",
     "wrist_3": "wrist_3_joint",
 }
-#: SciPy's names of the two orders; the letters of the second turn about the axes as they were.
+#: SciPy's names of the two orders; small letters are rotations about fixed axes.
 ORDERS = {"driver": "XYZ", "urdf": "xyz"}
 _SIX = ("x", "y", "z", "roll", "pitch", "yaw")
+#: Number of configurations for the fit, and for its check.
+_FITTED = 40
+#: Seeds of the configurations for the fit, and for its check.
+_FITTED_SEED, _CHECKED_SEED = 2, 3
+#: Largest residual, metres and radians: the rounding of a file with nine digits.
+_LEFT = 1e-8
+#: Number of configurations on which two calibrations are compared.
+_COMPARED = 1000
 
 
 def read_calibration(path: Path, order: str = "driver") -> dict[str, FloatArray]:
-    """(4, 4) origins by the names of joints, without a prefix.
+    """Read the origins (4, 4) by joint name, without a prefix.
 
     Args:
         path: The driver's YAML, or a `default_kinematics.yaml` of its robot description.
-        order: "driver" or "urdf": in which order the angles turn.
+        order: Order of the rotations: "driver" or "urdf".
 
     Raises:
         SourceError: the file cannot be read.
-        InputError: no such file; a link or a number is missing.
-        UnknownNameError: another order.
+        InputError: the file is not a calibration, or a link or a number is missing.
+        UnknownNameError: the order is unknown.
     """
     if order not in ORDERS:
-        raise UnknownNameError("order of turns", order, ORDERS)
+        raise UnknownNameError("order of rotations", order, ORDERS)
     try:
         data = yaml.safe_load(read_text(path, pipes=True))
     except (yaml.YAMLError, RecursionError) as error:
-        raise InputError("no YAML", where=str(path), found=" ".join(str(error).split())[:100]) from None
+        raise InputError(
+            "not a YAML file", where=str(path), found=" ".join(str(error).split())[:100]
+        ) from None
     kinematics = data.get("kinematics") if isinstance(data, Mapping) else None
     if not isinstance(kinematics, Mapping):
         raise InputError(
-            "no calibration of a Universal Robots arm",
+            "not a calibration of a Universal Robots arm",
             where=str(path),
-            remedy="the driver writes kinematics: shoulder: x: ...",
+            remedy="give the driver's file; it begins kinematics: shoulder: x: ...",
         )
     return {joint: _origin(kinematics, link, ORDERS[order], str(path)) for link, joint in LINKS.items()}
 
@@ -71,11 +90,11 @@ def read_calibration(path: Path, order: str = "driver") -> dict[str, FloatArray]
 def _origin(kinematics: Mapping[Any, Any], link: str, sequence: str, where: str) -> FloatArray:
     entry = kinematics.get(link)
     if not isinstance(entry, Mapping):
-        raise InputError("a link is missing", where=where, found=f"no {link}")
+        raise InputError("the file lacks a link", where=where, found=f"no {link}")
     six = []
     for name in _SIX:
-        # YAML 1.1 takes 1e-05, which the driver writes for 0.00001, for a word; and a list of lists that are
-        # one another's may be short in the file and endless when it is written out.
+        # YAML 1.1 reads 1e-05, which the driver writes for 0.00001, as a word. A list is never printed: with
+        # YAML references, a short file may contain a very long one.
         value = entry.get(name)
         number = parse_float(str(value)) if isinstance(value, int | float | str) else None
         if number is None:
@@ -86,10 +105,110 @@ def _origin(kinematics: Mapping[Any, Any], link: str, sequence: str, where: str)
 
 
 def calibrated_tree(origins: Mapping[str, FloatArray]) -> KinematicTree:
-    """The arm of a calibration alone: `base` to `tool0`, six joints that turn about z."""
+    """Return the calibrated arm as a tree: `base` to `tool0`, six revolute joints about z."""
     z, rows, parent = np.array([0.0, 0.0, 1.0]), [], "base"
     for joint, T in origins.items():
         child = "tool0" if joint == "wrist_3_joint" else f"{joint}_link"
         rows.append((Joint(joint, JointKind.CONTINUOUS, 0, T, z), parent, child))
         parent = child
     return build_tree("calibration", "base", rows)
+
+
+def universal_robots(robot: Robot | Source, path: Path, order: str = "driver") -> Rewritten:
+    """Apply a calibration file to the URDF of a Universal Robots arm.
+
+    In the current ROS description all six joints turn about z, and their origins become those of the file. In
+    another URDF, such as the older description, the origins are fitted. The arm then moves like the
+    calibrated one, from `base` to `tool0`.
+
+    Args:
+        robot: The arm.
+        path: The driver's YAML file.
+        order: Order of the rotations in the file: "driver" agrees with the robot's controller, "urdf" with
+            the ROS description.
+
+    Raises:
+        SourceError: the file cannot be read.
+        InputError: the file is not a calibration, or the robot is not such an arm.
+        UnknownNameError: the order is unknown.
+    """
+    robot = robot if isinstance(robot, Robot) else load(robot)
+    origins = read_calibration(path, order)
+    prefix = _prefix(robot)
+    calibrated = chain(calibrated_tree(origins), "tool0", "base")
+    if _is_the_descriptions(robot, prefix):
+        result = Rewritten(robot, {prefix + joint: T for joint, T in origins.items()})
+    else:
+        result = _fit_origins(robot, calibrated, f"{prefix}tool0", f"{prefix}base")
+    return replace(result, certificate=_verify_written(result, calibrated, prefix))
+
+
+def _fit_origins(robot: Robot, calibrated: FrameChain, tip: str, base: str) -> Rewritten:
+    """Fit the robot's origins to the calibrated arm's poses, measured without noise."""
+    own = robot.chain(tip, base).coupling
+    if len(own.names) != len(calibrated.joint_names):
+        raise InputError(
+            "the robot's path has not as many coordinates as the calibrated arm",
+            where=f"{robot.name}, {base} to {tip}",
+            found=f"{len(own.names)} and {len(calibrated.joint_names)}",
+            remedy="use a URDF of ur_description, with base and tool0",
+        )
+    q = robot.sample(_FITTED, seed=_FITTED_SEED)
+    values = own.select(robot.tree, q)
+    if set(own.names) == set(calibrated.joint_names):
+        values = values[:, [own.names.index(name) for name in calibrated.joint_names]]
+    found = fitted_model(robot, q, calibrated.placement(values), tip=tip, base=base, judged=False)
+    left = np.abs(found.fitted.errors).max() if found.fitted is not None else 0.0
+    if left > _LEFT:
+        raise InputError(
+            "no origins make the robot move like the calibrated arm",
+            where=f"{robot.name}, {base} to {tip}",
+            found=f"a residual of {left:.3g} m or rad",
+            remedy="compare the joints' order, kinds and senses with a nominal arm: urdfkin same",
+        )
+    return found.written
+
+
+def _prefix(robot: Robot) -> str:
+    first = next(iter(LINKS.values()))
+    prefixes = [name.removesuffix(first) for name in robot.joint_names if name.endswith(first)]
+    if len(prefixes) != 1 or any(prefixes[0] + joint not in robot.joint_names for joint in LINKS.values()):
+        raise InputError(
+            "the robot is not a Universal Robots arm",
+            where=robot.name,
+            found=f"joints {', '.join(robot.joint_names[:8])}",
+            remedy=f"its joints must be {', '.join(LINKS.values())}, with one common prefix",
+        )
+    return prefixes[0]
+
+
+def _is_the_descriptions(robot: Robot, prefix: str) -> bool:
+    axes = [robot.tree.joints[robot.tree.joint_index(prefix + joint)].axis for joint in LINKS.values()]
+    return all(axis.tolist() == [0.0, 0.0, 1.0] for axis in axes)
+
+
+def _verify_written(result: Rewritten, calibrated: FrameChain, prefix: str) -> Certificate:
+    """Compare the written text with the file: poses that Pinocchio checks with the calibrated arm's poses."""
+    written = result.loaded
+    q = written.sample(_FITTED, seed=_CHECKED_SEED)
+    T = written.placement(q, [f"{prefix}base", f"{prefix}tool0"])
+    values = q[:, [written.coordinate_names.index(prefix + joint) for joint in LINKS.values()]]
+    away = float(np.abs(np.linalg.solve(T[:, 0], T[:, 1]) - calibrated.placement(values)).max())
+    if away > _LEFT:
+        raise InputError(
+            "the URDF's frames base and tool0 differ from those of the calibration",
+            where=result.robot.name,
+            found=f"base to tool0 is off by {away:.3g} m or rad",
+            remedy="use a URDF of ur_description, with base and tool0",
+        )
+    return written.certificate()
+
+
+def distance(one: Mapping[str, FloatArray], other: Mapping[str, FloatArray]) -> tuple[float, float]:
+    """Return the largest distance and angle (m, rad) between the tools of two calibrations, on samples."""
+    paths = [chain(calibrated_tree(origins), "tool0", "base") for origins in (one, other)]
+    q = np.random.default_rng(0).uniform(-np.pi, np.pi, (_COMPARED, len(LINKS)))
+    T, S = (path.placement(q) for path in paths)
+    turn = T[:, :3, :3].swapaxes(-1, -2) @ S[:, :3, :3]
+    angle = np.linalg.norm(turn - np.eye(3), axis=(-2, -1)) / np.sqrt(2.0)
+    return float(np.linalg.norm(T[:, :3, 3] - S[:, :3, 3], axis=1).max()), float(angle.max())

@@ -1,6 +1,6 @@
-"""New origins written into the URDF's own text: names, meshes, comments and formatting stay byte for byte.
+"""Write new joint origins into a URDF's own text; all other bytes stay the same.
 
-A robot whose joints stand elsewhere: its own text with their origins in it, and how far they moved.
+Names, meshes, comments and formatting are kept. `Rewritten` also reports how far each origin moved.
 """
 
 from __future__ import annotations
@@ -29,38 +29,38 @@ from urdfkin.urdf.records import JointRecord, Vector
 from urdfkin.urdf.writer import before, numbers, with_attributes
 from urdfkin.verify.certificate import Certificate
 
-#: Decimals of a metre and of a radian that are written: what a double of a robot's size has.
+#: Decimals of a metre and of a radian that are written: the precision of a double of a robot's size.
 _DECIMALS = 15
 _SAME = 10.0**-_DECIMALS
 
 
 def with_origins(data: bytes, origins: Mapping[str, FloatArray]) -> bytes:
-    """The URDF's bytes with these (4, 4) origins of joints, by name, in place of what they were.
+    """Return the URDF's bytes with new origins (4, 4) of joints, by name.
 
-    A number that stays the same to rounding keeps its digits. Of the angles that make one rotation those are
-    taken which are nearest to the old ones.
+    A number that is unchanged up to rounding keeps its digits. Of all roll, pitch and yaw angles of a
+    rotation, the ones nearest to the old angles are written.
 
     Raises:
-        InputError: the text has errors, or no such joint.
+        InputError: the text has errors, or a joint does not exist.
     """
     report = Reporter("<text>", data)
-    urdf = read_urdf(report, mimic=False)  # who follows whom is no matter here
+    urdf = read_urdf(report, mimic=False)  # mimic rules do not matter here
     if urdf is None or report.failed:
         errors = [one for one in report.findings() if one.severity is Severity.ERROR]
-        raise InputError("a text with errors is not edited", found=str(errors[0]))
+        raise InputError("a URDF with errors is not edited", found=str(errors[0]))
     mark = codecs.BOM_UTF8 if data.startswith(codecs.BOM_UTF8) else b""
     edits = list[Edit]()
     for name, T in origins.items():
         if (joint := urdf.by_name.get(name)) is None:
-            raise InputError("the text has no such joint", found=repr(name))
+            raise InputError("the URDF has no such joint", found=repr(name))
         edits += _edits(report.data, joint, T)
     return mark + edited(report.data, edits)
 
 
 def _edits(data: bytes, joint: JointRecord, T: FloatArray) -> list[Edit]:
-    values = {"xyz": _kept(joint, "xyz", T[:3, 3], joint.xyz)}
+    values = {"xyz": _three_numbers(joint, "xyz", T[:3, 3], joint.xyz)}
     if joint.quaternion is None:
-        values["rpy"] = _kept(joint, "rpy", nearest_rpy(T[:3, :3], joint.rpy), joint.rpy)
+        values["rpy"] = _three_numbers(joint, "rpy", nearest_rpy(T[:3, :3], joint.rpy), joint.rpy)
     else:
         quaternion = quaternion_of(T[:3, :3])
         sign = math.copysign(1.0, float(quaternion @ np.asarray(joint.quaternion)))
@@ -72,8 +72,8 @@ def _edits(data: bytes, joint: JointRecord, T: FloatArray) -> list[Edit]:
     return [before(data, joint.element.children[0], f"<origin {written}/>")]
 
 
-def _kept(joint: JointRecord, name: str, new: FloatArray, old: Vector) -> str:
-    """Three numbers as text; those that differ from the old ones by rounding as they were written."""
+def _three_numbers(joint: JointRecord, name: str, new: FloatArray, old: Vector) -> str:
+    """Return three numbers as text; a number that differs only by rounding keeps its old digits."""
     origin = joint.origin_element
     words = (origin.attributes.get(name, "") if origin is not None else "").split() or ["0"] * 3
     return " ".join(
@@ -83,14 +83,14 @@ def _kept(joint: JointRecord, name: str, new: FloatArray, old: Vector) -> str:
 
 
 def nearest_rpy(R: FloatArray, old: Vector) -> FloatArray:
-    """(3,) roll, pitch and yaw of a rotation, of all that make it those nearest to the old ones.
+    """Return roll, pitch and yaw (3,) of a rotation, the ones nearest to the old angles.
 
     >>> from urdfkin.kinematics.rotation import rotation_from_rpy
     >>> nearest_rpy(rotation_from_rpy([3.1, 3.0, 3.1]), (3.1, 3.0, 3.1)).round(12).tolist()
     [3.1, 3.0, 3.1]
     """
     roll, pitch, yaw = rpy_of(R).tolist()
-    if math.cos(pitch) <= ANGLE * EPS:  # roll and yaw turn about one axis: only their sum has a meaning
+    if math.cos(pitch) <= ANGLE * EPS:  # roll and yaw share one axis: only their sum matters
         roll, yaw = old[0], yaw + (old[0] - roll) * math.copysign(1.0, pitch)
     turns = ([roll, pitch, yaw], [roll + math.pi, math.pi - pitch, yaw + math.pi])
     wrapped = [
@@ -102,12 +102,12 @@ def nearest_rpy(R: FloatArray, old: Vector) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Rewritten:
-    """A robot with other origins.
+    """A robot with new joint origins.
 
     Attributes:
-        robot: As it was.
-        origins: (4, 4) by joint, of those that moved.
-        certificate: What Pinocchio said of the text with them.
+        robot: The original robot.
+        origins: The new origins (4, 4) by joint, of the joints that moved.
+        certificate: Pinocchio's check of the new text.
     """
 
     robot: Robot
@@ -116,25 +116,25 @@ class Rewritten:
 
     @cached_property
     def text(self) -> bytes:
-        """The URDF's own text with the new origins in it; every other byte is as it was."""
+        """The URDF's own text with the new origins; every other byte is unchanged."""
         return with_origins(self.robot.urdf.encode(), self.origins)
 
     @cached_property
     def loaded(self) -> Robot:
-        """The robot of that text, loaded as the first one was."""
+        """The robot of the new text, loaded with the same options as the original."""
         mimic = self.robot.verifier.mimic
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # what there is to warn of was warned of when it was loaded
+            warnings.simplefilter("ignore")  # the first load gave these warnings
             return load(self.text, mimic=mimic, root_joint=self.robot.root_joint)
 
     @cached_property
     def changes(self) -> Changes:
-        """What changed, in the words of `urdfkin.diff`, and how far each joint's changes move which frame."""
+        """The changes as `urdfkin.diff` lists them, with the frame that each joint's changes move most."""
         return diff(self.robot, self.loaded)
 
     @cached_property
     def moved(self) -> dict[str, tuple[float, float]]:
-        """By how much (m, rad) each joint's origin moved."""
+        """The distance and angle (m, rad) by which each joint's origin moved."""
         tree = self.robot.tree
         old = {name: tree.joints[tree.joint_index(name)].T_parent_joint for name in self.origins}
         return {

@@ -1,4 +1,4 @@
-"""`urdfkin calibrate`: a robot's numbers from measured poses, or from another model, in its own text."""
+"""`urdfkin calibrate`: fit a robot's parameters to measured poses, and write them into its own file."""
 
 from __future__ import annotations
 
@@ -28,39 +28,43 @@ _FILE = click.Path(path_type=Path)
 
 @click.command(epilog="Example: urdfkin calibrate ur5 --tip tool0 --fit base,tool,origins")
 @robot_argument
-@click.option("--poses", type=_FILE, help="What was measured: CSV or .npz, see docs/calibration.md.")
-@click.option("--like", metavar="MODEL", help="Move as this robot or table does, and keep the own frames.")
-@click.option("--ur", type=_FILE, help="The YAML of a Universal Robots arm's factory calibration.")
+@click.option("--poses", type=_FILE, help="Measured poses: CSV or .npz, see docs/calibration.md.")
+@click.option("--ur", type=_FILE, help="Factory calibration of a Universal Robots arm (YAML).")
 @click.option(
     "--order",
     type=click.Choice(["driver", "urdf"]),
     default="driver",
     show_default=True,
-    help="With --ur: how its angles turn.",
+    help="With --ur: order of the rotations in the file.",
 )
-@click.option("--tip", metavar="NAME", help="A link or joint. Default: the robot's tip.")
-@click.option("--base", metavar="NAME", help="A link or joint. Default: the robot's base.")
+@click.option("--tip", metavar="NAME", help="Tip: a link or joint. Default: the robot's tip.")
+@click.option("--base", metavar="NAME", help="Base: a link or joint. Default: the robot's base.")
 @click.option(
     "--fit",
     "fit",
     default="origins",
     show_default=True,
     metavar="SETS",
-    help="Of base, tool, offsets, origins, gains, with commas.",
+    help="Parameters to fit: base, tool, offsets, origins, gains, separated by commas.",
 )
-@click.option("--positions", is_flag=True, help="Without --poses: positions alone will be measured.")
+@click.option("--positions", is_flag=True, help="Without --poses: only positions will be measured.")
+@click.option("--noise", metavar="M,RAD", help="Standard deviations of the measurements. Default: estimated.")
 @click.option(
-    "--noise", metavar="M,RAD", help="Standard deviations of what was measured. Default: estimated."
+    "--unit",
+    type=click.Choice(["m", "mm"]),
+    default="m",
+    show_default=True,
+    help="Unit of measured positions.",
 )
+@click.option("--drop-odd", is_flag=True, help="Exclude outlier poses.")
+@click.option("--radians", is_flag=True, help="Joint angles are radians, even if they look like degrees.")
 @click.option(
-    "--unit", type=click.Choice(["m", "mm"]), default="m", show_default=True, help="Of measured positions."
+    "--all",
+    "every",
+    is_flag=True,
+    help="Write all fitted parameters, not only those that moved by more than 2 sigma.",
 )
-@click.option("--drop-odd", is_flag=True, help="Leave out poses that do not belong to the others.")
-@click.option("--radians", is_flag=True, help="Joint angles are radians, also where they look like degrees.")
-@click.option(
-    "--all", "every", is_flag=True, help="Write all fitted parameters, not only those beyond 2 sigma."
-)
-@click.option("--force", is_flag=True, help="Write a calibration that is not plausible, too.")
+@click.option("--force", is_flag=True, help="Write a calibration even if it is not plausible.")
 @forms("table", "json")
 @click.option("--output", "-o", type=_FILE, help="Write the calibrated URDF, or the table as TOML.")
 @click.pass_context
@@ -74,29 +78,33 @@ def command(
     output: Path | None,
     **_: Any,
 ) -> None:
-    """Which parameters of a path poses can tell, fitted to measured ones, and the URDF with them in it.
+    """Fit the parameters of ROBOT to measured poses, and write them back into its own file.
 
-    Of the written URDF every byte but the numbers that moved is as it was; Pinocchio checks it at the
-    measured configurations. ROBOT may be a table's file: then its cells are fitted. Without --poses, --like
-    and --ur it says what general poses would tell.
+    In the written URDF only the changed numbers differ. Pinocchio checks it at the measured configurations.
+    ROBOT may also be the file of a Denavit-Hartenberg table; then its cells are fitted. Without --poses
+    and --ur, the command lists which parameters are identifiable in principle.
 
     A calibration that is not plausible is refused with the likeliest reason: joint angles in degrees, rows of
-    q shifted against the poses, the sign of a joint. Nothing is written then without --force.
+    q shifted against the poses, or the sign of a joint. Then nothing is written without --force.
 
-    Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked, or refused.
+    Exit 0: verified. 1: Pinocchio disagrees. 2: bad input. 3: not checked, or refused.
     """
     from urdfkin.report.calibration import as_data, print_calibration, print_moved  # noqa: PLC0415
     from urdfkin.report.diff import print_changes  # noqa: PLC0415  keeps --help fast
 
     check_writable(output)
-    given = [name for name in ("poses", "like", "ur") if context.params[name] is not None]
+    given = [name for name in ("poses", "ur") if context.params[name] is not None]
     if len(given) > 1:
-        raise InputError("one model at a time", found=", ".join(f"--{name}" for name in given))
-    _refuse_idle(context, given)
+        raise InputError(
+            "give only one source of calibration", found=", ".join(f"--{name}" for name in given)
+        )
+    _reject_unused(context, given)
     loaded = load_robot(robot)
     with compiling():
-        found = None if ur is not None else _calibrated(context, loaded)
-        written = _of_the_factory(loaded, ur, order) if ur is not None else found.written if found else None
+        found = None if ur is not None else _run(context, loaded)
+        written = (
+            _factory_calibration(loaded, ur, order) if ur is not None else found.written if found else None
+        )
     out, data = console(), {} if found is None else as_data(found)
     if format_ == "json":
         data |= {"origins": {joint: T.tolist() for joint, T in written.origins.items()}} if written else {}
@@ -128,10 +136,10 @@ def command(
 def _refusal(found: Calibration) -> ImplausibleError:
     from urdfkin.calibration.calibrate import ImplausibleError  # noqa: PLC0415
 
-    return ImplausibleError(found, "--force writes it all the same")
+    return ImplausibleError(found, "--force writes it anyway")
 
 
-def _refuse_idle(context: click.Context, given: list[str]) -> None:
+def _reject_unused(context: click.Context, given: list[str]) -> None:
     measured = ("noise", "drop_odd", "unit", "radians", "every", "force")
     if given != ["poses"]:
         reject_unused_options(context, measured, "without --poses")
@@ -140,47 +148,44 @@ def _refuse_idle(context: click.Context, given: list[str]) -> None:
     if given:
         reject_unused_options(context, ("positions",), f"with --{given[0]}")
     else:
-        reject_unused_options(context, ("output",), "without --poses, --like and --ur")
-    if given in (["ur"], ["like"]):
-        reject_unused_options(context, ("fit",), f"with --{given[0]}")
+        reject_unused_options(context, ("output",), "without --poses and --ur")
     if given == ["ur"]:
-        reject_unused_options(context, ("tip", "base"), "with --ur")
+        reject_unused_options(context, ("fit", "tip", "base"), "with --ur")
 
 
-def _calibrated(context: click.Context, robot: Robot) -> Calibration:
-    """What the running command asks of measured poses, of another model, or of poses in general."""
+def _run(context: click.Context, robot: Robot) -> Calibration:
+    """Run the calibration that the command's options request."""
     from urdfkin.calibration.calibrate import calibrate  # noqa: PLC0415
-    from urdfkin.calibration.like import calibrate_like  # noqa: PLC0415
     from urdfkin.calibration.poses import read_poses  # noqa: PLC0415
     from urdfkin.dh.parse_table import is_table_file, read_table_or_screws  # noqa: PLC0415
     from urdfkin.dh.table import DHTable  # noqa: PLC0415
 
-    asked = context.params
-    tip, base = asked["tip"], asked["base"]
-    if asked["like"] is not None:
-        return calibrate_like(
-            robot, load_robot(asked["like"], mimic=None, root_joint=None), tip=tip, base=base
-        )
-    table = read_table_or_screws(asked["robot"]) if is_table_file(asked["robot"]) else None
+    options = context.params
+    tip, base = options["tip"], options["base"]
+    table = read_table_or_screws(options["robot"]) if is_table_file(options["robot"]) else None
     source = table if isinstance(table, DHTable) else robot
     path = robot.chain(tip, base)
     names = path.joint_names if source is robot else source.joint_names
     coordinates = robot.coordinate_names if source is robot else names
-    q, T = read_poses(asked["poses"], coordinates, names, asked["unit"]) if asked["poses"] else (None, None)
+    q, T = (
+        read_poses(options["poses"], coordinates, names, options["unit"])
+        if options["poses"]
+        else (None, None)
+    )
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # a table is loaded once more; it was warned of
+        warnings.simplefilter("ignore")  # a table is loaded a second time
         return calibrate(
             source,
             q,
             T,
             tip=tip,
             base=base,
-            fit=[name.strip() for name in asked["fit"].split(",")],
-            noise=_noise(asked["noise"]),
-            drop_odd=asked["drop_odd"],
-            complete=not asked["positions"],
-            radians=asked["radians"],
-            every=asked["every"],
+            fit=[name.strip() for name in options["fit"].split(",")],
+            noise=_noise(options["noise"]),
+            drop_odd=options["drop_odd"],
+            complete=not options["positions"],
+            radians=options["radians"],
+            every=options["every"],
             force=True,
         )
 
@@ -194,16 +199,20 @@ def _noise(text: str | None) -> tuple[float, float] | None:
     return metres, radians
 
 
-def _of_the_factory(robot: Robot, path: Path, order: str) -> Rewritten:
-    """A Universal Robots arm with its calibration; and what the order of its angles comes to."""
-    from urdfkin.calibration.like import distance, universal_robots  # noqa: PLC0415
-    from urdfkin.calibration.universal_robots import ORDERS, read_calibration  # noqa: PLC0415
+def _factory_calibration(robot: Robot, path: Path, order: str) -> Rewritten:
+    """Apply a factory calibration, and print how much the order of its rotations matters."""
+    from urdfkin.calibration.universal_robots import (  # noqa: PLC0415
+        ORDERS,
+        distance,
+        read_calibration,
+        universal_robots,
+    )
     from urdfkin.comparison.result import angle, length  # noqa: PLC0415
 
     metres, radians = distance(*(read_calibration(path, one) for one in ORDERS))
     say(
-        f"the angles' two orders, the driver's and a URDF's, put the tool {length(metres)} and "
-        f"{angle(radians)} apart at most: --order {order} is taken (docs/calibration.md)",
+        f"using --order {order}; the tool differs by up to {length(metres)} and {angle(radians)} between "
+        "--order driver and --order urdf (docs/calibration.md)",
         err=True,
     )
     return universal_robots(robot, path, order)

@@ -1,4 +1,4 @@
-"""`urdfkin diff`: what changed between two versions of a description."""
+"""`urdfkin diff`: list the changes between two versions of a robot description."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ EXAMPLE = "urdfkin diff arm.urdf my.urdf --markdown comment.md"
 @click.command(epilog=f"Example: {EXAMPLE}")
 @click.argument("a", metavar="OLD", shell_complete=complete_robot)
 @click.argument("b", metavar="NEW", shell_complete=complete_robot)
-@click.option(
-    "--effects/--no-effects", default=True, help="Whether to bound how far changes move frames (the default)."
-)
+@click.option("--effects/--no-effects", default=True, help="Bound how far the changes move frames (default).")
 @forms("table", "json")
 @click.option(
     "--markdown",
     type=click.Path(path_type=Path, dir_okay=False),
-    help="Write Markdown that fits a pull request's comment.",
+    help="Write Markdown for a pull request's comment.",
 )
 @xacro_option
 @click.pass_context
 def command(
     context: click.Context, a: str, b: str, effects: bool, format_: str, markdown: Path | None
 ) -> None:
-    """What changed from OLD to NEW, attribute by attribute, and how far that moves the robot's frames.
+    """List the changes from OLD to NEW, attribute by attribute, and how far they move the robot's frames.
 
-    Of each joint that changed, how far its changes alone move the frame that they move most, over all
-    configurations within limits and at equal coordinates; and the same of all changes together.
-    Exit 0: nothing changed. 1: something did. 2: bad input.
+    For each changed joint, the command prints how far its changes alone move the most affected frame. This is
+    the maximum over all configurations within limits, at equal coordinates. The last line is for all changes
+    together.
+
+    Exit 0: no changes. 1: changes. 2: bad input.
     """
     from urdfkin.comparison.diff import diff  # noqa: PLC0415
     from urdfkin.report.diff import as_data, markdown_of, print_changes  # noqa: PLC0415  keeps --help fast

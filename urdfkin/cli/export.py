@@ -1,4 +1,4 @@
-"""`urdfkin export`: a frame's kinematics as code, with its proof in the same file."""
+"""`urdfkin export`: write a frame's kinematics as code, with its proof in the same file."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ EXAMPLE = "urdfkin export panda --frame panda_hand --to c -o panda_hand.c"
     "quantities",
     multiple=True,
     metavar="NAMES",
-    help="placement, velocity, jacobian, jacobian_rate, hessian, acceleration."
+    help="Quantities: placement, velocity, jacobian, jacobian_rate, hessian, acceleration."
     f" Default: {','.join(QUANTITIES)}.",
 )
 @reference_option
 @click.option("--to", type=click.Choice(tuple(LANGUAGES)), default="c", show_default=True, help="Language.")
-@click.option("--name", metavar="WORD", help="What functions' names begin with. Default: robot and frame.")
+@click.option("--name", metavar="WORD", help="Prefix of function names. Default: robot and frame.")
 @click.option(
-    "--check", "file", type=click.Path(path_type=Path), help="Run the test vectors of a file written earlier."
+    "--check", "file", type=click.Path(path_type=Path), help="Run the test vectors of an exported file."
 )
 @verify_option
 @click.option(
@@ -53,15 +53,16 @@ def command(
     verify: bool,
     output: Path | None,
 ) -> None:
-    """A frame's kinematics as straight-line code for this robot alone, with its proof in the file.
+    """Write a frame's kinematics as straight-line code for one robot, with its proof in the file.
 
-    Constants are folded in, sine and cosine of each joint computed once. The expressions are held against
-    Pinocchio before they are written; the file says how closely they agreed, and brings test vectors with
-    true values at fifty digits. --check compiles or imports such a file and runs them; the file can do it
-    alone, too. ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input.
+    The robot's constants are part of the code, and each joint's sine and cosine are computed once. The
+    expressions are compared with Pinocchio before they are written. The file states how closely they agree.
+    It also contains test vectors with true values at fifty digits. --check compiles or imports a file and
+    runs its test vectors; the file can also do this alone. ROBOT is a path, a name that `urdfkin robots`
+    lists, or - for standard input.
 
-    Exit 0: verified. 1: Pinocchio, or a test vector, disagrees. 2: bad input, or a file that does not run
-    here. 3: not verified, or changed after it was written.
+    Exit 0: verified. 1: Pinocchio or a test vector disagrees. 2: bad input, or the file does not run here.
+    3: not verified, or changed after it was written.
     """
     if (robot is None) == (file is None):
         raise InputError("give a ROBOT to export, or --check FILE")
@@ -69,7 +70,7 @@ def command(
         reject_unused_options(
             context, [p.name or "" for p in context.command.params if p.name != "file"], "with --check"
         )
-        context.exit(_checked(file))
+        context.exit(_check(file))
     from urdfkin.export import write  # noqa: PLC0415
     from urdfkin.export.code import code_of  # noqa: PLC0415  keeps --help fast
 
@@ -88,7 +89,7 @@ def command(
     context.exit(exit_code(code.proof.certificate))
 
 
-def _checked(file: Path) -> int:
+def _check(file: Path) -> int:
     from urdfkin.export.check import check  # noqa: PLC0415
 
     found = check(file)
@@ -96,6 +97,6 @@ def _checked(file: Path) -> int:
         say(line)
     if not found.good:
         return 1
-    for doubt in found.doubts:
-        say(f"UNVERIFIED: {doubt}", err=True)
+    for reason in found.doubts:
+        say(f"UNVERIFIED: {reason}", err=True)
     return 0 if found.verified else 3

@@ -1,4 +1,4 @@
-"""`urdfkin same`: are these two models the same robot?"""
+"""`urdfkin same`: compare two robot models."""
 
 from __future__ import annotations
 
@@ -31,29 +31,31 @@ _PATH = click.Path(path_type=Path, dir_okay=False)
     "pairs",
     multiple=True,
     metavar="JOINT_OF_A=JOINT_OF_B",
-    help="Joints that are each other's; may be repeated.",
+    help="Match two joints; may be repeated.",
 )
 @click.option(
     "--strict",
     is_flag=True,
-    help="Exit 1 too where they are equivalent only up to something, or limits differ.",
+    help="Also exit 1 if the models are only equivalent, or if limits differ.",
 )
 @click.option(
     "--within",
     type=NumberFrom(0.0),
-    help="Exit 0 only if no frame is ever off by more, metres and radians, as both are written: proven.",
+    help="Exit 0 only if all frames provably stay within this distance (m and rad) as written.",
 )
 @click.option(
     "--boxes",
     type=Whole(0),
-    help="More than 131072 for sharper bounds where many things differ, in more time; 0 for none.",
+    help="Number of boxes for bounds (default 131072). More: sharper but slower; 0: none.",
 )
 @click.option("--all", "all_", is_flag=True, help="Show every line.")
 @forms("table", "json")
-@click.option("--certificate", type=_PATH, help="Write what was found as JSON that --recheck verifies.")
-@click.option("--recheck", type=_PATH, help="Verify a certificate against both models, without searching.")
-@click.option("--markdown", type=_PATH, help="Write Markdown that fits a pull request's comment.")
-@click.option("--html", type=_PATH, help="Write a page with a picture of both at the worst configuration.")
+@click.option("--certificate", type=_PATH, help="Write the result as JSON that --recheck verifies.")
+@click.option("--recheck", type=_PATH, help="Verify a certificate for both models, without a search.")
+@click.option("--markdown", type=_PATH, help="Write Markdown for a pull request's comment.")
+@click.option(
+    "--html", type=_PATH, help="Write an HTML page with a picture of both at the worst configuration."
+)
 @click.option("--schema", is_flag=True, help="Print the JSON Schema of a certificate instead.")
 @xacro_option
 @click.pass_context
@@ -72,14 +74,16 @@ def command(
     schema: bool,
     **paths: Path | None,
 ) -> None:
-    """Are A and B the same robot, in every configuration?
+    """Prove whether A and B are the same robot in every configuration.
 
-    A and B are what other commands take for a robot, or Denavit-Hartenberg tables. The same means: every
-    joint's screw and every link's place at home agree, up to where the base stands, joints' zeros and senses,
-    fixed links, names and order. Where they differ, the largest distance over all configurations within
-    limits is enclosed: a configuration that attains it, and a proven bound.
-    Exit 0: the same, or equivalent up to what is printed. 1: they differ; with --strict also where they are
-    equivalent only. With --within: 0 if no frame is ever off by more as written, else 1. 2: bad input.
+    A and B are robots as in other commands, or Denavit-Hartenberg tables. They are the same if the screws of
+    all joints and the zero-configuration poses of all links agree. A different base pose, joint zeros and
+    senses, fixed links, names and order are allowed. If they differ, the command prints an interval for the
+    largest distance of each frame over all configurations within limits. Its lower bound is attained at a
+    printed configuration; its upper bound is proven.
+
+    Exit 0: same, or equivalent up to the printed changes. 1: different; with --strict also if only
+    equivalent. With --within: 0 if all frames stay within the distance as written, else 1. 2: bad input.
     """
     from urdfkin.report.same import read_certificate, schema_text  # noqa: PLC0415  keeps --help fast
 
@@ -87,21 +91,21 @@ def command(
         click.echo(schema_text(), nl=False)
         return
     if a is None or b is None:
-        raise click.UsageError("name two models: urdfkin same A B")
+        raise click.UsageError("two models are needed: urdfkin same A B")
     check_writable(*paths.values())
     robots = load_two(a, b)
     with compiling():
         if recheck is not None:
-            from urdfkin.comparison.certificate import recheck as held  # noqa: PLC0415
+            from urdfkin.comparison.certificate import recheck as errors_of  # noqa: PLC0415
 
             document = read_certificate(recheck)
-            against = held(document, *robots)
-            for line in against:
+            errors = errors_of(document, *robots)
+            for line in errors:
                 say(line, err=True)
-            first = [f"; first here: {one['words']}" for one in document["differences"][:1]]
+            first = [f"; first difference: {one['words']}" for one in document["differences"][:1]]
             holds = f"the certificate holds: {document['verdict']}{''.join(first)}"
-            say("the certificate does not hold" if against else holds)
-            context.exit(1 if against or document["verdict"] == "differs" else 0)
+            say("the certificate does not hold" if errors else holds)
+            context.exit(1 if errors or document["verdict"] == "differs" else 0)
         from urdfkin.comparison.branch_and_bound import MOST  # noqa: PLC0415
         from urdfkin.comparison.result import Question  # noqa: PLC0415
         from urdfkin.comparison.verdict import parse_map, same  # noqa: PLC0415
@@ -125,7 +129,7 @@ def _write(
     *,
     all_: bool,
 ) -> None:
-    """Every form that was asked for; `words` are the command's options besides the question."""
+    """Write the result in every requested form; `words` are the command's other options."""
     from urdfkin.comparison.certificate import certificate  # noqa: PLC0415
     from urdfkin.report.same import markdown_of, print_sameness  # noqa: PLC0415
 

@@ -1,3 +1,3 @@
-"""Whether two models are the same robot, proven: one idea a file."""
+"""Compare two robot models: prove whether they move alike, and list their differences."""
 
 from __future__ import annotations

@@ -1,24 +1,21 @@
-"""How fast the distance of a frame of two models bends: second derivatives, bounded everywhere.
+"""Bound the distance between a frame of two models by branch and bound.
 
-With D = p_B - p_A, what a joint does to D it does again to a derivative of D: a turn's derivative is the
-turn, and then u x. So y, where B's frame is, and d, how far it is from A's, give way to
+`urdfkin.model.mechanisms.upper_bound` adds the effects of all differences, each at its own worst
+configuration. Where many things differ, that sum is too large. This module bounds D(q) = p_B - p_A in boxes
+of all variables together. In a box with middle c and half widths h,
+
+    |D(q)| <= max |D(c) + sum_i D_i(c) x_i| + (1/2) sum_ij M_ij h_i h_j,     |x_i| <= h_i.
+
+Here M_ij bounds the second derivatives at every configuration. Boxes whose bound is small enough are
+dropped. The others are halved.
+
+M_ij is computed joint by joint. The derivative of a rotation about the axis u is the rotation, followed by
+u x. Let y be the position of B's frame, and d its distance from A's frame. The derivatives of both are
 
     y_i = u' x (Y - o'),    d_i = u x (Y - e(S t) (y - d)) + (u' - u) x (Y - o') + u x (o - o'),
 
-with Y = e(S' t') y, and these pass the joints in front as vectors that have no place
+with Y = e(S' t') y. The joints in front transform these derivatives as free vectors
 (`urdfkin.model.mechanisms.upper_bound`).
-
-
-A sharper bound where many things differ: branch and bound on boxes of configurations.
-
-`urdfkin.model.mechanisms.upper_bound` adds up what each difference does at its own worst configuration. Here
-D(q), how far B's frame is from A's, is looked at in boxes of all variables together. In one with middle c,
-half widths h,
-
-    |D(q)| <= max |D(c) + sum_i D_i(c) x_i| + (1/2) sum_ij M_ij h_i h_j,     |x_i| <= h_i,
-
-with M_ij the most that second derivatives are anywhere (`urdfkin.comparison.branch_and_bound`). Boxes that
-cannot hold a distance of interest are dropped, the others halved.
 """
 
 from __future__ import annotations
@@ -55,13 +52,13 @@ _Vectors = tuple[Support, Support]
 def curvature(
     steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables, frame: FramePair
 ) -> tuple[list[str], FloatArray]:
-    """Names of variables, and (variables, variables) what second derivatives of D are at most, metres.
+    """Return names of variables, and bounds (variables, variables) of the second derivatives of D, metres.
 
-    inf where a joint's values are moved by two variables, or by one at two rates.
+    Bounds are inf where two variables move one pair of joints, or one variable moves them by two factors.
     """
     names = list(dict.fromkeys(line.variable for pair in pairs for line in (pair.a, pair.b) if line.slope))
     found = np.zeros((len(names), len(names)))
-    for i, j, most in _bends(steps, pairs, variables, frame):
+    for i, j, most in _second_derivatives(steps, pairs, variables, frame):
         if not most:
             continue
         if not all(pairs[k].a.slope and pairs[k].a.slope == pairs[k].b.slope for k in (i, j)):
@@ -74,29 +71,31 @@ def curvature(
     return names, found
 
 
-def _bends(
+def _second_derivatives(
     steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables, frame: FramePair
 ) -> Iterator[tuple[int, int, float]]:
-    """For two steps, i not in front of j, the largest second derivative by the joints' values."""
-    free = [_without_place(step) for step in steps]
+    """Yield i, j <= i and the largest second derivative by the values of joints i and j."""
+    free = [_as_free_vectors(step) for step in steps]
     d, y = at_the_frame(frame, COARSE)
     for i in reversed(range(len(steps))):
-        first = _derived(steps[i], pairs[i], variables, d, y)
+        first = _derivatives(steps[i], pairs[i], variables, d, y)
         if steps[i].kind == "turns":
-            yield i, i, _in_front(_crossed(free[i], *first), free[: i + 1], pairs, variables)
+            yield i, i, _pass_to_front(_cross_products(free[i], *first), free[: i + 1], pairs, variables)
         vectors = before_it(free[i], *first)
         for j in reversed(range(i)):
             if steps[j].kind == "turns":
-                second = _derived(free[j], pairs[j], variables, *vectors)
-                yield i, j, _in_front(second, free[: j + 1], pairs, variables)
+                second = _derivatives(free[j], pairs[j], variables, *vectors)
+                yield i, j, _pass_to_front(second, free[: j + 1], pairs, variables)
                 vectors = passed(free[j], pairs[j], variables, *vectors)
             else:
                 vectors = before_it(free[j], *vectors)
         d, y = passed(steps[i], pairs[i], variables, d, y)
 
 
-def _in_front(vectors: _Vectors, steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables) -> float:
-    """The largest d in front of all steps, of vectors behind the last one's L."""
+def _pass_to_front(
+    vectors: _Vectors, steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables
+) -> float:
+    """Return the largest d in front of all steps, from vectors behind the last step's L."""
     vectors = before_it(steps[-1], *vectors)
     for step, pair in zip(reversed(steps[:-1]), reversed(pairs[: len(steps) - 1]), strict=True):
         slides = step.kind != "turns"
@@ -104,17 +103,17 @@ def _in_front(vectors: _Vectors, steps: Sequence[Step], pairs: Sequence[Pair], v
     return vectors[0].largest()
 
 
-def _derived(step: Step, pair: Pair, variables: Variables, d: Support, y: Support) -> _Vectors:
-    """The derivatives of both by a joint's value, behind its L."""
+def _derivatives(step: Step, pair: Pair, variables: Variables, d: Support, y: Support) -> _Vectors:
+    """Return the derivatives of d and y by a joint's value, behind its L."""
     if step.kind != "turns":
         u, other = step.axis.direction, step.other.direction
         return point(d.grid, other - u), point(d.grid, other)
     d, y = difference(step, pair, variables, y, d), y.turned(step.other, *variables.range(pair.b))
-    return _crossed(step, d, y)
+    return _cross_products(step, d, y)
 
 
-def _crossed(step: Step, d: Support, y: Support) -> _Vectors:
-    """U x both."""
+def _cross_products(step: Step, d: Support, y: Support) -> _Vectors:
+    """Return the cross products of u with d and of u' with y."""
     G, axis, other = d.grid.points, step.axis, step.other
     most = 0.0
     if other is not axis:
@@ -126,27 +125,27 @@ def _crossed(step: Step, d: Support, y: Support) -> _Vectors:
     return bent, Support(d.grid, y.at(there) - there @ other.point)
 
 
-def _without_place(step: Step) -> Step:
-    """What a step does to vectors."""
+def _as_free_vectors(step: Step) -> Step:
+    """Return the step's effect on free vectors."""
     axis = Screw(step.axis.direction, _ORIGIN)
     other = axis if step.other is step.axis else Screw(step.other.direction, _ORIGIN)
     before = IDENTITY if step.before is IDENTITY else pose(step.before[:3, :3])
     return replace(step, axis=axis, other=other, before=before)
 
 
-#: How many boxes there may be at a time: a second or two of a processor for a frame.
+#: Largest number of boxes at a time: one or two seconds of a processor for a frame.
 MOST = 2**17
-#: So many are computed at a time: Jacobians of more would take gigabytes.
+#: Boxes computed in one batch: Jacobians of more would take gigabytes.
 TOGETHER = 2**16
 
 
 class Boxes:
-    """One frame's distance, looked at in boxes.
+    """Bounds of one frame's distance in boxes of configurations.
 
     Args:
         search: Both robots.
         frame: The frame.
-        names: Of the variables that move it: see `moved_together`.
+        names: Names of the variables that move it: see `moved_together`.
     """
 
     def __init__(self, search: Search, frame: FramePair, names: Sequence[str]) -> None:
@@ -155,12 +154,12 @@ class Boxes:
         self.middle = search.ends.mean(axis=1)
         trees = [robot.tree for robot in search.robots]
         self.frames = trees[0].link_frames[frame.a], trees[1].link_frames[frame.b]
-        # B's frame is seen from A's root, where it is another tool.
+        # B's frame as a tool, expressed in A's root frame.
         q = search.configurations(self.middle[np.newaxis])[1]
         base = trees[1].link_frames[search.found.base[1]]
         self.seen = search.hold @ inverse(urdfkins(search.robots[1], q, [base])[0, 0])
         self.tool = inverse(frame.tool)[:3, 3]
-        #: (nv, variables) rates of either robot by the variables'.
+        #: (nv, variables) derivatives of each robot's joint values by the variables.
         self.rates = [np.zeros((tree.nv, len(names))) for tree in trees]
         lines = {joint.name: Line(f"a:{joint.name}", 1.0, 0.0) for joint in trees[0].joints if joint.nv == 1}
         for rates, tree, own in zip(self.rates, trees, (lines, search.variables.leaders), strict=True):
@@ -169,7 +168,7 @@ class Boxes:
                     rates[tree.v_index[tree.joint_index(joint)], names.index(line.variable)] = line.slope
 
     def bounds(self, c: FloatArray, h: FloatArray) -> FloatArray:
-        """(n,) the largest |D + sum_i D_i x_i| over |x_i| <= h_i, at middles (n, variables)."""
+        """Bound |D + sum_i D_i x_i| over |x_i| <= h_i, (n,) for middles (n, variables)."""
         D, G = self.at_middles(c)
         size = np.sqrt((D * D).sum(axis=1))
         along = (D[:, :, np.newaxis] * G).sum(axis=1) / np.maximum(size, NOT_ZERO)[:, np.newaxis]
@@ -177,7 +176,7 @@ class Boxes:
         return np.asarray(np.hypot(size + np.abs(along) @ h, across @ h))
 
     def at_middles(self, c: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(n, 3) D and (n, 3, variables) its derivatives at values (n, variables)."""
+        """Return D (n, 3) and its derivatives (n, 3, variables) at values (n, variables)."""
         z = np.tile(self.middle, (len(c), 1))
         z[:, self.at] = c
         (a, b), (q_a, q_b) = self.search.robots, self.search.configurations(z)
@@ -189,7 +188,7 @@ class Boxes:
     def _origin(
         self, robot: Robot, q: FloatArray, frame: str, tool: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """(n, 3) where a point of a frame is, and (n, 3, nv) its Jacobian."""
+        """Return the position (n, 3) of a frame's point, and its Jacobian (n, 3, nv)."""
         T, J = urdfkins(robot, q, [frame])[:, 0], robot.jacobian(q, frame, verify=False)
         if not tool.any():
             return T[:, :3, 3], J[:, :3]
@@ -198,14 +197,14 @@ class Boxes:
 
 
 def tightened(search: Search, frame: FramePair, target: float, upper: float, most: int = MOST) -> float:
-    """A bound on a frame's distance, metres: `target` where that can be proven, else one of up to `upper`.
+    """Return a bound of a frame's distance, metres: `target` if it can be proven, else up to `upper`.
 
     Args:
         search: Both robots.
         frame: The frame.
-        target: What would be enough.
-        upper: What is proven already.
-        most: How many boxes there may be at a time.
+        target: The bound to prove.
+        upper: The bound that is proven already.
+        most: Largest number of boxes at a time.
     """
     variables = search.variables
     steps, pairs = moved_together(search.found, variables, frame)
@@ -224,7 +223,7 @@ def tightened(search: Search, frame: FramePair, target: float, upper: float, mos
     c, h, proven = ends.mean(axis=1)[np.newaxis], (ends[:, 1] - ends[:, 0]) / 2.0, np.array([upper])
     if not np.isfinite(M).all() or 2 ** _halvings(h, M, upper) > most:
         return upper
-    if not names:  # nothing on the way moves one against the other
+    if not names:  # no joint of the path changes the distance
         return min(upper, float(boxes.bounds(c, h)[0]))
     while len(c) and 2 * len(c) <= most:
         i = _longest(h, M)
@@ -243,16 +242,16 @@ def tightened(search: Search, frame: FramePair, target: float, upper: float, mos
 def moved_together(
     found: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[Step], list[Pair | None]]:
-    """The steps on the way to a frame from the first that differs, or that moves with one that does.
+    """Return the steps to a frame, from the first that differs or shares a variable with one that does.
 
-    What stands in front turns D and leaves its length, but a variable that moves a joint there, as the one
-    that a mimic joint behind it follows, bends D by that turn too.
+    A joint before the first difference rotates D and does not change its length. But its variable may also
+    move a mimic joint behind the difference. Then D depends on both motions, and the step is included.
     """
     steps, pairs = found.path(frame.previous), [variables.pairs[i] for i in found.indices(frame.previous)]
     first = len(steps) - len(behind_first(found, variables, frame)[0])
     for i in reversed(range(first)):
         if _variables(pairs[i : i + 1]) & _variables(pairs[first:]):
-            first = i  # what stands between brings its own variables
+            first = i  # the steps between have variables too
     return steps[first:], pairs[first:]
 
 
@@ -262,12 +261,12 @@ def _variables(pairs: Sequence[Pair | None]) -> set[str]:
 
 
 def _longest(h: FloatArray, M: FloatArray) -> int:
-    """The variable whose half width leaves most open."""
+    """Return the index of the variable that contributes most to the second-order term."""
     return int((h * (M @ h)).argmax())
 
 
 def _halvings(h: FloatArray, M: FloatArray, upper: float) -> int:
-    """How often a box has to be halved before it can tell anything."""
+    """Return how often a box must be halved until its bound can be below `upper`."""
     h, count = h.copy(), 0
     while 0.5 * h @ M @ h >= upper:
         h[_longest(h, M)] /= 2.0

@@ -1,4 +1,4 @@
-"""What `same` found as data that another can check again without searching."""
+"""Write the result of `same` as a certificate, and recheck a certificate without a search."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from urdfkin.model.mechanisms.variables import Variables, variables_of
 from urdfkin.model.tree import JointKind
 from urdfkin.robot import Robot
 
-#: How many boxes there may be at a time to prove a bound that is claimed.
+#: Largest number of boxes at a time when a claimed bound is proven.
 MOST_AGAIN = 2**22
-#: Up to what share numbers of a document are the same on any machine; m or rad that are 0 beside 0.
-_ALIKE, _ZERO = 1e-9, 1e-15
-#: By how many eps of it a bound that is proven again may be larger: its sums may round otherwise elsewhere.
+#: Relative tolerance of a document's numbers between machines; absolute tolerance (m or rad) for zero.
+_RELATIVE, _ZERO = 1e-9, 1e-15
+#: Tolerance of a bound that is proven again, in eps of the bound: sums round differently on other machines.
 _LAST_BITS = 64.0
-#: What is said of Pinocchio, and up to what share its two digits tell a number.
+#: The line of Pinocchio's confirmation, and the relative tolerance of its two digits.
 _CONFIRMATION = (
     r"Pinocchio \S+ finds at most (?P<metres>\d+(\.\d+)?(e[+-]?\d+)?) m at (?P<count>\d+) configurations, "
     "within the bounds"
@@ -37,12 +37,12 @@ _CONFIRMATION = (
 _TWO_DIGITS = 0.06
 #: The layout of the document, and its version.
 LAYOUT = "urdfkin-same-1"
-#: Parts that follow from how the models are laid on each other.
+#: Parts that follow from the alignment of the models.
 DERIVED = ("after", "remarks", "joints", "orders", "links", "base", "base_links", "rounding")
 
 
 def certificate(found: Sameness) -> dict[str, Any]:
-    """The document: map, verdict, differences, and of each frame its interval; null is "no bound"."""
+    """Return the document: map, verdict, differences and the interval of each frame; null is "no bound"."""
     models = zip(found.names, found.sources, found.digests, strict=True)
     return {
         "schema": LAYOUT,
@@ -92,109 +92,114 @@ def _interval(frame: Interval) -> dict[str, Any]:
 
 
 def recheck(document: Mapping[str, Any], a: Robot, b: Robot) -> list[str]:
-    """What of a certificate does not hold for two models; nothing where all of it does.
+    """Return the statements of a certificate that are wrong for two models; empty if all are right.
 
-    The models are laid on each other as the certificate says, so that nothing is searched. That has to be
-    something that two models of one robot may differ in: rigid motions, joints that there are, orders that
-    axes allow. What follows must be what it says, to the last remark; each lower bound is computed at its
-    configuration, by urdfkin and Pinocchio, each upper bound is proven again.
+    The models are aligned as the certificate states, so no search is needed. The stated alignment must be
+    allowed: its transforms are rigid motions, its joints exist, and the axes allow its orders. All statements
+    that follow from the alignment are compared, including the remarks. Each lower bound is computed at its
+    configuration by urdfkin and by Pinocchio. Each upper bound is proven again.
 
     Args:
-        document: What `certificate` made, checked against its schema.
+        document: The result of `certificate`, checked against its schema.
         a: The first model.
-        b: The second.
+        b: The second model.
 
     Raises:
-        InputError: it was made of other texts, or names what these models do not have.
+        InputError: the certificate is about other texts, or names a joint or link that a model lacks.
     """
     for which, robot in (("a", a), ("b", b)):
         if document[which]["sha256"] != digest(robot):
             raise InputError(
-                "the certificate was made of another text",
+                "the certificate is about another text",
                 where=f"model {which.upper()}",
                 found=f"SHA-256 {digest(robot)[:12]}..., not {document[which]['sha256'][:12]}...",
-                remedy="compare the models anew: urdfkin same A B",
+                remedy="compare the models again: urdfkin same A B",
             )
     try:
-        return list(_against(document, Comparator((a, b), {}, bounds=True)))
+        return list(_errors(document, Comparator((a, b), {}, bounds=True)))
     except UnknownNameError as error:
-        raise InputError("the certificate names what a model does not have", found=str(error)) from error
+        raise InputError(
+            "the certificate names a joint or link that a model lacks", found=str(error)
+        ) from error
 
 
-def _against(document: Mapping[str, Any], judge: Comparator) -> Iterator[str]:
+def _errors(document: Mapping[str, Any], comparator: Comparator) -> Iterator[str]:
     gauge = _gauge(document)
-    if (why := _not_a_gauge(document, gauge, judge)) is not None:
+    if (why := _not_a_gauge(document, gauge, comparator)) is not None:
         yield why
         return
-    found = align(*judge.mechanisms, {one["a"]: one["b"] for one in document["joints"]}, gauge)
-    variables = variables_of(found, judge.tolerance)
-    said = judge.said(found, variables)
-    wrong = list(_said_against(document, judge, said))
+    found = align(*comparator.mechanisms, {one["a"]: one["b"] for one in document["joints"]}, gauge)
+    variables = variables_of(found, comparator.tolerance)
+    said = comparator.said(found, variables)
+    wrong = list(_statement_errors(document, comparator, said))
     yield from wrong
     claims = {(frame["a"], frame["b"]): frame for frame in document["frames"]}
     if len(claims) < len(document["frames"]):
         yield "a frame has two intervals"
-    search = judge.search(found, variables)
+    search = comparator.search(found, variables)
     for frame, names in zip(found.frames, said.links, strict=True):
         if (claim := claims.pop(names, None)) is None:
             yield f"frame {names[0]} has no interval"
         else:
-            yield from _interval_against(search, frame, claim, said.rounding, sharply=not wrong)
-    yield from (f"frame {names[0]} is not one of both models" for names in claims)
+            yield from _interval_errors(search, frame, claim, said.rounding, sharply=not wrong)
+    yield from (f"frame {names[0]} is not a common frame of the models" for names in claims)
     if document["as_written"] is not None:
-        yield from _as_written_against(document["as_written"], judge, found, sharply=not wrong)
-    yield from _confirmation_against(document["checked"], judge, found, variables)
+        yield from _as_written_errors(document["as_written"], comparator, found, sharply=not wrong)
+    yield from _confirmation_errors(document["checked"], comparator, found, variables)
 
 
-def _said_against(document: Mapping[str, Any], judge: Comparator, said: Sameness) -> Iterator[str]:
-    """What does not hold of names, verdict, differences and all else that costs nothing to compute."""
-    for which, robot in zip("ab", judge.robots, strict=True):
+def _statement_errors(document: Mapping[str, Any], comparator: Comparator, said: Sameness) -> Iterator[str]:
+    """Yield the wrong statements about names, verdict, differences and everything else without a proof."""
+    for which, robot in zip("ab", comparator.robots, strict=True):
         if document[which]["name"] != robot.name:
             yield f"model {which.upper()}: its name is {robot.name}, not {document[which]['name']}"
     again = certificate(said)
     wrong = {one["words"]: one for one in again["differences"]}
     claimed = {one["words"]: one for one in document["differences"]}
-    yield from (f"not named as a difference: {words}" for words in wrong if words not in claimed)
+    yield from (f"not listed as a difference: {words}" for words in wrong if words not in claimed)
     yield from (f"no difference: {words}" for words in claimed if words not in wrong)
     if len(claimed) < len(document["differences"]):
-        yield "differences: one is named twice"
+        yield "differences: one is listed twice"
     for words, one in claimed.items():
         if words in wrong and not _same_difference(one, wrong[words], said.rounding):
-            yield f"differences: the models say otherwise of the size of: {words}"
+            yield f"differences: the size is wrong in: {words}"
     if document["verdict"] != said.verdict.value:
         yield f"the verdict is {said.verdict.value}, not {document['verdict']}"
     yield from (
-        f"{part}: the models say otherwise" for part in DERIVED if not _alike(document[part], again[part])
+        f"{part}: not what the models give" for part in DERIVED if not _equal(document[part], again[part])
     )
 
 
 def _same_difference(
     claimed: Mapping[str, Any], said: Mapping[str, Any], rounding: tuple[float, float]
 ) -> bool:
-    """Whether place, parameter and sizes of a difference are the same, these but for rounding."""
+    """Return whether place, parameter and sizes of a difference agree, sizes within rounding."""
     sizes = zip(("metres", "radians"), rounding, strict=True)
     return all(claimed[part] == said[part] for part in ("place", "what")) and all(
-        math.isclose(claimed[part], said[part], rel_tol=_ALIKE, abs_tol=most) for part, most in sizes
+        math.isclose(claimed[part], said[part], rel_tol=_RELATIVE, abs_tol=most) for part, most in sizes
     )
 
 
-def _confirmation_against(
-    claimed: str, judge: Comparator, found: Alignment, variables: Variables
+def _confirmation_errors(
+    claimed: str, comparator: Comparator, found: Alignment, variables: Variables
 ) -> Iterator[str]:
-    """What does not hold of Pinocchio's confirmation; one that says that it was not asked claims nothing."""
+    """Yield the wrong statements about Pinocchio's confirmation; a skipped check claims nothing."""
     if claimed.startswith(("not asked of Pinocchio: ", "not verified by Pinocchio: ")):
         return
     said = re.fullmatch(_CONFIRMATION, claimed)
     if said is None or int(said["count"]) != CONFIRMED:
-        yield "checked: no confirmation that urdfkin writes"
+        yield "checked: not a confirmation in the form that urdfkin writes"
         return
-    off, rounding = float(judge.asked(found, variables).max(initial=0.0)), judge.rounding(found, variables)[0]
+    off, rounding = (
+        float(comparator.pinocchio_distances(found, variables).max(initial=0.0)),
+        comparator.rounding(found, variables)[0],
+    )
     if not math.isclose(float(said["metres"]), off, rel_tol=_TWO_DIGITS, abs_tol=rounding):
         yield f"checked: Pinocchio finds at most {off:.2g} m, not {said['metres']} m"
 
 
 def _gauge(document: Mapping[str, Any]) -> Gauge:
-    """What is free, as the document has it."""
+    """Return the gauge that the document states: base, senses, zeros, conversions and orders."""
     joints, base = document["joints"], document["base_links"]
     return Gauge(
         (base[0], base[1]),
@@ -209,52 +214,54 @@ def _gauge(document: Mapping[str, Any]) -> Gauge:
     )
 
 
-def _not_a_gauge(document: Mapping[str, Any], gauge: Gauge, judge: Comparator) -> str | None:
-    """Why what is said to be free is nothing that a model may differ in; None where it is."""
-    a, b = judge.mechanisms
+def _not_a_gauge(document: Mapping[str, Any], gauge: Gauge, comparator: Comparator) -> str | None:
+    """Return why the stated gauge is not allowed; None if it is allowed."""
+    a, b = comparator.mechanisms
     for joint in document["joints"]:
         a.tree.joint_index(joint["a"])
         b.tree.joint_index(joint["b"])
     if not is_pose(JointKind.FLOATING, gauge.X):
-        return "base: no rigid motion"
+        return "base: not a rigid motion"
     for name, made in gauge.conversions.items():
         if not made.holds_for(a.tree.joints[a.tree.joint_index(name)].kind):
-            return f"joint {name}: B's joint cannot be where its conversion says"
+            return f"joint {name}: its conversion is not possible for a joint of this kind"
     for names in gauge.orders:
-        if not b.may_be_taken(names, judge.tolerance):
-            return f"orders: axes do not allow {', '.join(names)}"
+        if not b.may_be_taken(names, comparator.tolerance):
+            return f"orders: the axes do not allow {', '.join(names)}"
         b = b.in_order(names)
     return None
 
 
-def _alike(claimed: Any, said: Any) -> bool:
-    """Whether two parts of a document are the same, numbers but for the last digits."""
+def _equal(claimed: Any, said: Any) -> bool:
+    """Return whether two parts of a document are equal, numbers except for their last digits."""
     if isinstance(said, dict):
-        return claimed.keys() == said.keys() and all(_alike(claimed[key], said[key]) for key in said)
+        return claimed.keys() == said.keys() and all(_equal(claimed[key], said[key]) for key in said)
     if isinstance(said, list):
-        return len(claimed) == len(said) and all(map(_alike, claimed, said))
+        return len(claimed) == len(said) and all(map(_equal, claimed, said))
     if isinstance(said, float) and isinstance(claimed, float | int):
-        return math.isclose(claimed, said, rel_tol=_ALIKE, abs_tol=_ZERO)
+        return math.isclose(claimed, said, rel_tol=_RELATIVE, abs_tol=_ZERO)
     return bool(claimed == said)
 
 
-def _as_written_against(
-    claim: Mapping[str, Any], judge: Comparator, found: Alignment, *, sharply: bool
+def _as_written_errors(
+    claim: Mapping[str, Any], comparator: Comparator, found: Alignment, *, sharply: bool
 ) -> Iterator[str]:
-    """What does not hold of how far a frame is off with nothing put right."""
-    written = judge.as_written(found)
-    variables = variables_of(written, judge.tolerance)
-    names = [(judge.trees[0].links[frame.a], judge.trees[1].links[frame.b]) for frame in written.frames]
+    """Yield the wrong statements about the largest distance of a frame as written."""
+    written = comparator.as_written(found)
+    variables = variables_of(written, comparator.tolerance)
+    names = [
+        (comparator.trees[0].links[frame.a], comparator.trees[1].links[frame.b]) for frame in written.frames
+    ]
     if (claim["a"], claim["b"]) not in names:
-        yield f"as written: frame {claim['a']} is not one of both models"
+        yield f"as written: frame {claim['a']} is not a common frame of the models"
         return
     frame = written.frames[names.index((claim["a"], claim["b"]))]
-    search, rounding = judge.search(written, variables), judge.rounding(written, variables)
-    against = _interval_against(search, frame, claim, rounding, sharply=sharply)
-    yield from (f"as written: {line}" for line in against)
+    search, rounding = comparator.search(written, variables), comparator.rounding(written, variables)
+    problems = _interval_errors(search, frame, claim, rounding, sharply=sharply)
+    yield from (f"as written: {line}" for line in problems)
 
 
-def _interval_against(
+def _interval_errors(
     search: Search,
     frame: FramePair,
     claim: Mapping[str, Any],
@@ -262,19 +269,19 @@ def _interval_against(
     *,
     sharply: bool,
 ) -> Iterator[str]:
-    """What does not hold of an interval: its lower bound is computed, its upper ones are proven again.
+    """Yield the wrong statements about an interval: compute its lower bound, prove its upper bounds.
 
     Args:
         search: Both robots.
         frame: The frame.
-        claim: What the document says of it.
-        rounding: (m, rad) that is taken for none.
-        sharply: Whether an upper bound that costs boxes is proven; in vain where another part is wrong.
+        claim: The document's statement about the frame.
+        rounding: (m, rad) that counts as zero.
+        sharply: Whether to prove an upper bound by branch and bound; useless if another part is wrong.
     """
-    against = list[str]()
+    problems = list[str]()
     if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:
-        against += _not_attained(search, frame, claim, rounding)
-    yield from against
+        problems += _not_attained(search, frame, claim, rounding)
+    yield from problems
     metres = (math.inf if claim["upper"] is None else claim["upper"]) - rounding[0]
     radians = (math.inf if claim["radians"] is None else claim["radians"]) - rounding[1]
     for grid in (COARSE, FINE):
@@ -285,27 +292,27 @@ def _interval_against(
         return
     place = f"frame {claim['a']}"
     if _within(proven[1], radians, rounding[1]):
-        if against or not sharply:
+        if problems or not sharply:
             return
-        # A claim below what is attained is not searched for: no search could prove it.
+        # A claimed bound below an attained distance cannot be proven.
         attained = max(claim["lower"], float(search.seen([frame])[0].max()))
         if metres < attained - 2.0 * rounding[0]:
-            yield f"{place}: its upper bound is not proven, it is {attained:.6g} m off somewhere"
+            yield f"{place}: its upper bound is wrong: {attained:.6g} m is attained"
             return
         proven = tightened(search, frame, metres, proven[0], MOST_AGAIN), proven[1]
         if _within(proven[0], metres, rounding[0]):
             return
-    yield f"{place}: its upper bound is not proven, {proven[0]:.6g} m and {proven[1]:.6g} rad are"
+    yield f"{place}: its upper bound is not proven; {proven[0]:.6g} m and {proven[1]:.6g} rad are proven"
 
 
 def _not_attained(
     search: Search, frame: FramePair, claim: Mapping[str, Any], rounding: tuple[float, float]
 ) -> Iterator[str]:
-    """Why a lower bound is none: its configurations, or what either library finds there."""
+    """Yield why a lower bound is wrong: its configurations, or the distance that a library finds there."""
     place = f"frame {claim['a']}"
     q_a, q_b = np.array([claim["q_a"]]), np.array([claim["q_b"]])
     if not search.belong_together(q_a, q_b):
-        yield f"{place}: its configurations do not belong together, or leave the limits"
+        yield f"{place}: its configurations do not correspond to each other, or leave the limits"
         return
     for computed, by in ((urdfkins, "urdfkin"), (pinocchios, "Pinocchio")):
         turned, off = apart(*(Ts[0, 0] for Ts in search.poses_at(q_a, q_b, [frame], computed)))
@@ -316,5 +323,5 @@ def _not_attained(
 
 
 def _within(proven: float, claimed: float, rounding: float) -> bool:
-    """Whether a bound that is proven allows the one that is claimed: both round, the same way or not."""
+    """Return whether the proven bound confirms the claimed one, except for rounding."""
     return proven <= claimed + rounding + _LAST_BITS * EPS * abs(claimed) if math.isfinite(claimed) else True

@@ -1,4 +1,4 @@
-"""What changed between two versions of one description, and how far each change moves a frame."""
+"""List the changes between two versions of a robot description, and bound how far each moves a frame."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from urdfkin.urdf.plain_xml import plain_xml
 from urdfkin.urdf.sources import Source
 from urdfkin.urdf.writer import to_urdf
 
-#: Attributes that are several numbers, and what each is called.
+#: Attributes of several numbers, and the name of each number.
 _PARTS = {"xyz": ("x", "y", "z"), "rpy": ("roll", "pitch", "yaw")}
-#: What holds of a joint where its file says nothing.
+#: Values of a joint's attributes that the file omits.
 _DEFAULTS = {f"origin {part}": 0.0 for parts in _PARTS.values() for part in parts}
 _AXIS = {"axis x": 1.0, "axis y": 0.0, "axis z": 0.0}
 _RULE = {"mimic multiplier": 1.0, "mimic offset": 0.0}
-#: What of a joint moves links.
+#: Attributes of a joint that affect the motion of links.
 _MOVING = ("", "origin", "axis", "mimic", "type", "parent", "child")
 
 Value = float | str
@@ -33,13 +33,13 @@ Value = float | str
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One attribute that is another, or an element that only one version has.
+    """One changed attribute, or an element that only one version has.
 
     Attributes:
-        element: "joint elbow", "link tool".
-        what: "origin x", "mass", ...; "" where the element itself came or went.
-        old: None where there was nothing.
-        new: None where there is nothing any more.
+        element: The element, for example "joint elbow" or "link tool".
+        what: The attribute, for example "origin x" or "mass"; "" where the whole element is new or gone.
+        old: The old value; None where the old version has none.
+        new: The new value; None where the new version has none.
     """
 
     element: str
@@ -49,7 +49,7 @@ class Change:
 
     @property
     def moves(self) -> bool:
-        """Whether links may move otherwise for it."""
+        """Whether the change can affect the motion of links."""
         return self.element.startswith("joint ") and self.what.split(" ")[0] in _MOVING
 
     def __str__(self) -> str:
@@ -59,14 +59,14 @@ class Change:
 
 
 def word(value: Value | None) -> str:
-    """As a reviewer would write it."""
+    """Return a value as text: the shortest decimal that reads back exactly, or "none"."""
     if isinstance(value, float):
         return next(text for text in (f"{value:.15g}", repr(value)) if float(text) == value)
     return "none" if value is None else value
 
 
 def motion_words(frame: Interval, moves: str = "move", turns: str = "turn") -> str:
-    """How far changes move a frame; where they do not, how far they turn it."""
+    """Return in words how far changes move a frame, or how far they turn it if they do not move it."""
     if frame.lower == 0.0:
         return f"{turns} {frame.frame} by up to {up_to(angle, frame.radians_seen, frame.radians)}"
     return f"{moves} {frame.frame} by up to {up_to(length, frame.lower, frame.upper)}"
@@ -74,14 +74,14 @@ def motion_words(frame: Interval, moves: str = "move", turns: str = "turn") -> s
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """The frame that one joint's changes alone move most, and the interval of its distance."""
+    """The frame that the changes of one joint alone move most, and the interval of its distance."""
 
     element: str
     interval: Interval
 
     @property
     def words(self) -> str:
-        """What they do."""
+        """The effect in words, for example "moves tool0 by up to 38 mm"."""
         return motion_words(self.interval, "moves", "turns")
 
     def __str__(self) -> str:
@@ -90,13 +90,13 @@ class Effect:
 
 @dataclass(frozen=True, slots=True)
 class Changes:
-    """What changed between two versions of a description; make one with `urdfkin.diff`.
+    """The changes between two versions of a description; the result of `urdfkin.diff`.
 
     Attributes:
-        sources: What was given.
-        changes: In the order of the file: joints, links, then the robot itself.
-        effects: Of joints whose changes move links, each alone.
-        total: Of all changes together, the farthest frame; None where nothing moves.
+        sources: The two sources, as given.
+        changes: The changes: the robot's name, then joints, then links, in the order of the file.
+        effects: The effect of each joint whose changes move links, each joint alone.
+        total: The farthest frame under all changes together; None where nothing moves.
     """
 
     sources: tuple[str, str]
@@ -110,17 +110,17 @@ class Changes:
 
     @property
     def effect_of(self) -> dict[str, Effect]:
-        """By element."""
+        """The effects by element."""
         return {effect.element: effect for effect in self.effects}
 
 
 def diff(a: Robot | Source | DHTable, b: Robot | Source | DHTable, *, effects: bool = True) -> Changes:
-    """What changed from one version of a description to another, as a reviewer would say it.
+    """List the changes from one version of a description to another, attribute by attribute.
 
     Args:
-        a: The old version: a robot, or what `load` takes.
-        b: The new one.
-        effects: Whether to bound how far each joint's changes move the frames behind it.
+        a: The old version: a robot, or a source for `load`.
+        b: The new version, likewise.
+        effects: Whether to bound how far the changes of each joint move the frames behind it.
 
     Raises:
         UrdfError: a version with errors; SourceError, UnknownNameError, InputError: as `load`.
@@ -157,8 +157,8 @@ def _changes(old: str, new: str) -> Iterator[Change]:
 
 
 def _facts(element: Element, tag: str) -> dict[str, Value]:
-    """Everything that an element says: the way to it in words, and the value."""
-    found = dict(_said(element, ""))
+    """Return the attributes of an element and its children: the path in words, and the value."""
+    found = dict(_attributes(element, ""))
     found.pop("name", None)
     if tag == "joint":
         defaults: dict[str, Value] = dict(_DEFAULTS)
@@ -168,7 +168,7 @@ def _facts(element: Element, tag: str) -> dict[str, Value]:
     return found
 
 
-def _said(element: Element, way: str) -> Iterator[tuple[str, Value]]:
+def _attributes(element: Element, way: str) -> Iterator[tuple[str, Value]]:
     for name, text in element.attrib.items():
         if (parts := _PARTS.get(name)) and len(words := text.split()) == len(parts):
             yield from (
@@ -181,7 +181,7 @@ def _said(element: Element, way: str) -> Iterator[tuple[str, Value]]:
     for k, child in enumerate(element):
         if isinstance(child.tag, str):
             count = f" {tags[: k + 1].count(child.tag)}" if tags.count(child.tag) > 1 else ""
-            yield from _said(child, f"{way} {child.tag}{count}".strip())
+            yield from _attributes(child, f"{way} {child.tag}{count}".strip())
 
 
 def _value(text: str) -> Value:
@@ -190,7 +190,7 @@ def _value(text: str) -> Value:
 
 
 def _effect(old: Robot, new: Robot, element: str) -> Effect | None:
-    """What one joint's changes do alone: the old robot with that joint of the new one."""
+    """Compute the effect of one joint's changes alone: the old robot with that joint of the new one."""
     name = element.removeprefix("joint ")
     trees = old.tree, new.tree
     if any(name not in {joint.name for joint in tree.joints} for tree in trees):
@@ -204,15 +204,15 @@ def _effect(old: Robot, new: Robot, element: str) -> Effect | None:
     if ends[0] != ends[1] or (joint.mimic and joint.mimic.leader not in {j.name for j in trees[0].joints}):
         return None
     try:
-        changed = load(to_urdf(_exchanged(trees[0], at, joint)), verify=False)
+        changed = load(to_urdf(_with_joint(trees[0], at, joint)), verify=False)
         plain = load(to_urdf(trees[0]), verify=False)
-    except InputError:  # what a URDF cannot say once more has no effect that could be computed so
+    except InputError:  # a model that cannot be written as a URDF again: no effect is computed
         return None
     worst = same(plain, changed).worst_as_written
     return None if worst is None else Effect(element, worst)
 
 
-def _exchanged(tree: KinematicTree, at: int, joint: Joint) -> KinematicTree:
+def _with_joint(tree: KinematicTree, at: int, joint: Joint) -> KinematicTree:
     joints = list(tree.joints)
     joints[at] = replace(joint, parent=joints[at].parent)
     return KinematicTree(tree.name, tree.links, tuple(joints))

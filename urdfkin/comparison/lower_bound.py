@@ -1,9 +1,9 @@
-"""How far apart a frame of two models does come: the worst configuration that a search finds.
+"""Search the configuration with the largest distance between a frame of two models.
 
-Whatever it finds is attained, so that its distance is a lower bound; how near that is to the largest one,
-the upper bound tells (`urdfkin.model.mechanisms.upper_bound`). Each joint's value enters a position as a
-sine and a cosine, so that going along one coordinate after the other, from the worst of many configurations,
-ends well.
+The distance at the configuration found is attained, so it is a lower bound of the largest distance. The upper
+bound (`urdfkin.model.mechanisms.upper_bound`) limits how far the search can be off. Each joint value enters a
+position as a sine and a cosine. Therefore coordinate search from the worst of many random configurations
+works well.
 """
 
 from __future__ import annotations
@@ -24,27 +24,27 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.verify.sampling import sample
 
-#: Random configurations that a search begins with, and those of them that are corners of all ranges.
+#: Number of random configurations, and of corners of all ranges, at the start of a search.
 SAMPLES, CORNERS = 512, 128
-#: How many of the worst are climbed from, and values that are tried along a coordinate.
+#: Number of the worst configurations that the search starts from, and of values tried along a coordinate.
 STARTS, ALONG = 4, 13
-#: Frames that climb in one batch.
+#: Frames that are searched in one batch.
 TOGETHER = 24
-#: By which part of its range a coordinate is moved, round by round.
+#: Share of its range within which a coordinate is varied, round by round.
 WINDOWS = (1.0, 1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001)
 
-#: Who computes (n, frames, 4, 4) of a robot at q for frames.
+#: Computes the poses (n, frames, 4, 4) of a robot's frames at q.
 Placements = Callable[[Robot, FloatArray, Sequence[str]], FloatArray]
 
 
 class Search:
-    """Both robots, moved together.
+    """Search over the common variables of two aligned robots.
 
     Args:
         robots: A and B.
-        found: How they lie on each other.
-        variables: What moves them.
-        seed: Of the configurations that it begins with.
+        found: The alignment of the robots.
+        variables: The variables that move both robots.
+        seed: Seed of the random configurations.
     """
 
     def __init__(
@@ -54,9 +54,9 @@ class Search:
         self.names = list(variables.ranges)
         self.ends = np.array([self._ends(name) for name in self.names]).reshape(-1, 2)
         self.rng = np.random.default_rng(seed)
-        #: (4, 4) where B's base link stands, seen from A's root; it moves with A's base link.
+        #: (4, 4) pose of B's base link in A's root frame; it moves with A's base link.
         self.hold = found.X @ found.b.homes[found.base[1]]
-        #: Whether either base link is on the robot's root body.
+        #: For each robot, whether its base link is on the root body.
         self.stands = tuple(
             m.body_of[link] == 0 for m, link in zip((found.a, found.b), found.base, strict=True)
         )
@@ -72,11 +72,11 @@ class Search:
         )
 
     def configurations(self, z: FloatArray, *, moved: bool = False) -> tuple[FloatArray, FloatArray]:
-        """(n, nq) of A and of B for values (n, variables).
+        """Return configurations (n, nq) of A and of B for values (n, variables).
 
         Args:
-            z: The values.
-            moved: Whether A's planar and floating joints are anywhere, not at home.
+            z: The values of the variables.
+            moved: Whether A's planar and floating joints are random instead of neutral.
         """
         values = dict(zip(self.names, z.T, strict=True))
         tree_a, tree_b = (robot.tree for robot in self.robots)
@@ -97,7 +97,7 @@ class Search:
         return q_a, q_b
 
     def belong_together(self, q_a: FloatArray, q_b: FloatArray) -> bool:
-        """Whether (1, nq) of either robot are one configuration of both, within all ranges, to rounding."""
+        """Return whether two configurations (1, nq) correspond and are within all ranges, to rounding."""
         sizes = tuple(robot.nq for robot in self.robots)
         if (q_a.shape, q_b.shape) != ((1, sizes[0]), (1, sizes[1])):
             return False
@@ -112,13 +112,13 @@ class Search:
         return bool(off.all() and (low - room <= z).all() and (z <= high + room).all())
 
     def poses(self, z: FloatArray, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
-        """(n, frames, 4, 4) of A at values (n, variables), and of B with its base where A's is."""
+        """Return poses (n, frames, 4, 4) of A and of B, on A's base, at values (n, variables)."""
         return self.poses_at(*self.configurations(z), frames, urdfkins)
 
     def poses_at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
     ) -> tuple[FloatArray, FloatArray]:
-        """`poses` at configurations of each robot, (n, nq), by whom `computed` says."""
+        """Return `poses` at configurations (n, nq) of each robot, computed by the function `computed`."""
         a, b = self.robots
         Ts_a = computed(a, q_a, [a.tree.link_frames[frame.a] for frame in frames])
         base = b.tree.link_frames[self.found.base[1]]
@@ -134,20 +134,20 @@ class Search:
     def at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
     ) -> FloatArray:
-        """(n, frames) how far (m) frames are off at configurations of each robot, (n, nq)."""
+        """Return distances (n, frames), metres, at configurations (n, nq) of each robot."""
         return _distances(*self.poses_at(q_a, q_b, frames, computed))
 
     def random(self, n: int) -> FloatArray:
-        """(n, variables) values within their ranges."""
+        """Return random values (n, variables) within their ranges."""
         low, high = self.ends.T
         return np.asarray(low + (high - low) * self.rng.random((n, len(self.names))))
 
     def metres(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """(n, frames) how far the frames' origins are apart; arguments as `poses`."""
+        """Return distances (n, frames) of the frames' origins, metres; arguments as for `poses`."""
         return _distances(*self.poses(z, frames))
 
     def seen(self, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
-        """(n, frames) distances at random values and corners of the ranges; the values (n, variables)."""
+        """Return distances (n, frames) at random values and at corners of the ranges, and these values."""
         low, high = self.ends.T
         z = self.random(SAMPLES)
         corners = np.where(self.rng.random((CORNERS, len(self.names))) < 0.5, low, high)
@@ -155,32 +155,32 @@ class Search:
         return self.metres(z, frames), z
 
     def worst(self, frames: Sequence[FramePair]) -> list[tuple[float, FloatArray]]:
-        """For each frame the largest distance found (m) and the values there."""
+        """Return for each frame the largest distance found, metres, and the values there."""
         found: list[tuple[float, FloatArray]] = []
         for first in range(0, len(frames), TOGETHER):
             some = frames[first : first + TOGETHER]
             off, z = self.seen(some)
-            found += self._climbed(some, z[np.argsort(-off, axis=0)[:STARTS].T])
+            found += self._climb(some, z[np.argsort(-off, axis=0)[:STARTS].T])
         return found
 
     def most_turned(self, frame: FramePair) -> FloatArray:
-        """(variables,) of random values and corners of the ranges those at which a frame is turned most."""
+        """Return the sampled values (variables,) at which a frame's orientations differ most."""
         z = self.seen([frame])[1]
         Ts_a, Ts_b = self.poses(z, [frame])
         turned = [apart(T, other)[0] for T, other in zip(Ts_a[:, 0], Ts_b[:, 0], strict=True)]
         return np.asarray(z[int(np.argmax(turned))])
 
-    def _climbed(self, frames: Sequence[FramePair], z: FloatArray) -> list[tuple[float, FloatArray]]:
-        """The best that going along one coordinate after the other leads to.
+    def _climb(self, frames: Sequence[FramePair], z: FloatArray) -> list[tuple[float, FloatArray]]:
+        """Maximize each frame's distance by coordinate search.
 
         Args:
-            frames: Each climbs on its own, all in one batch.
-            z: (frames, starts, variables).
+            frames: The frames; each is searched separately, all in one batch.
+            z: (frames, starts, variables) start values.
         """
-        ways = [self._on_the_way(frame) for frame in frames]
+        ways = [self._variables_of(frame) for frame in frames]
         low, high = self.ends.T
         k, s = np.ogrid[: len(frames), : z.shape[1]]
-        best = self._own(z[:, :, np.newaxis], frames)[..., 0]
+        best = self._own_distances(z[:, :, np.newaxis], frames)[..., 0]
         steps = np.linspace(-0.5, 0.5, ALONG)
         for window in WINDOWS:
             for turn in range(max(map(len, ways))):
@@ -197,7 +197,7 @@ class Search:
                 tried[
                     k[..., np.newaxis], s[..., np.newaxis], np.arange(ALONG), i[:, np.newaxis, np.newaxis]
                 ] = values
-                off = self._own(tried, frames)
+                off = self._own_distances(tried, frames)
                 at = off.argmax(axis=2)
                 better = off[k, s, at] > best
                 z = np.where(better[..., np.newaxis], tried[k, s, at], z)
@@ -205,15 +205,15 @@ class Search:
         at = best.argmax(axis=1)
         return [(float(best[n, m]), z[n, m]) for n, m in enumerate(at)]
 
-    def _own(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """(frames, starts, values) distances of each frame at values of its own, with variables last."""
-        flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])  # of robots that nothing moves, too
+    def _own_distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
+        """Return distances (frames, starts, values) of each frame at its own values, variables last."""
+        flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])  # also for robots without variables
         off = self.metres(flat, frames).reshape(*z.shape[:-1], len(frames))
         n = np.arange(len(frames))
         return np.asarray(off[n, :, :, n])
 
-    def _on_the_way(self, frame: FramePair) -> list[int]:
-        """The variables that move a frame in either model."""
+    def _variables_of(self, frame: FramePair) -> list[int]:
+        """Return the indices of the variables that move a frame in at least one model."""
         steps = set(self.found.indices(frame.previous))
         names = {
             line.variable
@@ -234,12 +234,12 @@ def _distances(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def urdfkins(robot: Robot, q: FloatArray, frames: Sequence[str]) -> FloatArray:
-    """(n, frames, 4, 4) by the recursion."""
+    """Return poses (n, frames, 4, 4) computed by the forward recursion."""
     return robot.placement(q, frames, verify=False)
 
 
 def pinocchios(robot: Robot, q: FloatArray, frames: Sequence[str]) -> FloatArray:
-    """(n, frames, 4, 4) as Pinocchio reads the robot's text."""
+    """Return poses (n, frames, 4, 4) computed by Pinocchio from the robot's text."""
     return robot.verifier.oracle().placements(q, frames)
 
 

@@ -1,4 +1,4 @@
-"""What was found out about two models: the verdict, what it rests on, and how to use it."""
+"""The result of comparing two models: verdict, differences, joint map and intervals of distance."""
 
 from __future__ import annotations
 
@@ -16,32 +16,32 @@ from urdfkin.model.configuration import checked, neutral
 from urdfkin.model.mechanisms.mechanism import JointTransform
 from urdfkin.model.tree import FloatArray, KinematicTree
 
-#: A tenth, as four digits round to it: from there on a prefix serves; none does from nine of them on.
+#: Smallest number printed with a prefix (0.1 to four digits); the unit alone is used from 9 times it on.
 _TENTH, _NINE = 0.09995, 9.0
 
 
 class Verdict(Enum):
-    """How two models move: alike, alike up to what `Sameness.up_to` names, or not."""
+    """Whether two models are the same, equivalent up to the kinds in `Sameness.up_to`, or different."""
 
     SAME = "same"
     SAME_AFTER = "same after"
     DIFFERS = "differs"
 
 
-#: What B may differ in from A and still be equivalent, in the order in which it is named.
+#: Kinds of changes up to which two models are equivalent, in the order of the headline.
 FREE = ("base", "zeros", "senses", "free joints", "tools")
-#: What a difference may be of if each frame that both have is still bounded.
+#: Kinds of differences for which the distance of each common frame is still bounded.
 BOUNDED = frozenset({"axis", "place", "frame", "mimic rule", "fixed"})
 
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """What is asked of two models.
+    """A question about two models.
 
     Attributes:
-        within: Metres and radians by which frames may be off as written; None: whether the models are
-            equivalent.
-        strict: Whether being equivalent only, and remarks, count as differences.
+        within: Largest allowed distance of a frame as written, in metres and in radians. None: ask whether
+            the models are equivalent.
+        strict: Whether equivalent models and models with remarks count as different.
     """
 
     within: float | None = None
@@ -50,17 +50,17 @@ class Question:
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """A frame's largest distance over all configurations within limits lies in here.
+    """An interval that contains a frame's largest distance over all configurations within limits.
 
     Attributes:
-        frame: Link of A, and
-        frame_b: of B.
-        lower: Metres, attained at `q_a` and `q_b`.
-        upper: Metres, proven; inf where nothing bounds it.
-        radians: What its orientations differ by at most, proven.
-        radians_seen: What they do differ by somewhere.
+        frame: The link of A.
+        frame_b: The link of B.
+        lower: Lower bound, metres; attained at `q_a` and `q_b`.
+        upper: Upper bound, metres, proven; inf where there is no bound.
+        radians: Upper bound of the angle between the orientations, proven.
+        radians_seen: An attained angle between the orientations.
         q_a: Configuration of A.
-        q_b: The one of B that belongs to it.
+        q_b: The corresponding configuration of B.
     """
 
     frame: str
@@ -75,14 +75,14 @@ class Interval:
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """One place where two models differ.
+    """One difference between two models.
 
     Attributes:
-        place: The joint or link of A, "joint elbow".
+        place: The joint or link of A, for example "joint elbow".
         what: The parameter in words, without the size: "axis", "origin", "mimic rule", "only in A", ...
-        words: All of it in a line.
-        radians: By how much, 0 where that says nothing.
-        metres: Likewise.
+        words: The difference in one line.
+        radians: Size of the difference as an angle, 0 where it has none.
+        metres: Size of the difference as a length, 0 where it has none.
     """
 
     place: str
@@ -94,9 +94,9 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class JointMap:
-    """A joint of A and what it is in B: value_b = sense * value_a + offset (rad, m).
+    """A joint of A and its joint of B: value_b = sense * value_a + offset (rad, m).
 
-    A planar or floating joint has the sense 1 and the offset 0, and a conversion where it counts otherwise.
+    A planar or floating joint has the sense 1 and the offset 0. It has a conversion where its pose differs.
     """
 
     a: str
@@ -108,31 +108,32 @@ class JointMap:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sameness:
-    """Whether two models are one robot; make one with `urdfkin.same`.
+    """Whether two models are the same robot; the result of `urdfkin.same`.
 
     Attributes:
         names: The robots' names.
-        sources: What was given.
+        sources: The two sources, as given.
         digests: SHA-256 of the two texts.
-        verdict: `Verdict.SAME`, `SAME_AFTER` what `after` says, or `DIFFERS`.
-        after: What has to be done for them to agree, a line each; also where they differ even then.
-        up_to: Of what these are, in standard words: "base", "zeros", "senses", "free joints", "tools".
-        differences: Where they do differ, from the base outwards; the first is the first place.
-        remarks: What is no matter of where things move: limits, kinds, links that only one has.
-        joints: Joints of A and of B that are each other's.
-        links: Likewise.
-        orders: Joints of B that were taken in another order, which their axes allow, run by run.
-        base: (4, 4) pose of B's root in A's root frame, at home; the identity where both stand alike.
-        base_links: The link of A, and the one of B on the same body, that both are seen from.
-        rounding: (m, rad) that frames may lie apart where nothing is said to differ.
-        frames: Of each link that both have, after what `after` says.
-        as_written: The same without it: of the frame that is then farthest; None where nothing has to be
-            done.
-        written: (m, rad) by which any frame of both is off at most as written, proven; infinite where
-            there is no bound. Of a table, frames that it names as the robot does.
-        narrowed: Joints whose mimic joints leave their limits, a line each; intervals cover all of a joint's
-            own range.
-        checked: What Pinocchio confirmed, or why it did not.
+        verdict: `Verdict.SAME`, `SAME_AFTER` the changes in `after`, or `DIFFERS`.
+        after: The changes of B that bring it closest to A, one line each; also where the models still differ.
+        up_to: The kinds of these changes: "base", "zeros", "senses", "free joints", "tools".
+        differences: The differences, ordered from the base to the tips.
+        remarks: Differences that do not affect motion: limits, kinds, links of one model only.
+        joints: The matched joints of A and B.
+        links: The matched links of A and B.
+        orders: Runs of joints of B that were taken in another order, which their axes allow.
+        base: (4, 4) pose of B's root in A's root frame, in the zero configuration; the identity where they
+            agree.
+        base_links: The link of A and the link of B, on the same body, relative to which poses are compared.
+        rounding: (m, rad) distance of frames that counts as rounding.
+        frames: The interval of each common link, with the changes in `after`.
+        as_written: The interval of the farthest frame without these changes; None where there are none.
+        written: (m, rad) proven bound of all common frames as written; infinite where there is no bound. Of
+            a table, only frames that have the same name in the robot count.
+        narrowed: Joints whose mimic joints leave their limits, one line each. Intervals cover the whole
+            range of the joint itself.
+        checked: Pinocchio's confirmation, or the reason why there is none.
+        trees: The two robot models.
     """
 
     names: tuple[str, str]
@@ -157,7 +158,7 @@ class Sameness:
     trees: tuple[KinematicTree, KinematicTree]
 
     def __bool__(self) -> bool:
-        """Whether they are the same, if need be after `after`."""
+        """Whether the models are the same or equivalent."""
         return self.verdict is not Verdict.DIFFERS
 
     def __repr__(self) -> str:
@@ -167,7 +168,7 @@ class Sameness:
 
     @property
     def worst(self) -> Interval | None:
-        """The frame whose distance may be largest, or its angle; None where none is off beyond rounding."""
+        """The frame with the largest bound of its distance, or of its angle; None if all are rounding."""
         metres, radians = self.rounding
         return max(
             (one for one in self.frames if one.lower > 0.0 or one.upper > metres or one.radians > radians),
@@ -177,39 +178,39 @@ class Sameness:
 
     @property
     def worst_as_written(self) -> Interval | None:
-        """The same at equal coordinates, with nothing put right."""
+        """The frame with the largest bound at equal coordinates, without the changes in `after`."""
         return self.as_written or self.worst
 
     def within(self, most: float) -> bool:
-        """Whether no frame of both is ever off by more (m and rad) as both models are written: proven.
+        """Return whether all common frames provably stay within a distance (m and rad) as written.
 
-        Roots are laid on each other, and equal coordinates are compared: a base, a zero or a tool that is
-        elsewhere counts. Models with joints of another kind, or that only one has, are never within.
+        The roots coincide, and equal coordinates are compared. So a different base, zero or tool counts.
+        The result is False if a joint has another kind or exists in one model only.
         """
         return {one.what for one in self.differences} <= BOUNDED and max(self.written) <= most
 
     def holds(self, question: Question) -> bool:
-        """Whether the answer to a question is yes."""
+        """Return whether the answer to a question is yes."""
         if not (bool(self) if question.within is None else self.within(question.within)):
             return False
         return not (question.strict and (self.verdict is Verdict.SAME_AFTER or self.remarks))
 
     def exit_code(self, *, strict: bool = False, within: float | None = None) -> int:
-        """0: equivalent, or within what is asked; 1: not.
+        """Return 0 if the models are equivalent, or within the given distance; else 1.
 
         Args:
-            strict: Whether being equivalent only, and remarks, count as differences.
-            within: Metres and radians by which frames may be off as written, proven.
+            strict: Whether equivalent models and models with remarks count as different.
+            within: Largest allowed distance of a frame as written, in metres and in radians.
         """
         return int(not self.holds(Question(within, strict)))
 
     def to_b(self, q: ArrayLike) -> FloatArray:
-        """(..., nq) of B for A's configurations (..., nq): there both stand alike, but for `base`.
+        """Return B's configurations (..., nq) for A's configurations (..., nq).
 
-        Coordinates that only B has are neutral.
+        There both models have the same poses, except for `base`. Coordinates of B alone are neutral.
 
         Raises:
-            InputError: another length than A's.
+            InputError: q does not have A's length.
         """
         return _mapped(self.trees, {one.a: one for one in self.joints}, checked(self.trees[0], q, "q"))
 
@@ -238,7 +239,7 @@ def _mapped(
 
 
 def length(metres: float) -> str:
-    """A length as people read it.
+    """Return a length as text, with a unit prefix.
 
     >>> length(0.0019), length(2e-9), length(1.5), length(math.inf)
     ('1.9 mm', '2 nm', '1.5 m', 'without bound')
@@ -247,7 +248,7 @@ def length(metres: float) -> str:
 
 
 def up_to(words: Callable[[float], str], lower: float, upper: float) -> str:
-    """An interval of lengths or angles: what is attained, and what is proven where that reads otherwise.
+    """Return an interval as text: the attained value, and the proven bound where its text differs.
 
     >>> up_to(length, 0.025, 0.025), up_to(angle, 0.4297, 0.4327), up_to(length, 1.0, math.inf)
     ('25 mm', '429.7 mrad (at most 432.7 mrad)', '1 m (without bound)')
@@ -259,7 +260,7 @@ def up_to(words: Callable[[float], str], lower: float, upper: float) -> str:
 
 
 def angle(radians: float) -> str:
-    """Likewise.
+    """Return an angle as text, with a unit prefix.
 
     >>> angle(0.0003), angle(1.5)
     ('0.3 mrad', '1.5 rad')
@@ -279,7 +280,7 @@ def _with_prefix(value: float, unit: str) -> str:
 
 
 def demand_joint_names(tree: KinematicTree, names: list[str], which: str) -> None:
-    """Raise UnknownNameError for a name that no joint has, InputError for one given twice."""
+    """Raise UnknownNameError if no joint has a name, and InputError if a name occurs twice."""
     for name in names:
         tree.joint_index(name)
     if len(set(names)) < len(names):

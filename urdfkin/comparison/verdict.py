@@ -1,4 +1,4 @@
-"""`same`: are these two models the same robot? The verdict, and what it rests on."""
+"""Decide whether two models are the same robot: the function `same` and its steps."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ from urdfkin.urdf.sources import Source
 from urdfkin.verify.pinocchio_module import version
 from urdfkin.verify.sampling import checked_choice
 
-#: Configurations at which Pinocchio confirms both robots.
+#: Configurations at which Pinocchio checks the distances.
 CONFIRMED = 8
-#: Frames that are far off at random configurations, one of which is the farthest.
+#: Number of frames, farthest at random configurations, among which the farthest one is searched.
 FARTHEST = 4
-#: Metres: squares of longer ways overflow.
+#: Longest path, metres: squares of longer lengths overflow.
 LONGEST = 1e150
-#: How near to what a search finds a bound is near enough.
+#: Ratio of a bound to the distance found at which the bound needs no improvement.
 NEAR = 1.05
 
 
@@ -50,28 +50,30 @@ def same(
     boxes: int = MOST,
     within: float | None = None,
 ) -> Sameness:
-    """Whether two models move alike in every configuration, proven.
+    """Decide and prove whether two models move alike in every configuration.
 
-    By the product of exponentials T(q) = exp(S_1 q_1) ... exp(S_n q_n) H, a link's motion is fixed by the
-    joints' screws S_i and its pose H at home. Two models move alike for all q if these agree, up to what may
-    differ: where the base stands, which fixed links there are, each joint's zero and sense, names, the order
-    of coordinates, frames that only are there to be looked at.
+    By the product of exponentials T(q) = exp(S_1 q_1) ... exp(S_n q_n) H, the motion of a link depends on the
+    screws S_i of the joints and on the link's pose H in the zero configuration. If these agree, two models
+    move alike for all q. The models may still differ in the base's pose, fixed links, joint zeros and senses,
+    names, the order of coordinates, and tool frames.
 
     Args:
-        a: A robot, or what `load` takes.
-        b: Likewise.
-        map: Joints of `a` and what they are called in `b`, where names and places do not tell.
-        bounds: Whether the largest distances are bounded, which takes longest where models differ.
-        boxes: How many boxes of configurations may be looked at at a time, for sharper bounds where many
-            things differ; 0: none.
-        within: Metres and radians that `Sameness.within` will be asked for: `boxes` are then spent on it.
+        a: A robot, or a source for `load`.
+        b: The other robot, likewise.
+        map: Names of joints of `a` and of their joints in `b`, where names and axes do not decide.
+        bounds: Whether to bound the largest distances; this takes most of the time where models differ.
+        boxes: Largest number of boxes of configurations at a time, for sharper bounds where many things
+            differ; 0: no boxes.
+        within: Distance (metres and radians) that you will pass to `Sameness.within`; the boxes are then
+            used to prove it.
 
     Returns:
-        The verdict with the map that it found, the first difference, and for every frame an interval in
-        which its largest distance over all configurations within limits lies.
+        The verdict, the map of joints and links, the differences, and for every frame an interval that
+        contains its largest distance over all configurations within limits.
 
     Raises:
-        UrdfError: a model with errors; SourceError, UnknownNameError, InputError: as `load`.
+        UrdfError: a model has errors.
+        SourceError, UnknownNameError, InputError: as for `load`.
 
     Example:
         >>> import urdfkin
@@ -83,24 +85,29 @@ def same(
         False
     """
     robots = _robot(a), _robot(b)
-    given = _demand_map(map)
+    given = _parse_given_map(map)
     whole_number(boxes, "boxes", 0)
     if within is not None:
         within = real_number(within, "within")
     for which, robot, names in (("A", robots[0], list(given)), ("B", robots[1], list(given.values()))):
         demand_joint_names(robot.tree, names, which)
-    # Copies, whose accounts are their own: what is computed here nobody was handed.
+    # Copies with ledgers of their own: results computed here are not counted as the user's results.
     return Comparator((copy(robots[0]), copy(robots[1])), given, bounds, boxes, within).judged()
 
 
-def _demand_map(given: Mapping[str, str] | None) -> dict[str, str]:
-    """Names and names, or InputError."""
+def _parse_given_map(given: Mapping[str, str] | None) -> dict[str, str]:
+    """Return the map as a dict; raise InputError if it is not a mapping of names to names."""
     if given is None:
         return {}
     if not isinstance(given, Mapping) or any(
         not isinstance(name, str) for pair in given.items() for name in pair
     ):
-        raise InputError("joints of A and their names in B", where="map", found=repr(given))
+        raise InputError(
+            "the map is not a mapping of joint names",
+            where="map",
+            found=repr(given),
+            remedy="give a dict of joints of A and their joints in B",
+        )
     return dict(given)
 
 
@@ -109,7 +116,15 @@ def _robot(source: Robot | Source | DHTable) -> Robot:
 
 
 class Comparator:
-    """Two robots on their way to a verdict."""
+    """The comparison of two robots, step by step.
+
+    Args:
+        robots: A and B.
+        given: Names of joints of A and of their joints in B.
+        bounds: Whether to bound the largest distances.
+        boxes: Largest number of boxes of configurations at a time.
+        within: Distance (metres and radians) to prove first; None: none.
+    """
 
     def __init__(
         self,
@@ -128,7 +143,7 @@ class Comparator:
         for which, mechanism, robot in zip("AB", self.mechanisms, robots, strict=True):
             if not mechanism.size <= LONGEST:
                 raise InputError(
-                    f"a way from the root to a link is longer than {LONGEST:g} m: its square is no double",
+                    f"a path from the root to a link is longer than {LONGEST:g} m: its square overflows",
                     where=f"model {which}, {robot.name}",
                     found=f"{mechanism.size:.6g} m",
                     remedy="write origins in metres",
@@ -136,9 +151,9 @@ class Comparator:
         self.tolerance: Tolerance = tolerance_of(*self.mechanisms)
 
     def judged(self) -> Sameness:
-        """The verdict."""
+        """Return the verdict with intervals and Pinocchio's confirmation."""
         found = align(*self.mechanisms, self.given)
-        self._demand_the_map(found)
+        self._check_map(found)
         variables = variables_of(found, self.tolerance)
         said = self.said(found, variables)
         frames = self._intervals(found, variables)
@@ -150,15 +165,15 @@ class Comparator:
             moving = variables_of(written, self.tolerance)
             as_written = self._farthest(written, moving)
             most = self._most(written, moving, as_written)
-            if len(written.frames) < len(self._counted(found)):
+            if len(written.frames) < len(self._compared_links(found)):
                 most = (math.inf, math.inf)
-        checked = self._confirmed(found, variables, frames)
+        checked = self._confirm(found, variables, frames)
         return replace(said, frames=frames, as_written=as_written, written=most, checked=checked)
 
     def said(self, found: Alignment, variables: Variables) -> Sameness:
-        """What follows from how the models are laid on each other; intervals and Pinocchio do not.
+        """Return the result that follows from the alignment: everything except intervals and confirmation.
 
-        Frames that are tools, set elsewhere, are put right in `found`.
+        This also corrects the tools in `found`: frames without children that differ.
         """
         names = tuple([joint.name for joint in tree.joints] for tree in self.trees)
         links = self.trees[0].links, self.trees[1].links
@@ -196,44 +211,44 @@ class Comparator:
         )
 
     def as_written(self, found: Alignment) -> Alignment:
-        """The same joints and links laid on each other with nothing put right: root on root.
+        """Return the alignment of the same joints and links without any change: root on root.
 
-        Where only one model has the other's root, the two links of that name are laid on each other. Of a
-        table, whose other frames are its convention's, only links of one name count.
+        If only one model has the name of the other's root link, the two links of that name coincide instead.
+        Of a table, only links with equal names count; its other frames depend on its convention.
         """
         a, b = self.mechanisms
         gauge = replace(AS_WRITTEN, X=base_as_written(a, b), orders=found.b.orders)
         written = align(a, b, found.names, gauge)
-        written.frames = written.frames_of(self._counted(found))
+        written.frames = written.frames_of(self._compared_links(found))
         return written
 
-    def _counted(self, found: Alignment) -> list[tuple[int, int]]:
-        """The links of both that count as written."""
+    def _compared_links(self, found: Alignment) -> list[tuple[int, int]]:
+        """Return the common links that are compared as written."""
         tables = any(robot.origin.table for robot in self.robots)
         links = self.trees[0].links, self.trees[1].links
         pairs = ((frame.a, frame.b) for frame in found.frames)
         return [(a, b) for a, b in pairs if not tables or links[0][a] == links[1][b]]
 
-    def _demand_the_map(self, found: Alignment) -> None:
-        """Raise InputError for a pair that was given and cannot be."""
+    def _check_map(self, found: Alignment) -> None:
+        """Raise InputError for a pair of the given map that is not possible."""
         made = found.names
         for ours, theirs in self.given.items():
             if made.get(ours) != theirs:
                 raise InputError(
-                    "these joints cannot be each other's: the links that carry them are not",
+                    "these joints cannot be matched: their parent links are not matched",
                     where="map",
                     found=f"{ours!r} of A, {theirs!r} of B",
-                    remedy="pair the joints before them, too, or leave these out",
+                    remedy="also map the joints before them, or remove this pair",
                 )
 
     def search(self, found: Alignment, variables: Variables) -> Search:
-        """What looks for the largest distances."""
+        """Return the search for the largest distances."""
         return Search(self.robots, found, variables)
 
     def rounding(self, found: Alignment, variables: Variables) -> tuple[float, float]:
-        """What everything that was taken for rounding can do together: each step's share, in turn.
+        """Return (m, rad) that all ignored rounding can add up to, step by step.
 
-        A joint that goes anywhere counts as if it went no further than it is tried.
+        A joint without limits counts with the range in which it is sampled.
         """
         ways = [
             max(abs(end) for end in ends)
@@ -272,7 +287,7 @@ class Comparator:
     def _most(
         self, written: Alignment, variables: Variables, farthest: Interval | None
     ) -> tuple[float, float]:
-        """(m, rad) that any frame is off at most; sharper only if that is needed for what was asked."""
+        """Return the bound (m, rad) of all frames; sharpen it only if `within` needs it."""
         metres, radians = self.rounding(written, variables)
         uppers = self._uppers(written, variables)
         target = 0.0 if self.within is None else self.within - metres
@@ -282,7 +297,7 @@ class Comparator:
         return most[0] + metres, most[1] + radians
 
     def _uppers(self, found: Alignment, variables: Variables) -> list[tuple[float, float]]:
-        """(m, rad) that each frame is off at most, more closely where it is most."""
+        """Return the bound (m, rad) of each frame, on a finer grid for the largest ones."""
         frames = found.frames
         uppers = [upper_bounds(found, variables, frame) for frame in frames]
         off = [k for k, upper in enumerate(uppers) if max(upper) > 0.0]
@@ -295,7 +310,7 @@ class Comparator:
     def _sharpen(
         self, uppers: list[tuple[float, float]], frames: Sequence[FramePair], search: Search, target: float
     ) -> None:
-        """Prove that no frame is off by more than a target (m), the widest first, as far as boxes go."""
+        """Prove that no frame is off by more than a target (m), the largest bound first, with boxes."""
         for _ in uppers:
             widest = max(range(len(uppers)), key=lambda k: uppers[k])
             if uppers[widest][0] <= target:
@@ -306,14 +321,14 @@ class Comparator:
                 break
 
     def _farthest(self, found: Alignment, variables: Variables) -> Interval | None:
-        """The interval of the frame that a search finds farthest."""
+        """Return the interval of the frame with the largest distance found by the search."""
         if not found.frames:
             return None
         metres, radians = self.rounding(found, variables)
         search = self.search(found, variables)
         off = search.seen(found.frames)[0].max(axis=0)
         far = [found.frames[k] for k in np.argsort(-off, kind="stable")[:FARTHEST]]
-        if off.max() <= metres:  # nothing is moved: the one that is turned most
+        if off.max() <= metres:  # no position differs: take the largest angle
             far = [max(found.frames, key=lambda frame: upper_bounds(found, variables, frame)[1])]
         climbed = zip(search.worst(far), far, strict=True)
         seen, frame = max(climbed, key=lambda both: both[0][0])
@@ -341,14 +356,14 @@ class Comparator:
         lower = max(0.0, metres - rounding[0])
         return Interval(*names, lower, *upper, turned, tuple(q_a[0].tolist()), tuple(q_b[0].tolist()))
 
-    def _confirmed(self, found: Alignment, variables: Variables, frames: tuple[Interval, ...]) -> str:
-        """Pinocchio, which reads both texts itself, at some configurations: no frame may break its bound."""
+    def _confirm(self, found: Alignment, variables: Variables, frames: tuple[Interval, ...]) -> str:
+        """Check the bounds with Pinocchio, which reads both texts itself, at some configurations."""
         if not all(checked_choice(robot.verifier.policy) for robot in self.robots):
             return "not asked of Pinocchio: loaded with verify=False"
         for robot in self.robots:
             if (reason := robot.verifier.cannot()) is not None:
                 return f"not verified by Pinocchio: {reason}"
-        off = self.asked(found, variables)
+        off = self.pinocchio_distances(found, variables)
         for interval, metres in zip(frames, off, strict=False):
             if metres > interval.upper * (1.0 + EPS):
                 raise UrdfkinError(
@@ -360,20 +375,20 @@ class Comparator:
         seen = f"{off.max(initial=0.0):.2g} m"
         return f"Pinocchio {version()} finds at most {seen} at {CONFIRMED} configurations, within the bounds"
 
-    def asked(self, found: Alignment, variables: Variables) -> FloatArray:
-        """(frames,) how far off (m) Pinocchio finds each frame at most at the configurations that confirm."""
+    def pinocchio_distances(self, found: Alignment, variables: Variables) -> FloatArray:
+        """Return each frame's largest distance (m) that Pinocchio finds at `CONFIRMED` configurations."""
         search = self.search(found, variables)
         q_a, q_b = search.configurations(search.random(CONFIRMED), moved=True)
         return np.asarray(search.at(q_a, q_b, found.frames, pinocchios).max(axis=0, initial=0.0))
 
 
 def _largest(bounds: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """The largest of metres and of radians."""
+    """Return the largest of all metres and the largest of all radians."""
     return max((way for way, _ in bounds), default=0.0), max((turn for _, turn in bounds), default=0.0)
 
 
 def _fixed_here(tree: KinematicTree, other: KinematicTree) -> set[int]:
-    """Fixed joints of a tree whose namesakes, or whose child link's joints, move in the other."""
+    """Return the fixed joints of a tree that move in the other one, by joint name or by child link."""
     moving = {joint.name for joint in other.joints if joint.kind.nv}
     ours = {joint.name for joint in tree.joints if joint.kind.nv}
     children = {
@@ -387,7 +402,10 @@ def _fixed_here(tree: KinematicTree, other: KinematicTree) -> set[int]:
 
 
 def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
-    """(4, 4) B's root in A's root frame: on it, or so that links are one of which either is a root."""
+    """Return the pose (4, 4) of B's root in A's root frame, as written.
+
+    If only one model has the name of the other's root link, the two links of that name coincide.
+    """
     if (root := a.tree.links[0]) in b.tree.links and not b.body_of[link := b.tree.link_index(root)]:
         return inverse(b.homes[link])
     if (root := b.tree.links[0]) in a.tree.links and not a.body_of[link := a.tree.link_index(root)]:
@@ -396,12 +414,12 @@ def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
 
 
 def digest(robot: Robot) -> str:
-    """SHA-256 of the file that a robot comes from: a URDF's text, or MJCF."""
+    """Return the SHA-256 of the robot's file: a URDF's text, or MJCF."""
     return robot.sha256
 
 
 def parse_map(words: tuple[str, ...]) -> dict[str, str]:
-    """NAME=NAME, several; raises InputError for what is none."""
+    """Parse several NAME=NAME; raise InputError for a word of another form."""
     return dict(_pairs(words))
 
 

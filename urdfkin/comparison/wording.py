@@ -1,4 +1,4 @@
-"""What an alignment says, in words: what has to be done, where the models differ, and what else there is."""
+"""Describe an alignment in words: the changes that make B equal to A, the differences and the remarks."""
 
 from __future__ import annotations
 
@@ -16,21 +16,24 @@ from urdfkin.model.tree import FloatArray, Joint, KinematicTree
 
 
 def put_right(found: Alignment, rounding: Tolerance, *, tables: bool = False) -> tuple[tuple[str, str], ...]:
-    """What makes B as A is: of `result.FREE` what it is, and a line. Tools are put right in `found`.
+    """Return the changes that turn B into A: a kind of `result.FREE` and a line each. Correct the tools.
 
     Args:
-        found: How they lie on each other.
-        rounding: What counts as none.
-        tables: Whether either is a table, whose frames are its convention's and no more than looked at.
+        found: The alignment of the models; differing tools are corrected in it.
+        rounding: The tolerance within which numbers are equal.
+        tables: Whether one model is a table. The frames of a table depend on its convention, so all of them
+            count as tools.
     """
     lines = list[tuple[str, str]]()
     tree_a, tree_b = found.a.tree, found.b.tree
     for which, mechanism, link in (("A", found.a, found.base[0]), ("B", found.b, found.base[1])):
         if mechanism.body_of[link]:
             root, base = mechanism.tree.links[0], mechanism.tree.links[link]
-            lines.append(("base", f"{which}'s root is {root}: seen from {base}, joints between run back"))
+            lines.append(
+                ("base", f"{which}'s root is {root}; as seen from {base}, the joints between are reversed")
+            )
     if found.X is not IDENTITY:
-        lines.append(("base", f"B's root stands in A's root frame at {pose_words(found.X, rounding)}"))
+        lines.append(("base", f"B's root is in A's root frame at {pose_words(found.X, rounding)}"))
     for step in found.steps:
         if step.conversion is not None:
             lines.append(("free joints", _conversion_words(found, step, step.conversion, rounding)))
@@ -51,24 +54,24 @@ def put_right(found: Alignment, rounding: Tolerance, *, tables: bool = False) ->
 
 
 def _tools_put_right(found: Alignment, rounding: Tolerance, *, tables: bool) -> Iterator[tuple[str, str]]:
-    """Take frames on which nothing hangs, and those around the base, for tools; a line of each."""
+    """Treat frames without children and frames around the base as tools; yield a line for each."""
     around, links = _around(found), (found.a.tree.links, found.b.tree.links)
     for k, frame in enumerate(found.frames):
         beside = (frame.a, frame.b) in around
         if frame.differs and (beside or tables or _is_tool(found, frame)):
             found.frames[k] = frame.put_right()
             if beside and rounding.holds(*apart(found.a.homes[frame.a], found.b.homes[frame.b])):
-                continue  # seen from the root it is where it was: the line of the base says all
+                continue  # its pose in the root frame is unchanged: the line about the base is enough
         if (tool := found.frames[k].tool) is not IDENTITY:
             moved = pose_words(tool, rounding)
             yield "tools", f"frame {links[1][frame.b]} is A's {links[0][frame.a]} moved by {moved}"
 
 
 def _around(found: Alignment) -> set[tuple[int, int]]:
-    """Frames of both on the body that either robot stands on, that say no more than where it stands.
+    """Return the common frames on the fixed body whose pose only states where the robot is mounted.
 
-    Of a link before all that carry joints, and of another that stands in the root's frame as in the other
-    model and carries none: a world, a table.
+    These are links before all links that carry moving joints. They are also links without moving joints
+    whose pose in the root frame is the same in both models, such as a world or a table.
     """
     if found.a.body_of[found.base[0]] or found.b.body_of[found.base[1]]:
         return set()
@@ -86,9 +89,9 @@ def _around(found: Alignment) -> set[tuple[int, int]]:
 
 
 def _beside_the_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
-    """Links of the root's body before all of them that carry moving joints; those that carry none.
+    """Return the links of the root body before all moving joints, and those that carry no moving joint.
 
-    None of either where no joint moves: then there is nothing that could stand elsewhere.
+    Both sets are empty if no joint moves.
     """
     tree = mechanism.tree
     carried = [0] * len(tree.links)
@@ -113,7 +116,7 @@ def _conversion_words(found: Alignment, step: Step, made: JointTransform, roundi
 
 
 def pose_words(T: FloatArray, rounding: Tolerance) -> str:
-    """A pose as a URDF's origin says it."""
+    """Return a pose in URDF `<origin>` notation."""
     xyz, rpy = T[:3, 3], rpy_of(T[:3, :3])
     words = (
         " ".join(repr(_rounded(float(x), least)) for x in numbers)
@@ -123,12 +126,12 @@ def pose_words(T: FloatArray, rounding: Tolerance) -> str:
 
 
 def _rounded(x: float, rounding: float) -> float:
-    """The shortest number within rounding."""
+    """Return the shortest decimal number within the rounding."""
     return round(x, math.ceil(-math.log10(rounding))) + 0.0
 
 
 def _is_tool(found: Alignment, frame: FramePair) -> bool:
-    """Whether nothing hangs on a frame, and it is fixed, in both models."""
+    """Return whether a frame is fixed and has no children in both models."""
     for tree, link in ((found.a.tree, frame.a), (found.b.tree, frame.b)):
         if link == 0 or tree.joints[link - 1].kind.nv or any(joint.parent == link for joint in tree.joints):
             return False
@@ -136,7 +139,7 @@ def _is_tool(found: Alignment, frame: FramePair) -> bool:
 
 
 def differences(found: Alignment, variables: Variables) -> tuple[Difference, ...]:
-    """Where they move otherwise, from the base outwards."""
+    """Return the differences that affect motion, ordered from the base to the tips."""
     tree_a, tree_b = found.a.tree, found.b.tree
     placed: list[tuple[float, list[Difference]]] = [
         (len(found.path(i)), _of_step(found, variables, i)) for i in range(len(found.steps))
@@ -160,7 +163,7 @@ def differences(found: Alignment, variables: Variables) -> tuple[Difference, ...
 
 
 def _of_the_pair(found: Alignment, tree_a: KinematicTree, tree_b: KinematicTree, link: str) -> bool:
-    """Whether a link that both have sits on bodies that both have: else its joint was named already."""
+    """Return whether the bodies of a common link are also common; otherwise a joint is reported already."""
     alone_a = {found.a.body_of[j + 1] for j in found.only_a}
     alone_b = {found.b.body_of[j + 1] for j in found.only_b}
     return (
@@ -170,7 +173,7 @@ def _of_the_pair(found: Alignment, tree_a: KinematicTree, tree_b: KinematicTree,
 
 
 def _carrier(tree: KinematicTree, link: str) -> str:
-    """The moving joint nearest before a link."""
+    """Return the last moving joint before a link, in words."""
     path = [tree.joints[i] for i in tree.path(tree.link_index(link)) if tree.joints[i].kind.nv]
     return f"joint {path[-1].name}" if path else "the base"
 
@@ -189,9 +192,9 @@ def _of_step(found: Alignment, variables: Variables, i: int) -> list[Difference]
         what, said = _axis_words(place, step, tolerance_of(found.a, found.b))
         some.append(Difference(place, what, said, step.tilt, step.shift))
     for steps, words in (
-        (variables.freer_a, "{0} is free in A and follows in B: {2}"),
-        (variables.freer_b, "{0} follows in A and is free in B: {1}"),
-        (variables.rules, "{0} follows by another rule: {1} in A, {2} in B"),
+        (variables.freer_a, "{0} is free in A and a mimic joint in B: {2}"),
+        (variables.freer_b, "{0} is a mimic joint in A and free in B: {1}"),
+        (variables.rules, "{0} has another mimic rule: {1} in A, {2} in B"),
     ):
         if i in steps:
             some.append(Difference(place, "mimic rule", words.format(place, _rule(joint), _rule(other))))
@@ -204,12 +207,12 @@ def _rule(joint: Joint) -> str:
 
 
 def _axis_words(place: str, step: Step, rounding: Tolerance) -> tuple[str, str]:
-    """The parameter, and the line: what of it is more than rounding."""
+    """Return the parameter that differs by more than rounding, and a line about it."""
     if step.kind in ("planar", "floating"):
         return "frame", f"{place}: its plane is tilted by {angle(step.tilt)}"
     parts = [f"tilted by {angle(step.tilt)}"] if step.tilt > rounding.angle else []
     parts += [f"{length(step.shift)} off"] if step.shift > rounding.way else []
-    alone = " (what hangs on it is not)" if step.other is not step.axis else ""
+    alone = " (the links behind it are not)" if step.other is not step.axis else ""
     return "axis", f"{place}: its axis is {' and '.join(parts)}{alone}"
 
 
@@ -223,7 +226,7 @@ def _of_frame(found: Alignment, frame: FramePair) -> Difference:
 
 
 def remarks(found: Alignment, variables: Variables, tolerance: Tolerance) -> tuple[Difference, ...]:
-    """What differs without moving anything elsewhere: limits, kinds, and links that only one has."""
+    """Return the differences that do not affect motion: limits, kinds, and links of one model only."""
     some = list[Difference]()
     for step in found.steps:
         if not step.unlike:
@@ -245,7 +248,8 @@ def _of_limits(step: Step, a: Joint, b: Joint, tolerance: Tolerance) -> Iterator
     ours = limits(a)
     if any(not _close(x, y, tolerance.angle) for x, y in zip(ours, back, strict=True)):
         words = f"{place}: limits {_range(ours)} in A, {_range((back[0], back[1]))} in B"
-        yield Difference(place, "limits", words + (" (as A counts)" if step.sense < 0 or step.offset else ""))
+        converted = " (in A's coordinate)" if step.sense < 0 or step.offset else ""
+        yield Difference(place, "limits", words + converted)
     for what in ("velocity", "effort"):
         x, y = (getattr(joint.limit, what, math.inf) for joint in (a, b))
         if not _close(x, y, tolerance.angle):

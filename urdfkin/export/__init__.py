@@ -1,4 +1,4 @@
-"""A robot's kinematics as code for where no Python runs, or no urdfkin, with its proof in the same file."""
+"""Export the kinematics of a robot's frame as code that runs without urdfkin, with its proof in the file."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from urdfkin.export.seal import seal
 if TYPE_CHECKING:
     from urdfkin.export.code import Code
 
-#: Language -> (module that holds `write`, a file's ending, one-line summary).
+#: Language -> (module of `write`, suffix of files, one-line summary).
 LANGUAGES: dict[str, tuple[str, str, str]] = {
     "c": ("urdfkin.export.c", ".c", "C99, single or double precision, one configuration or a batch"),
     "cpp": ("urdfkin.export.cpp", ".hpp", "C++11, a header of templates on the number"),
@@ -21,17 +21,17 @@ LANGUAGES: dict[str, tuple[str, str, str]] = {
     "casadi": ("urdfkin.export.python", "_casadi.py", "Python on CasADi's SX, MX and DM"),
     "sympy": ("urdfkin.export.python", "_sympy.py", "Python on SymPy's symbols"),
     "matlab": ("urdfkin.export.matlab", "_kinematics.m", "MATLAB and Octave"),
-    "latex": ("urdfkin.export.latex", ".tex", "formulas of a document, in the text's letters"),
+    "latex": ("urdfkin.export.latex", ".tex", "formulas of a document, in the textbook's symbols"),
 }
-#: What is written where nobody says which.
+#: Default quantities.
 QUANTITIES = ("placement", "jacobian", "acceleration")
 
 
 def write(code: Code, to: str) -> str:
-    """The text of a file.
+    """Return the text of a file in a language, with its seal.
 
     Raises:
-        UnknownNameError: no such language.
+        UnknownNameError: the language is unknown.
     """
     if to not in LANGUAGES:
         raise UnknownNameError("language", to, LANGUAGES)

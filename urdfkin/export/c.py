@@ -1,8 +1,9 @@
-"""C99 without allocation and without variables of its own, in double or single precision, with a batch form.
+"""Write C99 in double or single precision, for one configuration and for batches.
 
-A function is a straight line over numbers that lie `L` apart: next to each other for one configuration, a
-register apart for a batch, where a compiler makes one instruction for all lanes of each line. What does not
-depend on the robot stands in `frames/`, with places for the rest.
+The code has no allocation and no global variables. A function is straight-line code on numbers that are `L`
+apart in memory. For one configuration L is 1. For a batch L is the number of lanes, and a compiler makes one
+vector instruction of each line. The parts of a file that do not depend on the robot are templates in
+`frames/`.
 """
 
 from __future__ import annotations
@@ -21,12 +22,12 @@ _PLACE = re.compile(r"@(\w+)@")
 
 
 def write(code: Code, to: str = "c") -> str:
-    """A translation unit, which declares its functions alone where `NAME_DECLARATIONS` is defined."""
+    """Return a translation unit; with `NAME_DECLARATIONS` defined it only declares the functions."""
     return unit(code, comment(_head(code)), "\n".join([*vectors(code), main(code, "check_one.c")]))
 
 
 def unit(code: Code, head: str = "", main: str = "") -> str:
-    """The functions, with what stands before them and the program after them."""
+    """Return the functions, with a head before them and a program after them."""
     return framed(
         "file.c",
         head=head,
@@ -39,18 +40,18 @@ def unit(code: Code, head: str = "", main: str = "") -> str:
 
 
 def framed(name: str, /, **parts: str | int) -> str:
-    """A frame with its places filled; what is put in is not looked at again."""
+    """Return a template with its `@name@` places filled once; the inserted text is not searched again."""
     text = (_FRAMES / name).read_text(encoding="utf-8")
     return _PLACE.sub(lambda found: str(parts[found[1]]), text)
 
 
 def literal(x: float) -> str:
-    """A constant of the file's own precision."""
+    """Return a constant in the precision of the file."""
     return f"R({x!r})"
 
 
 def comment(lines: Sequence[str]) -> str:
-    """Lines as a comment."""
+    """Return lines as a C comment."""
     return "/* " + "\n".join(f" * {line}".rstrip() for line in lines)[3:] + "\n */"
 
 
@@ -75,18 +76,18 @@ def _head(code: Code) -> list[str]:
 
 
 def what(function: Function) -> str:
-    """A function's result in words."""
+    """Return the shape and the equations of a function's result in words."""
     return f"{' x '.join(map(str, function.shape))}, eq. {', '.join(function.quantity.equations)}"
 
 
-def _given(function: Function, real: str) -> str:
+def _parameters(function: Function, real: str) -> str:
     return ", ".join([*(f"const {real} *{letter}" for letter in function.inputs), f"{real} *out"])
 
 
 def _declarations(code: Code) -> Iterator[str]:
-    yield "/* `out` is written row by row; a batch has n of everything, one configuration after the other. */"
+    yield "/* `out` is written row by row. A batch has n configurations, one after the other. */"
     for function in code.functions:
-        given = _given(function, f"{code.name.upper()}_REAL")
+        given = _parameters(function, f"{code.name.upper()}_REAL")
         yield f"/* {what(function)} */"
         yield f"void {code.name}_{function.name}({given});"
         yield f"void {code.name}_{function.name}_batch(size_t n, {given});"
@@ -103,8 +104,8 @@ def _function(code: Code, function: Function) -> str:
         name=function.name,
         title=code.name,
         operations=function.operations,
-        given=f"({_given(function, 'real')})",
-        given_rest=f"{_given(function, 'real')})",
+        given=f"({_parameters(function, 'real')})",
+        given_rest=f"{_parameters(function, 'real')})",
         count=count,
         room=layout.room,
         inputs=", ".join(f"{x.op}[{x.of[0]}]" for x in layout.inputs) or "R(0.0)",
@@ -128,20 +129,20 @@ def _function(code: Code, function: Function) -> str:
 
 
 def spare(code: Code, function: Function) -> int:
-    """How many rows more are eight numbers more, in whatever is read or written."""
+    """Return the number of rows that are at least eight numbers, in every input and in the result."""
     widths = (*code.widths(function).values(), len(function.results))
     return max(-(-8 // width) if width else 0 for width in widths)
 
 
 def advance(code: Code, function: Function) -> str:
-    """On to the next LANES configurations."""
+    """Return C code that moves the pointers to the next LANES configurations."""
     return ", ".join(f"{x} += LANES * {width}" for x, width in code.widths(function).items())
 
 
 class Layout:
-    """Where a function's inputs, angles, sines and cosines stand in front of its line.
+    """Layout of a function's inputs, angles, sines and cosines in the array `in`.
 
-    The angles lie side by side: first those that are inputs, then those that are computed.
+    The angles are contiguous: first those that are inputs, then those that are computed.
     """
 
     def __init__(self, function: Function) -> None:
@@ -154,7 +155,7 @@ class Layout:
         self.room = max(1, self.first + 3 * len(self.angles))
 
     def place(self, node: Node) -> int:
-        """Of an input, an angle, a sine or a cosine."""
+        """Return the index of an input, an angle, a sine or a cosine."""
         if node.op in ("sin", "cos"):
             return self.place(node.of[0]) + len(self.angles) * (1 if node.op == "sin" else 2)
         if node in self.angles:
@@ -173,14 +174,14 @@ def _lines(writer: Writer, layout: Layout) -> Iterator[str]:
 
 def _sines(writer: Writer, layout: Layout) -> Iterator[str]:
     count = len(layout.angles)
-    yield from (f"{angle};" for angle in _made(writer, layout, "in[{}]"))
+    yield from (f"{angle};" for angle in _computed_angles(writer, layout, "in[{}]"))
     for k in range(layout.first, layout.first + count):
         yield f"in[{k + count}] = sin(in[{k}]);"
         yield f"in[{k + 2 * count}] = cos(in[{k}]);"
 
 
-def _made(writer: Writer, layout: Layout, at: str) -> Iterator[str]:
-    """The angles that are no inputs themselves."""
+def _computed_angles(writer: Writer, layout: Layout, at: str) -> Iterator[str]:
+    """Yield C code for the angles that are not inputs."""
     for node in layout.made:
         value = writer.whole(node, lambda x: at.format(layout.place(x)))
         yield f"{at.format(layout.place(node))} = {value}"
@@ -202,7 +203,7 @@ def _reads(layout: Layout, widths: dict[str, int]) -> Iterator[str]:
 
 def _lane_sines(writer: Writer, layout: Layout) -> Iterator[str]:
     if count := len(layout.angles):
-        for made in _made(writer, layout, "in[{} * LANES + k]"):
+        for made in _computed_angles(writer, layout, "in[{} * LANES + k]"):
             yield f"for (int k = 0; k < LANES; ++k) {made};"
         places = (f"in + {layout.first + k * count} * LANES" for k in range(3))
         yield f"sines_cosines({', '.join(places)}, {count});"
@@ -212,9 +213,9 @@ def _lane_sines(writer: Writer, layout: Layout) -> Iterator[str]:
 
 
 def vectors(code: Code) -> Iterator[str]:
-    """Inputs, true values and what they may be off by, as arrays."""
+    """Yield the test vectors as arrays: inputs, true values and tolerances."""
     found, n = code.proof.vectors, len(code.proof.vectors)
-    yield "/* The true values at fifty digits, and how far a number may be off, in eps of its kind. */"
+    yield "/* True values at fifty digits, and the tolerance of each number, in eps of its precision. */"
     for k, (letter, width) in enumerate(
         code.widths(max(code.functions, key=lambda f: len(f.inputs))).items()
     ):
@@ -232,7 +233,7 @@ def _array(declared: str, rows: Sequence[Sequence[str]]) -> str:
 
 
 def _numbers(values: Sequence[str]) -> str:
-    """A list of numbers over several lines."""
+    """Return a list of numbers, wrapped over several lines."""
     lines, line = list[str](), "       "
     for value in values:
         if len(line) + len(value) > 108:
@@ -243,7 +244,7 @@ def _numbers(values: Sequence[str]) -> str:
 
 
 def main(code: Code, frame: str) -> str:
-    """A program that computes the test vectors."""
+    """Return a program that runs the test vectors."""
     return framed("check.c", checks="".join(_check(code, function, frame) for function in code.functions))
 
 

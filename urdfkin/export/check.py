@@ -1,7 +1,7 @@
-"""Run what a file brings with it: compile or import it, and have it compute its test vectors.
+"""Check an exported file: compile or import it, and run its test vectors.
 
-The file is run as code, as its user would run it: from someone else's hands it deserves the same care. A copy
-runs, in a folder of its own, so that nothing beside the file runs with it.
+The file is run as code. A file from someone else needs the same care as any other program. A copy of it runs
+in a separate folder, so that no other file beside it is run.
 """
 
 from __future__ import annotations
@@ -19,25 +19,25 @@ from urdfkin.export.seal import is_sealed
 from urdfkin.system.files import read_text
 from urdfkin.system.processes import own_python
 
-#: What every file says in its first lines.
+#: Text in the first lines of every exported file.
 _MARK = "straight-line code for this robot and frame"
 _MAIN = re.compile(r"^#ifdef (\w+)_MAIN$", re.MULTILINE)
 _FUNCTION = re.compile(r"^function f = ([A-Za-z]\w*)\(\)", re.MULTILINE | re.ASCII)
 _STRICT = ("-Wall", "-Wextra", "-pedantic", "-Werror")
-#: Of a file's first lines.
+#: Number of characters that are searched as the head of a file.
 _HEAD = 2000
-#: Seconds that nothing takes; a robot of a thousand joints compiles in one of these minutes.
-_PATIENCE = 600.0
+#: Time limit, seconds; a robot of a thousand joints compiles in one minute.
+_TIME_LIMIT = 600.0
 
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """What a file says of itself.
+    """The result of a check.
 
     Attributes:
-        lines: One for each function and precision.
-        good: Whether all of them compute what they should.
-        doubts: Why its head does not vouch for it, in words; empty where it does.
+        lines: One line for each function and precision.
+        good: Whether all functions agree with their test vectors.
+        doubts: Reasons why the file is not verified; empty for a verified one.
     """
 
     lines: tuple[str, ...]
@@ -46,7 +46,7 @@ class Checked:
 
     @property
     def verified(self) -> bool:
-        """Whether Pinocchio confirmed what was printed, and the file is as it was written."""
+        """Whether Pinocchio confirmed the expressions and the file is unchanged."""
         return not self.doubts
 
 
@@ -54,48 +54,48 @@ def check(file: Path) -> Checked:
     """Compile or import a file that `export` wrote, and run its test vectors.
 
     Raises:
-        InputError: another file, or one that does not run here; the message says what is missing.
-        SourceError: it cannot be read.
+        InputError: the file is not an export, or it does not run here; the message names what is missing.
+        SourceError: the file cannot be read.
     """
     text = read_text(file)
     head = text[:_HEAD]
     if _MARK not in head:
-        raise InputError("not a file that urdfkin export has written", where=str(file))
+        raise InputError("not a file of urdfkin export", where=str(file))
     with tempfile.TemporaryDirectory() as folder:
-        runs = {".c": _compiled, ".hpp": _compiled, ".py": _imported, ".m": _octave}
+        runs = {".c": _run_compiled, ".hpp": _run_compiled, ".py": _run_imported, ".m": _run_octave}
         if (run := runs.get(file.suffix)) is None:
             raise InputError(
-                "nothing that runs",
+                "a file of this kind cannot be run",
                 where=str(file),
-                found=file.suffix or "no ending",
-                remedy=f"check a file that ends in {', '.join(runs)}",
+                found=file.suffix or "no suffix",
+                remedy=f"check a file with the suffix {', '.join(runs)}",
             )
         lines = tuple(
             line for words in run(file, text, Path(folder)) for line in words
-        )  # a copy, alone there
+        )  # a copy, alone in its folder
     if not lines:
-        raise InputError("a file without test vectors", where=str(file))
+        raise InputError("the file has no test vectors", where=str(file))
     return Checked(lines, all(line.startswith("good ") for line in lines), tuple(_doubts(text)))
 
 
 def _doubts(text: str) -> Iterator[str]:
     if "UNVERIFIED" in text[:_HEAD]:
-        yield "nobody held these expressions against Pinocchio when they were written"
+        yield "these expressions were not compared with Pinocchio when they were written"
     sealed = is_sealed(text)
     if sealed is None:
-        yield "the file has no seal, so that its head may belong to other numbers; export it again"
+        yield "the file has no seal, so its head may belong to other numbers; export it again"
     elif not sealed:
-        yield "the file was changed after it was written, its head or its numbers; export it again"
+        yield "the file was changed after it was written; export it again"
 
 
-def _compiled(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
-    """In both precisions, by the system's compiler with all its warnings as errors."""
+def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
+    """Compile and run in both precisions, with the system's compiler and all warnings as errors."""
     found = _MAIN.search(text)
     if found is None:
-        raise InputError("a file without test vectors", where=str(file))
+        raise InputError("the file has no test vectors", where=str(file))
     plain = file.suffix == ".c"
     compiler = _program("cc" if plain else "c++", file)
-    copy = _copied(text, folder / f"checked{file.suffix}")
+    copy = _copy(text, folder / f"checked{file.suffix}")
     language = ["-std=c99", "-x", "c"] if plain else ["-std=c++11", "-x", "c++"]
     for real in ("double", "float"):
         macros = [f"-D{found[1]}_MAIN", f"-D{found[1]}_REAL={real}"]
@@ -107,38 +107,44 @@ def _compiled(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
         yield [f"{line} ({real})" for line in _run([str(built)], file)]
 
 
-def _imported(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
-    copy = _copied(text, folder / "checked.py")
+def _run_imported(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
+    copy = _copy(text, folder / "checked.py")
     code = f"import runpy; runpy.run_path({str(copy)!r}, run_name='__main__')"
     yield _run(own_python(code), file, cwd=folder)
 
 
-def _octave(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
+def _run_octave(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
     found = _FUNCTION.search(text)
     if found is None:
-        raise InputError("a file without test vectors", where=str(file))
-    _copied(text, folder / f"{found[1]}.m")
+        raise InputError("the file has no test vectors", where=str(file))
+    _copy(text, folder / f"{found[1]}.m")
     octave = [_program("octave-cli", file), "--no-init-file", "--no-site-file"]
     yield _run([*octave, "--eval", f"{found[1]}().check();"], file, cwd=folder)
 
 
-def _copied(text: str, place: Path) -> Path:
-    """The text that was read, in a folder of its own: neither its name nor what lies beside it is run."""
+def _copy(text: str, place: Path) -> Path:
+    """Write the text to a separate folder under a fixed name, so that no other file is run."""
     place.write_text(text, encoding="utf-8")
     return place
 
 
 def _program(name: str, file: Path) -> str:
     if (found := shutil.which(name)) is None:
-        raise InputError(f"{name} is not installed, which checks this file", where=str(file))
+        raise InputError(f"{name} is needed to check this file and is not installed", where=str(file))
     return found
 
 
 def _run(command: Sequence[str], file: Path, cwd: Path | None = None) -> list[str]:
-    """The verdicts that a command prints."""
+    """Run a command and return the verdicts that it prints."""
     try:
         done = subprocess.run(
-            command, capture_output=True, text=True, errors="replace", timeout=_PATIENCE, check=False, cwd=cwd
+            command,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=_TIME_LIMIT,
+            check=False,
+            cwd=cwd,
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         raise InputError("the file does not run", where=str(file), found=str(error)) from None
@@ -146,5 +152,7 @@ def _run(command: Sequence[str], file: Path, cwd: Path | None = None) -> list[st
     if done.returncode != 0 and not any(line.startswith("WRONG ") for line in lines):
         words = (done.stderr.strip() or done.stdout.strip()).splitlines()
         first = next((line for line in words if "error" in line.lower()), "")
-        raise InputError("the file does not run", where=str(file), found=first or (words or ["no word"])[-1])
+        raise InputError(
+            "the file does not run", where=str(file), found=first or (words or ["no output"])[-1]
+        )
     return lines

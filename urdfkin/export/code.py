@@ -1,4 +1,4 @@
-"""What a file of code is written from: the functions of one frame, the names in them, and their proof."""
+"""The language-independent form of an export: the functions of one frame, their names and their proof."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ from urdfkin.model.tree import KinematicTree
 from urdfkin.verify.quantities import Quantity, quantity, walked
 from urdfkin.verify.verifier import Verifier
 
-#: Of a sum, a product, and what needs no brackets.
+#: Precedence of a sum, a change of sign, a product, and an operand that needs no brackets.
 _SUM, _SIGN, _PRODUCT, _ATOM = range(4)
 _LEVEL = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT}
 
 
 @dataclass(frozen=True)
 class Code:
-    """A frame's functions.
+    """The functions of a frame.
 
     Attributes:
-        name: A word that the names of functions begin with.
-        robot: The robot's name, fit for a comment; so are the others.
-        frame: The frame's.
-        reference: For which point and in which axes.
-        functions: One for each quantity.
-        coordinates: Of q.
-        rates: Of v and a.
-        joints: The path's moving joints.
-        words: Identifiers: by letter of the input, for each of its numbers; and for the path's joints.
-        vouched: What they are worth; None for what urdfkin compiles for itself.
+        name: Prefix of the names of functions.
+        robot: The robot's name, safe in a comment, as are all other names here.
+        frame: The frame's name.
+        reference: The reference frame.
+        functions: One function for each quantity.
+        coordinates: Names of the coordinates of q.
+        rates: Names of the coordinates of v and a.
+        joints: Names of the path's moving joints.
+        words: Identifiers for the numbers of each input, by its letter, and for the path's joints.
+        vouched: The proof; None for code that urdfkin compiles for itself.
     """
 
     name: str
@@ -56,9 +56,9 @@ class Code:
 
     @property
     def proof(self) -> Proof:
-        """What they are worth."""
+        """The proof of the functions."""
         if self.vouched is None:
-            raise ValueError("code without a proof is not handed out")
+            raise ValueError("code without a proof is not exported")
         return self.vouched
 
     @property
@@ -72,12 +72,12 @@ class Code:
         return len(self.rates)
 
     def widths(self, function: Function) -> dict[str, int]:
-        """How many numbers a function takes of q, v and a, as far as it takes them."""
+        """Return the length of each input of a function, by its letter."""
         return {letter: self.nq if letter == "q" else self.nv for letter in function.inputs}
 
     @property
     def head(self) -> list[str]:
-        """What a reader must know, without comment marks; whether it is verified comes first."""
+        """The head of a file, without comment marks; the verdict is its first line if it is UNVERIFIED."""
         verdict, *rest = self.proof.lines
         lines = [verdict] if not self.proof.certificate.verified else []
         lines += [
@@ -87,8 +87,8 @@ class Code:
         lines += [
             "Metres, radians, seconds. Results are row by row; six-vectors and Jacobian rows are [linear;"
         ]
-        lines += [f"angular], seen in {self.reference.name}; accelerations are classical, without gravity."]
-        lines += ["Numbers such as 7.130 are the equations' in the chapter: urdfkin explain 7.130", ""]
+        lines += [f"angular] in {self.reference.name}; accelerations are classical, without gravity."]
+        lines += ["Numbers such as 7.130 are equations of the textbook: urdfkin explain 7.130", ""]
         lines += [f"q[{i}] {name}" for i, name in enumerate(self.coordinates)]
         if self.rates != self.coordinates:
             lines += [f"v[{i}], a[{i}] {name}" for i, name in enumerate(self.rates)]
@@ -105,21 +105,21 @@ def code_of(
     name: str | None,
     verify: bool | None,
 ) -> Code:
-    """Everything that is written about a frame.
+    """Make the code of a frame, with its proof.
 
     Raises:
-        UnknownNameError: no such frame, quantity or reference.
-        InputError: no quantity, or one that the walk does not compute.
-        VerificationError: Pinocchio computes something else.
+        UnknownNameError: the frame, a quantity or the reference is unknown.
+        InputError: there is no quantity, or one that cannot be exported.
+        VerificationError: Pinocchio computes another result.
     """
     tree, reference = verifier.tree, Reference.of(reference)
     plan = plan_of([tree.frame_link(frame)])
     rows = _rows(quantities)
     if not tree.nv and any(row.columns for row in rows):
         raise InputError(
-            "a Jacobian without columns",
+            "the Jacobian has no columns",
             where=tree.name,
-            found="nothing that moves",
+            found="no moving joint",
             remedy="export the placement",
         )
     code = bare(tree, plan, frame, rows, reference, title("", name) if name else title(tree.name, frame))
@@ -134,7 +134,7 @@ def bare(
     reference: Reference,
     name: str,
 ) -> Code:
-    """The same without a proof."""
+    """Make the code of a frame without a proof."""
     coordinates, rates = coordinate_names(tree), rate_names(tree)
     joints = tuple(tree.joints[i].name for i in plan.joints)
     return Code(
@@ -151,7 +151,7 @@ def bare(
 
 
 def exported() -> list[Quantity]:
-    """The quantities that can be written as code."""
+    """Return the quantities that can be exported."""
     return [row for row in walked() if row.name in recursion.QUANTITIES]
 
 
@@ -172,13 +172,13 @@ def _rows(names: Collection[str]) -> list[Quantity]:
 
 
 class Writer:
-    """A function's expressions as text, in any language with infix operators.
+    """Writer of a function's expressions as text, for any language with infix operators.
 
     Args:
-        code: Whose names are used.
+        code: The code with the names to use.
         function: One of its functions.
-        literal: Writes a constant.
-        sine: Whether sine and cosine are operations; else they are given like inputs.
+        literal: Function that writes a constant.
+        sine: Whether to write sine and cosine as operations; else they are inputs.
     """
 
     def __init__(
@@ -200,12 +200,12 @@ class Writer:
 
     @property
     def given(self) -> list[Node]:
-        """What is needed of q, v and a; and sines and cosines, where they are given."""
+        """The needed numbers of q, v and a, and the sines and cosines if they are inputs."""
         leaves = (*self.code.words, *self.leaves)
         return [node for node in self.function.nodes if node.op in leaves and node in self.inside]
 
     def statements(self) -> Iterator[tuple[str, list[tuple[str, str]]]]:
-        """For each place on the path its head, and its statements: names and values."""
+        """Yield the comment and the statements (name, value) for each step of the path."""
         nodes = [x for x in self.function.statements if x in self.inside and x.op not in self.leaves]
         for place, group in groupby(nodes, key=lambda node: node.place):
             found = list(group)
@@ -216,16 +216,16 @@ class Writer:
     def _place(self, place: int) -> str:
         joints, steps = self.code.joints, self.function.plan.steps
         if place < len(joints):
-            kind = ("turns", "slides", "is planar", "is floating")[steps[place, Step.KIND]]
+            kind = ("is revolute", "is prismatic", "is planar", "is floating")[steps[place, Step.KIND]]
             return f"{joints[place]} {kind}"
         return self.code.frame if place == len(joints) else "results"
 
     def results(self) -> list[str]:
-        """The values, row by row."""
+        """Return the values of the result as text, row by row."""
         return [self.text(x) for x in self.function.results]
 
     def text(self, x: Number, level: int = _SUM) -> str:
-        """An expression as an operand that must bind as tightly as `level`."""
+        """Return an expression as an operand, in brackets if its precedence is below `level`."""
         if not isinstance(x, Node):
             return self.literal(float(x))
         if x in self.own or x.op in self.code.words:
@@ -233,7 +233,7 @@ class Writer:
         return self.defined(x, level)
 
     def defined(self, x: Node, level: int = _SUM) -> str:
-        """What a statement says."""
+        """Return the right-hand side of a statement."""
         if x.op in ("sin", "cos", "sqrt"):
             return f"{x.op}({self.text(x.of[0])})"
         if x.op == "neg":
@@ -241,12 +241,12 @@ class Writer:
         else:
             own = _LEVEL[x.op]
             left, right = x.of
-            # a + (b + c) keeps its brackets: it is rounded as it was evaluated for the check.
+            # a + (b + c) keeps its brackets, so that it rounds as in the comparison with Pinocchio.
             text = f"{self.text(left, own)} {x.op} {self.text(right, own + 1)}"
         return text if own >= level else f"({text})"
 
     def whole(self, x: Number, given: Callable[[Node], str], level: int = _SUM) -> str:
-        """An expression with nothing left out: for an angle, which stands before the statements."""
+        """Return an expression without names of statements: for an angle, computed before them."""
         if not isinstance(x, Node):
             return self.literal(float(x))
         if x.op in self.code.words:

@@ -1,13 +1,10 @@
-"""The C of one function, made into machine code by the system's compiler and kept between runs, sealed.
+"""Compile one frame of one robot to machine code: the fastest form, for configurations and batches.
 
-What is kept is named by the text, the compiler and the processor it was made for. It is loaded from memory,
-not from a file that somebody might change after it was looked at.
+The first call of a quantity compiles the C of `export` with the system's compiler. The result is compared
+with Pinocchio before it is used. Without a compiler, Numba's forward recursion computes.
 
-
-One frame of one robot, compiled for it alone: the fastest form, single configurations and batches.
-
-The C that `export` writes goes through the system's compiler the first time that a quantity is asked for.
-What comes back is held against Pinocchio before it is used. Without a compiler Numba's walk computes.
+The machine code is stored in a checksummed cache, under a key of text, compiler and processor. It is loaded
+from memory, because a file could be changed after its checksum was tested.
 """
 
 from __future__ import annotations
@@ -46,21 +43,24 @@ from urdfkin.verify.sampling import draw
 from urdfkin.verify.verifier import Verifier
 
 _FLAGS = ("-std=c99", "-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fPIC", "-shared")
-#: GCC takes half a register on many processors whose whole ones are as fast.
+#: By default GCC uses half registers on many processors where whole registers are as fast.
 _WHOLE_REGISTERS = {"x86_64": ("-mprefer-vector-width=512",)}
-_PATIENCE = 600.0
+_TIME_LIMIT = 600.0
 _names = count()
 
 
 class NoCompilerError(Exception):
-    """There is none, or it does not take the code; the message is its own."""
+    """Error for a missing C compiler, or one that rejects the code; the message is the compiler's."""
 
 
 def library(code: Code) -> ctypes.CDLL:
-    """What computes the code's only function: `task`, which takes a row of `compiled.task` and says whether.
+    """Return the library of the code's only function.
+
+    Its entry point is `task`. It takes an array with the fields of `KernelArgs`, and returns 0, or 1 for an
+    input that is not finite.
 
     Raises:
-        NoCompilerError: no C compiler, or it fails.
+        NoCompilerError: there is no C compiler, or it fails.
     """
     if (compiler := shutil.which("cc")) is None:
         raise NoCompilerError("cc is not installed")
@@ -69,10 +69,10 @@ def library(code: Code) -> ctypes.CDLL:
     folder = kept_folder("library", [], text, *flags, _version(compiler), _processor())
     data = get(folder / "machine.code") if folder else None
     if data is None:
-        data = _compiled(text, [compiler, *flags])
+        data = _compile(text, [compiler, *flags])
         if folder:
             put(folder / "machine.code", data)
-    return _loaded(data)
+    return _load(data)
 
 
 def _entrance(code: Code) -> str:
@@ -111,7 +111,7 @@ def _entrance(code: Code) -> str:
     )
 
 
-def _compiled(text: str, command: list[str]) -> bytes:
+def _compile(text: str, command: list[str]) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         source, made = Path(folder, "robot.c"), Path(folder, "robot.so")
         source.write_text(text, encoding="utf-8")
@@ -120,7 +120,7 @@ def _compiled(text: str, command: list[str]) -> bytes:
             capture_output=True,
             text=True,
             errors="replace",
-            timeout=_PATIENCE,
+            timeout=_TIME_LIMIT,
             check=False,
         )
         if done.returncode != 0:
@@ -130,12 +130,12 @@ def _compiled(text: str, command: list[str]) -> bytes:
         return made.read_bytes()
 
 
-def _loaded(data: bytes) -> ctypes.CDLL:
+def _load(data: bytes) -> ctypes.CDLL:
     descriptor = os.memfd_create("urdfkin", os.MFD_CLOEXEC)
     with os.fdopen(descriptor, "wb") as file:
         file.write(data)
         file.flush()
-        # The loader takes what has the same name for the same library: no two names are alike.
+        # The loader identifies a library by its name, so every library gets another name.
         return ctypes.CDLL(f"/proc/self/fd/{'./' * next(_names)}{descriptor}")
 
 
@@ -149,7 +149,7 @@ def _version(compiler: str) -> str:
 
 @cache
 def _processor() -> str:
-    """What it can do, which `-march=native` asks."""
+    """Return the processor's features, which decide the meaning of `-march=native`."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -157,16 +157,16 @@ def _processor() -> str:
     return next((line for line in lines if line.startswith(("flags", "Features"))), platform.machine())
 
 
-#: Configurations that Pinocchio is asked about, besides the neutral one and the ends of the limits.
+#: Number of random configurations compared with Pinocchio, besides the neutral one and the limits.
 CHECKED = 100
-#: Of eight configurations they lie on the stack, half a megabyte at most.
+#: Largest number of results; those of eight configurations are on the stack, at most half a megabyte.
 _MOST_RESULTS = 8192
 _PLACES = KernelArgs.Q, KernelArgs.V, KernelArgs.A
 _compiling = lock_over_forks()
 
 
 class _Robot(Protocol):
-    """Whose frame it is."""
+    """The parts of `Robot` that a compiled frame uses."""
 
     verifier: Verifier
 
@@ -179,16 +179,16 @@ class _Robot(Protocol):
 
 
 class CompiledFrame:
-    """One frame of a robot in one reference; make one with `Robot.compiled`.
+    """One frame of a robot in one reference frame, compiled; the result of `Robot.compiled`.
 
-    Results are those of `Robot` within the bound, not to the last bit; those of a batch and of its
-    configurations one by one are the same. Inputs are looked at as everywhere: another shape, or a number
-    that is not finite, is an error. A call is not checked by Pinocchio, and the ledger says so; the machine
-    code was, on a hundred configurations, unless the robot was loaded with `verify=False`.
+    Results agree with those of `Robot` within the bound, not to the last bit. A batch and its single
+    configurations give equal bits. Inputs are checked: a wrong shape or a number that is not finite is an
+    error. Pinocchio does not check each call, and the ledger counts calls as unchecked. Pinocchio checks the
+    machine code once, on a hundred configurations, unless the robot is loaded with `verify=False`.
 
     Attributes:
         frame: The frame's name.
-        reference: For velocities, Jacobians and accelerations.
+        reference: The reference frame of velocities, Jacobians and accelerations.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("ur5")
@@ -202,7 +202,7 @@ class CompiledFrame:
         self._robot, self._tree = robot, robot.verifier.tree
         self._plan = robot.plan([self._tree.frame_link(frame)])
         self._batches: dict[str, Callable[[int], int] | None] = {}
-        # Compiled, or read from disk, when they are first called.
+        # Compiled or read from the cache at the first call.
         self._placement: Fast = partial(self._first, "placement")
         self._velocity: Fast = partial(self._first, "velocity")
         self._jacobian: Fast = partial(self._first, "jacobian")
@@ -211,42 +211,42 @@ class CompiledFrame:
         self._acceleration: Fast = partial(self._first, "acceleration")
 
     def __reduce__(self) -> tuple[Callable[..., CompiledFrame], tuple[str, Reference]]:
-        # It holds addresses of this process.
+        # The object contains addresses of this process, so it is made again.
         return self._robot.compiled, (self.frame, self.reference)
 
     def placement(self, q: Given, out: FloatArray | None = None, *, threads: int | None = None) -> FloatArray:
-        """(..., 4, 4) T_world_frame: eq. 7.77. Arguments and errors as `Robot.placement`."""
+        """Return T_world_frame (..., 4, 4), eq. 7.77; arguments and errors as for `Robot.placement`."""
         if threads is None and (one := self._placement(q, out)) is not None:
             return one
-        return self._computed("placement", (q,), out, threads)
+        return self._compute_batch("placement", (q,), out, threads)
 
     def velocity(
         self, q: Given, v: Given, out: FloatArray | None = None, *, threads: int | None = None
     ) -> FloatArray:
-        """(..., 6) [linear; angular] m/s, rad/s: eq. 7.127, 7.128."""
+        """Return the velocity (..., 6), [linear; angular], m/s and rad/s: eq. 7.127, 7.128."""
         if threads is None and (one := self._velocity(q, v, out)) is not None:
             return one
-        return self._computed("velocity", (q, v), out, threads)
+        return self._compute_batch("velocity", (q, v), out, threads)
 
     def jacobian(self, q: Given, out: FloatArray | None = None, *, threads: int | None = None) -> FloatArray:
-        """(..., 6, nv): eq. 7.85."""
+        """Return the Jacobian (..., 6, nv): eq. 7.85."""
         if threads is None and (one := self._jacobian(q, out)) is not None:
             return one
-        return self._computed("jacobian", (q,), out, threads)
+        return self._compute_batch("jacobian", (q,), out, threads)
 
     def jacobian_rate(
         self, q: Given, v: Given, out: FloatArray | None = None, *, threads: int | None = None
     ) -> FloatArray:
-        """(..., 6, nv): eq. 7.126."""
+        """Return the time derivative of the Jacobian (..., 6, nv): eq. 7.126."""
         if threads is None and (one := self._jacobian_rate(q, v, out)) is not None:
             return one
-        return self._computed("jacobian rate", (q, v), out, threads)
+        return self._compute_batch("jacobian rate", (q, v), out, threads)
 
     def hessian(self, q: Given, out: FloatArray | None = None, *, threads: int | None = None) -> FloatArray:
-        """(..., 6, nv, nv): how each rate changes each column, eq. 7.126 before it is summed."""
+        """Return the Hessian (..., 6, nv, nv): the terms of eq. 7.126 before their sum."""
         if threads is None and (one := self._hessian(q, out)) is not None:
             return one
-        return self._computed("hessian", (q,), out, threads)
+        return self._compute_batch("hessian", (q,), out, threads)
 
     def acceleration(
         self,
@@ -257,21 +257,21 @@ class CompiledFrame:
         *,
         threads: int | None = None,
     ) -> FloatArray:
-        """(..., 6) [linear; angular] m/s^2, rad/s^2, classical: eq. 7.129, 7.130."""
+        """Return the classical acceleration (..., 6), [linear; angular], m/s^2, rad/s^2: eq. 7.129, 7.130."""
         if threads is None and (one := self._acceleration(q, v, a, out)) is not None:
             return one
-        return self._computed("acceleration", (q, v, a), out, threads)
+        return self._compute_batch("acceleration", (q, v, a), out, threads)
 
     # -- inside --------------------------------------------------------------------------------------------
 
     def _first(self, name: str, q: Given, *others: object) -> FloatArray | None:
-        """Make what computes one configuration, and compute."""
+        """Compile the function for one configuration, and call it."""
         with importing:
             from urdfkin.compiled.single import arrays_are_known, called  # noqa: PLC0415  loads Numba
 
         own = (
             self._tree.floating_joints or self._plan.is_large
-        )  # a quaternion's norm, or a range, is looked at
+        )  # a quaternion's norm, or the range of results, must be checked
         if own or not (isinstance(q, np.ndarray) and q.ndim == 1 and arrays_are_known()):
             return None
         row = QUANTITIES[name]
@@ -283,13 +283,13 @@ class CompiledFrame:
         return compute(q, *others)
 
     def _machine_code(self, row: Quantity) -> Any:
-        """The function `task`, compiled and checked once; None without a compiler."""
+        """Return the function `task`, compiled and checked once; None without a compiler."""
         with _compiling:
             if row.name not in self._batches:
-                self._batches[row.name] = self._made(row)
+                self._batches[row.name] = self._make(row)
             return self._batches[row.name]
 
-    def _made(self, row: Quantity) -> Any:
+    def _make(self, row: Quantity) -> Any:
         verifier = self._robot.verifier
         code = bare(verifier.tree, self._plan, self.frame, [row], self.reference, "robot")
         if not 0 < len(code.functions[0].results) <= _MOST_RESULTS:
@@ -307,10 +307,10 @@ class CompiledFrame:
     def _call(self, inputs: Sequence[Given]) -> Call:
         return Call(self._tree, self._robot.plan, self.frame, self.reference, None, inputs)
 
-    def _computed(
+    def _compute_batch(
         self, name: str, inputs: Sequence[Given], out: FloatArray | None, threads: int | None
     ) -> FloatArray:
-        """Any batch, in parts for several threads."""
+        """Compute a batch, in parts for several threads."""
         row = QUANTITIES[name]
         if (made := self._machine_code(row)) is None:
             return self._robot.compute(
@@ -331,7 +331,7 @@ class CompiledFrame:
         def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
             task = np.zeros(len(KernelArgs), dtype=np.int64)
             task[KernelArgs.N], task[KernelArgs.OUT] = len(part), part.ctypes.data
-            # Of rows that are shorter than a register, the last is written with what lies beyond its end.
+            # The last row may be shorter than a register; the register is then written past the row's end.
             stage = lines(LANES * part[0].size + LANES) if row.columns and is_staged(found) else None
             task[KernelArgs.STAGE] = 0 if stage is None else stage.ctypes.data
             for place, x in zip(_PLACES, parts, strict=False):

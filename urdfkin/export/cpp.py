@@ -1,4 +1,4 @@
-"""C++11: a header of templates on the number: `double`, `float`, the numbers of automatic derivatives."""
+"""Write a C++11 header of templates on the number type: `double`, `float`, automatic differentiation."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from urdfkin.export.function import Function
 
 
 def write(code: Code, to: str = "cpp") -> str:
-    """A header, with its check as a program where `NAME_MAIN` is defined."""
+    """Return a header; with `NAME_MAIN` defined it is a program that runs its check."""
     name, up = code.name, code.name.upper()
     first = code.functions[0]
     head = [

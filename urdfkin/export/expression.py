@@ -1,9 +1,9 @@
-"""A number that writes code: arithmetic on it makes a graph of expressions instead of a result.
+"""Symbolic numbers: arithmetic on them builds a graph of expressions for code generation.
 
-The chapter's equations (`urdfkin.kinematics.equations`) run on it as on any other kind of number. What is
-known is folded as it comes: constants are Python's floats, products with 0 and 1 and sums with 0 are gone, a
-minus is drawn out of products and into differences, and an expression that was made before is the same node
-again. So sine and cosine of each joint stand in the graph once, and whatever else two equations share.
+The textbook's equations (`urdfkin.kinematics.equations`) run on these numbers as on any others. The graph
+simplifies expressions at once. Constants are Python's floats and are folded. Products with 0 and 1 and sums
+with 0 are removed. A minus is moved out of products and into differences. Equal expressions are one node, so
+each joint's sine and cosine occur once.
 
 >>> graph = Graph()
 >>> x, y = graph.input("q", 0), graph.input("q", 1)
@@ -21,21 +21,21 @@ from typing import Any
 
 from urdfkin.kinematics.number_kinds import bound
 
-#: A number of an equation that runs on the graph: known, or an expression.
+#: A number of an equation on the graph: a constant or an expression.
 Number = Any
 _EQUATIONS = re.compile(r"(?:7\.\d+(?:, )?)+")
 
 
 class Node:
-    """An expression: an input, or an operation on others; made by a graph and by arithmetic.
+    """An expression: an input, or an operation on other expressions.
 
     Attributes:
         op: "q", "v" or "a" for an input; "+", "-", "*", "/", "neg", "sin", "cos" or "sqrt".
-        of: What it is made of, nodes and constants; an input's place.
-        index: When it was made: nothing is made before what it is made of.
-        place: At which step of the walk it was made.
-        equation: The numbers of the equation that made it, if one has them.
-        name: What to call it; "" where nobody asks.
+        of: The operands, nodes and constants; for an input its index.
+        index: Order of creation; operands have smaller indices.
+        place: Index of the step of the recursion that created it.
+        equation: Numbers of the equation that created it; "" if it has none.
+        name: Name in the code; "" for no name.
     """
 
     __slots__ = ("equation", "graph", "index", "name", "of", "op", "place")
@@ -70,7 +70,7 @@ class Node:
 
     @property
     def operands(self) -> list[Node]:
-        """The expressions it is made of."""
+        """The operands that are expressions."""
         return [x for x in self.of if isinstance(x, Node)]
 
 
@@ -78,81 +78,81 @@ class Graph:
     """The expressions of one function.
 
     Attributes:
-        place: At which step the walk is.
-        equation: The numbers of the equation that runs.
-        chapter: The equations, which note their numbers on what they make.
+        place: Index of the current step of the recursion.
+        equation: Numbers of the current equation.
+        chapter: The textbook's equations; each writes its numbers on the nodes that it creates.
     """
 
     def __init__(self) -> None:
         self._made: dict[tuple[Any, ...], Node] = {}
         self.place, self.equation = 0, ""
-        self.chapter: Any = bound(made=self._noting)
+        self.chapter: Any = bound(made=self._record_numbers)
 
     def input(self, letter: str, place: int) -> Node:
-        """Number `place` of q, v or a."""
+        """Return the node of coordinate `place` of q, v or a."""
         return self.made(letter, place)
 
     def made(self, op: str, *of: Any) -> Node:
-        """The node of an operation, made once."""
+        """Return the node of an operation; equal operations are one node."""
         key = (op, *of)
         if (node := self._made.get(key)) is None:
             node = self._made[key] = Node(self, op, of, len(self._made))
         return node
 
     def sine_cosine(self, x: Number) -> tuple[Number, Number]:
-        """Of an angle that may be known."""
+        """Return sine and cosine of an angle, which may be a constant."""
         if not isinstance(x, Node):
             return math.sin(x), math.cos(x)
         return self.made("sin", x), self.made("cos", x)
 
     def root(self, x: Number) -> Number:
-        """The square root."""
+        """Return the square root."""
         return self.made("sqrt", x) if isinstance(x, Node) else math.sqrt(x)
 
     def sum(self, x: Number, y: Number) -> Number:
-        """X + y."""
+        """Return x + y."""
         if _is(x, 0.0) or _is(y, 0.0):
             return y if _is(x, 0.0) else x
-        if (positive := _negated(y)) is not None:
+        if (positive := _without_minus(y)) is not None:
             return self.difference(x, positive)
-        if (positive := _negated(x)) is not None:
+        if (positive := _without_minus(x)) is not None:
             return self.difference(y, positive)
-        return self.made("+", *_ordered(x, y))
+        return self.made("+", *_in_order(x, y))
 
     def difference(self, x: Number, y: Number) -> Number:
-        """X - y."""
+        """Return x - y."""
         if x is y or _is(y, 0.0):
             return 0.0 if x is y else x
         if _is(x, 0.0):
             return -y
-        if (positive := _negated(y)) is not None:
+        if (positive := _without_minus(y)) is not None:
             return self.sum(x, positive)
-        if (positive := _negated(x)) is not None:
+        if (positive := _without_minus(x)) is not None:
             return -self.sum(positive, y)
         if (other := self._made.get(("-", y, x))) is not None:
             return -other
         return self.made("-", x, y)
 
     def product(self, x: Number, y: Number) -> Number:
-        """X y."""
+        """Return the product of x and y."""
         if _is(x, 0.0) or _is(y, 0.0):
             return 0.0
         for one, other in ((x, y), (y, x)):
             if _is(one, 1.0):
                 return other
-            if (positive := _negated(one)) is not None:
+            if (positive := _without_minus(one)) is not None:
                 return -(positive * other)
-        return self.made("*", *_ordered(x, y))
+        return self.made("*", *_in_order(x, y))
 
-    def _noting(self, equation: Callable[..., Any]) -> Callable[..., Any]:
-        """An equation that notes its numbers on what it makes, unless another called it."""
+    def _record_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
+        """Return an equation that writes its numbers on new nodes, unless another equation called it."""
         found = _EQUATIONS.match(equation.__doc__ or "")
         if found is None:
             return equation
         numbers = found[0].rstrip(", ")
 
         @wraps(equation)
-        def noting(*arguments: Any) -> Any:
+        def recording(*arguments: Any) -> Any:
             if self.equation:
                 return equation(*arguments)
             self.equation = numbers
@@ -161,28 +161,28 @@ class Graph:
             finally:
                 self.equation = ""
 
-        return noting
+        return recording
 
 
 def _is(x: Number, value: float) -> bool:
     return not isinstance(x, Node) and x == value
 
 
-def _negated(x: Number) -> Number:
-    """`y` where x is -y, y no negative constant itself; else None."""
+def _without_minus(x: Number) -> Number:
+    """Return y if x is -y, where y is an expression or a positive constant; else None."""
     if isinstance(x, Node):
         return x.of[0] if x.op == "neg" else None
     return -x if x < 0.0 else None
 
 
-def _ordered(x: Number, y: Number) -> tuple[Number, Number]:
-    """The same for x, y and y, x: a constant first, then what was made first."""
+def _in_order(x: Number, y: Number) -> tuple[Number, Number]:
+    """Return two operands in a fixed order: a constant first, then the older node."""
     first, second = sorted((x, y), key=lambda z: z.index if isinstance(z, Node) else -1)
     return first, second
 
 
 def needed(results: Sequence[Number]) -> list[Node]:
-    """The expressions that some numbers are made of, and they themselves, as they were made one by one."""
+    """Return all expressions in some results, including their operands, in order of creation."""
     waiting, seen = [x for x in results if isinstance(x, Node)], set[Node]()
     while waiting:
         if (node := waiting.pop()) not in seen:

@@ -1,7 +1,8 @@
-"""One quantity of one frame as a function: what it takes, what it gives, and the statements between.
+"""One quantity of one frame as a function: its inputs, its statements and its results.
 
-A statement is an expression that is used more than once, that is a number of a link's state, or a sine, a
-cosine or a root. All others stand where they are used.
+An expression is a statement if it is used more than once or is a number of a link's state. Sines, cosines,
+roots and quotients are statements, too. A long expression is split into statements. Other expressions are
+written where they are used.
 """
 
 from __future__ import annotations
@@ -23,9 +24,9 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.quantities import Quantity
 
 _INPUTS = ("q", "v", "a")
-#: What a statement of its own is made for, wherever it is used.
+#: Operations that are always statements.
 _ALWAYS = ("sin", "cos", "sqrt", "/")
-#: More operations than these no line has.
+#: Largest number of operations in a line.
 _LONGEST = 12
 
 
@@ -34,10 +35,10 @@ class Function:
     """Straight-line code for one quantity.
 
     Attributes:
-        quantity: Its row of the table.
-        reference: For which point and in which axes.
-        plan: The path.
-        results: Row by row: constants and expressions.
+        quantity: The quantity's row of the table.
+        reference: The reference frame.
+        plan: The compiled tree of the path.
+        results: The results, constants and expressions, row by row.
     """
 
     quantity: Quantity
@@ -47,45 +48,45 @@ class Function:
 
     @property
     def name(self) -> str:
-        """Of the quantity, as a word."""
+        """The quantity's name as an identifier."""
         return self.quantity.method
 
     @property
     def inputs(self) -> str:
-        """What it takes: "q", "qv" or "qva"."""
+        """The letters of the inputs: "q", "qv" or "qva"."""
         return self.quantity.inputs
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of the result."""
+        """The shape of the result."""
         return self.quantity.own_shape(self.plan.nv)
 
     @cached_property
     def nodes(self) -> list[Node]:
-        """All that is needed, in an order in which it can be computed."""
+        """All needed expressions, in an order in which they can be computed."""
         return needed(self.results)
 
     @cached_property
     def operations(self) -> int:
-        """How many there are, a change of sign none."""
+        """The number of operations; a change of sign does not count."""
         return sum(node.op not in (*_INPUTS, "neg") for node in self.nodes)
 
     @cached_property
     def angles(self) -> list[Node]:
-        """Whose sine or cosine is needed."""
+        """The angles with a sine or cosine in the function."""
         found = (node.of[0] for node in self.nodes if node.op in ("sin", "cos"))
         return list(dict.fromkeys(found))
 
     @cached_property
     def statements(self) -> list[Node]:
-        """The nodes with a line of their own, in order."""
+        """The nodes that are statements, in order."""
         uses = Counter[Node]()
         for value in self.results:
             if isinstance(value, Node):
-                uses[_bare(value)] += 1
+                uses[_without_minus(value)] += 1
         for node in self.nodes:
             if node.op != "neg":
-                uses.update(map(_bare, node.operands))
+                uses.update(map(_without_minus, node.operands))
         found, length = list[Node](), dict[Node, int]()
         for node in self.nodes:
             length[node] = 1 + sum(length[x] for x in node.operands)
@@ -97,7 +98,7 @@ class Function:
         return found
 
     def within(self, leaves: Collection[str]) -> set[Node]:
-        """The nodes that results are made of, without what is behind these operations."""
+        """Return the nodes of the results, without the operands of the operations in `leaves`."""
         waiting, found = [x for x in self.results if isinstance(x, Node)], set[Node]()
         while waiting:
             if (node := waiting.pop()) not in found:
@@ -106,7 +107,7 @@ class Function:
         return found
 
     def evaluated(self, inputs: Sequence[FloatArray]) -> FloatArray:
-        """(n, ...) for q (n, nq), and v and a (n, nv) as far as it takes them; no code is written for it."""
+        """Evaluate the expressions with NumPy: results (n, ...) for q (n, nq), v and a (n, nv)."""
         value: dict[Node, Any] = {}
         given = dict(zip(_INPUTS, inputs, strict=False))
         for node in self.nodes:
@@ -132,18 +133,18 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
 }
 
 
-def _bare(node: Node) -> Node:
-    """Without its sign: -x is written where it is used."""
+def _without_minus(node: Node) -> Node:
+    """Return the node without its minus: -x is written where it is used."""
     return node.of[0] if node.op == "neg" else node
 
 
 def function_of(plan: CompiledTree, quantity: Quantity, reference: Reference) -> Function:
-    """The function for the plan's only frame.
+    """Make the function of a quantity for the compiled tree's only frame.
 
     Args:
-        plan: The path.
-        quantity: A row that the walk computes.
-        reference: For which point and in which axes.
+        plan: The compiled tree of the path.
+        quantity: A quantity that can be exported.
+        reference: The reference frame.
     """
     graph = Graph()
 
@@ -162,7 +163,7 @@ def function_of(plan: CompiledTree, quantity: Quantity, reference: Reference) ->
 
 
 def _name(place: int, state: State) -> None:
-    """Call the numbers of a state by the text's letters."""
+    """Name the numbers of a link's state with the textbook's symbols."""
     named = {f"R{place + 1}_{r}{c}": x for r, row in enumerate(state.R) for c, x in enumerate(row)}
     for letter in ("p", "w", "vel", "alpha", "acc"):
         vector = getattr(state, letter)

@@ -1,6 +1,6 @@
-r"""LaTeX: the same straight line as formulas of a document, in the text's letters.
+r"""Write a LaTeX document: the straight-line code as formulas, in the textbook's symbols.
 
-A joint is called by its number on the path, which a list at the beginning explains.
+A joint has its number on the path as its index. A list at the beginning gives the joints' names.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from urdfkin.export.code import Code, Writer
 from urdfkin.export.expression import Node
 from urdfkin.export.function import Function
 
-#: The letters of a state: the text's.
+#: The textbook's symbols of a link's state.
 _LETTERS = {
     "R": "R",
     "p": "p",
@@ -37,7 +37,7 @@ _RESULTS = {
 
 
 def write(code: Code, to: str = "latex") -> str:
-    """A document of its own."""
+    """Return a complete document."""
     lines = [f"% {line}".rstrip() for line in code.head]
     lines += [
         r"\documentclass{article}",

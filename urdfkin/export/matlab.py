@@ -1,4 +1,4 @@
-"""MATLAB and Octave: a function that hands out the functions, its check among them."""
+"""Write a MATLAB and Octave file: one function that returns the others, including the check."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from urdfkin.export.function import Function
 
 _CHECK = """
 function check()
-% For each function the largest error as a share of what it may be off by: at most 1.
+% For each function the largest error as a share of its tolerance: at most 1.
 {given}
 {functions}
 end
 
-function told(name, found, right, within)
+function report(name, found, right, within)
 off = abs(found(:) - right(:));
 share = off ./ (within(:) * 2^-52);
 share(off == 0) = 0;
@@ -31,7 +31,7 @@ end
 
 
 def write(code: Code, to: str = "matlab") -> str:
-    """A file `NAME_kinematics.m`."""
+    """Return the text of a file `NAME_kinematics.m`."""
     name = f"{code.name}_kinematics"
     head = [
         *code.head,
@@ -84,7 +84,7 @@ def _check(code: Code) -> str:
             f"    x = {name}({inputs});",
             "    found(k, :) = reshape(permute(x, ndims(x):-1:1), 1, []);",
             "end",
-            f"told('{name}', found, right, within);",
+            f"report('{name}', found, right, within);",
         ]
     return _CHECK.format(given="\n".join(given), functions="\n".join(checks), n=len(found))
 

@@ -1,7 +1,6 @@
-"""Names of a URDF in code: an identifier in every language, or words in a comment; never anything else.
+"""Convert names of a URDF to identifiers and to text in comments, safe in every language.
 
-An identifier gets a prefix of ours wherever it is used (`s_`, `q_`), so that none is a keyword; it is ASCII,
-short, and no two are alike.
+Identifiers are short, ASCII and unique. The code adds a prefix (`s_`, `q_`), so that none is a keyword.
 """
 
 from __future__ import annotations
@@ -11,13 +10,13 @@ from collections.abc import Iterable
 
 from urdfkin.dh.export.numeric_code import plain
 
-#: MATLAB takes names of 63 letters.
+#: Longest identifier; MATLAB allows names of 63 letters, with the prefix.
 _LONGEST = 40
 _LONGEST_SHOWN = 80
 
 
 def safe(name: str) -> str:
-    """Letters, digits and single low lines.
+    """Return a name with only letters, digits and single underscores.
 
     >>> safe("panda_joint1"), safe("*/ int x; //"), safe("%")
     ('panda_joint1', 'int_x', 'x')
@@ -27,7 +26,7 @@ def safe(name: str) -> str:
 
 
 def all_safe(names: Iterable[str]) -> list[str]:
-    """The same for several, no two alike, whatever letters a language takes for equal.
+    """Return safe names for several, all different even in a language that ignores case.
 
     >>> all_safe(["a b", "a/b", "A_b_2"])
     ['a_b', 'a_b_2', 'A_b_2_2']
@@ -45,7 +44,7 @@ def all_safe(names: Iterable[str]) -> list[str]:
 
 
 def title(robot: str, frame: str) -> str:
-    """What a frame's code is called; it begins with a letter and always gets a suffix.
+    """Return the name of a frame's code; it begins with a letter, and the code adds a suffix.
 
     >>> title("panda", "panda_hand"), title("ur5", "tool0"), title("2", "x"), title("", "my arm")
     ('panda_hand', 'ur5_tool0', 'robot_2_x', 'my_arm')
@@ -56,12 +55,12 @@ def title(robot: str, frame: str) -> str:
 
 
 def shown(name: str) -> str:
-    """A name in a comment of any language, not at any length."""
+    """Return a name for a comment in any language, shortened to 80 characters."""
     return quiet(name if len(name) <= _LONGEST_SHOWN else f"{name[:_LONGEST_SHOWN]}...")
 
 
 def quiet(text: str) -> str:
-    r"""Words for a comment of any language: printable ASCII that ends none, C's trigraphs included.
+    r"""Return printable ASCII that cannot end a comment in any language, also not by C's trigraphs.
 
     >>> quiet("*/ int x; ??/")
     '_/ int x; __/'

@@ -1,10 +1,10 @@
-"""What goes along with code: who confirmed it, and results that are right to fifty digits.
+"""The proof in an exported file: a comparison with Pinocchio, and test vectors at fifty digits.
 
-The expressions that are printed are evaluated as they stand and held against Pinocchio's results. Whether a
-language, its compiler and its library compute the same from the printed text, the test vectors say wherever
-the file arrives: true values at fifty digits from the URDF's decimals, and for each number how far a correct
-computation may be off, in eps of the number's own kind. Their inputs are numbers of single precision, so that
-they are the same in both.
+The printed expressions are evaluated as they are and compared with Pinocchio's results. The test vectors then
+check the file wherever it is used, with its language, compiler and library. They contain true values at fifty
+digits, computed from the URDF's decimals. For each number they also contain the error bound of a correct
+computation, in eps of its precision. The inputs are single-precision numbers, so they are equal in both
+precisions.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ from urdfkin.verify.exact.recursion import move
 from urdfkin.verify.sampling import draw
 from urdfkin.verify.verifier import Verifier, bound_of
 
-#: Configurations that Pinocchio is asked about, besides the neutral one and the ends of the limits.
+#: Number of random configurations compared with Pinocchio, besides the neutral one and the limits.
 CHECKED = 100
-#: Configurations with results at fifty digits.
+#: Number of test vectors: configurations with results at fifty digits.
 VECTORS = 4
 
 
 @dataclass(frozen=True)
 class Vector:
-    """One configuration, and what each function makes of it.
+    """A test vector: one configuration and the true result of each function.
 
     Attributes:
         inputs: q, v and a.
-        results: By quantity, the true values, row by row, as decimals.
-        within: By quantity, how far each number may be off, in eps.
+        results: By quantity, the true values as decimals, row by row.
+        within: By quantity, the error bound of each number, in eps.
     """
 
     inputs: tuple[list[float], ...]
@@ -53,13 +53,13 @@ class Vector:
 
 @dataclass(frozen=True)
 class Proof:
-    """What a file is worth.
+    """The proof of an exported file.
 
     Attributes:
-        sha256: Of the URDF's text.
-        urdfkin: Version.
-        certificate: Of the printed expressions.
-        vectors: To be computed again.
+        sha256: SHA-256 of the URDF's text.
+        urdfkin: Version of urdfkin.
+        certificate: The certificate of the printed expressions.
+        vectors: The test vectors.
     """
 
     sha256: str
@@ -69,7 +69,7 @@ class Proof:
 
     @property
     def lines(self) -> list[str]:
-        """In words."""
+        """The proof in words."""
         oracle = quiet(self.certificate.oracle)
         if not self.certificate.verified:
             reasons = quiet("; ".join(self.certificate.not_verified)) or "nothing was checked"
@@ -95,13 +95,13 @@ def prove(
     functions: Sequence[Function],
     verify: bool | None,
 ) -> Proof:
-    """Hold functions against Pinocchio, and compute test vectors.
+    """Compare functions with Pinocchio, and compute test vectors.
 
     Raises:
-        VerificationError: Pinocchio computes something else.
+        VerificationError: Pinocchio computes another result.
     """
     tree = verifier.tree
-    checker = copy(verifier)  # with an account of its own
+    checker = copy(verifier)  # with a separate ledger
     drawn = draw(tree, CHECKED, np.random.default_rng(0), with_special=True)
     for function in functions:
         inputs = (drawn.q, drawn.v, drawn.a)[: len(function.inputs)]
@@ -153,7 +153,7 @@ def _single(x: FloatArray) -> FloatArray:
 
 
 def _within(function: Function, part: object) -> FloatArray:
-    """(n, numbers) k * scale."""
+    """Return the error bounds k * scale, (n, numbers), in eps."""
     bound = bound_of(function.quantity, part)  # type: ignore[arg-type]
     scale = np.where(bound.scale > 0.0, np.maximum(bound.scale, SMALLEST), 0.0)
     n = len(scale)
@@ -167,6 +167,6 @@ def _decimal(x: object) -> str:
 
 
 def _rounded_down(x: float) -> str:
-    """Six digits, and no more than x."""
+    """Return x with six digits, rounded down."""
     text = f"{x:.6g}"
     return text if float(text) <= x else f"{x * (1.0 - 1e-6):.6g}"

@@ -1,4 +1,4 @@
-"""Python for NumPy, Numba, JAX, CasADi and SymPy: the same lines, which differ in what stands around them."""
+"""Write Python for NumPy, Numba, JAX, CasADi and SymPy: equal expressions in different functions."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from urdfkin.export.function import Function
 
 @dataclass(frozen=True)
 class Dialect:
-    """What a library wants.
+    """The parts of a file that depend on the library.
 
     Attributes:
-        about: What a function of the file takes and gives.
-        imports: Lines, one with a place for those of `cos`, `sin` and `sqrt` that are used.
-        decorator: Before each function, if anything.
-        entering: Lines at a function's beginning, from its inputs.
-        index: Of a number of an input.
-        result: Lines that return numbers of a shape.
-        values: The body of `_values(function, inputs)`: the results for each of a list of configurations.
-        before: What a run of the file's own check sets first.
+        about: Description of a function's inputs and results.
+        imports: Import lines, with a place for the used functions among `cos`, `sin` and `sqrt`.
+        result: Function that yields the lines that return numbers in a shape.
+        values: Body of `_values(function, inputs)`, which returns the results for a list of configurations.
+        decorator: Line before each function; "" for none.
+        entering: Function that returns the first lines of a function from its inputs.
+        index: Format of an element of an input.
+        before: Line that the file's own check runs first; "" for none.
     """
 
     about: str
@@ -41,7 +41,7 @@ def _rows(values: Sequence[str], width: int) -> list[Sequence[str]]:
 
 
 def _in_array(create: str, index: str) -> Callable[[list[str], tuple[int, ...]], Iterator[str]]:
-    """Written one by one into an array."""
+    """Return the writer of results into an array, element by element."""
 
     def result(values: list[str], shape: tuple[int, ...]) -> Iterator[str]:
         yield f"out = {create.format(shape, ', '.join(map(str, shape)))}"
@@ -55,7 +55,10 @@ def _in_array(create: str, index: str) -> Callable[[list[str], tuple[int, ...]],
 def _nested(
     opening: str, closing: str, row: str = "[{}]", deeper: str = ""
 ) -> Callable[[list[str], tuple[int, ...]], Iterator[str]]:
-    """Row by row, inside one call; a Hessian's rows lie below each other unless `deeper` shapes them."""
+    """Return the writer of results in one call, row by row.
+
+    The rows of a Hessian are stacked unless `deeper` reshapes them.
+    """
 
     def result(values: list[str], shape: tuple[int, ...]) -> Iterator[str]:
         yield f"return {opening}"
@@ -81,7 +84,7 @@ _ONE_BY_ONE = "return [{} for one in zip(*inputs)]"
 
 DIALECTS = {
     "numpy": Dialect(
-        about="Arrays q (..., {nq}), v and a (..., {nv}), which broadcast; results have the same.",
+        about="Arrays q (..., {nq}), v and a (..., {nv}), which broadcast; so do results.",
         imports="import numpy as np\nfrom numpy import {}",
         entering=_shapes,
         index="{}[..., {}]",
@@ -97,7 +100,7 @@ DIALECTS = {
     ),
     "jax": Dialect(
         about="One configuration, arrays q ({nq},), v and a ({nv},), of any precision; for jit, vmap, grad.\n"
-        "XLA's fusion compiles for minutes where a chain is long; this leaves it out:\n"
+        "XLA's fusion pass takes minutes to compile long chains; this disables it:\n"
         'jax.jit(jax.vmap(function), compiler_options={{"xla_disable_hlo_passes": "fusion"}})',
         imports="import jax\nimport jax.numpy as jnp\nfrom jax.numpy import {}",
         entering=lambda inputs: [f"{x} = jnp.asarray({x})" for x in inputs],
@@ -127,7 +130,7 @@ DIALECTS = {
 
 
 def write(code: Code, to: str) -> str:
-    """A module with a function for each quantity, and its check: `python FILE`."""
+    """Return a module with a function for each quantity and a check, which `python FILE` runs."""
     dialect = DIALECTS[to]
     about = dialect.about.format(nq=code.nq, nv=code.nv)
     lines = [
@@ -175,7 +178,7 @@ def _values(function, inputs):
 
 
 def check():
-    """For each function its largest error as a share of what it may be off by: at most 1."""
+    """Return the largest error of each function as a share of its tolerance: at most 1."""
     shares = {{}}
     for function in ({functions}):
         name, worst = function.__name__, 0.0
@@ -202,7 +205,7 @@ if __name__ == "__main__":
 
 
 def _check(code: Code, dialect: Dialect) -> Iterator[str]:
-    yield "\n# Configurations, true values at fifty digits, and how far a number may be off, in eps = 2^-52."
+    yield "\n# Configurations, true values at fifty digits, and tolerances in eps = 2^-52."
     vectors = code.proof.vectors
     most = max((function.inputs for function in code.functions), key=len)
     yield "INPUTS = {" + ", ".join(f'"{f.name}": "{f.inputs}"' for f in code.functions) + "}"

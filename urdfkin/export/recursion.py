@@ -1,11 +1,12 @@
-"""The recursion of section 7.7 along one path, on whatever kind of number the equations are given.
+"""The forward recursion of section 7.7 along one path, for any kind of number.
 
-A plan of one frame is a row of steps: carried along a rigid link, turned by a constant, moved by a joint
-whose axis is z. Places and Jacobians are followed in the world's axes, as in the text. Velocities and
-accelerations are followed in each link's own, where axes are (0, 0, 1) and links constants; what is asked for
-in the world's is turned back joint by joint, which takes a third less than R itself.
+The compiled tree of a frame is a row of steps. Each step is a translation along a rigid link, a constant
+rotation and the motion of a joint about or along z. Placements and Jacobians are computed in the world's
+axes, as in the textbook. Velocities and accelerations are computed in each link's own axes, where joint axes
+are (0, 0, 1) and links are constant. Results in the world's axes are then rotated back joint by joint. This
+takes a third fewer operations than R itself.
 
-The recursion itself is `urdfkin.model.recursion`; here it reads a plan.
+`urdfkin.model.recursion` contains the recursion; this module applies it to a compiled tree.
 """
 
 from __future__ import annotations
@@ -28,11 +29,11 @@ class Kind:
     """A kind of number.
 
     Attributes:
-        chapter: The equations, computing with it.
-        sine_cosine: Of an angle.
-        root: The square root.
-        entering: Told before each step, before the frame (after the last step) and before its results.
-        reached: Told of each state, after as many steps.
+        chapter: The textbook's equations for this kind of number.
+        sine_cosine: Returns sine and cosine of an angle.
+        root: Returns the square root.
+        entering: Callback before each step, before the frame (after the last step) and before its results.
+        reached: Callback for each state, with the number of steps.
     """
 
     chapter: Any
@@ -43,18 +44,18 @@ class Kind:
 
 
 class TreeRecursion(Recursion):
-    """One path.
+    """The forward recursion along one path.
 
     Args:
-        plan: Of one frame.
-        kind: Of number.
-        inputs: q, v and a; zeros where nobody asks for them.
-        own: Whether motion is seen in each link's own axes.
+        plan: The compiled tree of one frame.
+        kind: The kind of number.
+        inputs: q, v and a; zeros where they are not needed.
+        own: Whether to compute motion in each link's own axes.
 
     Attributes:
-        states: After each step.
-        end: The frame's.
-        turns: The rotations from each frame's axes to those of the one before, from the base on.
+        states: The state after each step.
+        end: The state of the frame.
+        turns: The rotations from each frame's axes to the previous frame's axes, from the base.
     """
 
     def __init__(
@@ -67,29 +68,29 @@ class TreeRecursion(Recursion):
         state = State()
         for i in range(len(plan.steps)):
             kind.entering(i)
-            state = self._moved(i, self._rigid(state, plan.geometry[i].tolist()))
+            state = self._move(i, self._carry(state, plan.geometry[i].tolist()))
             self.states.append(state)
             kind.reached(i, state)
         kind.entering(len(self.states))
-        self.end = self._rigid(state, plan.offsets[0].tolist())
+        self.end = self._carry(state, plan.offsets[0].tolist())
         kind.reached(len(self.states), self.end)
         kind.entering(len(self.states) + 1)
 
     def turned(self, s: State, S: Matrix) -> State:
-        """As ever, and remembered."""
+        """Rotate a state, and store the rotation."""
         self.turns.append(S)
         return super().turned(s, S)
 
-    def _rigid(self, s: State, row: Sequence[float]) -> State:
+    def _carry(self, s: State, row: Sequence[float]) -> State:
         R, d = row[: Geometry.OFFSET], row[Geometry.OFFSET : Geometry.MULTIPLIER]
-        x, y, z = _structure(R[0:3]), _structure(R[3:6]), _structure(R[6:9])
-        return self.turned(self.carried(s, _structure(d)), (x, y, z))
+        x, y, z = _without_rounding(R[0:3]), _without_rounding(R[3:6]), _without_rounding(R[6:9])
+        return self.turned(self.carried(s, _without_rounding(d)), (x, y, z))
 
     def _about_z(self, angle: Number) -> Matrix:
         found: Matrix = self.eq.about_z(*self.kind.sine_cosine(angle), 0.0, 1.0)
         return found
 
-    def _moved(self, i: int, s: State) -> State:
+    def _move(self, i: int, s: State) -> State:
         (kind, at, rate_at), (q, v, a) = self.plan.steps[i].tolist(), self.inputs
         multiplier, constant = self.plan.geometry[i, Geometry.MULTIPLIER :].tolist()
         if kind == Motion.PLANAR:
@@ -109,7 +110,7 @@ class TreeRecursion(Recursion):
 
     @property
     def columns(self) -> list[Column]:
-        """The rates of the path."""
+        """The columns of the Jacobian."""
         found = []
         for row, factor in zip(self.plan.columns.tolist(), self.plan.multipliers.tolist(), strict=True):
             s = self.states[row[ColumnField.STEP]]
@@ -120,70 +121,70 @@ class TreeRecursion(Recursion):
         return found
 
 
-def _structure(x: Sequence[float]) -> Vector:
-    """A constant vector without what is less than the rounding of its largest number.
+def _without_rounding(x: Sequence[float]) -> Vector:
+    """Return a constant vector; entries below the rounding of its largest entry become 0.
 
-    The cosine of the double nearest to pi/2 is 6e-17: a product for nothing wherever it stands. What leaving
-    it out costs is counted in `urdfkin.kinematics.roundings`.
+    For example, the cosine of the double nearest to pi/2 is 6e-17 and would only add useless products. The
+    error is counted in `urdfkin.kinematics.roundings`.
     """
     least = EPS / 2.0 * max(map(abs, x))
     first, second, third = (c if abs(c) > least else 0.0 for c in x)
     return first, second, third
 
 
-# -- what is asked of the frame ----------------------------------------------------------------------------
+# -- the quantities of the frame ----------------------------------------------------------------------------
 
 
 def placement(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
-    """T_world_frame, row by row."""
+    """Return T_world_frame, row by row."""
     end = TreeRecursion(plan, kind, inputs, own=False).end
     rows = [[*row, x] for row, x in zip(end.R, end.p, strict=True)]
     return [*(x for row in rows for x in row), 0.0, 0.0, 0.0, 1.0]
 
 
 def velocity(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
-    """[linear; angular]: 7.127, 7.128."""
-    walk = _seen_by(plan, kind, inputs, reference)
-    return _six(walk, reference, *walk.velocity(walk.end, reference))
+    """Return the velocity [linear; angular]: 7.127, 7.128."""
+    path = _recursion(plan, kind, inputs, reference)
+    return _six_vector(path, reference, *path.velocity(path.end, reference))
 
 
 def acceleration(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
-    """[linear; angular], classical: 7.129, 7.130."""
-    walk = _seen_by(plan, kind, inputs, reference)
-    return _six(walk, reference, *walk.acceleration(walk.end, reference))
+    """Return the classical acceleration [linear; angular]: 7.129, 7.130."""
+    path = _recursion(plan, kind, inputs, reference)
+    return _six_vector(path, reference, *path.acceleration(path.end, reference))
 
 
 def jacobian(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
-    """Row by row, 7.85."""
-    walk = TreeRecursion(plan, kind, inputs, own=False)
-    return _by_row(walk.jacobian(walk.end, walk.columns, plan.nv, reference))
+    """Return the Jacobian row by row: 7.85."""
+    path = TreeRecursion(plan, kind, inputs, own=False)
+    return _by_row(path.jacobian(path.end, path.columns, plan.nv, reference))
 
 
 def jacobian_rate(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
-    """Row by row, 7.126."""
-    walk = TreeRecursion(plan, kind, inputs, own=False)
-    return _by_row(walk.jacobian_rate(walk.end, walk.columns, plan.nv, reference))
+    """Return the time derivative of the Jacobian row by row: 7.126."""
+    path = TreeRecursion(plan, kind, inputs, own=False)
+    return _by_row(path.jacobian_rate(path.end, path.columns, plan.nv, reference))
 
 
 def hessian(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
-    """Column by column of each row of 7.85, how each rate changes it: 7.126 before it is summed."""
-    walk, nv = TreeRecursion(plan, kind, inputs, own=False), plan.nv
+    """Return the derivative of each Jacobian entry by each coordinate: 7.126 before its sum."""
+    path, nv = TreeRecursion(plan, kind, inputs, own=False), plan.nv
     out: list[Number] = [0.0] * (6 * nv**2)
-    for of, by, factor, six in walk.hessian(walk.end, walk.columns, reference):
+    for of, by, factor, six in path.hessian(path.end, path.columns, reference):
         for row, x in enumerate(six):
             out[(row * nv + of) * nv + by] = out[(row * nv + of) * nv + by] + factor * x
     return out
 
 
-def _seen_by(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> TreeRecursion:
-    # From the world's origin a motion is seen through p, which is followed in the world's axes.
+def _recursion(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> TreeRecursion:
+    # The reference WORLD needs p, which is computed in the world's axes.
     return TreeRecursion(plan, kind, inputs, own=reference is not Reference.WORLD)
 
 
-def _six(walk: TreeRecursion, reference: Reference, linear: Vector, angular: Vector) -> list[Number]:
+def _six_vector(path: TreeRecursion, reference: Reference, linear: Vector, angular: Vector) -> list[Number]:
     if reference is Reference.LOCAL_WORLD_ALIGNED:
-        for S in reversed(walk.turns):
-            linear, angular = walk.eq.rotate(S, linear), walk.eq.rotate(S, angular)
+        for S in reversed(path.turns):
+            linear, angular = path.eq.rotate(S, linear), path.eq.rotate(S, angular)
     return [*linear, *angular]
 
 
@@ -191,7 +192,7 @@ def _by_row(columns: Sequence[Sequence[Number]]) -> list[Number]:
     return [x for row in zip(*columns, strict=True) for x in row]
 
 
-#: By the names of the table of quantities.
+#: Functions by the names of the table of quantities.
 QUANTITIES: dict[str, Callable[[CompiledTree, Kind, Any, Reference], list[Number]]] = {
     "placement": placement,
     "velocity": velocity,

@@ -1,6 +1,7 @@
-"""A file's digest in its own head: whether its numbers, its test vectors and its claims are as written.
+"""The seal of an exported file: a digest of the whole text in its own head.
 
-It is a digest, not a signature: it shows that a file was changed, not who wrote it.
+It detects changes of the file's numbers, test vectors and statements. It is a digest, not a signature: it
+does not prove who wrote the file.
 """
 
 from __future__ import annotations
@@ -9,18 +10,18 @@ import hashlib
 import re
 
 _ZEROS = "0" * 64
-#: The line of a head that `seal` completes.
+#: The line of a file's head that `seal` completes.
 SEAL = f"Seal sha256 {_ZEROS}"
 _LINE = re.compile(r"^([ %*]*Seal sha256 )([0-9a-f]{64})$", re.MULTILINE)
 
 
 def seal(text: str) -> str:
-    """A file's text with its digest in the place of the zeros."""
+    """Return a file's text with its digest instead of the zeros."""
     return _LINE.sub(lambda found: found[1] + _digest(text), text, count=1)
 
 
 def is_sealed(text: str) -> bool | None:
-    """Whether a file is as it was written, whatever its line ends; None: it has no seal."""
+    """Return whether a file is unchanged, except for line ends; None if it has no seal."""
     text = text.replace("\r\n", "\n")
     if (found := _LINE.search(text)) is None:
         return None

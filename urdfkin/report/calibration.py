@@ -1,4 +1,4 @@
-"""A calibration to read, and as data: what the poses tell, what moved, and what to doubt."""
+"""Print a calibration, or return it as JSON data: parameters, errors and warnings."""
 
 from __future__ import annotations
 
@@ -19,22 +19,23 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
-#: Of the noise: less than that is left only where rounding stands for it.
+#: Ratio of residuals to noise below which the noise is only rounding.
 _ROUNDING = 0.5
 
 
 def print_calibration(found: Calibration, out: Console) -> None:
-    """Print it."""
-    model, told = found.model, found.identification
+    """Print a calibration: parameters, errors, noise, base, tool and warnings."""
+    model, identification = found.model, found.identification
     poses = f", {counted(len(found.fitted.errors), 'pose')}" if found.fitted is not None else ""
     out.print(f"{found.robot.name}: {model.base} to {model.tip}{poses}", style="bold")
-    out.print(f"{told.rank} of {len(found.parameters)} parameters can be told, {len(told.still)} stand still")
+    identifiable, fixed = identification.rank, len(identification.still)
+    out.print(f"{identifiable} of {len(found.parameters)} parameters identifiable, {fixed} fixed")
     if found.fitted is None:
-        print_named(out, ["can be told"], [(str(found.parameters[k]),) for k in sorted(told.kept)])
+        print_named(out, ["identifiable"], [(str(found.parameters[k]),) for k in sorted(identification.kept)])
         print_named(
             out,
-            ["stands still", "because it"],
-            [(str(found.parameters[k]), reason) for k, reason in sorted(told.still.items())],
+            ["fixed", "reason"],
+            [(str(found.parameters[k]), reason) for k, reason in sorted(identification.still.items())],
             left=(0, 1),
         )
     else:
@@ -47,41 +48,44 @@ def print_calibration(found: Calibration, out: Console) -> None:
                 if k in found.written_parameters
                 else "",
             )
-            for k in sorted(told.kept)
+            for k in sorted(identification.kept)
         ]
-        print_named(out, ["parameter", "moved by", "uncertain by", "written"], rows)
+        print_named(out, ["parameter", "moved by", "standard deviation", "written"], rows)
     if found.fitted is None or found.before is None:
         return
     noise = found.fitted.noise
     said = f"{length(noise.metres)}" + (
         f", {angle(noise.radians)}" if found.fitted.errors.shape[1] == 6 else ""
     )
-    every = sum(p in found.writable for p in told.kept)
+    every = sum(p in found.writable for p in identification.kept)
     few = found.written_fit is not None and len(found.written_parameters) < every
     as_written = f"; as written: {_rms(found.written_fit)}" if few and found.written_fit is not None else ""
-    out.print(f"before: {_rms(found.before)} (rms); after: {_rms(found.fitted)}{as_written}")
+    out.print(f"rms error before the fit: {_rms(found.before)}; after: {_rms(found.fitted)}{as_written}")
     if few:
-        out.print(f"written: {len(found.written_parameters)} of {every} parameters, those beyond 2 sigma")
+        out.print(
+            f"written: {len(found.written_parameters)} of {every} parameters, those that moved by more than "
+            "2 sigma"
+        )
     if not found.stated and not found.fitted.is_judged:
-        out.print("noise: unknown, no number is left to estimate it from")
+        out.print("noise: unknown, there are no redundant measurements")
     elif found.stated:
         ratio = f"{found.fitted.ratio:.3g} +- {found.fitted.spread:.2g}"
-        out.print(f"noise: {said} as stated; {ratio} times that is left")
+        out.print(f"noise: {said} as stated; the residuals are {ratio} times as large")
     elif found.fitted.ratio < _ROUNDING:
-        out.print("noise: none, what is left is rounding")
+        out.print("noise: none, the residuals are rounding")
     else:
-        out.print(f"noise: {said}, estimated from what is left")
+        out.print(f"noise: {said}, estimated from the residuals")
     for name, T in (("base", found.base), ("tool", found.tool)):
         if T is not None:
             out.print(f"{name}: {_written(T)}", soft_wrap=True)
     for line in doubts(found):
-        out.print(f"doubt: {line}", soft_wrap=True, style="bold yellow")
+        out.print(f"warning: {line}", soft_wrap=True, style="bold yellow")
 
 
 def print_moved(written: Rewritten, out: Console) -> None:
-    """By how much each joint's origin moved."""
+    """Print by how much each joint's origin moved."""
     rows = [(joint, length(shift), angle(turn)) for joint, (shift, turn) in written.moved.items()]
-    print_named(out, ["joint", "its origin shifted by", "turned by"], rows)
+    print_named(out, ["joint", "origin moved by", "rotated by"], rows)
 
 
 def _amount(value: float, unit: str) -> str:
@@ -101,24 +105,24 @@ def _written(T: FloatArray) -> str:
 
 
 def as_data(found: Calibration) -> dict[str, Any]:
-    """For a program: null for what is not known."""
-    told = found.identification
+    """Return the calibration as JSON data; null for unknown values."""
+    identification = found.identification
     data: dict[str, Any] = {
         "robot": found.robot.name,
         "source": found.robot.source,
         "base": found.model.base,
         "tip": found.model.tip,
-        "rank": told.rank,
+        "rank": identification.rank,
         "parameters": [
             {
                 "place": parameter.where,
                 "name": parameter.what,
                 "unit": parameter.unit or "1",
-                "fitted": k in told.kept,
+                "fitted": k in identification.kept,
                 "moved": float(found.values[k]) if found.fitted is not None else None,
                 "deviation": _finite(found.deviations[k]) if found.fitted is not None else None,
                 "written": float(found.written_values[k]) if k in found.written_parameters else None,
-                "still_because": told.still.get(k),
+                "still_because": identification.still.get(k),
             }
             for k, parameter in enumerate(found.parameters)
         ],
@@ -128,7 +132,7 @@ def as_data(found: Calibration) -> dict[str, Any]:
     fitted = found.fitted
     names = ("base", found.base), ("tool", found.tool)
     return data | {
-        "covariance_of": [str(found.parameters[k]) for k in told.kept],
+        "covariance_of": [str(found.parameters[k]) for k in identification.kept],
         "covariance": [[_finite(x) for x in row] for row in fitted.covariance],
         "noise": {"metres": fitted.noise.metres, "radians": fitted.noise.radians}
         if found.stated or fitted.is_judged

@@ -1,4 +1,4 @@
-"""What changed between two versions of a description, to read: on a terminal, as Markdown, as data."""
+"""Print the changes between two versions of a description, or return them as Markdown or JSON data."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
 
 def headline(found: Changes) -> str:
-    """How much changed and what all of it moves, in a line."""
+    """Return the number of changes, and how far all together move a frame, in one line."""
     if not found:
         return "nothing changed"
     head = counted(len(found.changes), "change")
     if found.total is None:
-        return f"{head}, nothing moves otherwise" if not any(c.moves for c in found.changes) else head
+        return f"{head}, no effect on motion" if not any(c.moves for c in found.changes) else head
     return f"{head}; together they {motion_words(found.total)}"
 
 
@@ -31,7 +31,7 @@ def _by_element(found: Changes) -> dict[str, list[Change]]:
 
 
 def print_changes(found: Changes, out: Console) -> None:
-    """Print them, an element's together, with what a joint's alone move."""
+    """Print the changes by element, with the effect of each joint's changes alone."""
     out.print(f"{found.sources[0]} -> {found.sources[1]}", soft_wrap=True)
     for element, changes in _by_element(found).items():
         for change in changes:
@@ -42,7 +42,7 @@ def print_changes(found: Changes, out: Console) -> None:
 
 
 def markdown_of(found: Changes, limit: int = LIMIT) -> str:
-    """For a pull request's comment."""
+    """Return the changes as Markdown for a pull request's comment, at most `limit` characters."""
     lines = [f"## {text(headline(found))}", "", f"{text(found.sources[0])} → {text(found.sources[1])}", ""]
     if found:
         lines += ["| element | what | old | new | alone |", "| --- | --- | --- | --- | --- |"]
@@ -57,14 +57,14 @@ def markdown_of(found: Changes, limit: int = LIMIT) -> str:
         row = f"| {' | '.join(map(text, (*cells, said)))} |"
         left -= len(row) + 1
         if left < 0:
-            lines += ["", f"{counted(len(found.changes) - k, 'change')} more did not fit."]
+            lines += ["", f"{counted(len(found.changes) - k, 'more change')} not shown."]
             break
         lines.append(row)
     return "\n".join([*lines, ""])
 
 
 def as_data(found: Changes) -> dict[str, Any]:
-    """For a program: null where there was nothing, and where nothing bounds a distance."""
+    """Return the changes as JSON data; null for a missing value, and for a distance without bound."""
 
     def far(interval: Any) -> dict[str, Any] | None:
         if interval is None:

@@ -1,8 +1,6 @@
-"""Whether two models are one robot, to read: on a terminal and as Markdown.
+"""Report the comparison of two models: on a terminal, as Markdown and as an HTML page; read certificates.
 
-Whether two models are one robot, as a page: verdict, intervals, both at the worst configuration.
-
-Reading what `urdfkin same --certificate` wrote: JSON that keeps to its published schema.
+The page shows the verdict, the intervals and a picture of both models at the worst configuration.
 """
 
 from __future__ import annotations
@@ -37,23 +35,23 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
-#: Lines of a kind that are shown unless all are asked for.
+#: Number of lines of a kind that are shown without --all.
 SHOWN = 12
-#: Where models differ and names did not say which joints are each other's.
-GUESSED = "by how joints lie, since names do not tell; if other pairs are meant, --map says so"
+#: First line where models differ and joints were not matched by name.
+GUESSED = "joints are matched by their axes, since names do not match; use --map to match other pairs"
 HEADS = ("frame", "at least", "at most", "turned at most")
-#: Of an interval: radians that are attained, and that are proven.
+#: Attributes of an interval: the attained and the proven angle.
 TURNED = ("radians_seen", "radians")
-#: What is asked unless something else is.
+#: The default question.
 EQUIVALENT = Question()
-#: A bound that is rounding may be larger than it by so much: sums round too.
+#: Factor on the rounding up to which a bound counts as rounding: sums round too.
 DUST = 1.001
-#: Above lines about joints whose mimic joints leave their limits.
-NARROWED = "limits of mimic joints, which intervals do not keep"
+#: Head of the lines about joints whose mimic joints leave their limits.
+NARROWED = "limits of mimic joints, which intervals ignore"
 
 
 def headline(found: Sameness, question: Question = EQUIVALENT) -> str:
-    """The answer to what was asked, in a line."""
+    """Return the answer to a question in one line."""
     limits = sum(one.what == "limits" for one in found.remarks)
     besides = f"; limits of {counted(limits, 'joint')} differ" if limits else ""
     if question.within is not None:
@@ -61,8 +59,8 @@ def headline(found: Sameness, question: Question = EQUIVALENT) -> str:
     if found.verdict is Verdict.DIFFERS:
         by = _by(found.frames, found.rounding)
         if found.frames and not by:
-            by = ", though no frame of both is off by more than rounding"
-        return f"DIFFERS{by}; first here: {found.differences[0].words}{besides}"
+            by = ", although no common frame is off by more than rounding"
+        return f"DIFFERS{by}; first difference: {found.differences[0].words}{besides}"
     metres, radians = found.rounding
     off = f"no frame is off by more than rounding, {length(metres)} and {angle(radians)}"
     if found.verdict is Verdict.SAME:
@@ -72,18 +70,18 @@ def headline(found: Sameness, question: Question = EQUIVALENT) -> str:
 
 
 def _within(found: Sameness, most: float) -> str:
-    """Whether frames are off by no more, metres and radians, and which is not."""
-    asked = f"WITHIN {most:g} m and rad: as written, "
+    """Return the answer to --within: whether all frames stay within a distance, and which one does not."""
+    limit = f"WITHIN {most:g} m and rad: as written, "
     if found.within(most):
-        return f"{asked}no frame is ever off by more than {_both(*found.written)}"
+        return f"{limit}no frame is ever off by more than {_both(*found.written)}"
     if (beyond := next((one for one in found.differences if one.what not in BOUNDED), None)) is not None:
-        return f"NOT {asked}{beyond.words}"
+        return f"NOT {limit}{beyond.words}"
     frames = (found.as_written,) if found.as_written is not None else found.frames
     far = [one for one in frames if one.lower > most or one.radians_seen > most]
     if far:
         worst = max(far, key=lambda one: (one.lower, one.radians_seen))
-        return f"NOT {asked}{worst.frame} is {_off(worst, found.rounding)} off"
-    return f"NOT {asked}no frame is proven to be off by less than {_both(*found.written)}"
+        return f"NOT {limit}{worst.frame} is {_off(worst, found.rounding)} off"
+    return f"NOT {limit}the proven bound is {_both(*found.written)}"
 
 
 def _both(metres: float, radians: float) -> str:
@@ -91,7 +89,7 @@ def _both(metres: float, radians: float) -> str:
 
 
 def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
-    """By how much frames are apart, metres and radians, whichever is more than rounding; empty: neither."""
+    """Return the largest distance and angle of all frames in words; empty if both are rounding."""
     lower, upper = (max((getattr(one, end) for one in frames), default=0.0) for end in ("lower", "upper"))
     seen, radians = (max((getattr(one, end) for one in frames), default=0.0) for end in TURNED)
     parts: list[tuple[Callable[[float], str], float, float]] = []
@@ -108,14 +106,14 @@ def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
 
 
 def _off(frame: Interval, rounding: tuple[float, float]) -> str:
-    """How far one frame is off, metres and radians, whichever is more than rounding; empty: neither."""
+    """Return the distance and angle of one frame in words; empty if both are rounding."""
     parts = [up_to(length, frame.lower, frame.upper)] if frame.upper > DUST * rounding[0] else []
     parts += [up_to(angle, frame.radians_seen, frame.radians)] if frame.radians > DUST * rounding[1] else []
     return " and ".join(parts)
 
 
 def far_frames(found: Sameness) -> list[Interval]:
-    """Frames that may be off by more than rounding, the farthest first."""
+    """Return the frames that may be off by more than rounding, the farthest first."""
     return sorted(
         (
             frame
@@ -127,19 +125,19 @@ def far_frames(found: Sameness) -> list[Interval]:
 
 
 def rows(frames: Sequence[Interval]) -> list[list[str]]:
-    """A table's, under `HEADS`."""
+    """Return the rows of the table with the columns `HEADS`."""
     return [[frame.frame, length(frame.lower), length(frame.upper), angle(frame.radians)] for frame in frames]
 
 
 def as_written(found: Sameness) -> str:
-    """How far a frame is off where nothing is put right; empty where that is no more than rounding."""
+    """Return how far a frame is off as written, in words; empty if that is rounding."""
     frame = found.as_written
     off = "" if frame is None else _off(frame, found.rounding)
     return f"as written, {frame.frame} is {off} off" if frame is not None and off else ""
 
 
 def where(found: Sameness, frame: Interval) -> str:
-    """At which configuration a lower bound is attained, in A's coordinates with their units."""
+    """Return the configuration at which a lower bound is attained, in A's coordinates with their units."""
     from urdfkin.model.configuration import coordinate_names, units  # noqa: PLC0415
 
     names = zip(coordinate_names(found.trees[0]), units(found.trees[0], "q"), frame.q_a, strict=False)
@@ -148,10 +146,10 @@ def where(found: Sameness, frame: Interval) -> str:
 
 
 def renamed(found: Sameness) -> list[str]:
-    """Joints and links that are called otherwise."""
+    """Return lines about joints and links that have different names, and about other orders of joints."""
     joints = [f"joint {one.a} is {one.b}" for one in found.joints if one.a != one.b]
     joints += [
-        f"joints of B stand in another order, which their axes allow; taken as {', '.join(names)}"
+        f"joints of B have another order, which their axes allow; compared in the order {', '.join(names)}"
         for names in found.orders
     ]
     if joints and not found:
@@ -162,20 +160,20 @@ def renamed(found: Sameness) -> list[str]:
 def print_sameness(
     found: Sameness, out: Console, question: Question = EQUIVALENT, *, all_: bool = False
 ) -> None:
-    """Print the answer and what it rests on; every line reads without colour.
+    """Print the answer and its reasons; every line is readable without colour.
 
     Args:
-        found: What `same` found.
-        out: Where to.
-        question: What was asked.
-        all_: Whether every line is shown, not the first dozen of a kind.
+        found: The result of `same`.
+        out: The console.
+        question: The question.
+        all_: Whether to show every line, not only the first dozen of a kind.
     """
     for which, name, source in zip("AB", found.names, found.sources, strict=True):
         out.print(f"{which}: {name} ({source})", soft_wrap=True)
     head = headline(found, question)
     out.print(head, style="bold green" if found.holds(question) else "bold red", soft_wrap=True)
     some = None if all_ else SHOWN
-    _print_lines(out, "after", found.after, some)
+    _print_lines(out, "changes of B", found.after, some)
     if found.after and as_written(found) not in head:
         _print_lines(out, "", [as_written(found)], some)
     words = [one.words for one in found.differences]
@@ -184,17 +182,17 @@ def print_sameness(
     if frames:
         out.print("largest distance over all configurations within limits:")
         out.print(plain_table(list(HEADS), rows(frames[:some]), words=(0,)))
-        _left(out, len(frames), some)
+        _print_rest(out, len(frames), some)
         if off := attained(frames[0]):
             out.print(f"{frames[0].frame} is {off} off at: {where(found, frames[0])}", soft_wrap=True)
     _print_lines(out, NARROWED, found.narrowed, some)
-    _print_lines(out, "called otherwise", renamed(found), some)
-    _print_lines(out, "besides", [one.words for one in found.remarks], some)
+    _print_lines(out, "different names", renamed(found), some)
+    _print_lines(out, "differences without effect on motion", [one.words for one in found.remarks], some)
     out.print(found.checked, soft_wrap=True)
 
 
 def attained(frame: Interval) -> str:
-    """How far a frame is off at its configuration; empty where that is nothing."""
+    """Return how far a frame is off at its configuration, in words; empty if it is not off."""
     parts = [length(frame.lower)] if frame.lower else []
     parts += [angle(frame.radians_seen)] if frame.radians_seen and not frame.lower else []
     return " and ".join(parts)
@@ -207,16 +205,16 @@ def _print_lines(out: Console, head: str, lines: Sequence[str], some: int | None
         out.print(f"{head}:")
     for line in lines[:some]:
         out.print(f"  {line}", soft_wrap=True)
-    _left(out, len(lines), some)
+    _print_rest(out, len(lines), some)
 
 
-def _left(out: Console, n: int, some: int | None) -> None:
+def _print_rest(out: Console, n: int, some: int | None) -> None:
     if some is not None and n > some:
         out.print(f"  ... and {n - some} more: --all shows them")
 
 
 def markdown_of(found: Sameness, question: Question = EQUIVALENT) -> str:
-    """The answer, for a pull request's comment."""
+    """Return the answer as Markdown for a pull request's comment."""
     mark = "✅" if found.holds(question) else "❌"
     text = markdown_text
     names = " and ".join(
@@ -224,11 +222,11 @@ def markdown_of(found: Sameness, question: Question = EQUIVALENT) -> str:
     )
     lines = [f"## {mark} {text(headline(found, question))}", "", names, ""]
     for head, words in (
-        ("After", [*found.after, as_written(found)] if found.after else []),
+        ("Changes of B", [*found.after, as_written(found)] if found.after else []),
         ("Differences", [one.words for one in found.differences]),
         (NARROWED.capitalize(), found.narrowed),
-        ("Called otherwise", renamed(found)),
-        ("Besides", [one.words for one in found.remarks]),
+        ("Different names", renamed(found)),
+        ("Differences without effect on motion", [one.words for one in found.remarks]),
     ):
         if words:
             lines += [f"**{head}**", ""]
@@ -244,13 +242,13 @@ def markdown_of(found: Sameness, question: Question = EQUIVALENT) -> str:
     return "\n".join([*lines, text(found.checked), ""])
 
 
-#: The picture's half side, and how much of it the robots take, in its own units.
+#: Half the side of a picture, in its own units, and the share of it that the robots fill.
 HALF, FILLED = 150.0, 0.9
-#: Of the picture's side what its scale takes at most, and where it stands: up from the lower edge.
+#: Largest length of the scale bar as a share of the picture's side, and its distance from the lower edge.
 SCALE, FOOT = 0.3, 6.0
-#: Of a frame's axes in the close view, as a share of it.
+#: Length of a frame's axes in the close view, as a share of the distance shown.
 AXIS = 0.35
-#: Two ways to look: from ahead and to the left, a little from above; and along the same way from the side.
+#: Two views: title, azimuth and elevation of the direction of view, radians.
 VIEWS = (("from the front", 0.6, 0.35), ("from the side", 0.6 + np.pi / 2.0, 0.35))
 
 
@@ -261,14 +259,14 @@ def as_html(
     options: Sequence[str] = (),
     started: datetime | None = None,
 ) -> str:
-    """The page, which answers what was asked. Names may be anything: the template escapes them all.
+    """Return the HTML page with the answer. The template escapes all names.
 
     Args:
-        found: What `same` found.
+        found: The result of `same`.
         robots: A and B.
-        question: What was asked.
-        options: Of the command that repeats it, besides the question.
-        started: When; None: now.
+        question: The question.
+        options: Other options of the command, for the line that repeats it.
+        started: Date and time on the page; None: now.
     """
     moment = started or datetime.now(UTC)
     frames = far_frames(found)
@@ -302,7 +300,7 @@ def as_html(
 
 
 def _command(robots: tuple[Robot, Robot], question: Question, options: Sequence[str]) -> str:
-    """The command line that asks the same again."""
+    """Return the command line that repeats the comparison."""
     words = [robot.origin.words for robot in robots]
     words += [] if question.within is None else [f"--within {question.within!r}"]
     words += ["--strict"] if question.strict else []
@@ -312,13 +310,16 @@ def _command(robots: tuple[Robot, Robot], question: Question, options: Sequence[
 def pictures(
     found: Sameness, robots: tuple[Robot, Robot], worst: Interval | None, *, written: bool = False
 ) -> list[dict[str, Any]]:
-    """Both robots' skeletons from two sides, and the frame close by: lines (x, y, x, y) for A and for B.
+    """Draw the skeletons of both robots in two views, and the worst frame close up.
 
     Args:
-        found: What `same` found.
+        found: The result of `same`.
         robots: A and B.
-        worst: The frame and the configurations; None: the zero configuration.
-        written: Whether B stands as it is written, not where it is equivalent to A.
+        worst: The worst frame with its configurations; None: draw the zero configuration.
+        written: Whether to draw B as written, not with the changes that make it equivalent to A.
+
+    Returns:
+        For each view its title, scale bar and lines (x, y, x, y) of A, of B and between them.
     """
     a, b = robots
     q_a = np.array(worst.q_a) if worst else a.neutral()
@@ -332,33 +333,33 @@ def pictures(
         i, j = a.tree.link_index(found.base_links[0]), b.tree.link_index(found.base_links[1])
         T_b = T_a[i] @ inverse(ours.homes[i]) @ found.base @ theirs.homes[j] @ inverse(T_b[j]) @ T_b
     bones = _bones(a, T_a), _bones(b, T_b)
-    drawn = [_drawn(title, turn, tip, bones) for title, turn, tip in VIEWS]
+    drawn = [_draw(title, turn, tip, bones) for title, turn, tip in VIEWS]
     if worst is not None:
         at = T_a[a.tree.link_index(worst.frame)], T_b[b.tree.link_index(worst.frame_b)]
         room = float(np.linalg.norm(at[0][:3, 3] - at[1][:3, 3]))
         if room > 0.0:
             axes = tuple(_axes(T, AXIS * room) for T in at)
             gap = np.stack((at[0][:3, 3], at[1][:3, 3]))[np.newaxis]
-            drawn.append(_drawn(f"{worst.frame}, close by", *VIEWS[0][1:], (axes[0], axes[1]), gap))
+            drawn.append(_draw(f"{worst.frame}, close by", *VIEWS[0][1:], (axes[0], axes[1]), gap))
     return drawn
 
 
 def _bones(robot: Robot, Ts: FloatArray) -> FloatArray:
-    """(joints, 2, 3) from each link to the links that hang on it."""
+    """Return lines (joints, 2, 3) from each link to its child links."""
     ends = [(Ts[joint.parent, :3, 3], Ts[i + 1, :3, 3]) for i, joint in enumerate(robot.tree.joints)]
     return np.array(ends).reshape(-1, 2, 3)
 
 
 def _axes(T: FloatArray, size: float) -> FloatArray:
-    """(3, 2, 3) a frame's axes."""
+    """Return the axes of a frame as lines (3, 2, 3)."""
     origin = np.tile(T[:3, 3], (3, 1))
     return np.stack((origin, origin + size * T[:3, :3].T), axis=1)
 
 
-def _drawn(
+def _draw(
     title: str, turn: float, tip: float, lines: tuple[FloatArray, FloatArray], gap: FloatArray | None = None
 ) -> dict[str, Any]:
-    """A view: seen from a direction, fitted into the picture."""
+    """Return one view: lines projected along a direction and scaled to the picture."""
     c, s, up, down = np.cos(turn), np.sin(turn), np.cos(tip), np.sin(tip)
     seen = np.array([[-s, c, 0.0], [down * c, down * s, -up]])  # right, and down the page
     flat = [x @ seen.T for x in (*lines, np.zeros((0, 2, 3)) if gap is None else gap)]
@@ -379,7 +380,7 @@ def _drawn(
 
 
 def round_length(most: float) -> float:
-    """The largest of 1, 2 and 5 times a power of ten that is no larger.
+    """Return the largest of 1, 2 and 5 times a power of ten that is at most `most`.
 
     >>> round_length(0.034), round_length(7.0), round_length(1.0)
     (0.02, 5.0, 1.0)
@@ -389,16 +390,16 @@ def round_length(most: float) -> float:
 
 
 def schema_text() -> str:
-    """The JSON Schema (draft 2020-12) of a certificate."""
+    """Return the JSON Schema (draft 2020-12) of a certificate."""
     return asset("same-1.schema.json")
 
 
 def read_certificate(path: Path) -> dict[str, Any]:
-    """A certificate from a file.
+    """Read a certificate from a file.
 
     Raises:
         SourceError: the file cannot be read.
-        InputError: it is not JSON, no certificate, of another version, or breaks the schema.
+        InputError: the file is not JSON, not a certificate, of another version, or violates the schema.
     """
     data = read_json(path)
     keeps_to(json.loads(schema_text()), data, LAYOUT, str(path), "urdfkin same A B --certificate FILE")

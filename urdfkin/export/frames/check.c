@@ -14,7 +14,7 @@ static double share(int n, const real *found, const double *right, const double 
     return worst;
 }
 
-static int told(const char *name, int n, double worst)
+static int report(const char *name, int n, double worst)
 {
     const int good = worst <= 1.0;
     const char *const word = good ? "good" : "WRONG";

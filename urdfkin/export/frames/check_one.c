@@ -1,4 +1,4 @@
-    { /* each vector alone, and all of them again and again in a batch that fills no register */
+    { /* Each vector alone, and all vectors repeated in a batch that does not fill the last register. */
         enum { N = 3 * LANES + 3 };
         static real @arrays@, all[N][@count@];
         real one[@count@];
@@ -13,5 +13,5 @@
             worst = larger(worst, share(@count@, one, right, within));
             worst = larger(worst, share(@count@, all[k], right, within));
         }
-        wrong |= told("@name@", @n@, worst);
+        wrong |= report("@name@", @n@, worst);
     }

@@ -6,5 +6,5 @@
             @name@(@passed@, one);
             worst = larger(worst, share(@count@, one, true_@name@[k], within_@name@[k]));
         }
-        wrong |= told("@name@", @n@, worst);
+        wrong |= report("@name@", @n@, worst);
     }

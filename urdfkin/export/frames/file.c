@@ -30,17 +30,17 @@ extern "C" {
 
 typedef @UP@_REAL real;
 #define R(x) ((real)(x))
-/* Configurations side by side in the batch form. */
+/* Number of configurations that the batch form computes together. */
 #define LANES 8
 
-/* Eight numbers at once: from eight rows of memory to eight columns, and back. */
+/* Transposition of eight numbers of eight rows in memory, and back. */
 #if (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12)) && !defined(@UP@_PORTABLE)
 #ifdef __AVX512F__
 typedef real eight __attribute__((vector_size(8 * sizeof(real))));
 typedef real anywhere __attribute__((vector_size(8 * sizeof(real)), aligned(sizeof(real)), may_alias));
 INLINE void get(eight *x, const real *from) { *x = *(const anywhere *)from; }
 INLINE void put(real *to, const eight *x) { *(anywhere *)to = *x; }
-/* Single numbers, pairs and fours change places across the diagonal. */
+/* Exchange of single numbers, pairs and fours across the diagonal. */
 INLINE void exchange_1(eight *x, eight *y)
 {
     const eight one = *x, other = *y;
@@ -60,7 +60,7 @@ INLINE void exchange_4(eight *x, eight *y)
     *y = __builtin_shufflevector(one, other, 4, 5, 6, 7, 12, 13, 14, 15);
 }
 #else
-/* Where a register holds four at the most, fours change places by their names alone. */
+/* For registers of at most four numbers, the exchange of fours only renames them. */
 typedef real four __attribute__((vector_size(4 * sizeof(real))));
 typedef real anywhere __attribute__((vector_size(4 * sizeof(real)), aligned(sizeof(real)), may_alias));
 typedef struct { four half[2]; } eight;
@@ -95,7 +95,7 @@ INLINE void exchange_4(eight *x, eight *y)
     x->half[1] = low;
 }
 #endif
-/* Loops that compilers unroll, so that x lies in registers. */
+/* Compilers unroll these loops, so that x is in registers. */
 INLINE void transpose(eight *x)
 {
     for (int i = 0; i < 8; i += 2) exchange_1(x + i, x + i + 1);
@@ -124,14 +124,14 @@ INLINE void transpose(eight *x)
 }
 #endif
 
-/* Eight columns of LANES rows that are so wide; what lies beyond a row's end is read as well. */
+/* Read eight columns of LANES rows of a width; this also reads numbers beyond the end of a short row. */
 INLINE void columns(const real *rows, int width, eight *x)
 {
     for (int k = 0; k < 8; ++k) get(x + k, rows + k * width);
     transpose(x);
 }
 
-/* Row after row. Where a row is shorter than eight numbers, what is written beyond it is the next row's. */
+/* Write row after row. In rows shorter than eight numbers, the next row overwrites the numbers beyond the end. */
 INLINE void write_rows(const real *results, int count, real *out)
 {
     for (int j = 0; j < count; j += 8) {

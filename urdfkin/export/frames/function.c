@@ -1,7 +1,7 @@
 
 /* ---- @name@: @operations@ operations ---- */
 
-/* From what is known of a configuration, its inputs, then sines, then cosines, L apart. */
+/* Results from inputs, angles, sines and cosines, which are L apart in memory. */
 INLINE void line_@name@(const real *in, real *out, const size_t L)
 {
     (void)in;
@@ -17,7 +17,7 @@ void @title@_@name@@given@
     line_@name@(in, out, 1);
 }
 
-/* From the inputs of LANES configurations, which stand before the sines. */
+/* Results of LANES configurations from their inputs, which are before the sines. */
 static void all_lanes_@name@(real *restrict in, real *restrict results)
 {
 @lane_sines@
@@ -36,7 +36,7 @@ static void lanes_@name@@given@
 
 void @title@_@name@_batch(size_t n, @given_rest@
 {
-    /* Nothing beyond an array's end is touched: the last rows are computed in copies. */
+    /* The last rows are computed in copies, so that no memory beyond an array's end is read or written. */
     for (; n > LANES + @spare@; n -= LANES, @advance@, out += LANES * @count@)
         lanes_@name@(@passed@, out);
     while (n) {

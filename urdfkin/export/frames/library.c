@@ -3,11 +3,11 @@
 #include <immintrin.h>
 #endif
 
-/* For urdfkin itself: where q, v, a and the results lie, how many there are, and where a block's results come
-   together on their way past the caches (0: they go at once), stand in a row of whole numbers. 0, or 1 where an
-   input is not finite. */
+/* The entry point for urdfkin. Its argument is an array of integers: the number of configurations, the addresses
+   of q, v, a and the results, and the address of a buffer. The buffer collects the results of a block before they
+   are written past the caches (0: write them directly). It returns 0, or 1 if an input is not finite. */
 
-/* What one register holds, and how it goes past the caches. */
+/* Numbers in a register, and the instructions that load it and write it past the caches. */
 #if defined(__AVX512F__)
 #define PIECE 8
 #define LOAD _mm512_loadu_pd
@@ -22,8 +22,8 @@
 #define STREAM _mm_stream_pd
 #endif
 
-/* Of so many times LANES numbers: 0 x is 0, or no number. Four sums, of which none waits for another. It brings
-   near what is computed with next. */
+/* Check count * LANES numbers: 0 x is 0, or NaN if x is not finite. The four sums are independent, so they run in
+   parallel. The check also loads the inputs of the next block into the cache. */
 #define SUMS 4
 typedef double numbers __attribute__((vector_size(PIECE * sizeof(double)), aligned(sizeof(double)), may_alias));
 INLINE void look(size_t count, const double *x, numbers *bad)
@@ -35,7 +35,7 @@ INLINE void look(size_t count, const double *x, numbers *bad)
     for (size_t k = 0; k < count % SUMS; ++k) bad[k] += 0.0 * at[k];
 }
 
-/* A line that is written whole is not read before. */
+/* Write whole cache lines, which the processor then does not read first. */
 INLINE void stream(const double *x, size_t count, double *out)
 {
     size_t i = 0;
@@ -47,7 +47,7 @@ INLINE void stream(const double *x, size_t count, double *out)
     for (; i < count; ++i) out[i] = x[i];
 }
 
-/* One configuration in every lane: the same machine code as a batch's, and so the same bits. */
+/* One configuration in every lane, with the machine code of a batch, so that the bits are equal. */
 static void one(@given@, double *out)
 {
     ALIGNED double in[@room@ * LANES];

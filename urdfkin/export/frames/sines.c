@@ -1,8 +1,8 @@
 
-/* Sine and cosine of so many angles in each lane: Cody and Waite's reduction to [-pi/4, pi/4], the polynomials of
-   fdlibm (Sun Microsystems, k_sin.c and k_cos.c), then the quarter turns. No branch, so that a compiler can do
-   it for all lanes at once; a lane whose angle is FAR takes the library's functions. None is where the sum of
-   the squares is small. */
+/* Sine and cosine of `count` angles in each lane: Cody and Waite's reduction to [-pi/4, pi/4], the polynomials of
+   fdlibm (Sun Microsystems, k_sin.c and k_cos.c), then the quarter turns. There is no branch, so a compiler can
+   compute all lanes at once. A lane with an angle of FAR or more uses the library's functions. There is none if
+   the sum of squares is below FAR squared. */
 #define IS_SINGLE (sizeof(real) == sizeof(float))
 #define FAR (IS_SINGLE ? R(8192.0) : R(823549.0))
 INLINE int any_far(const real *x, const int count)
@@ -29,13 +29,13 @@ SELDOM void library_sines(const real *x, real *sine, real *cosine, const int cou
 
 INLINE void sines_cosines(const real *x, real *sine, real *cosine, const int count)
 {
-    /* Added to a number, it leaves no room for a fraction. pi/2 in three parts, of which n times the first two
-       is exact. */
+    /* Adding and subtracting `whole` rounds to an integer. p1, p2 and p3 are parts of pi/2; n p1 and n p2 are
+       exact. */
     const real whole = IS_SINGLE ? R(12582912.0) : R(6755399441055744.0);
     const real p1 = IS_SINGLE ? R(1.5703125) : R(1.57079632673412561417e+00);
     const real p2 = IS_SINGLE ? R(4.837512969970703125e-4) : R(6.07710050630396597660e-11);
     const real p3 = IS_SINGLE ? R(7.54978995489188216e-8) : R(2.02226624879595063154e-21);
-    /* What is left of the angle, and n modulo 4, from -2 to 2. */
+    /* The reduced angle, and n modulo 4, from -2 to 2. */
     for (int k = 0; k < count * LANES; ++k) {
         const real n = (x[k] * R(0.636619772367581382) + whole) - whole;
         sine[k] = ((x[k] - n * p1) - n * p2) - n * p3;
