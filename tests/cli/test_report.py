@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -107,6 +108,23 @@ def test_compare_exits_1_on_a_regression_and_0_the_other_way(good: Path, bad: Pa
     found = json.loads(urdfkin("compare", good, bad, "--format", "json").text)
     assert found["schema"] == "urdfkin-comparison/1"
     assert found["regressions"] == sum(change["regression"] for change in found["changes"]) > 0
+
+
+def test_compare_lists_a_changed_axis_and_states_that_changes_alone_exit_with_0(
+    good: Path, tmp_path: Path
+) -> None:
+    changed = arms()
+    joint: Any = changed["robots"][1]["model"]["joints"][2]  # type: ignore[index]
+    joint["axis"] = [-x for x in joint["axis"]]
+    new = tmp_path / "new.json"
+    new.write_text(json.dumps(changed))
+    done = urdfkin("compare", good, new)
+    assert done.code == 0
+    words = " ".join(done.text.split())
+    assert f"ur5: joint {joint['name']}, axis: z -> -z, turned by 3.142 rad" in words
+    assert words.endswith(
+        "no regression, 1 change (exit 0: changes alone do not fail, a regression would (1))"
+    )
 
 
 @pytest.mark.slow

@@ -109,9 +109,7 @@ def test_a_robot_that_moves_otherwise_is_told_joint_by_joint_and_is_no_regressio
     joint["limit"]["upper"] = 1.5
     changed = {change.what: change for change in compare(arms(), new).changes}
     start = f"joint {joint['name']}, "
-    (moved,) = changed.keys() - {start + "axis", start + "origin", start + "upper limit"}
-    assert moved.endswith(" from base_link")
-    assert changed[moved].new.endswith(" rad away, on 200 configurations")
+    assert changed.keys() == {start + "axis", start + "origin", start + "upper limit"}
     assert not any(change.regression for change in changed.values())
     assert changed[start + "axis"].robot == "ur5"
     assert changed[start + "axis"].new == "-z, turned by 3.142 rad"

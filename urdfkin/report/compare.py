@@ -29,7 +29,6 @@ from urdfkin.model.summary import axis_words, rule_words
 from urdfkin.report.document import Check, Document, Joint, Model, Robot, Units, outcome_of
 from urdfkin.report.markdown import LIMIT, shortened
 from urdfkin.report.pages import print_named
-from urdfkin.report.tip_motion import tip_motion
 from urdfkin.report.words import VERDICTS, check_name, counted, percent, quantity_name, summary, units, worst
 
 if TYPE_CHECKING:
@@ -315,8 +314,6 @@ def _robot(source: str, old: Robot, new: Robot, factor: float) -> Iterator[Chang
             yield Change(source, what, str(n_old), str(n_new))
     for what, was, now in model_changes(old["model"], new["model"]):
         yield Change(source, what, was, now)
-    if (moved := tip_motion(old["model"], new["model"])) is not None:
-        yield Change(source, f"{moved.tip} from {moved.base}", "where it was", str(moved))
     yield from _tables(source, old, new)
     yield from _findings(source, old, new)
     same = old["joints"] == new["joints"]
