@@ -228,7 +228,7 @@ def test_a_base_that_one_side_takes_for_another_is_found(monkeypatch: pytest.Mon
 
 
 def test_bases_that_are_not_as_many_as_samples_are_refused() -> None:
-    with pytest.raises(InputError, match="base is one, or one for each of 2 samples"):
+    with pytest.raises(InputError, match="base: wrong batch shape; give one motion, or 2"):
         judge(urdfkin.load("polar"), samples=2, base=draw_base(3, np.random.default_rng(1)))
 
 

@@ -120,7 +120,7 @@ def test_a_damaged_judgement_is_told_and_made_again(judge: Judge, tmp_path: Path
     assert again.err.count("is computed again") == 2
     assert judge.asked == ["planar_two_link", "double_pendulum"]
     (tmp_path / "judge.json").write_text("{}")
-    with pytest.warns(StoreWarning, match="says nothing"):
+    with pytest.warns(StoreWarning, match="cannot be read"):
         assert stored(tmp_path).judgements == ()
 
 
