@@ -121,9 +121,9 @@ def test_compare_lists_a_changed_axis_and_states_that_changes_alone_exit_with_0(
     done = urdfkin("compare", good, new)
     assert done.code == 0
     words = " ".join(done.text.split())
-    assert f"ur5: joint {joint['name']}, axis: z -> -z, turned by 3.142 rad" in words
+    assert f"ur5: joint {joint['name']}, axis: z -> -z, rotated by 3.142 rad" in words
     assert words.endswith(
-        "no regression, 1 change (exit 0: changes alone do not fail, a regression would (1))"
+        "no regression, 1 change (exit 0: no regression; only a regression gives exit 1)"
     )
 
 
@@ -132,7 +132,7 @@ def test_compare_lists_a_changed_axis_and_states_that_changes_alone_exit_with_0(
     ("words", "message"),
     [
         (("report", "none.json"), "none.json: cannot be read"),
-        (("report",), "name the file"),
+        (("report",), "give the file"),
         (("compare", "none.json", "none.json"), "cannot be read"),
         (("validate", "ur5", "--html", "/nowhere/a.html"), "/nowhere/a.html: cannot be written"),
         (("plot", "ur5", "-o", "a.svg"), "--to VALUES"),

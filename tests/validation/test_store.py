@@ -305,7 +305,7 @@ def test_parts_from_several_machines_merge_to_the_report_of_one_run(undisturbed:
         assert {robot.verdict for robot in part.robots} <= {Verdict.VERIFIED, Verdict.BAD_INPUT}
     whole = tmp_path / "whole"
     early = run("campaign", "merge", str(whole), str(tmp_path / "1"), str(tmp_path / "3"))
-    assert "chunks are missing" in early.text
+    assert "chunks missing" in early.text
     assert stored(whole).interrupted
     merged = run("campaign", "merge", str(whole), *(str(tmp_path / str(i)) for i in (1, 2, 3)))
     assert merged.text.endswith("complete\n"), merged.err
@@ -467,9 +467,9 @@ def test_status_says_what_is_done_what_failed_and_what_is_left(tmp_path: Path) -
     found = run("campaign", "status", str(tmp_path))
     assert found.code == 3
     assert "robots: 2 of 3 are done, 1 of them failed" in found.text
-    assert "chunks: 3 are there, 3 are missing" in found.text
+    assert "chunks: 3 done, 3 missing" in found.text
     assert "failed: 'no such robot': " in found.text
     assert "of one processor" in found.text
-    assert "nobody is at work on it" in found.text
+    assert "no process is running" in found.text
     validate(ROBOTS, samples=SAMPLES, store=tmp_path)
-    assert "chunks: 6 are there, 0 are missing" in run("campaign", "status", str(tmp_path)).text
+    assert "chunks: 6 done, 0 missing" in run("campaign", "status", str(tmp_path)).text

@@ -1,4 +1,4 @@
-"""`urdfkin compare`: what changed between two validations."""
+"""`urdfkin compare`: compare two validation reports."""
 
 from __future__ import annotations
 
@@ -23,10 +23,12 @@ EXAMPLE = "urdfkin compare main.json branch.json --markdown comment.md"
     type=NumberFrom(1.0),
     default=2.0,
     show_default=True,
-    help="By how much a worst disagreement may grow before it is a regression.",
+    help="Factor by which a worst disagreement may grow without a regression.",
 )
 @forms("table", "json")
-@click.option("--markdown", type=click.Path(path_type=Path), help="Write Markdown for a pull request.")
+@click.option(
+    "--markdown", type=click.Path(path_type=Path), help="Write Markdown for a pull request comment."
+)
 @click.pass_context
 def command(
     context: click.Context, old: Path, new: Path, factor: float, format_: str, markdown: Path | None
