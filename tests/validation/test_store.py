@@ -466,7 +466,7 @@ def test_status_says_what_is_done_what_failed_and_what_is_left(tmp_path: Path) -
     validate(ROBOTS, samples=SAMPLES, store=tmp_path, progress=interrupted_after(5))
     found = run("campaign", "status", str(tmp_path))
     assert found.code == 3
-    assert "robots: 2 of 3 are done, 1 of them failed" in found.text
+    assert "robots: 2 of 3 done, 1 of them failed" in found.text
     assert "chunks: 3 done, 3 missing" in found.text
     assert "failed: 'no such robot': " in found.text
     assert "of one processor" in found.text

@@ -185,7 +185,7 @@ def _judged(judgement: Judgement) -> Table:
         ]
         for line in judgement["lines"]
     )
-    return plain_table([*heads, "\nnearer"], rows, words=(0,))
+    return plain_table([*heads, "smaller\nerror"], rows, words=(0,))
 
 
 def _print_robot(robot: Robot, out: Console, *, cases: bool) -> None:

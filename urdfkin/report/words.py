@@ -99,11 +99,11 @@ def nearer(line: Judged) -> Literal["urdfkin", "Pinocchio", "equal"]:
 
 
 def nearer_counts(lines: Sequence[Judged]) -> str:
-    """Return how often urdfkin's typical error is smaller, equal and larger, as text."""
+    """Return how often urdfkin's typical error is smaller, equal and larger."""
     counts = Counter(nearer(line) for line in lines)
     return (
-        f"urdfkin is nearer in {counts['urdfkin']:,} of {counted(len(lines), 'line')}, equal in "
-        f"{counts['equal']:,}, farther in {counts['Pinocchio']:,}"
+        f"urdfkin is more accurate in {counts['urdfkin']:,} of {counted(len(lines), 'line')}, equal in "
+        f"{counts['equal']:,}, less accurate in {counts['Pinocchio']:,}"
     )
 
 
