@@ -469,7 +469,7 @@ def test_status_says_what_is_done_what_failed_and_what_is_left(tmp_path: Path) -
     assert "robots: 2 of 3 done, 1 of them failed" in found.text
     assert "chunks: 3 done, 3 missing" in found.text
     assert "failed: 'no such robot': " in found.text
-    assert "of one processor" in found.text
+    assert "on one processor" in found.text
     assert "no process is running" in found.text
     validate(ROBOTS, samples=SAMPLES, store=tmp_path)
     assert "chunks: 6 done, 0 missing" in run("campaign", "status", str(tmp_path)).text

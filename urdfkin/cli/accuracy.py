@@ -85,9 +85,9 @@ def _open_results(folder: Path | None, asked: Asked, shard: str | None) -> Itera
         say(f"urdfkin: warning: {message}", err=True)
 
     with opened(folder, Store.reading(folder, tell).manifest, tell, shard=shard) as store:
-        judged = AccuracyResult(store, asked)
-        judged.begin()
-        yield judged
+        store_results = AccuracyResult(store, asked)
+        store_results.begin()
+        yield store_results
 
 
 def _study(

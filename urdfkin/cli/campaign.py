@@ -77,8 +77,8 @@ def _print_accuracy_progress(store: Store, counts: dict[int, tuple[int, bool]]) 
     from urdfkin.report.words import counted  # noqa: PLC0415  keeps --help fast
     from urdfkin.validation.accuracy_store import AccuracyResult  # noqa: PLC0415
 
-    if (judged := AccuracyResult.of(store)) is not None:
-        say(f"accuracy study: {sum(map(judged.has, robots)):,} of {counted(len(robots), 'robot')}")
+    if (results := AccuracyResult.of(store)) is not None:
+        say(f"accuracy study: {sum(map(results.has, robots)):,} of {counted(len(robots), 'robot')}")
 
 
 def _why(store: Store, robot: int) -> str:

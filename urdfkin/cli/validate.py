@@ -94,7 +94,7 @@ def command(
     scheduler: str | None,
     json_progress: bool,
     cases: bool,
-    **asked: Any,
+    **options: Any,
 ) -> None:
     """Compare every frame and joint with Pinocchio in all three reference frames, on many samples.
 
@@ -110,13 +110,13 @@ def command(
     With --store, the same command resumes an interrupted run, and `urdfkin report DIR` shows the report at
     any time.
     """
-    files = {name: asked.pop(name) for name in FILES}
-    store, shard, retry = (asked[name] for name in ("store", "shard", "retry"))
+    files = {name: options.pop(name) for name in FILES}
+    store, shard, retry = (options[name] for name in ("store", "shard", "retry"))
     if bool(robots) == all_:
         raise click.UsageError("give either robots or --all (every robot of example-robot-data)")
     if (retry or shard) and store is None:
         raise click.UsageError("--retry and --shard need --store DIR")
-    if scheduler and (asked["jobs"] > 1 or asked["isolate"]):
+    if scheduler and (options["jobs"] > 1 or options["isolate"]):
         raise click.UsageError(
             "--scheduler cannot be combined with --jobs or --isolate, which start processes on this machine"
         )
@@ -132,11 +132,11 @@ def command(
     how = how_to_load()
     if how["xacro_args"] and not any(map(is_xacro, robots)):
         reject_unused_options(context, ("xacro_arg",), "without a .xacro file")
-    given = [_once(robot, how) if judged else robot for robot in robots or examples()]
+    given = [_load_stdin(robot, how) if judged else robot for robot in robots or examples()]
     with stoppable() as stop, compiling(), _cluster(scheduler) as on, progress(as_json=json_progress) as tell:
-        report = validate(given, executor=on, progress=tell, **asked, **how)
+        report = validate(given, executor=on, progress=tell, **options, **how)
         if judged and not report.interrupted:
-            of = Asked(judge_samples, asked["seed"], judge_moving_base)
+            of = Asked(judge_samples, options["seed"], judge_moving_base)
             report = judge_all(report, given, of, store=store, shard=shard, retry=retry is not None, how=how)
     if shard:
         _say_shard(report, shard, store)
@@ -165,7 +165,7 @@ def _cluster(scheduler: str | None) -> Iterator[Engine | None]:
         yield cluster
 
 
-def _once(source: str, how: dict[str, Any]) -> Robot | str:
+def _load_stdin(source: str, how: dict[str, Any]) -> Robot | str:
     """Load standard input now: it can be read only once, and the accuracy study needs it later."""
     from urdfkin.loading import load  # noqa: PLC0415  keeps --help fast
 

@@ -299,11 +299,11 @@ def _renamed(before: Mapping[str, Robot], after: Mapping[str, Robot]) -> dict[st
     }
 
 
-def _by_name(robots: Mapping[str, Robot], besides: Mapping[str, Robot]) -> dict[str, list[str]]:
+def _by_name(robots: Mapping[str, Robot], others: Mapping[str, Robot]) -> dict[str, list[str]]:
     """Return the sources that only this report has, by the robot's name in its text."""
     named: dict[str, list[str]] = {}
     for source, robot in robots.items():
-        if source not in besides:
+        if source not in others:
             named.setdefault(robot["name"], []).append(source)
     return named
 

@@ -174,13 +174,13 @@ def joint_rows(model: Model) -> list[dict[str, Any]]:
             "q": _coordinate(joint),
             "axis": axis_words(joint["axis"]) if joint["axis"] else "",
             **_limits(joint["limit"], joint["kind"]),
-            "kept": _kept(joint),
+            "kept": _remaining_range(joint),
         }
         for joint in model["joints"]
     ]
 
 
-def _kept(joint: Joint) -> str:
+def _remaining_range(joint: Joint) -> str:
     """Return a sentence on the range that the limits of mimic joints leave; empty if they leave all of it."""
     kept = joint.get("kept")
     if kept is None:

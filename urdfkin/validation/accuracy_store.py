@@ -58,7 +58,7 @@ class AccuracyResult:
     """
 
     def __init__(self, store: Store, asked: Asked) -> None:
-        self._store, self._asked = store, asked
+        self._store, self._settings = store, asked
 
     @classmethod
     def merge(cls, store: Store, others: Sequence[Store]) -> None:
@@ -67,14 +67,14 @@ class AccuracyResult:
         Raises:
             InputError: The stores have different settings of the study.
         """
-        theirs = [judged for judged in map(cls.of, others) if judged is not None]
+        theirs = [results for results in map(cls.of, others) if results is not None]
         if theirs:
-            mine = cls.of(store) or cls(store, theirs[0]._asked)
-            for judged in theirs:
-                mine._demand_same(judged)
-            mine.begin()
-            for judged in theirs:
-                mine._take(judged)
+            own = cls.of(store) or cls(store, theirs[0]._settings)
+            for results in theirs:
+                own._demand_same(results)
+            own.begin()
+            for results in theirs:
+                own._copy_missing(results)
 
     @classmethod
     def of(cls, store: Store) -> AccuracyResult | None:
@@ -91,7 +91,7 @@ class AccuracyResult:
 
     def begin(self) -> None:
         """Write the settings into the store."""
-        self._store.write(JUDGE, (json.dumps(asdict(self._asked)) + "\n").encode())
+        self._store.write(JUDGE, (json.dumps(asdict(self._settings)) + "\n").encode())
 
     def found(self, robot: int) -> Judgement | NotJudged | None:
         """Return the result of a robot; None if the store has none."""
@@ -110,17 +110,17 @@ class AccuracyResult:
         """Return the sha256 of the robot's text that was compared."""
         return self._store.manifest.robots[robot][1]
 
-    def _take(self, other: AccuracyResult) -> None:
+    def _copy_missing(self, other: AccuracyResult) -> None:
         for robot in range(len(self._store.manifest.robots)):
             if self.found(robot) is None and (found := other.found(robot)) is not None:
                 self.keep(robot, found)
 
     def _demand_same(self, other: AccuracyResult) -> None:
-        if other._asked != self._asked:
+        if other._settings != self._settings:
             raise InputError(
                 "the stores have accuracy results with different options",
                 where=str(other._store.folder),
-                found=f"{other._asked.words}, and {self._asked.words} in {self._store.folder}",
+                found=f"{other._settings.words}, and {self._settings.words} in {self._store.folder}",
                 remedy="use the same options for all parts",
             )
 
@@ -128,7 +128,7 @@ class AccuracyResult:
         manifest = self._store.manifest
         origin, stamp = manifest.robots[robot]
         origin = replace(origin, oracle=None)  # a second oracle does not affect the study
-        numbers = [manifest.provenance, version("mpmath"), asdict(self._asked), asdict(origin), stamp]
+        numbers = [manifest.provenance, version("mpmath"), asdict(self._settings), asdict(origin), stamp]
         return hashlib.sha256(json.dumps([LAYOUT, "judge", *numbers], sort_keys=True).encode()).hexdigest()
 
 

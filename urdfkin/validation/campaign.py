@@ -108,43 +108,45 @@ def validate(
     folder = None if store is None else _folder(store)
     if (retry or shard is not None) and store is None:
         raise InputError("retry and shard need a store", remedy="give store=FOLDER")
-    many = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
+    given = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
     started = datetime.datetime.now(datetime.UTC)
     pinocchio()  # once, before the work, so that a missing Pinocchio is an error at once
-    found, unread = subjects(many, mimic, root_joint, xacro_args)
+    found, unread = subjects(given, mimic, root_joint, xacro_args)
     if witness_of(oracle) is not PINOCCHIO:
         found = [replace(one, origin=replace(one.origin, oracle=oracle)) for one in found]
     cut = Cut(samples)
-    gathering = ResultCollector(found, cut, shares(len(found), cut, shard), progress)
-    most = memory.share(jobs) if executor is None else None  # each machine of an executor measures its own
-    campaign = _Campaign(found, cut, seed, most, gathering)
-    interrupted, kept, begin = False, None, time.perf_counter()
+    collector = ResultCollector(found, cut, shares(len(found), cut, shard), progress)
+    memory_limit = (
+        memory.share(jobs) if executor is None else None
+    )  # executors: each machine has its own limit
+    campaign = _Campaign(found, cut, seed, memory_limit, collector)
+    interrupted, open_store, begin = False, None, time.perf_counter()
     with contextlib.ExitStack() as stack:
         if folder is not None:
             manifest = Manifest.of(found, samples, seed, started.isoformat(timespec="seconds"))
-            there = opened(folder, manifest, _warn, shard=shard, retry_failed=retry == "failed")
-            kept = stack.enter_context(there)
+            opening = opened(folder, manifest, _warn, shard=shard, retry_failed=retry == "failed")
+            open_store = stack.enter_context(opening)
         try:
-            if kept is not None:
-                campaign.use(kept)
+            if open_store is not None:
+                campaign.use(open_store)
             for i, error in unread.items():
-                for index in gathering.missing(i):  # only the first: after it the robot counts as failed
+                for index in collector.missing(i):  # only the first: after it the robot counts as failed
                     campaign.enter(campaign.task(i, index), failure(found[i], error))
-            missing = [robot for i, robot in enumerate(found) if any(True for _ in gathering.missing(i))]
+            missing = [robot for i, robot in enumerate(found) if any(True for _ in collector.missing(i))]
             if missing and (isolate or any(map(_is_robot, missing))):
                 load_kernels()  # once, so that no worker compiles and no robot's time includes it
                 begin = time.perf_counter()
-            gathering.begin()
+            collector.begin()
             _engine(jobs, isolate, executor).run(campaign.work(), campaign.enter)
         except KeyboardInterrupt:
             interrupted = True
         except UrdfkinError as error:
-            gathering.give_up(Failure(Verdict.NOT_VERIFIED, str(error)))
+            collector.give_up(Failure(Verdict.NOT_VERIFIED, str(error)))
         except Exception as error:  # finished results stay
-            gathering.give_up(
+            collector.give_up(
                 Failure(Verdict.NOT_VERIFIED, unexpected_error(error), error=format_traceback(error))
             )
-    reports = tuple(gathering.reports())
+    reports = tuple(collector.reports())
     return ValidationReport(
         robots=reports,
         asked=len(reports),
@@ -190,9 +192,9 @@ def stored(folder: str | os.PathLike[str]) -> ValidationReport:
     store = Store.reading(Path(folder), _warn)
     store.check_names()
     manifest, found = store.manifest, store.manifest.subjects()
-    gathering = ResultCollector(found, manifest.cut, shares(len(found), manifest.cut))
-    _Campaign(found, manifest.cut, manifest.seed, None, gathering).use(store)
-    reports, standing = tuple(gathering.reports()), gathering.standing()
+    collector = ResultCollector(found, manifest.cut, shares(len(found), manifest.cut))
+    _Campaign(found, manifest.cut, manifest.seed, None, collector).use(store)
+    reports, standing = tuple(collector.reports()), collector.standing()
     judgements, all_judged = _judgements(store, reports)
     return ValidationReport(
         robots=reports,
@@ -213,9 +215,9 @@ def _judgements(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Jud
         return (), True
     from urdfkin.validation.accuracy_store import AccuracyResult, NotJudged  # noqa: PLC0415  needs mpmath
 
-    if (judged := AccuracyResult.of(store)) is None:
+    if (results := AccuracyResult.of(store)) is None:
         return (), True
-    found = [judged.found(i) for i, report in enumerate(reports) if report.tallies]
+    found = [results.found(i) for i, report in enumerate(reports) if report.tallies]
     return tuple(None if isinstance(one, NotJudged) else one for one in found), None not in found
 
 
@@ -227,7 +229,7 @@ class _Campaign:
     cut: Cut
     seed: int
     memory: int | None
-    gathering: ResultCollector
+    collector: ResultCollector
     store: Store | None = None
 
     def task(self, robot: int, index: int) -> Task:
@@ -236,9 +238,9 @@ class _Campaign:
     def use(self, store: Store) -> None:
         """Read the answers of a store, and save new answers there."""
         for robot in range(len(self.subjects)):
-            for index in self.gathering.missing(robot):
+            for index in self.collector.missing(robot):
                 if (found := store.answer(robot, index)) is not None:
-                    self.gathering.enter(self.task(robot, index), found, kept=True)
+                    self.collector.enter(self.task(robot, index), found, kept=True)
         self.store = store
 
     def work(self) -> Iterator[Iterator[Task]]:
@@ -246,13 +248,13 @@ class _Campaign:
         return (self._tasks(robot) for robot in range(len(self.subjects)))
 
     def _tasks(self, robot: int) -> Iterator[Task]:
-        return (self.task(robot, index) for index in self.gathering.missing(robot))
+        return (self.task(robot, index) for index in self.collector.missing(robot))
 
     def enter(self, task: Task, found: Answer) -> None:
         """Save an answer in the store, then count it."""
         if self.store is not None and not (isinstance(found, Failure) and found.passing):
             self.store.keep(task.robot, task.chunk.index, found)
-        self.gathering.enter(task, found)
+        self.collector.enter(task, found)
 
 
 def shares(robots: int, cut: Cut, shard: str | None = None) -> list[range]:

@@ -70,7 +70,7 @@ class ResultCollector:
         self._subjects, self._cut, self._progress = subjects, cut, progress
         self._robots = [_Robot(part) for part in parts]
         self._chunks = sum(map(len, parts))
-        self._chunks_done = self._kept = self._over = self._failures = 0
+        self._chunks_done = self._from_earlier = self._robots_done = self._failures = 0
 
     def begin(self) -> None:
         """Report the progress at the start of the work."""
@@ -83,8 +83,8 @@ class ResultCollector:
         was_over, had_failed, before = robot.over, robot.has_failed, robot.done
         robot.enter(task.chunk.index, found)
         self._chunks_done += robot.done - before
-        self._kept += kept * (robot.done - before)
-        self._over += robot.over and not was_over
+        self._from_earlier += kept * (robot.done - before)
+        self._robots_done += robot.over and not was_over
         self._failures += robot.has_failed and not had_failed
         if self._progress is not None:
             self._progress(self.standing(self._subjects[task.robot].label))
@@ -92,11 +92,11 @@ class ResultCollector:
     def standing(self, label: str = "") -> CampaignProgress:
         """Return the progress. `label` names the current robot."""
         return CampaignProgress(
-            robots_done=self._over,
+            robots_done=self._robots_done,
             robots=sum(bool(robot.part) for robot in self._robots),
             chunks_done=self._chunks_done,
             chunks=self._chunks,
-            chunks_kept=self._kept,
+            chunks_kept=self._from_earlier,
             failures=self._failures,
             label=label,
         )

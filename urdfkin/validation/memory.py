@@ -33,9 +33,9 @@ def share(processes: int = 1) -> int | None:
 
 def needed(tree: KinematicTree, samples: int) -> int:
     """Return the maximum number of bytes for checking a robot."""
-    rates, links = sum(joint.kind.nv for joint in tree.joints), len(tree.links)
-    block = min(BLOCK_BYTES, 2 * links * frame_bytes(samples, rates))
-    return _FOR_CUBE * rates**3 + _FOR_LINK * links + _ARRAYS * max(block, frame_bytes(samples, rates))
+    nv, links = sum(joint.kind.nv for joint in tree.joints), len(tree.links)
+    block = min(BLOCK_BYTES, 2 * links * frame_bytes(samples, nv))
+    return _FOR_CUBE * nv**3 + _FOR_LINK * links + _ARRAYS * max(block, frame_bytes(samples, nv))
 
 
 def demand(tree: KinematicTree, samples: int, most: int | None) -> None:

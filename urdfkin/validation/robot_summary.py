@@ -74,11 +74,11 @@ def _joint(robot: Robot, i: int, narrowed: dict[str, NarrowedRange]) -> dict[str
         "v": tree.v_index[i] if joint.kind.nv else None,
         "limit": _limit(joint),
         "mimic": asdict(joint.mimic) if joint.mimic else None,
-        "kept": _kept(narrowed.get(joint.name)),
+        "kept": _remaining_range(narrowed.get(joint.name)),
     }
 
 
-def _kept(narrowed: NarrowedRange | None) -> dict[str, Any] | None:
+def _remaining_range(narrowed: NarrowedRange | None) -> dict[str, Any] | None:
     """Return the part of a joint's range in which its mimic joints stay within their limits.
 
     None: the mimic joints do not narrow the range.
