@@ -22,7 +22,7 @@ EXAMPLE = "urdfkin report results.json --html report.html --junit report.xml"
 def command(
     context: click.Context, /, results: Path | None, cases: bool, schema: bool, **files: Path | None
 ) -> None:
-    """Show or write the report of an earlier `urdfkin validate ... --json RESULTS.json` or `--store DIR`.
+    """Show or write the report of an earlier validation, from its JSON data or its store.
 
     A store has a report at any time. An incomplete store is reported as an interrupted run.
 

@@ -43,7 +43,7 @@ def _with_quantities(command: _T) -> _T:
 @click.argument("robots", nargs=-1, metavar="[ROBOT]...", shell_complete=complete_robot)
 @click.option("--all", "all_", is_flag=True, help="All robots of example-robot-data in the catalogue.")
 @click.option(
-    "--samples", type=Whole(0), default=1000, show_default=True, help="Random configurations per robot."
+    "--samples", type=Whole(0), default=1000, show_default=True, help="Random configurations for each robot."
 )
 @click.option(
     "--seed", type=Whole(0), default=0, show_default=True, help="The same seed gives the same numbers."
@@ -57,28 +57,30 @@ def _with_quantities(command: _T) -> _T:
     default="pinocchio",
     help="mujoco: also compare with MuJoCo.",
 )
-@click.option("--isolate", is_flag=True, help="Run each robot in its own process; report a crash.")
+@click.option("--isolate", is_flag=True, help="Run each robot in its own process; a crash is its result.")
 @xacro_option
 @click.option(
     "--store",
     type=click.Path(path_type=Path),
-    help="Folder for results; resumes an interrupted run.",
+    help="Folder for results; the same command resumes an interrupted run.",
 )
 @click.option("--retry", type=click.Choice(["failed"]), help="With --store: compute failed robots again.")
 @click.option("--shard", metavar="I/N", help="With --store: run only part I of N.")
 @click.option(
     "--scheduler",
     metavar="ADDRESS",
-    help="Dask scheduler, or local:N for N workers here.",
+    help="Address of a dask scheduler, or local:N for N workers on this machine.",
 )
 @click.option("--json-progress", is_flag=True, help="Print progress as lines of JSON on standard error.")
 @click.option(
     "--judge",
     "judged",
     is_flag=True,
-    help="Accuracy study: both errors at 50 digits.",
+    help="Accuracy study: compare both with values at 50 digits.",
 )
-@click.option("--judge-samples", type=Whole(1), default=5, show_default=True, help="Samples for --judge.")
+@click.option(
+    "--judge-samples", type=Whole(1), default=5, show_default=True, help="Random configurations for --judge."
+)
 @click.option("--judge-moving-base", is_flag=True, help="With --judge: random motion of the root link.")
 @click.option("--json", "json_", type=click.Path(path_type=Path), help="Write the report as JSON.")
 @report_options
