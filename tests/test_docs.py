@@ -150,7 +150,7 @@ def test_no_page_says_that_a_validation_compares_every_quantity() -> None:
 
 
 def test_the_exit_status_without_a_robot_is_the_tables() -> None:
-    (row,) = re.findall(r"^\| (\d) \|.*none was named", (ROOT / "docs/ci.md").read_text("utf-8"), re.M)
+    (row,) = re.findall(r"^\| (\d) \|.*no robot was given", (ROOT / "docs/ci.md").read_text("utf-8"), re.M)
     assert run("validate").code == int(row)
 
 

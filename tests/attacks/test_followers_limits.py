@@ -76,7 +76,7 @@ def test_the_report_shows_what_mimic_joints_leave_of_a_range() -> None:
     document = json.loads(json.dumps(validate([robot], samples=8).as_dict()))
     jsonschema.validate(document, json.loads(asset("validation-1.schema.json")))
     page = as_html(document)
-    assert "leader: its mimic joints keep their limits from -0.005 to 0.005 m only (f1)." in page
+    assert "leader: its mimic joints are within limits only from -0.005 to 0.005 m (f1)." in page
     assert "URDF527" in page
 
 

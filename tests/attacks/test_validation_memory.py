@@ -121,14 +121,15 @@ def test_a_robot_that_does_not_fit_is_not_verified_and_pinocchio_is_not_asked(
 
     monkeypatch.setattr(memory, "share", lambda processes=1: 2_000_000 // processes)
     monkeypatch.setattr(Oracle, "__init__", asked)
-    monkeypatch.setattr(chunk_module, "_kept", {})
+    monkeypatch.setattr(chunk_module, "_cache", {})
     robot = validate("talos", samples=1).robots[0]
     assert robot.verdict is Verdict.NOT_VERIFIED
     assert robot.reason is not None
     assert (
-        "checking it would take more memory than a validation keeps to (50% of what is free" in robot.reason
+        "not enough memory to check the robot (all processes of a validation use 50% of the free memory)"
+        in robot.reason
     )
-    assert "GB, where 0.002 GB are left to each process" in robot.reason
+    assert "GB needed, 0.002 GB allowed for each process" in robot.reason
     assert robot.portrait.model is not None
 
 

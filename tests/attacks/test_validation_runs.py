@@ -51,7 +51,7 @@ def test_whatever_a_robot_raises_is_its_result_and_the_others_are_verified(
     assert [robot.verdict for robot in report.robots] == ["verified", "not verified", "verified"]
     robot = report.robots[1]
     assert robot.reason is not None
-    assert robot.reason.startswith("an unforeseen error in urdfkin, please report it: ")
+    assert robot.reason.startswith("unexpected error in urdfkin, please report it: ")
     assert raising_worker.WORDS[error] in robot.reason
     assert robot.error is not None
     assert "in raising" in robot.error
@@ -154,7 +154,7 @@ def test_a_disagreement_stays_one_whatever_else_goes_wrong(monkeypatch: pytest.M
     robot = report.robots[0]
     assert robot.verdict is Verdict.DISAGREES
     assert str(robot.reason).startswith("20 of ")
-    assert "results lie outside their bound; an unforeseen error" in str(robot.reason)
+    assert "results lie outside their bound; unexpected error" in str(robot.reason)
     assert "MemoryError: no message" in str(robot.reason)
     assert report.exit_code == 1
 

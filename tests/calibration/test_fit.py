@@ -190,8 +190,8 @@ def test_as_many_numbers_as_parameters_leave_nothing_to_judge_by() -> None:
         ({"noise": (0.0, 1.0)}, "noise must be positive"),
         ({"noise": 1.0}, "noise must be two numbers"),
         ({"fit": []}, "no parameters to fit"),
-        ({"fit": "origins"}, "are a list of names"),
-        ({"tip": 5}, "tip is a name"),
+        ({"fit": "origins"}, "must be a list of names"),
+        ({"tip": 5}, "tip must be a name"),
     ],
 )
 def test_bad_input_is_told(change: dict[str, object], words: str) -> None:

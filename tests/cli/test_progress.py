@@ -76,12 +76,12 @@ def test_a_log_gets_a_line_now_and_then_and_a_short_run_none(monkeypatch: pytest
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--retry", "failed"], "go with --store"),
-        (["--shard", "1/2"], "go with --store"),
+        (["--retry", "failed"], "need --store"),
+        (["--shard", "1/2"], "need --store"),
         (["--store", "s", "--shard", "1/2", "--json", "x"], "a shard has no report"),
-        (["--store", "s", "--shard", "3/2"], "the i-th of n parts"),
-        (["--scheduler", "local:2", "--jobs", "2"], "--jobs and --isolate are for"),
-        (["--scheduler", "local:none"], "starts N workers"),
+        (["--store", "s", "--shard", "3/2"], "not of the form i/n"),
+        (["--scheduler", "local:2", "--jobs", "2"], "--scheduler cannot be combined"),
+        (["--scheduler", "local:none"], "without a number N"),
     ],
 )
 def test_options_that_do_not_go_together_are_refused(
@@ -100,7 +100,7 @@ def test_a_shard_says_what_it_came_to_and_what_comes_next(tmp_path: Path) -> Non
     done = urdfkin(*words, "--shard", "2/2")
     assert done.code == 0
     assert f"shard 2/2 of {where}: 1 robot, " in done.text
-    assert "then: urdfkin campaign merge" in done.text
+    assert "next: urdfkin campaign merge" in done.text
     assert urdfkin("report", where).code == 130
     assert urdfkin(*words, "--shard", "1/2").code == 0
     assert urdfkin("report", where).code == 0

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -61,9 +62,9 @@ def test_the_judge_says_that_the_base_moved_where_it_was_told_to(tmp_path: Path)
     moving = urdfkin(*words, "--judge-moving-base", "--html", page)
     after = json.loads(data.read_text())["robots"][0]["judge"]
     assert (still.code, moving.code) == (0, 0)
-    assert "on 1 sample on a moving base" in moving.text
+    assert "1 sample on a moving base" in moving.text
     assert "moving base" not in still.text
-    assert "on 1 sample on a moving base" in page.read_text()
+    assert "1 sample on a moving base" in page.read_text()
     assert (before["moving_base"], after["moving_base"]) == (False, True)
     assert before["lines"] != after["lines"]
 
@@ -109,12 +110,27 @@ def test_compare_exits_1_on_a_regression_and_0_the_other_way(good: Path, bad: Pa
     assert found["regressions"] == sum(change["regression"] for change in found["changes"]) > 0
 
 
+def test_compare_lists_a_changed_axis_and_states_that_changes_alone_exit_with_0(
+    good: Path, tmp_path: Path
+) -> None:
+    changed = arms()
+    joint: Any = changed["robots"][1]["model"]["joints"][2]  # type: ignore[index]
+    joint["axis"] = [-x for x in joint["axis"]]
+    new = tmp_path / "new.json"
+    new.write_text(json.dumps(changed))
+    done = urdfkin("compare", good, new)
+    assert done.code == 0
+    words = " ".join(done.text.split())
+    assert f"ur5: joint {joint['name']}, axis: z -> -z, rotated by 3.142 rad" in words
+    assert words.endswith("no regression, 1 change (exit 0: no regression; only a regression gives exit 1)")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "message"),
     [
         (("report", "none.json"), "none.json: cannot be read"),
-        (("report",), "name the file"),
+        (("report",), "give the file"),
         (("compare", "none.json", "none.json"), "cannot be read"),
         (("validate", "ur5", "--html", "/nowhere/a.html"), "/nowhere/a.html: cannot be written"),
         (("plot", "ur5", "-o", "a.svg"), "--to VALUES"),

@@ -81,7 +81,7 @@ def test_the_schema_describes_everything_that_is_written() -> None:
 def test_a_spoiled_document_is_refused_with_its_place(spoil: Any) -> None:
     document = cast("dict[str, Any]", arms())
     spoil(document)
-    with pytest.raises(InputError, match=r"breaks the layout urdfkin-validation/1: found \$"):
+    with pytest.raises(InputError, match=r"does not conform to the layout urdfkin-validation/1: found \$"):
         checked(document, "results.json")
 
 

@@ -228,7 +228,7 @@ def test_a_base_that_one_side_takes_for_another_is_found(monkeypatch: pytest.Mon
 
 
 def test_bases_that_are_not_as_many_as_samples_are_refused() -> None:
-    with pytest.raises(InputError, match="base is one, or one for each of 2 samples"):
+    with pytest.raises(InputError, match="base: wrong batch shape; give one motion, or 2"):
         judge(urdfkin.load("polar"), samples=2, base=draw_base(3, np.random.default_rng(1)))
 
 
@@ -318,10 +318,10 @@ def test_errors_that_are_the_same_double_are_counted_as_equal_and_not_as_nearer(
     judged = Judgement("arm", 1, 0, (line(0.1, 0.2), line(0.2, 0.2), line(0.3, 0.2), line(0.1, 0.1)))
     lines = judged.as_dict()["lines"]
     assert [nearer(one) for one in lines] == ["urdfkin", "equal", "Pinocchio", "equal"]
-    counts = "urdfkin is nearer in 1 of 4 lines, equal in 2, farther in 1"
+    counts = "urdfkin is more accurate in 1 of 4 lines, equal in 2, less accurate in 1"
     assert nearer_counts(lines) == counts
     assert judged_on(judged.as_dict()) == f"1 sample; {counts}"  # type: ignore[arg-type]
-    assert f"\n{counts}; " in make_judge.page({"arm": judged})
+    assert f"\n{counts}. " in make_judge.page({"arm": judged})
 
 
 def test_polar_has_as_many_equal_lines_as_its_page_says() -> None:

@@ -62,7 +62,7 @@ def test_it_goes_on_where_it_was_ended_and_the_report_is_that_of_one_run(
     judge.ends_at = "double_pendulum"
     assert urdfkin(*WORDS, "--store", store).code == 130
     assert stored(store).interrupted
-    assert "judged: 1 of 2 robots" in urdfkin("campaign", "status", store).text
+    assert "accuracy study: 1 of 2 robots" in urdfkin("campaign", "status", store).text
     judge.ends_at = ""
     assert urdfkin(*WORDS, "--store", store, "--json", str(again)).code == 2  # of the robot that is none
     assert judge.asked == ["planar_two_link", "double_pendulum"]
@@ -99,7 +99,7 @@ def test_parts_judge_each_robot_once_and_merge_to_the_report_of_one_run(judge: J
         urdfkin(*WORDS, "--store", store, "--shard", shard)
     assert judge.asked == ["planar_two_link", "double_pendulum"]
     merged = urdfkin("campaign", "merge", whole, *(store for _, store in shards))
-    assert "judged: 2 of 2 robots" in merged.text
+    assert "accuracy study: 2 of 2 robots" in merged.text
     urdfkin("report", whole, "--json", str(again))
     assert judged(again) == expected
     urdfkin(*WORDS[:-1], "2", "--store", shards[1][1], "--shard", "2/2")
@@ -120,7 +120,7 @@ def test_a_damaged_judgement_is_told_and_made_again(judge: Judge, tmp_path: Path
     assert again.err.count("is computed again") == 2
     assert judge.asked == ["planar_two_link", "double_pendulum"]
     (tmp_path / "judge.json").write_text("{}")
-    with pytest.warns(StoreWarning, match="says nothing"):
+    with pytest.warns(StoreWarning, match="cannot be read"):
         assert stored(tmp_path).judgements == ()
 
 
@@ -129,13 +129,13 @@ def test_what_cannot_be_judged_is_said_each_time_and_tried_again_when_asked(
 ) -> None:
     judge.refuses = "planar_two_link"
     words = (*WORDS, "--store", str(tmp_path))
-    said = "urdfkin: planar_two_link: not judged: InputError: not to be judged"
+    said = "urdfkin: planar_two_link: no accuracy result: InputError: not to be judged"
     assert said in urdfkin(*words).err
     assert said in urdfkin(*words).err
     assert judge.asked == ["planar_two_link", "double_pendulum"]
     assert not stored(tmp_path).interrupted
     judge.refuses = ""
-    assert "not judged" not in urdfkin(*words, "--retry", "failed").err
+    assert "no accuracy result" not in urdfkin(*words, "--retry", "failed").err
     assert None not in stored(tmp_path).judgements
 
 

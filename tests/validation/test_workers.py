@@ -54,7 +54,8 @@ def test_processes_change_no_number(how: dict[str, Any]) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("how", "words"), [(HOW[0], "died twice, then alone"), (HOW[1], "died"), (HOW[2], "died")]
+    ("how", "words"),
+    [(HOW[0], "crashed twice, the second time alone"), (HOW[1], "crashed"), (HOW[2], "crashed")],
 )
 def test_a_death_is_that_robots_result_and_the_others_go_on(
     how: dict[str, Any], words: str, deaths: Path
@@ -123,7 +124,7 @@ def test_a_robot_for_which_no_process_can_be_started_is_not_verified(monkeypatch
     for how in HOW:
         report = validate(["ur5", "planar_two_link"], samples=60, **how)
         assert [robot.verdict for robot in report.robots] == [Verdict.NOT_VERIFIED] * 2
-        reason = "no process could be started for it: OSError: [Errno 24] Too many open files"
+        reason = "no process could be started: OSError: [Errno 24] Too many open files"
         assert {robot.reason for robot in report.robots} == {reason}
         assert not report.passed
 

@@ -1,4 +1,4 @@
-"""`urdfkin validate --judge`: the true errors of urdfkin and of Pinocchio."""
+"""`urdfkin validate --judge`: accuracy study of urdfkin and Pinocchio."""
 
 from __future__ import annotations
 
@@ -28,18 +28,22 @@ def judge_all(
     retry: bool = False,
     how: Mapping[str, Any],
 ) -> ValidationReport:
-    """The report with a judgement of every robot that was compared.
+    """Run the accuracy study of every compared robot and return the report with its results.
 
-    One that cannot be judged costs its judgement and a line on stderr; an interrupt costs those to come.
+    If the study of a robot fails, a line on stderr states the reason. An interrupt skips the remaining
+    robots.
 
     Args:
-        report: What `validate` found about the robots given, in their order.
-        given: Robots, or what names them.
-        asked: What the judge is asked for.
-        store: The folder that keeps what `validate` found, and the judge.
-        shard: Only the robots whose first chunk is in that part, of which the report tells.
-        retry: Whether what could not be judged before is tried again.
+        report: The report of `validate` on the given robots, in their order.
+        given: Robots, or their sources.
+        asked: Settings of the study.
+        store: Folder of the campaign, which also stores the results of the study; None: no store.
+        shard: Only the robots with their first chunk in that part. The report covers the same part.
+        retry: Whether to repeat studies that failed before.
         how: `mimic`, `root_joint` and `xacro_args`, as in `load`.
+
+    Returns:
+        The report with the results of the study.
     """
     from urdfkin.validation.accuracy_store import NotJudged  # noqa: PLC0415
     from urdfkin.validation.campaign import shares  # noqa: PLC0415  keeps --help fast
@@ -49,17 +53,19 @@ def judge_all(
     here = [i for i, part in enumerate(parts) if part]
     judgements: list[Judgement | None] = []
     try:
-        with _kept(store, asked, shard) as kept:
+        with _open_results(store, asked, shard) as results:
             for i, robot in zip(here, report.robots, strict=True):
                 if not robot.tallies or parts[i].start > 0:
                     continue
-                found = None if kept is None else kept.found(i)
+                found = None if results is None else results.found(i)
                 if found is None or (retry and isinstance(found, NotJudged)):
-                    found, is_lasting = _judged(given[i], asked, None if kept is None else kept.stamp(i), how)
-                    if kept is not None and is_lasting:
-                        kept.keep(i, found)
+                    found, is_lasting = _study(
+                        given[i], asked, None if results is None else results.stamp(i), how
+                    )
+                    if results is not None and is_lasting:
+                        results.keep(i, found)
                 if isinstance(found, NotJudged):
-                    say(f"urdfkin: {robot.source}: not judged: {found.reason}", err=True)
+                    say(f"urdfkin: {robot.source}: no accuracy result: {found.reason}", err=True)
                 judgements.append(None if isinstance(found, NotJudged) else found)
     except KeyboardInterrupt:
         report = replace(report, interrupted=True)
@@ -67,8 +73,8 @@ def judge_all(
 
 
 @contextmanager
-def _kept(folder: Path | None, asked: Asked, shard: str | None) -> Iterator[AccuracyResult | None]:
-    """The judgements in a store, of which the whole or a part is for this process alone."""
+def _open_results(folder: Path | None, asked: Asked, shard: str | None) -> Iterator[AccuracyResult | None]:
+    """Open the accuracy results of a store, locked as a whole or for one part."""
     if folder is None:
         yield None
         return
@@ -79,15 +85,15 @@ def _kept(folder: Path | None, asked: Asked, shard: str | None) -> Iterator[Accu
         say(f"urdfkin: warning: {message}", err=True)
 
     with opened(folder, Store.reading(folder, tell).manifest, tell, shard=shard) as store:
-        judged = AccuracyResult(store, asked)
-        judged.begin()
-        yield judged
+        store_results = AccuracyResult(store, asked)
+        store_results.begin()
+        yield store_results
 
 
-def _judged(
+def _study(
     source: Robot | str, asked: Asked, stamp: str | None, how: Mapping[str, Any]
 ) -> tuple[Judgement | NotJudged, bool]:
-    """What the judge says, and whether it would say so again."""
+    """Return the accuracy result of a robot, and whether a repetition would give the same."""
     import numpy as np  # noqa: PLC0415  keeps --help fast
 
     from urdfkin.validation.accuracy import judge  # noqa: PLC0415
@@ -102,6 +108,9 @@ def _judged(
             rng = np.random.default_rng([asked.seed, 1])
             base = draw_base(asked.samples, rng) if asked.moving_base else None
             return judge(robot.read(), samples=asked.samples, seed=asked.seed, base=base), True
-        raise InputError("the file has changed since it was compared", remedy="begin again when it stays")
+        raise InputError(
+            "the file has changed since it was compared",
+            remedy="start the validation again when the file no longer changes",
+        )
     except Exception as error:
         return NotJudged(f"{type(error).__name__}: {error}"), is_same and isinstance(error, UrdfkinError)

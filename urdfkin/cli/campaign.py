@@ -1,4 +1,4 @@
-"""`urdfkin campaign`: what a store has, and several stores as one."""
+"""`urdfkin campaign`: progress of a resumable validation, and merging of stores from several machines."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from urdfkin.validation.store import Store
 
 EXAMPLE = "urdfkin campaign status nightly"
-#: How many robots that failed are named, and how many chunks are read for their times.
+#: Maximum number of failed robots that are listed, and of chunks that are read for their times.
 _NAMED, _READ = 20, 200
 
 _FOLDER = click.Path(path_type=Path, file_okay=False)
@@ -21,17 +21,20 @@ _FOLDER = click.Path(path_type=Path, file_okay=False)
 
 @click.group(epilog=f"Example: {EXAMPLE}")
 def command() -> None:
-    """Validations that are kept in a folder, by `urdfkin validate ... --store DIR`."""
+    """Show the progress of a resumable validation; merge results of several machines.
+
+    The folder of results is made by `urdfkin validate ... --store DIR`.
+    """
 
 
 @command.command(epilog=f"Example: {EXAMPLE}")
 @click.argument("folder", metavar="DIR", type=_FOLDER)
 @click.pass_context
 def status(context: click.Context, folder: Path) -> None:
-    """Say what is done, what failed and how long the rest takes.
+    """Show the finished and failed robots, and an estimate of the remaining time.
 
-    By the files' names alone, so that it is quick and disturbs nobody; `urdfkin report DIR` reads and checks
-    them. Exit 0: complete. 3: something is missing or failed.
+    Reads mainly the file names, so it is fast and does not disturb a running validation. `urdfkin report DIR`
+    reads and checks all files. Exit 0: complete. 3: something is missing or failed.
     """
     from urdfkin.cli.progress import duration  # noqa: PLC0415  keeps --help fast
     from urdfkin.validation.store import Store  # noqa: PLC0415
@@ -44,42 +47,42 @@ def status(context: click.Context, folder: Path) -> None:
     missing = sum(size - done for done, has_failed in counts.values() if not has_failed)
     over = sum(done == size or has_failed for done, has_failed in counts.values())
     of = f"{manifest.samples:,} samples of each robot, seed {manifest.seed}"
-    say(f"{folder}: {of}, began {manifest.started}")
-    say(f"robots: {over:,} of {len(counts):,} are done, {len(failed):,} of them failed")
-    say(f"chunks: {there:,} are there, {missing:,} are missing")
-    _say_judged(store, counts)
+    say(f"{folder}: {of}, started {manifest.started}")
+    say(f"robots: {over:,} of {len(counts):,} done, {len(failed):,} of them failed")
+    say(f"chunks: {there:,} done, {missing:,} missing")
+    _print_accuracy_progress(store, counts)
     for robot in failed[:_NAMED]:
         say(f"  failed: {manifest.robots[robot][0].words}{_why(store, robot)}")
     if len(failed) > _NAMED:
         say(f"  and {len(failed) - _NAMED:,} more")
     if missing and (seconds := _seconds(store, counts)) is not None:
         say(
-            f"left: {duration(missing * seconds)} of one processor, at {seconds:.2g} s a chunk;"
-            " divide by the processors at work"
+            f"remaining: {duration(missing * seconds)} on one processor, {seconds:.2g} s for each chunk;"
+            " divide by the number of processors"
         )
     if (holder := store.at_work()) is not None:
-        say(f"at work: {holder}")
+        say(f"in use by: {holder}")
     elif missing:
-        say("nobody is at work on it: give the same `urdfkin validate ... --store` again to go on")
+        say("no process is running; to resume, repeat the same `urdfkin validate ... --store` command")
     if failed:
-        say("the same with --retry failed computes what failed again")
+        say("to compute the failed robots again, add --retry failed to the same command")
     context.exit(3 if missing or failed else 0)
 
 
-def _say_judged(store: Store, counts: dict[int, tuple[int, bool]]) -> None:
-    """How far the judge has come, where it was asked for."""
+def _print_accuracy_progress(store: Store, counts: dict[int, tuple[int, bool]]) -> None:
+    """Print the progress of the accuracy study, if requested."""
     if not store.has_judge:
         return
     robots = [robot for robot, (_, has_failed) in counts.items() if not has_failed]
     from urdfkin.report.words import counted  # noqa: PLC0415  keeps --help fast
     from urdfkin.validation.accuracy_store import AccuracyResult  # noqa: PLC0415
 
-    if (judged := AccuracyResult.of(store)) is not None:
-        say(f"judged: {sum(map(judged.has, robots)):,} of {counted(len(robots), 'robot')}")
+    if (results := AccuracyResult.of(store)) is not None:
+        say(f"accuracy study: {sum(map(results.has, robots)):,} of {counted(len(robots), 'robot')}")
 
 
 def _why(store: Store, robot: int) -> str:
-    """The reason that the first of its failures gives."""
+    """Return the reason of the robot's first failure."""
     from urdfkin.validation.answer import Failure  # noqa: PLC0415
 
     for index in range(len(store.manifest.cut)):
@@ -90,7 +93,7 @@ def _why(store: Store, robot: int) -> str:
 
 
 def _seconds(store: Store, counts: dict[int, tuple[int, bool]]) -> float | None:
-    """What a chunk takes, from some of those that are there, of as many robots as possible."""
+    """Return the mean seconds of a chunk, from a sample of finished chunks of many robots."""
     from urdfkin.validation.chunk import ChunkResult  # noqa: PLC0415
 
     known = [robot for robot, (done, _) in counts.items() if done]
@@ -105,9 +108,10 @@ def _seconds(store: Store, counts: dict[int, tuple[int, bool]]) -> float | None:
 @click.argument("folder", metavar="DIR", type=_FOLDER)
 @click.argument("stores", metavar="STORE...", nargs=-1, required=True, type=_FOLDER)
 def merge(folder: Path, stores: tuple[Path, ...]) -> None:
-    """Copy into DIR what other stores of the same campaign have, the judge's too: shards from other machines.
+    """Merge other stores of the same campaign into DIR.
 
-    Each file is read and checked; what is damaged is said and left out. DIR is made if it is not there.
+    The stores can be the shards of several machines. Results of the accuracy study are copied too. Each file
+    is read and checked; damaged files are reported and skipped. DIR is made if it does not exist.
     """
     from urdfkin.validation.accuracy_store import AccuracyResult  # noqa: PLC0415  keeps --help fast
     from urdfkin.validation.store import Store, opened  # noqa: PLC0415
@@ -117,14 +121,14 @@ def merge(folder: Path, stores: tuple[Path, ...]) -> None:
         for other in others[1:]:
             whole.demand_same(other.manifest, other.folder)
         for other in others:
-            say(f"{other.folder}: {whole.take(other):,} chunks taken")
+            say(f"{other.folder}: {whole.take(other):,} chunks copied")
         if any(other.has_judge for other in others):
             AccuracyResult.merge(whole, others)
         counts = whole.counts()
         size = len(whole.manifest.cut)
         missing = sum(size - done for done, failed in counts.values() if not failed)
-        _say_judged(whole, counts)
-    say(f"{folder}: complete" if not missing else f"{folder}: {missing:,} chunks are missing")
+        _print_accuracy_progress(whole, counts)
+    say(f"{folder}: complete" if not missing else f"{folder}: {missing:,} chunks missing")
 
 
 def _warn(message: str) -> None:

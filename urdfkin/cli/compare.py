@@ -1,4 +1,4 @@
-"""`urdfkin compare`: what changed between two validations."""
+"""`urdfkin compare`: compare two validation reports."""
 
 from __future__ import annotations
 
@@ -23,21 +23,23 @@ EXAMPLE = "urdfkin compare main.json branch.json --markdown comment.md"
     type=NumberFrom(1.0),
     default=2.0,
     show_default=True,
-    help="By how much a worst disagreement may grow before it is a regression.",
+    help="Factor by which a worst disagreement may grow without a regression.",
 )
 @forms("table", "json")
-@click.option("--markdown", type=click.Path(path_type=Path), help="Write Markdown for a pull request.")
+@click.option(
+    "--markdown", type=click.Path(path_type=Path), help="Write Markdown for a pull request comment."
+)
 @click.pass_context
 def command(
     context: click.Context, old: Path, new: Path, factor: float, format_: str, markdown: Path | None
 ) -> None:
-    """Say what changed between two reports: versions, robots, verdicts, figures.
+    """Compare two reports: versions, robots, verdicts and disagreements.
 
-    A regression is a run that passed and does not, a robot that is gone or worse off, results outside their
-    bound that were inside, something that is compared no more or on fewer samples, a wider bound, or a worst
-    disagreement that grew by more than the factor and above 2 eps*scale. A robot whose model changed is told,
-    with how far its tip is from where it was; that alone is none. A report that contradicts itself is
-    refused.
+    A regression is one of these: the run passed before and fails now; a robot is missing, or its verdict is
+    worse; more results lie outside their bound; something is no longer compared, or on fewer samples; a bound
+    is wider; a worst disagreement grew by more than the factor and is above 2 eps*scale. A changed model is
+    listed joint by joint. It is not a regression by itself; `same` and `diff` compute how far a frame moves.
+    A report that contradicts itself is an error.
     Exit 0: no regression. 1: a regression. 2: a file that cannot be used.
     """
     from urdfkin.report.compare import (  # noqa: PLC0415

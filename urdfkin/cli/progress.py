@@ -1,4 +1,4 @@
-"""How far a campaign has come: a bar on a terminal, plain lines in a log, JSON for programs."""
+"""Progress of a campaign: a bar on a terminal, plain lines in a log, JSON for programs."""
 
 from __future__ import annotations
 
@@ -17,58 +17,56 @@ from urdfkin.errors.escape import printable
 if TYPE_CHECKING:
     from urdfkin.validation.collector import CampaignProgress, Progress
 
-#: Seconds between two lines: of a log, and for a program.
+#: Seconds between two lines of a log, and between two lines of JSON.
 _LINES, _JSON = 10.0, 0.5
 
 
 class Pace:
-    """Chunks a second in this run, and how long what is missing takes at that; no clock that can be set.
+    """Speed in chunks per second and remaining time, measured with a monotonic clock.
 
-    It counts from when last nothing was computed yet: what was compiled before makes nobody slow.
+    The measurement starts at the last call before the first computed chunk. Earlier compiling is not counted.
     """
 
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
         self._now, self._begin = now, now()
 
-    def of(self, standing: CampaignProgress) -> tuple[float | None, float | None]:
-        """Chunks a second and seconds left; None while nobody can know."""
-        seconds, fresh = self._now() - self._begin, standing.chunks_done - standing.chunks_kept
+    def of(self, state: CampaignProgress) -> tuple[float | None, float | None]:
+        """Return chunks per second and seconds left; None before the first chunk."""
+        seconds, fresh = self._now() - self._begin, state.chunks_done - state.chunks_kept
         if fresh <= 0:
             self._begin = self._now()
         if fresh <= 0 or seconds <= 0.0:
             return None, None
         rate = fresh / seconds
-        return rate, (standing.chunks - standing.chunks_done) / rate
+        return rate, (state.chunks - state.chunks_done) / rate
 
 
 @contextmanager
 def progress(*, as_json: bool) -> Iterator[Progress]:
-    """What `validate` is told of its progress with: lines of JSON, or what suits standard error."""
+    """Yield the progress callback for `validate`: JSON lines, a bar on a terminal, or plain lines."""
     pace = Pace()
     if as_json:
-        with _now_and_then(_JSON, lambda standing: _json(standing, pace)) as tell:
+        with _at_intervals(_JSON, lambda state: _json(state, pace)) as tell:
             yield tell
     elif sys.stderr is not None and sys.stderr.isatty():
         with _bar(pace) as tell:
             yield tell
     else:
-        with _now_and_then(
-            _LINES, lambda standing: say(f"urdfkin: {line(standing, pace)}", err=True)
-        ) as tell:
+        with _at_intervals(_LINES, lambda state: say(f"urdfkin: {line(state, pace)}", err=True)) as tell:
             yield tell
 
 
-def line(standing: CampaignProgress, pace: Pace) -> str:
-    """It all in words."""
+def line(state: CampaignProgress, pace: Pace) -> str:
+    """Return the progress as one line of text."""
     return (
-        f"{standing.robots_done:,} of {standing.robots:,} robots, {standing.chunks_done:,} of"
-        f" {standing.chunks:,} chunks{_kept(standing)}; {_speed(standing, pace)}"
-        f"{_failures(standing)}; {standing.label}"
+        f"{state.robots_done:,} of {state.robots:,} robots, {state.chunks_done:,} of"
+        f" {state.chunks:,} chunks{_earlier(state)}; {_speed(state, pace)}"
+        f"{_failures(state)}; {state.label}"
     )
 
 
 def duration(seconds: float) -> str:
-    """Seconds in the words of who waits.
+    """Format a duration.
 
     >>> duration(7), duration(100), duration(9000), duration(200_000)
     ('7 s', '1 min 40 s', '2 h 30 min', '2 d 7 h')
@@ -81,33 +79,33 @@ def duration(seconds: float) -> str:
     return f"{whole} s"
 
 
-def _kept(standing: CampaignProgress) -> str:
-    return f" ({standing.chunks_kept:,} from before)" if standing.chunks_kept else ""
+def _earlier(state: CampaignProgress) -> str:
+    return f" ({state.chunks_kept:,} from before)" if state.chunks_kept else ""
 
 
-def _speed(standing: CampaignProgress, pace: Pace) -> str:
-    rate, left = pace.of(standing)
+def _speed(state: CampaignProgress, pace: Pace) -> str:
+    rate, left = pace.of(state)
     if rate is None or left is None:
         return "nothing computed yet, "
     return f"{rate:.3g} chunks/s, {duration(left)} left, "
 
 
-def _failures(standing: CampaignProgress) -> str:
-    return f"{standing.failures:,} failed" if standing.failures else "none failed"
+def _failures(state: CampaignProgress) -> str:
+    return f"{state.failures:,} failed" if state.failures else "none failed"
 
 
 @contextmanager
-def _now_and_then(seconds: float, show: Callable[[CampaignProgress], Any]) -> Iterator[Progress]:
-    """Show the first standing after some seconds and so on; JSON the first and the last one too."""
+def _at_intervals(seconds: float, show: Callable[[CampaignProgress], Any]) -> Iterator[Progress]:
+    """Show the progress every `seconds`. With JSON also show the first and the last one."""
     shown, last = time.monotonic(), None
     first = seconds == _JSON
 
-    def tell(standing: CampaignProgress) -> None:
+    def tell(state: CampaignProgress) -> None:
         nonlocal shown, last, first
-        last = standing
+        last = state
         if first or time.monotonic() - shown >= seconds:
             shown, last, first = time.monotonic(), None, False
-            show(standing)
+            show(state)
 
     try:
         yield tell
@@ -116,9 +114,9 @@ def _now_and_then(seconds: float, show: Callable[[CampaignProgress], Any]) -> It
             show(last)
 
 
-def _json(standing: CampaignProgress, pace: Pace) -> None:
-    rate, left = pace.of(standing)
-    data = asdict(standing) | {"chunks_per_second": rate, "seconds_left": left}
+def _json(state: CampaignProgress, pace: Pace) -> None:
+    rate, left = pace.of(state)
+    data = asdict(state) | {"chunks_per_second": rate, "seconds_left": left}
     say(json.dumps(data), err=True)
 
 
@@ -134,14 +132,14 @@ def _bar(pace: Pace) -> Iterator[Progress]:
     with Progress(*columns, console=console(err=True), transient=True) as bar:
         task = bar.add_task("", total=None, words="")
 
-        def tell(standing: CampaignProgress) -> None:
-            pace_ = _speed(standing, pace)
-            words = f"{standing.robots_done}/{standing.robots} robots, {pace_}{_failures(standing)},"
+        def tell(state: CampaignProgress) -> None:
+            pace_ = _speed(state, pace)
+            words = f"{state.robots_done}/{state.robots} robots, {pace_}{_failures(state)},"
             bar.update(
                 task,
-                completed=standing.chunks_done,
-                total=standing.chunks,
-                description=printable(standing.label),
+                completed=state.chunks_done,
+                total=state.chunks,
+                description=printable(state.label),
                 words=words,
             )
 

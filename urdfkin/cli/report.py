@@ -1,4 +1,4 @@
-"""`urdfkin report`: render a report from the data of an earlier run, or from a campaign's store."""
+"""`urdfkin report`: make a report from the JSON data of an earlier run, or from a campaign's store."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ EXAMPLE = "urdfkin report results.json --html report.html --junit report.xml"
 
 @click.command(epilog=f"Example: {EXAMPLE}")
 @click.argument("results", metavar="RESULTS.json|DIR", type=click.Path(path_type=Path), required=False)
-@click.option("--json", "json_", type=click.Path(path_type=Path), help="Write a store's report as data.")
+@click.option("--json", "json_", type=click.Path(path_type=Path), help="Write the report of a store as JSON.")
 @report_options
-@click.option("--schema", is_flag=True, help="Print the JSON Schema of the data instead.")
+@click.option("--schema", is_flag=True, help="Print the JSON Schema of the data and exit.")
 @click.pass_context
 def command(
     context: click.Context, /, results: Path | None, cases: bool, schema: bool, **files: Path | None
 ) -> None:
-    """Show or write the report of an earlier `urdfkin validate ... --json RESULTS.json` or `--store DIR`.
+    """Show or write the report of an earlier validation, from its JSON data or its store.
 
-    A store has one at any time: one that is not complete says so, and is reported as an interrupted run.
+    A store has a report at any time. An incomplete store is reported as an interrupted run.
 
-    Exit as the run did: 0 when it had verified everything, 1 for a disagreement, 3 for a robot not verified,
-    130 when it was interrupted. 2: a robot could not be read, or the file cannot be used.
+    The exit status is that of the run. 0: everything verified. 1: a disagreement. 2: a robot could not be
+    read, or the file cannot be used. 3: a robot was not verified. 130: interrupted.
     """
     from urdfkin.report.document import asset, outcome_of  # noqa: PLC0415  keeps --help fast
     from urdfkin.report.reading import read_document, stored_document  # noqa: PLC0415
@@ -36,7 +36,7 @@ def command(
         click.echo(asset("validation-1.schema.json"), nl=False)
         return
     if results is None:
-        raise click.UsageError("name the file of `urdfkin validate --json FILE`, or the folder of --store")
+        raise click.UsageError("give the file of `urdfkin validate --json FILE`, or the folder of --store")
     document = stored_document(results) if is_folder(results) else read_document(results)
     check_writable(*files.values())
     failed = write_reports(document, files)

@@ -1,4 +1,4 @@
-"""The forms a report can take, as options: the same for `validate`, which makes one, and `report`."""
+"""Options for the formats of a report, shared by `validate` and `report`."""
 
 from __future__ import annotations
 
@@ -20,32 +20,36 @@ if TYPE_CHECKING:
     from urdfkin.report.document import Document
 
 
-#: The files of a form, each with its place: one, or a page and what lies beside it.
+#: The files of a format, each with its path: one file, or a page with a folder of files.
 Files = Iterator[tuple[Path, bytes]]
 
 _PATH = click.Path(path_type=Path, dir_okay=False)
 
-#: What options call a report's files.
+#: Parameter names of the options for a report's files.
 FILES = ("json_", "html", "junit", "markdown")
 report_options = together(
-    click.option("--html", type=_PATH, help="Write the report as a page for a browser, offline."),
-    click.option("--junit", type=_PATH, help="Write JUnit XML, a test case for each robot and quantity."),
-    click.option("--markdown", type=_PATH, help="Write Markdown that fits a pull request's comment."),
-    click.option("--cases/--no-cases", default=False, help="Show the line that replays each worst case."),
+    click.option("--html", type=_PATH, help="Write the report as an offline HTML page."),
+    click.option(
+        "--junit", type=_PATH, help="Write JUnit XML, with a test case for each robot and quantity."
+    ),
+    click.option("--markdown", type=_PATH, help="Write Markdown for a pull request comment."),
+    click.option(
+        "--cases/--no-cases", default=False, help="Show the command that computes each worst case again."
+    ),
 )
 
 
 def check_writable(*paths: Path | None) -> None:
-    """Fail before the work, not after it.
+    """Raise SourceError before the work if a file cannot be written.
 
     Raises:
-        SourceError: no permission or no such folder.
+        SourceError: Missing permission, or no such folder.
     """
     for path in paths:
         if path is None:
             continue
         try:
-            if path.exists() and not path.is_file():  # a device or a pipe is not replaced
+            if path.exists() and not path.is_file():  # a device or a pipe is written directly
                 continue
             with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}."):
                 pass
@@ -55,23 +59,23 @@ def check_writable(*paths: Path | None) -> None:
 
 
 def write_reports(document: Document, files: Mapping[str, Path | None]) -> int:
-    """Write the forms that were asked for, each whatever becomes of the others.
+    """Write the requested formats. A failure of one does not affect the others.
 
     Returns:
-        0, or the exit code of the first that could not be written; what was wrong has been said.
+        0, or the exit code of the first format that could not be written. Its error has been printed.
     """
     forms = {"json_": _json, "html": _html, "junit": _junit, "markdown": _markdown}
-    codes = (_written(path, forms[name], document) for name in FILES if (path := files[name]) is not None)
+    codes = (_write(path, forms[name], document) for name in FILES if (path := files[name]) is not None)
     return next(filter(None, list(codes)), 0)
 
 
 def say_written(files: Mapping[str, Path | None]) -> None:
-    """Name the files that were written, if any."""
+    """Print the names of the written files, if any."""
     if named := [str(files[name]) for name in FILES if files[name]]:
         say(f"wrote {', '.join(named)}")
 
 
-def _written(path: Path, form: Callable[[Document, Path], Files], document: Document) -> int:
+def _write(path: Path, form: Callable[[Document, Path], Files], document: Document) -> int:
     try:
         for place, data in form(document, path):
             if place.parent != path.parent:

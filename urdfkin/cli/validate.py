@@ -1,4 +1,4 @@
-"""`urdfkin validate`: every frame and joint against Pinocchio, on many samples."""
+"""`urdfkin validate`: compare every frame and joint with Pinocchio, on many samples."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
 
 
 def _with_quantities(command: _T) -> _T:
-    """The help, which names the quantities as the table has them."""
+    """Insert the names of the compared quantities into the help."""
     assert command.help is not None
     command.help = command.help.format(compared=compared(), not_compared=not_compared())
     return command
@@ -41,33 +41,48 @@ def _with_quantities(command: _T) -> _T:
 @_with_quantities
 @click.command(epilog=f"Example: {EXAMPLE}")
 @click.argument("robots", nargs=-1, metavar="[ROBOT]...", shell_complete=complete_robot)
-@click.option("--all", "all_", is_flag=True, help="Every robot of example-robot-data in the catalogue.")
-@click.option("--samples", type=Whole(0), default=1000, show_default=True, help="For each robot.")
+@click.option("--all", "all_", is_flag=True, help="All robots of example-robot-data in the catalogue.")
+@click.option(
+    "--samples", type=Whole(0), default=1000, show_default=True, help="Random configurations for each robot."
+)
 @click.option(
     "--seed", type=Whole(0), default=0, show_default=True, help="The same seed gives the same numbers."
 )
 @click.option("--jobs", type=Whole(1), default=1, show_default=True, help="Local processes.")
-@mimic_option("Whether mimic joints follow (the default).")
-@root_joint_option("Hang the root from a joint.")
+@mimic_option("Whether mimic joints follow their rule (default: they do).")
+@root_joint_option("Add a joint above the root link.")
 @click.option(
     "--oracle",
     type=click.Choice(["pinocchio", "mujoco"]),
     default="pinocchio",
-    help="mujoco: MuJoCo is a second witness.",
+    help="mujoco: also compare with MuJoCo.",
 )
-@click.option("--isolate", is_flag=True, help="Each robot in a process of its own, whose death is a result.")
+@click.option("--isolate", is_flag=True, help="Run each robot in its own process; a crash is its result.")
 @xacro_option
 @click.option(
-    "--store", type=click.Path(path_type=Path), help="A folder that keeps every chunk; go on there."
+    "--store",
+    type=click.Path(path_type=Path),
+    help="Folder for results; the same command resumes an interrupted run.",
 )
-@click.option("--retry", type=click.Choice(["failed"]), help="Compute these again, with --store.")
-@click.option("--shard", metavar="I/N", help="Only the I-th of N parts, with --store.")
-@click.option("--scheduler", metavar="ADDRESS", help="A dask scheduler's, or local:N for N workers here.")
-@click.option("--json-progress", is_flag=True, help="Progress as lines of JSON on standard error.")
-@click.option("--judge", "judged", is_flag=True, help="Say whose last digits are right, at 50 digits.")
-@click.option("--judge-samples", type=Whole(1), default=5, show_default=True, help="For --judge.")
-@click.option("--judge-moving-base", is_flag=True, help="For --judge: the root link moves, at random.")
-@click.option("--json", "json_", type=click.Path(path_type=Path), help="Write the report as data.")
+@click.option("--retry", type=click.Choice(["failed"]), help="With --store: compute failed robots again.")
+@click.option("--shard", metavar="I/N", help="With --store: run only part I of N.")
+@click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Address of a dask scheduler, or local:N for N workers on this machine.",
+)
+@click.option("--json-progress", is_flag=True, help="Print progress as lines of JSON on standard error.")
+@click.option(
+    "--judge",
+    "judged",
+    is_flag=True,
+    help="Accuracy study: compare both with values at 50 digits.",
+)
+@click.option(
+    "--judge-samples", type=Whole(1), default=5, show_default=True, help="Random configurations for --judge."
+)
+@click.option("--judge-moving-base", is_flag=True, help="With --judge: random motion of the root link.")
+@click.option("--json", "json_", type=click.Path(path_type=Path), help="Write the report as JSON.")
 @report_options
 @click.pass_context
 def command(
@@ -81,33 +96,34 @@ def command(
     scheduler: str | None,
     json_progress: bool,
     cases: bool,
-    **asked: Any,
+    **options: Any,
 ) -> None:
-    """Compare every frame and joint with Pinocchio's, in all three references, on many samples.
+    """Compare every frame and joint with Pinocchio in all three reference frames, on many samples.
 
-    Compared: {compared}. Not compared: {not_compared}; calls of the library and commands check those one by
-    one.
+    Compared: {compared}. Not compared: {not_compared}; each call of the library and each command checks those
+    itself.
 
-    Configurations are drawn within limits; the neutral one and the ends of the limits are added, and every
-    eighth sample has rates a hundred times larger. Disagreement is given in multiples of eps * scale: 1 to
-    10 is what rounding gives. Exit 0: verified. 1: a disagreement. 2: a robot that cannot be read. 3: a robot
-    that was not verified. 128 and the signal's number: ended by it; what had finished is written.
+    Configurations are random within the limits. The neutral configuration and both ends of the limits are
+    added. Every eighth sample has joint velocities and joint accelerations a hundred times larger.
+    Disagreements are in multiples of eps * scale: rounding gives 1 to 10. Exit 0: verified. 1: a
+    disagreement. 2: a robot cannot be read. 3: a robot was not verified. 128 + n: stopped by signal n;
+    finished results are saved.
 
-    With --store the same command goes on where one was ended, however it was, and `urdfkin report DIR` has
-    the report at any time.
+    With --store, the same command resumes an interrupted run, and `urdfkin report DIR` shows the report at
+    any time.
     """
-    files = {name: asked.pop(name) for name in FILES}
-    store, shard, retry = (asked[name] for name in ("store", "shard", "retry"))
+    files = {name: options.pop(name) for name in FILES}
+    store, shard, retry = (options[name] for name in ("store", "shard", "retry"))
     if bool(robots) == all_:
-        raise click.UsageError("name robots, or say --all for every robot of example-robot-data")
+        raise click.UsageError("give either robots or --all (every robot of example-robot-data)")
     if (retry or shard) and store is None:
-        raise click.UsageError("--retry and --shard go with --store DIR")
-    if scheduler and (asked["jobs"] > 1 or asked["isolate"]):
+        raise click.UsageError("--retry and --shard need --store DIR")
+    if scheduler and (options["jobs"] > 1 or options["isolate"]):
         raise click.UsageError(
-            "--jobs and --isolate are for this machine's processes, --scheduler for others'"
+            "--scheduler cannot be combined with --jobs or --isolate, which start processes on this machine"
         )
     if shard and any(files.values()):
-        raise click.UsageError("a shard has no report: merge the stores, then `urdfkin report DIR`")
+        raise click.UsageError("a shard has no report; run `urdfkin campaign merge`, then `urdfkin report`")
     from urdfkin.report.document import Document  # noqa: PLC0415  keeps --help fast
     from urdfkin.report.terminal import print_report  # noqa: PLC0415
     from urdfkin.urdf.sources import is_xacro  # noqa: PLC0415
@@ -118,11 +134,11 @@ def command(
     how = how_to_load()
     if how["xacro_args"] and not any(map(is_xacro, robots)):
         reject_unused_options(context, ("xacro_arg",), "without a .xacro file")
-    given = [_once(robot, how) if judged else robot for robot in robots or examples()]
+    given = [_load_stdin(robot, how) if judged else robot for robot in robots or examples()]
     with stoppable() as stop, compiling(), _cluster(scheduler) as on, progress(as_json=json_progress) as tell:
-        report = validate(given, executor=on, progress=tell, **asked, **how)
+        report = validate(given, executor=on, progress=tell, **options, **how)
         if judged and not report.interrupted:
-            of = Asked(judge_samples, asked["seed"], judge_moving_base)
+            of = Asked(judge_samples, options["seed"], judge_moving_base)
             report = judge_all(report, given, of, store=store, shard=shard, retry=retry is not None, how=how)
     if shard:
         _say_shard(report, shard, store)
@@ -137,7 +153,7 @@ def command(
 
 @contextmanager
 def _cluster(scheduler: str | None) -> Iterator[Engine | None]:
-    """The cluster that was asked for, with a line on where to watch it."""
+    """Connect to the requested cluster and print its messages."""
     if scheduler is None:
         yield None
         return
@@ -145,21 +161,21 @@ def _cluster(scheduler: str | None) -> Iterator[Engine | None]:
         from urdfkin.validation.cluster import connected  # noqa: PLC0415  an extra
     except ImportError:
         raise InputError(
-            "a cluster needs dask.distributed", remedy="pip install 'urdfkin[cluster]'"
+            "--scheduler needs dask.distributed", remedy="pip install 'urdfkin[cluster]'"
         ) from None
     with connected(scheduler, lambda line: say(f"urdfkin: {line}", err=True)) as cluster:
         yield cluster
 
 
-def _once(source: str, how: dict[str, Any]) -> Robot | str:
-    """Standard input can be read once, and the judge comes second: load it now."""
+def _load_stdin(source: str, how: dict[str, Any]) -> Robot | str:
+    """Load standard input now: it can be read only once, and the accuracy study needs it later."""
     from urdfkin.loading import load  # noqa: PLC0415  keeps --help fast
 
     return load(source, **how) if source == "-" else source
 
 
 def _say_shard(report: ValidationReport, shard: str, store: Path | None) -> None:
-    """What a part came to; the report is of the whole."""
+    """Print the result of a shard. The report covers the whole campaign."""
     from urdfkin.report.words import counted  # noqa: PLC0415  keeps --help fast
 
     for robot in report.robots:
@@ -170,4 +186,4 @@ def _say_shard(report: ValidationReport, shard: str, store: Path | None) -> None
         f"shard {shard} of {store}: {counted(len(report.robots), 'robot')}, {results:,} results compared, "
         f"{sum(robot.failed for robot in report.robots):,} outside their bound, {report.seconds:.1f} s"
     )
-    say("then: urdfkin campaign merge DIR STORE..., urdfkin report DIR")
+    say("next: urdfkin campaign merge DIR STORE..., then urdfkin report DIR")

@@ -1,4 +1,4 @@
-"""Reports: the JSON document of a validation as HTML, JUnit XML, Markdown and terminal text; and compared.
+"""Reports of a validation as HTML, JUnit XML, Markdown and terminal text, and the comparison of two reports.
 
-Everything here starts from the document, so that a report can be rendered later and elsewhere.
+Every report is made from the JSON document, so it can also be made later and on another machine.
 """

@@ -1,14 +1,17 @@
-"""What changed about a robot itself between two reports: joints, their axes, places, limits and leaders.
+"""Comparison of two validation reports: versions, robots, verdicts and disagreements.
 
-A comparison of two reports, to read: on a terminal and as Markdown.
+A change is a regression in these cases:
 
-What changed between two reports: versions, robots, verdicts, figures; and which changes are regressions.
+- The run passed before and fails now.
+- A robot is missing, or its verdict is worse.
+- More results lie outside their bound.
+- A quantity or a table is no longer compared, or there are fewer samples or results.
+- A bound is wider for the same joints.
+- The worst disagreement grew by more than a factor, and is above the error of a single rounding. The same
+  applies to its ratio to the bound, above a tenth.
 
-A change is a regression when something that held no longer does: the run passed and does not, a robot is gone
-or its verdict worse, more results lie outside their bound, a quantity, a table, samples or results are
-compared no more, a bound is wider for the same joints, or the worst disagreement or its share of the bound
-grew by more than a factor and past what rounding of a single operation gives. A robot that moves otherwise is
-a change, and so is another name of its file: it is known again by what its text calls it.
+A changed model is not a regression: its joints are listed with their axes, placements, limits and mimic
+rules. Neither is another file name: the robot is recognized by the name in its text.
 """
 
 from __future__ import annotations
@@ -29,21 +32,20 @@ from urdfkin.model.summary import axis_words, rule_words
 from urdfkin.report.document import Check, Document, Joint, Model, Robot, Units, outcome_of
 from urdfkin.report.markdown import LIMIT, shortened
 from urdfkin.report.pages import print_named
-from urdfkin.report.tip_motion import tip_motion
 from urdfkin.report.words import VERDICTS, check_name, counted, percent, quantity_name, summary, units, worst
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 
-#: Texts longer than this say no more.
+#: Maximum length of a text; longer ones are truncated.
 _LONGEST = 200
-#: Digits of a pose that are told; how far it is from the old one says the rest.
-_TOLD = Tolerance(1e-9, 1e-9)
+#: Precision of a displayed pose. Smaller changes are visible in the displayed distance.
+_PRECISION = Tolerance(1e-9, 1e-9)
 
 
 def model_changes(old: Model | None, new: Model | None) -> Iterator[tuple[str, str, str]]:
-    """What, before, after; empty words where it was not there."""
+    """Yield the name, old value and new value of each change of a model. A missing value is empty."""
     before, after = _joints(old), _joints(new)
     for name in dict.fromkeys([*before, *after]):
         was, now = before.get(name), after.get(name)
@@ -64,19 +66,19 @@ def _joints(model: Model | None) -> dict[str, Joint]:
 
 
 def _joint_changes(was: Joint, now: Joint) -> Iterator[tuple[str, str, str]]:
-    """The same of one joint: lengths and angles as people say them."""
+    """Yield the changes of one joint, with lengths and angles as text."""
     for entry, aspect in (("kind", "kind"), ("parent", "parent link"), ("child", "child link")):
         if dict(was)[entry] != dict(now)[entry]:
             yield aspect, str(dict(was)[entry]), str(dict(now)[entry])
     if was["axis"] != now["axis"]:
         first, second = (axis_words(axis) if axis else "none" for axis in (was["axis"], now["axis"]))
-        yield "axis", first, second + _turned(was["axis"], now["axis"])
+        yield "axis", first, second + _angle_between(was["axis"], now["axis"])
     if was["placement"] != now["placement"]:
         Ts = [np.array(joint["placement"]) for joint in (was, now)]
         away = length(float(np.linalg.norm(Ts[1][:3, 3] - Ts[0][:3, 3])))
-        turned = angle(float(rotation_angle(Ts[0][:3, :3], Ts[1][:3, :3])))
-        first, second = (pose_words(T, _TOLD) for T in Ts)
-        yield "origin", first, f"{second}: {away} away, turned by {turned}"
+        rotation = angle(float(rotation_angle(Ts[0][:3, :3], Ts[1][:3, :3])))
+        first, second = (pose_words(T, _PRECISION) for T in Ts)
+        yield "origin", first, f"{second}: moved by {away}, rotated by {rotation}"
     limits = [dict(joint["limit"] or {}) for joint in (was, now)]
     for entry in ("lower", "upper", "velocity", "effort"):
         bounds = [limit.get(entry) for limit in limits]
@@ -84,14 +86,14 @@ def _joint_changes(was: Joint, now: Joint) -> Iterator[tuple[str, str, str]]:
             first, second = ("none" if bound is None else f"{bound:.12g}" for bound in bounds)
             yield f"{entry} limit", first, second
     if was["mimic"] != now["mimic"]:
-        yield "leader", _rule(was), _rule(now)
+        yield "mimic rule", _rule(was), _rule(now)
 
 
-def _turned(first: Sequence[float] | None, second: Sequence[float] | None) -> str:
+def _angle_between(first: Sequence[float] | None, second: Sequence[float] | None) -> str:
     if not first or not second:
         return ""
     a, b = np.array(first), np.array(second)
-    return f", turned by {angle(float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)))}"
+    return f", rotated by {angle(float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)))}"
 
 
 def _rule(joint: Joint) -> str:
@@ -108,7 +110,7 @@ def _cut(text: str) -> str:
 
 
 def print_comparison(old: Document, new: Document, found: Comparison, out: Console) -> None:
-    """Print what changed; every line reads without colour."""
+    """Print the changes. Every line is complete without colour."""
     for title, document in (("old", old), ("new", new)):
         out.print(f"{title}: {document['started']}, {summary(document)}")
     heads = ["worst, eps*scale", "old", "new"]
@@ -121,21 +123,21 @@ def print_comparison(old: Document, new: Document, found: Comparison, out: Conso
 
 
 def verdict(found: Comparison) -> str:
-    """The outcome in one line."""
+    """Return the outcome in one line."""
     if found.regressions:
         return f"{counted(len(found.regressions), 'regression')}, {counted(len(found.changes), 'change')}"
     return f"no regression, {counted(len(found.changes), 'change')}"
 
 
 def _exit(found: Comparison) -> str:
-    """What the command's exit code means."""
+    """Return the exit code of the command, with its meaning."""
     if found.regressions:
         return "exit 1: a regression"
-    return "exit 0: changes alone do not fail, a regression would (1)" if found.changes else "exit 0"
+    return "exit 0: no regression; only a regression gives exit 1" if found.changes else "exit 0"
 
 
 def markdown_of(old: Document, new: Document, found: Comparison, limit: int = LIMIT) -> str:
-    """What changed, for a pull request's comment."""
+    """Return the changes as Markdown for a comment on a pull request."""
     mark = "❌" if found.regressions else "✅"
     lines = [f"## {mark} {verdict(found)[0].upper()}{verdict(found)[1:]}", ""]
     lines += ["| worst, eps·scale | old | new |", "| --- | ---: | ---: |"]
@@ -149,7 +151,7 @@ def markdown_of(old: Document, new: Document, found: Comparison, limit: int = LI
         row = _row(change)
         left -= len(row) + 1
         if left < 0:
-            lines += ["", f"{counted(len(ordered) - shown, 'change')} more did not fit."]
+            lines += ["", f"{counted(len(ordered) - shown, 'further change')} did not fit."]
             break
         lines.append(row)
     return "\n".join([*lines, ""])
@@ -166,24 +168,24 @@ def _cell(value: Units | str) -> str:
     return value if isinstance(value, str) else units(value)
 
 
-#: A worst disagreement may grow by this factor before it counts: the largest of many samples is a lottery.
+#: A worst disagreement may grow by this factor without a regression: the maximum of random samples varies.
 FACTOR = 2.0
-#: Below this many eps * scale nothing is a regression: a single rounding gives as much.
+#: A worst disagreement up to this many eps * scale is no regression: a single rounding gives as much.
 FLOOR = 2.0
-#: Below this share of its bound a result is far from it.
+#: A ratio to the bound up to this value is no regression.
 _SHARE_FLOOR = 0.1
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One difference.
+    """One difference of two reports.
 
     Attributes:
         robot: The robot's source; None for the run as a whole.
-        what: What changed.
-        old: Before, in words; empty where it was not there.
-        new: After; empty where it is gone.
-        regression: Whether something that held no longer does.
+        what: Name of the changed value.
+        old: Old value as text; empty if it was missing.
+        new: New value as text; empty if it is missing.
+        regression: Whether the change is a regression.
     """
 
     robot: str | None
@@ -199,22 +201,22 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Everything that changed, regressions first in each part."""
+    """All changes between two reports."""
 
     changes: tuple[Change, ...]
 
     @property
     def regressions(self) -> tuple[Change, ...]:
-        """The changes for the worse."""
+        """The changes that are regressions."""
         return tuple(change for change in self.changes if change.regression)
 
     @property
     def exit_code(self) -> int:
-        """1 on a regression."""
+        """1 if there is a regression, else 0."""
         return 1 if self.regressions else 0
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return plain data for JSON."""
         return {
             "schema": "urdfkin-comparison/1",
             "regressions": len(self.regressions),
@@ -223,19 +225,22 @@ class Comparison:
 
 
 def compare(old: Document, new: Document, factor: float = FACTOR) -> Comparison:
-    """The changes from one report to another.
+    """Compare two reports.
 
     Args:
-        old: The report before.
-        new: The report after.
-        factor: By how much a worst disagreement may grow.
+        old: The old report.
+        new: The new report.
+        factor: Factor by which a worst disagreement may grow.
+
+    Returns:
+        All changes, each marked if it is a regression.
     """
     changes = [*_run(old, new), *_robots(old, new, factor)]
     return Comparison(tuple(changes))
 
 
 def _run(old: Document, new: Document) -> Iterator[Change]:
-    """Versions and settings; how the runs ended; a run that was cut short where the other was not."""
+    """Yield changes of versions, settings and outcome, and an interruption of one run only."""
     yield from _mapping("version of ", old["versions"], new["versions"])
     yield from _mapping("", *({"seed": str(d["seed"])} for d in (old, new)))
     if old["samples"] != new["samples"]:
@@ -258,12 +263,12 @@ def _mapping(prefix: str, old: Mapping[str, str], new: Mapping[str, str]) -> Ite
 
 def _robots(old: Document, new: Document, factor: float) -> Iterator[Change]:
     before, after = _by_source(old), _by_source(new)
-    moved = _moved(before, after)
+    renamed = _renamed(before, after)
     for source in dict.fromkeys([*before, *after]):
-        if source in moved:
-            yield Change(source, "file", source, moved[source])
-            yield from _robot(source, before[source], after[moved[source]], factor)
-        elif source in moved.values():
+        if source in renamed:
+            yield Change(source, "file", source, renamed[source])
+            yield from _robot(source, before[source], after[renamed[source]], factor)
+        elif source in renamed.values():
             continue
         elif source not in after:
             yield Change(source, "robot", before[source]["verdict"], "", regression=True)
@@ -275,7 +280,7 @@ def _robots(old: Document, new: Document, factor: float) -> Iterator[Change]:
 
 
 def _by_source(document: Document) -> dict[str, Robot]:
-    """Robots by what names them; a source that was given twice is counted."""
+    """Return robots by their source. A repeated source gets a number."""
     named: dict[str, Robot] = {}
     for robot in document["robots"]:
         source, count = robot["source"], 1
@@ -286,19 +291,19 @@ def _by_source(document: Document) -> dict[str, Robot]:
     return named
 
 
-def _moved(before: Mapping[str, Robot], after: Mapping[str, Robot]) -> dict[str, str]:
-    """Where a robot's file has another name now: what is gone and what is new call their robot alike."""
+def _renamed(before: Mapping[str, Robot], after: Mapping[str, Robot]) -> dict[str, str]:
+    """Return renamed files: a missing and a new source with the same robot name."""
     gone, new = _by_name(before, after), _by_name(after, before)
     return {
         gone[name][0]: new[name][0] for name in gone if len(gone[name]) == 1 and len(new.get(name, [])) == 1
     }
 
 
-def _by_name(robots: Mapping[str, Robot], besides: Mapping[str, Robot]) -> dict[str, list[str]]:
-    """The sources that the other report has not, by what the robot is called in its text."""
+def _by_name(robots: Mapping[str, Robot], others: Mapping[str, Robot]) -> dict[str, list[str]]:
+    """Return the sources that only this report has, by the robot's name in its text."""
     named: dict[str, list[str]] = {}
     for source, robot in robots.items():
-        if source not in besides:
+        if source not in others:
             named.setdefault(robot["name"], []).append(source)
     return named
 
@@ -315,8 +320,6 @@ def _robot(source: str, old: Robot, new: Robot, factor: float) -> Iterator[Chang
             yield Change(source, what, str(n_old), str(n_new))
     for what, was, now in model_changes(old["model"], new["model"]):
         yield Change(source, what, was, now)
-    if (moved := tip_motion(old["model"], new["model"])) is not None:
-        yield Change(source, f"{moved.tip} from {moved.base}", "where it was", str(moved))
     yield from _tables(source, old, new)
     yield from _findings(source, old, new)
     same = old["joints"] == new["joints"]
@@ -332,7 +335,7 @@ def _robot(source: str, old: Robot, new: Robot, factor: float) -> Iterator[Chang
 
 
 def _tables(source: str, old: Robot, new: Robot) -> Iterator[Change]:
-    """Denavit-Hartenberg tables that are compared no more, or were not before."""
+    """Yield Denavit-Hartenberg tables that are compared in one report only."""
     before, after = ({(c["base"], c["tip"]): bool(c["samples"]) for c in r["chains"]} for r in (old, new))
     for base, tip in dict.fromkeys([*before, *after]):
         ends = [compared.get((base, tip), False) for compared in (before, after)]
@@ -375,7 +378,7 @@ def _grew(old: Units, new: Units, factor: float, floor: float = FLOOR) -> bool:
 
 
 def _findings(source: str, old: Robot, new: Robot) -> Iterator[Change]:
-    """Errors and warnings by code; the verdict says whether an error matters."""
+    """Yield changed numbers of errors and warnings by code. The verdict shows whether an error matters."""
     counts: list[dict[str, int]] = [{}, {}]
     for count, robot in zip(counts, (old, new), strict=True):
         for finding in robot["findings"]:
@@ -389,7 +392,7 @@ def _findings(source: str, old: Robot, new: Robot) -> Iterator[Change]:
 
 
 def figures(old: Document, new: Document) -> list[tuple[str, Units | str, Units | str]]:
-    """The worst disagreement of each quantity over all robots, before and after; empty where not compared."""
+    """Return each quantity with its worst disagreement in the old and new report; empty if not compared."""
     names = dict.fromkeys(c["quantity"] for d in (old, new) for r in d["robots"] for c in r["checks"])
     return [(name, _worst(old, name), _worst(new, name)) for name in names]
 

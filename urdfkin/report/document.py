@@ -1,4 +1,4 @@
-"""The JSON document of a validation: its types and its published schema."""
+"""Types and schema of the JSON document of a validation."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import Any, Literal, NotRequired, TypedDict, cast
 
 from urdfkin.validation.outcome import Outcome, outcome
 
-#: A disagreement in eps * scale; None is no number, or what must agree exactly and does not.
+#: A disagreement in eps * scale. None: a result is NaN, or two values that must be equal differ.
 Units = float | None
 Verdict = Literal["verified", "disagrees", "not verified", "bad input"]
 
 
 class Limit(TypedDict):
-    """Bounds of a joint."""
+    """Limits of a joint."""
 
     lower: float | None
     upper: float | None
@@ -24,7 +24,7 @@ class Limit(TypedDict):
 
 
 class Mimic(TypedDict):
-    """Whom a joint follows."""
+    """Mimic rule of a joint: multiplier * (value of the mimicked joint) + offset."""
 
     leader: str
     multiplier: float
@@ -32,7 +32,7 @@ class Mimic(TypedDict):
 
 
 class Kept(TypedDict):
-    """The part of a joint's range in which its mimic joints keep their limits; None where there is none."""
+    """The part of a joint's range in which its mimic joints stay within their limits; None: no such part."""
 
     lower: float | None
     upper: float | None
@@ -40,7 +40,7 @@ class Kept(TypedDict):
 
 
 class Joint(TypedDict):
-    """A joint, fixed ones too."""
+    """A joint. Fixed joints are included."""
 
     name: str
     kind: str
@@ -56,7 +56,7 @@ class Joint(TypedDict):
 
 
 class Model(TypedDict):
-    """What a robot is made of."""
+    """The links and joints of a robot."""
 
     name: str
     source: str
@@ -74,7 +74,7 @@ class Model(TypedDict):
 
 
 class Finding(TypedDict):
-    """Something about the URDF file."""
+    """A finding in the URDF file."""
 
     code: str
     severity: Literal["error", "warning", "note"]
@@ -126,14 +126,14 @@ class Chain(TypedDict):
 
 
 class Errors(TypedDict):
-    """True errors of one side."""
+    """Errors of one library with respect to the values at fifty digits."""
 
     worst: float
     typical: float
 
 
 class Judged(TypedDict):
-    """One quantity in one reference, judged."""
+    """Accuracy of one quantity in one reference frame."""
 
     quantity: str
     reference: str | None
@@ -143,7 +143,7 @@ class Judged(TypedDict):
 
 
 class Judgement(TypedDict):
-    """Both sides against values that are right to fifty digits."""
+    """Result of the accuracy study: errors with respect to values at fifty digits."""
 
     robot: str
     samples: int
@@ -153,7 +153,7 @@ class Judgement(TypedDict):
 
 
 class Case(TypedDict):
-    """The sample with the largest share of its bound."""
+    """The sample with the largest ratio to its bound."""
 
     sample: int
     frame: str
@@ -165,7 +165,7 @@ class Case(TypedDict):
 
 
 class Pair(TypedDict):
-    """One side's answers held against a second witness's."""
+    """Comparison of one library with a second oracle."""
 
     failed: int
     worst: Units
@@ -173,7 +173,7 @@ class Pair(TypedDict):
 
 
 class Alone(TypedDict):
-    """How many results each disagrees about with two others who agree."""
+    """Number of results in which one library differs and the two others agree."""
 
     urdfkin: int
     pinocchio: int
@@ -181,7 +181,7 @@ class Alone(TypedDict):
 
 
 class Witness(TypedDict):
-    """What a second witness says."""
+    """Comparison with a second oracle."""
 
     by: str
     urdfkin: Pair
@@ -191,7 +191,7 @@ class Witness(TypedDict):
 
 
 class Check(TypedDict):
-    """One quantity in one reference."""
+    """Comparison of one quantity in one reference frame."""
 
     quantity: str
     reference: str | None
@@ -210,7 +210,7 @@ class Check(TypedDict):
 
 
 class Timings(TypedDict):
-    """Seconds, summed over processes."""
+    """Computing times in seconds, summed over processes."""
 
     read: float
     urdfkin: float
@@ -220,7 +220,7 @@ class Timings(TypedDict):
 
 
 class Robot(TypedDict):
-    """One robot."""
+    """Report of one robot."""
 
     source: str
     name: str
@@ -260,17 +260,17 @@ class Document(TypedDict):
 
 
 def outcome_of(document: Document) -> Outcome:
-    """How the run ended, from what is reported of its robots."""
+    """Return the outcome of the run, from the verdicts of its robots."""
     verdicts = [robot["verdict"] for robot in document["robots"]]
     return outcome(verdicts, document.get("asked", len(verdicts)), document["interrupted"])
 
 
 def asset(name: str) -> str:
-    """The text of a file that ships with the reports."""
+    """Return the text of a file in `urdfkin/report/assets`."""
     return resources.files("urdfkin.report").joinpath("assets", name).read_text(encoding="utf-8")
 
 
 @cache
 def schema() -> dict[str, Any]:
-    """The JSON Schema (draft 2020-12) of the document."""
+    """Return the JSON Schema (draft 2020-12) of the document."""
     return cast("dict[str, Any]", json.loads(asset("validation-1.schema.json")))

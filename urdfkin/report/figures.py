@@ -1,13 +1,12 @@
-"""A picture of how far results disagree: a histogram for each quantity above its bound.
+"""Histograms of the disagreements, and the data of the 3D view.
 
-The abscissa is the disagreement in eps * scale on a logarithmic axis. Each row is one quantity, all
-references together: the hill is the share of its results, the triangle the worst, the bar on the right the
-bound from the shallowest frame to the deepest. A hill that keeps left of its bar is verified.
+The plot has one row for each quantity, with all reference frames together. Its x axis is the disagreement in
+eps * scale, logarithmic. The histogram shows the results, the triangle the worst one, and the bar the bound,
+from the frame with the fewest joints before it to the one with the most. A quantity is verified if its
+histogram lies left of its bar.
 
-
-What the 3D view of a robot needs, as small as it can be: links, joints, chains with their tables.
-
-The numbers are for the eye: seven digits. Everything that is computed with stands in the JSON document.
+The data of the 3D view is compact: links, joints and chains with their tables. Its numbers have seven digits
+for display; the JSON document has the full numbers.
 """
 
 from __future__ import annotations
@@ -25,13 +24,13 @@ if TYPE_CHECKING:
     from urdfkin.view.figure import Axes
 
 
-#: What lies below is drawn as exact: a hundredth of a rounding.
+#: Disagreements below this value, a hundredth of a rounding, are drawn as exact.
 _LEFT = 1e-2
 _HEIGHT = 0.82
 
 
 def distributions(robot: Robot, edges: Sequence[float], prefix: str) -> str:
-    """The picture of one robot as inline SVG; empty if nothing was compared."""
+    """Return the plot of one robot as inline SVG; empty if nothing was compared."""
     names = quantities([robot])
     if not names:
         return ""
@@ -42,7 +41,7 @@ def distributions(robot: Robot, edges: Sequence[float], prefix: str) -> str:
         for row, name in enumerate(names):
             _row(axes, len(names) - 1 - row, of_quantity(robot, name), np.asarray(edges))
         _decorate(axes, names, right)
-        said = (
+        descriptions = (
             f"{quantity_name(name)}: worst {units(worst(c['worst'] for c in of_quantity(robot, name)))}"
             for name in names
         )
@@ -50,12 +49,12 @@ def distributions(robot: Robot, edges: Sequence[float], prefix: str) -> str:
             figure,
             prefix,
             f"Distribution of the disagreement with Pinocchio, {robot['source']}",
-            f"Histograms in eps*scale for each quantity, against the bound. {'; '.join(said)}.",
+            f"Histograms in eps*scale for each quantity, against the bound. {'; '.join(descriptions)}.",
         )
 
 
 def _right(checks: Sequence[Check], edges: Sequence[float]) -> float:
-    """The right end of the axis: past every bound and every finite disagreement."""
+    """Return the right end of the axis, beyond every bound and every finite disagreement."""
     ends = [check["bound"][1] or 1.0 for check in checks] + [check["worst"] or 1.0 for check in checks]
     return float(min(max(ends) * 2.0, edges[-1] * 10.0))
 
@@ -142,12 +141,14 @@ _KINDS = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
 
 
 def scene(model: Model, chains: list[Chain]) -> dict[str, Any]:
-    """A robot for the page's script, `assets/view3d.js`.
+    """Return a robot as data for the script of the page, `assets/view3d.js`.
 
     Returns:
-        `links`: names. `joints`: one list each of name, kind's index, parent link, child link, pose in the
-        parent (three rows of four), axis or 0, place in q or -1, lower, upper (None: no bound), mimic
-        (leader's place in q, multiplier, offset) or 0. `chains`: base link, tip link, two tables.
+        `links`: names. `joints`: one list for each joint: name, index of its kind, parent link, child link,
+            pose in
+        the parent (three rows of four), axis or 0, index in q or -1, lower and upper limit (None: no limit),
+        mimic rule (the mimicked joint's index in q, multiplier, offset) or 0. `chains`: base link, tip link,
+        two tables.
     """
     links = {name: i for i, name in enumerate(model["links"])}
     joints = {joint["name"]: i for i, joint in enumerate(model["joints"])}
@@ -201,7 +202,7 @@ def _table(table: Table, joints: dict[str, int]) -> dict[str, Any]:
 
 
 def _link(frame: str, links: dict[str, int], joints: dict[str, int]) -> int:
-    """The link that carries a frame."""
+    """Return the index of the link with a frame."""
     kind, _, rest = frame.partition(":")
     if kind in ("link", "joint") and (rest in links or rest in joints):
         frame = rest

@@ -1,7 +1,8 @@
-"""The report as an HTML page: it opens offline, asks no network for anything, and escapes every name.
+"""Report as an HTML page that works offline, uses no network and escapes every name.
 
-A page that would become too large to open at once holds the summary, and beside it lies a file for each
-robot, which is loaded when the robot is unfolded: as a script, since a page from a disc may read no other.
+A large report is split: the page has the summary, and a file for each robot has its details. The page loads
+such a file when you unfold the robot. The files are scripts, because a browser lets a page from disk load no
+other files.
 """
 
 from __future__ import annotations
@@ -42,19 +43,20 @@ if TYPE_CHECKING:
     from jinja2 import Environment
     from markupsafe import Markup
 
-#: With no more robots than this they stand open.
+#: Maximum number of robots for which all details are unfolded at the start.
 _OPEN = 1
-#: So many of those that failed stand open, which come first.
+#: Number of failed robots (listed first) that are unfolded at the start.
 _FAILURES_OPEN = 20
-#: With more robots than this, distributions are drawn for those alone that are not verified: a second each.
+#: With more robots than this, histograms are drawn only for robots that are not verified (each takes a
+#: second).
 _DRAWN = 100
-#: Letters of all robots' details from which on they lie in files of their own.
+#: Maximum length of all details, characters. Beyond it each robot's details are in their own file.
 MOST = 5_000_000
 
 
 @cache
 def environment() -> Environment:
-    """What fills templates in: every name is escaped, a missing one is an error."""
+    """Return the template environment. Every name is escaped; a missing name is an error."""
     from jinja2 import Environment, PackageLoader, StrictUndefined  # noqa: PLC0415  keeps --help fast
 
     environment = Environment(
@@ -70,14 +72,14 @@ def environment() -> Environment:
 
 
 def as_is(text: str) -> Markup:
-    """A text of our own, which a template takes as it is."""
+    """Mark a trusted text, which a template does not escape."""
     from markupsafe import Markup  # noqa: PLC0415
 
     return Markup(text)
 
 
 def as_html(document: Document) -> str:
-    """One page with everything. Names may be anything, `<script>` included: the template escapes them all."""
+    """Return the report as one page. The template escapes all names, even `<script>`."""
     document = _worst_first(document)
     return _page(
         document,
@@ -86,15 +88,15 @@ def as_html(document: Document) -> str:
 
 
 def as_files(document: Document, name: str) -> Iterator[tuple[str, str]]:
-    """The files of a report, the page itself last.
+    """Yield the files of a report, the page last.
 
     Args:
         document: The report's data.
-        name: What the page is called; what lies beside it is in a folder called after it.
+        name: File name of the page. The folder of the robots' files is named after it.
 
     Yields:
-        The place of each file, seen from the page, and its text: the page alone, or beside it a file for each
-        robot where they are more than `MOST` letters together.
+        The path of each file relative to the page, and its text. If all details together are longer than
+        `MOST` characters, each robot has its own file.
     """
     document = _worst_first(document)
     robots, folder = document["robots"], f"{name.removesuffix('.html')}-robots"
@@ -156,7 +158,7 @@ def _page(document: Document, robots: list[dict[str, Any]], token: str = "", fol
 
 
 def _summary(robot: Robot, index: int) -> dict[str, Any]:
-    """What stands of a robot while it is folded."""
+    """Return the data of a folded robot."""
     opened = robot["verdict"] != "verified" and index < _FAILURES_OPEN
     return {"index": index, "data": robot, "summary": pages.overview(robot, []), "file": "", "opened": opened}
 
@@ -214,14 +216,17 @@ def _robot(robot: Robot, index: int, document: Document) -> dict[str, Any]:
 
 
 def _plot(robot: Robot, index: int, document: Document) -> str:
-    """Empty where matplotlib is not installed, or where it would take too long: the tables say the same."""
+    """Return the plot of a robot; empty without matplotlib, or if it would take too long.
+
+    The tables contain the same numbers.
+    """
     if not installed() or (len(document["robots"]) > _DRAWN and robot["verdict"] == "verified"):
         return ""
     return distributions(robot, document["histogram_edges"], f"p{index}-")
 
 
 def when(started: str) -> str:
-    """The moment in words; as it stands if it is no ISO date."""
+    """Return the start time as text; the input itself if it is not an ISO date."""
     try:
         moment = datetime.fromisoformat(started)
     except ValueError:

@@ -1,7 +1,7 @@
-"""JUnit XML: a suite for each robot, a case for each quantity and reference, the full text in the body.
+"""JUnit XML: a test suite for each robot, with a test case for each quantity and reference frame.
 
-The layout is the one that Jenkins publishes (junit-10.xsd) and that GitLab, GitHub actions and others read.
-Some of them drop the attributes of a failure: its text says everything.
+The layout is that of Jenkins (junit-10.xsd), which GitLab, GitHub actions and others read. Some of them
+ignore the attributes of a failure, so the text of the failure is complete.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from urdfkin.report.words import (
     witness_title,
 )
 
-#: What XML 1.0 cannot hold, not even escaped.
+#: Characters that XML 1.0 forbids, even escaped.
 _FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def as_junit(document: Document) -> bytes:
-    """The report as a JUnit XML file."""
+    """Return the report as a JUnit XML file."""
     suites = [_suite(robot, document) for robot in document["robots"]]
     if _incomplete(document):
         suites.insert(0, _whole_run(document))
@@ -47,10 +47,10 @@ def _suite(robot: Robot, document: Document) -> ET.Element:
     name = _clean(robot["source"])
     cases = [*(_case(check, robot) for check in in_order(robot)), _verdict(robot)]
     facts = {"robot": robot["name"], "verdict": robot["verdict"], "seed": str(document["seed"])}
-    return _made(name, cases, facts | document["versions"], robot["seconds"], document)
+    return _suite_element(name, cases, facts | document["versions"], robot["seconds"], document)
 
 
-def _made(
+def _suite_element(
     name: str, cases: list[ET.Element], facts: dict[str, str], seconds: float, document: Document
 ) -> ET.Element:
     suite = ET.Element(
@@ -73,17 +73,17 @@ def _made(
 
 
 def _incomplete(document: Document) -> bool:
-    """Whether something is wrong that no robot's suite can tell."""
+    """Whether the run has an error that belongs to no robot."""
     robots = document["robots"]
     return document["interrupted"] or not robots or len(robots) != document.get("asked", len(robots))
 
 
 def _whole_run(document: Document) -> ET.Element:
-    """A suite for what is nobody's in particular: an interrupt, robots that are missing, or none at all."""
+    """Return a suite for errors of the whole run: an interrupt, missing robots, or no robots."""
     reason = outcome_of(document).reason or ""
     case = ET.Element("testcase", {"name": "every robot was compared in full", "classname": "urdfkin"})
     ET.SubElement(case, "error", {"type": "not passed", "message": reason}).text = reason
-    return _made("the whole run", [case], document["versions"], document["seconds"], document)
+    return _suite_element("the whole run", [case], document["versions"], document["seconds"], document)
 
 
 def _case(check: Check, robot: Robot) -> ET.Element:
@@ -103,7 +103,7 @@ def _case(check: Check, robot: Robot) -> ET.Element:
 
 
 def _verdict(robot: Robot) -> ET.Element:
-    """A robot's verdict, which more than its results may have to do with: why, in full."""
+    """Return a test case with a robot's verdict and all its reasons."""
     case = ET.Element("testcase", {"name": "verdict", "classname": f"urdfkin.{_clean(robot['source'])}"})
     reason = _clean(robot["reason"] or f"{robot['results']:,} results compared")
     text = f"{robot['verdict']}: {reason}" + (f"\n{_clean(error)}" if (error := robot.get("error")) else "")
@@ -125,7 +125,7 @@ def _text(check: Check, robot: Robot) -> str:
         f"outside their bound: {check['failed']:,}",
         f"disagreement in eps*scale: median {units(check['median'])}, 99th percentile {units(check['p99'])},"
         f" worst {units(check['worst'])}",
-        f"largest share of a bound: {percent(check['share_of_bound'])}",
+        f"largest disagreement relative to its bound: {percent(check['share_of_bound'])}",
     ]
     if tightest is not None and widest is not None:
         lines.append(f"bounds: {tightest:.0f} to {widest:.0f} eps*scale")
@@ -142,5 +142,5 @@ def _time(seconds: float) -> str:
 
 
 def _clean(text: str) -> str:
-    """Names may hold what XML forbids; the escape says which character it was."""
+    """Escape characters that XML forbids, as their code in hexadecimal."""
     return _FORBIDDEN.sub(lambda found: f"\\x{ord(found[0]):02x}", text)

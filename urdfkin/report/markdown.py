@@ -1,4 +1,4 @@
-"""Markdown that fits a pull request's comment: the verdict, a table, and what failed with its replay line."""
+"""Markdown for a comment on a pull request: verdict, table, and failures with their replay commands."""
 
 from __future__ import annotations
 
@@ -23,15 +23,18 @@ from urdfkin.report.words import (
     worst_of,
 )
 
-#: GitHub refuses comments longer than 65,536 characters.
+#: Maximum length. GitHub accepts comments of up to 65,536 characters.
 LIMIT = 60_000
 _MARKS = {"verified": "✅", "disagrees": "❌", "not verified": "⚠️", "bad input": "⛔"}
-#: How many failing checks are shown for each robot.
+#: Maximum number of failed checks that are shown for each robot.
 _SHOWN = 3
 
 
 def as_markdown(document: Document) -> str:
-    """The report as a comment; robots that failed come first, and a line says what did not fit."""
+    """Return the report as a comment.
+
+    Failed robots come first. A line states the number of robots that did not fit.
+    """
     found = outcome_of(document)
     head = [
         f"## {'✅ Verified against' if found.passed else '❌ Not verified against'} Pinocchio"
@@ -44,10 +47,10 @@ def as_markdown(document: Document) -> str:
     foot = [
         "",
         *_three_sides(document["robots"]),
-        "Worst disagreement for each quantity in eps·scale: 1 to 10 is what rounding gives.",
+        "Worst disagreement for each quantity in eps·scale; rounding gives 1 to 10.",
         "",
         f"<sub>urdfkin {text(document['versions'].get('urdfkin', '?'))}, {text(document['started'])}."
-        " Repeat it:</sub>",
+        " To repeat the run:</sub>",
         "",
         fenced(shortened(document["command"], 2000)),
         "",
@@ -58,12 +61,12 @@ def as_markdown(document: Document) -> str:
 
 
 def _three_sides(robots: list[Robot]) -> list[str]:
-    """A table of the pairs, where a second witness was asked; every quantity over all robots."""
+    """Return the table with a second oracle: one row for each quantity, all robots together."""
     if (title := witness_title(robots)) is None:
         return []
     heads = ["quantity", *map(text, witness_heads(title))]
     lines = [
-        f"{text(title)} was asked too; the largest share of each pair's bound:",
+        f"Comparison of urdfkin, Pinocchio and {text(title)}: the largest ratio to each pair's bound:",
         "",
         _row(heads),
         _row(["---", *["---:"] * (len(heads) - 2), "---"]),
@@ -84,7 +87,7 @@ def _body(robots: list[Robot], room: int) -> list[str]:
         if left < 0:
             rest = robots[shown:]
             good = sum(robot["verdict"] == "verified" for robot in rest)
-            tails += ["", f"{counted(len(rest), 'robot')} more did not fit; {good} of them verified."]
+            tails += ["", f"{counted(len(rest), 'further robot')} did not fit; {good} of them verified."]
             break
         lines.append(row)
         tails += tail
@@ -106,7 +109,7 @@ def _cells(robot: Robot, quantities: list[tuple[str, ...]]) -> list[str]:
 
 
 def _details(robot: Robot) -> list[str]:
-    """What went wrong with one robot."""
+    """Return the failures of one robot."""
     lines: list[str] = []
     if robot["reason"]:
         lines += ["", f"**{markdown_code(robot['source'])}**: {text(shortened(robot['reason'], 600))}"]
@@ -129,7 +132,7 @@ def _row(cells: Iterable[str]) -> str:
 
 
 def fenced(code: str) -> str:
-    """A block of code whose fence is longer than any run of backticks inside."""
+    """Return a code block with a fence longer than any run of backticks inside."""
     longest = max((len(run) for run in re.findall("`+", code)), default=0)
     fence = "`" * max(3, longest + 1)
     lines = "\n".join(map(printable, code.split("\n")))
@@ -137,5 +140,5 @@ def fenced(code: str) -> str:
 
 
 def shortened(words: str, length: int) -> str:
-    """At most `length` characters."""
+    """Truncate a text to `length` characters."""
     return words if len(words) <= length else words[: length - 4] + " ..."

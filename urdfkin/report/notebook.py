@@ -1,4 +1,4 @@
-"""A robot in a notebook's cell: the report's 3D view alone, in a frame that asks no network for anything."""
+"""3D view of a robot in a notebook cell, in a frame without network access."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 
 class Cell:
-    """What `Robot.view` hands to a notebook.
+    """The 3D view that `Robot.view` returns in a notebook.
 
     Args:
         robot: The robot.
-        q: (nq,) where it begins.
-        height: Pixels.
+        q: (nq,) configuration at the start.
+        height: Height in pixels.
     """
 
     def __init__(self, robot: Robot, q: FloatArray, height: int) -> None:
@@ -34,7 +34,7 @@ class Cell:
         return log_line(f"<a view of {self._name}: the last line of a notebook's cell shows it>")
 
     def page(self) -> str:
-        """The page."""
+        """Return the HTML page."""
         model = cast("Model", self._description)
         data: dict[str, Any] = {"source": self._name, "joints": moving_names(model), "chains": []}
         return (
@@ -50,7 +50,7 @@ class Cell:
         )
 
     def _repr_html_(self) -> str:
-        # Scripts, but nothing of the notebook's own.
+        # The frame may run its scripts but cannot access the notebook.
         return (
             f'<iframe sandbox="allow-scripts" title="{escape(self._name)}" srcdoc="{escape(self.page())}"'
             f' style="width:100%;height:{self._height}px;border:0"></iframe>'

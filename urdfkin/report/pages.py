@@ -1,7 +1,4 @@
-"""Plain tables for a terminal of any width: names on the left, numbers on the right at six digits.
-
-A robot as the page shows it: rows of tables and cells of the heat map, ready for the template.
-"""
+"""Tables for terminals of any width, and the data of one robot for the template of the HTML page."""
 
 from __future__ import annotations
 
@@ -39,9 +36,10 @@ if TYPE_CHECKING:
 def make_table(
     columns: Sequence[str], rows: Iterable[Sequence[str | float]], *, left: Collection[int] = (0,)
 ) -> Table:
-    """A plain table: the columns in `left` on the left, the others on the right, numbers at six digits.
+    """Return a plain table with numbers at six digits.
 
-    What is below rounding of the table's largest number is shown as 0: full precision is for machines.
+    Columns in `left` are left-aligned, the others right-aligned. Numbers below the rounding error of the
+    table's largest number are shown as 0. Use JSON for full precision.
     """
     from rich import box  # noqa: PLC0415
     from rich.table import Table  # noqa: PLC0415
@@ -62,10 +60,9 @@ def print_named(
     *,
     left: Collection[int] = (0,),
 ) -> None:
-    """A table like `make_table`'s whose first column holds names, which are never folded.
+    """Print a table like that of `make_table`. The names in the first column are never folded.
 
-    Where the terminal is too narrow, a name that leaves no room for what belongs to it stands on a line of
-    its own above that.
+    On a narrow terminal a long name is on its own line, above the other cells of its row.
     """
     from rich.cells import cell_len  # noqa: PLC0415
 
@@ -96,7 +93,7 @@ def print_named(
 
 
 def fits(out: Console, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> bool:
-    """Whether a table is no wider than the terminal: a blank behind each cell, one between two columns."""
+    """Whether a table fits the terminal, with one space after each cell and one between two columns."""
     return sum(width + 2 for width in _widths(columns, rows)) - 1 <= out.width
 
 
@@ -117,20 +114,20 @@ def _texts(rows: Iterable[Sequence[str | float]]) -> list[list[str]]:
 
 _READABLE = DisplayUnits(digits=6)
 
-#: Upper edges of the heat map's steps, shares of the bound; what is above the last lies outside.
+#: Upper edges of the heat map's colour steps, as ratios to the bound. Above the last, a result is outside.
 HEAT_STEPS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """A cell of the heat map: its text, its step, and whether the quantity failed there."""
+    """A cell of the heat map: its text and its colour step."""
 
     text: str
     step: int
 
 
 def overview(robot: Robot, quantities_of: Sequence[Sequence[str]]) -> dict[str, Any]:
-    """A line of the overview table, with numbers to sort by."""
+    """Return a row of the overview table, with sort keys."""
     checks = robot["checks"]
     largest, share = worst(check["worst"] for check in checks), share_of(robot)
     return {
@@ -167,7 +164,7 @@ def _sortable(value: Units) -> float:
 
 
 def joint_rows(model: Model) -> list[dict[str, Any]]:
-    """Every joint with its limits; moving ones first would break the order of q, so the order stays."""
+    """Return a row for each joint with its limits, in the order of q."""
     return [
         {
             "name": joint["name"],
@@ -177,22 +174,24 @@ def joint_rows(model: Model) -> list[dict[str, Any]]:
             "q": _coordinate(joint),
             "axis": axis_words(joint["axis"]) if joint["axis"] else "",
             **_limits(joint["limit"], joint["kind"]),
-            "kept": _kept(joint),
+            "kept": _remaining_range(joint),
         }
         for joint in model["joints"]
     ]
 
 
-def _kept(joint: Joint) -> str:
-    """What limits of mimic joints leave of a joint's range; empty where they leave all of it."""
+def _remaining_range(joint: Joint) -> str:
+    """Return a sentence on the range that the limits of mimic joints leave; empty if they leave all of it."""
     kept = joint.get("kept")
     if kept is None:
         return ""
     if kept["lower"] is None or kept["upper"] is None:
-        return f"{joint['name']}: nowhere do its mimic joints keep their limits ({', '.join(kept['by'])})."
+        return (
+            f"{joint['name']}: no value keeps its mimic joints within their limits ({', '.join(kept['by'])})."
+        )
     unit = "m" if joint["kind"] == "prismatic" else "rad"
     ends = f"{range_words((kept['lower'], kept['upper']))} {unit}"
-    return f"{joint['name']}: its mimic joints keep their limits from {ends} only ({', '.join(kept['by'])})."
+    return f"{joint['name']}: its mimic joints are within limits only from {ends} ({', '.join(kept['by'])})."
 
 
 def _coordinate(joint: Joint) -> str:
@@ -218,7 +217,7 @@ def _limits(limit: Limit | None, kind: str) -> dict[str, str]:
 
 
 def heat_map(robot: Robot, model: Model) -> tuple[list[str], list[tuple[str, list[Cell]]]]:
-    """Column heads, and for each moving joint its name and cells: the worst over all references."""
+    """Return the column heads, and the name and cells of each moving joint (worst reference frame)."""
     quantities_of = columns([robot])
     frame = {name: i for i, name in enumerate(robot["frames"])}
     moving = {name: i for i, name in enumerate(robot["joints"])}
@@ -235,7 +234,7 @@ def heat_map(robot: Robot, model: Model) -> tuple[list[str], list[tuple[str, lis
 
 
 def _columns(model: Model) -> dict[str, list[int]]:
-    """Which columns of all joints' rates belong to each joint, followers too."""
+    """Return the columns of the full Jacobian that belong to each joint, mimic joints included."""
     own: dict[str, list[int]] = {}
     at = 0
     for joint in model["joints"]:
@@ -257,7 +256,10 @@ def _cell(checks: Sequence[Check], where: dict[str, list[int]]) -> Cell:
 
 
 def _share(check: Check, subject: int) -> float:
-    """At most which share of its bound a subject's worst was: of the tightest, never above any's."""
+    """Return an upper bound on the ratio of a subject's worst disagreement to its bound.
+
+    It uses the tightest bound, and is at most the largest ratio of the check.
+    """
     value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["share_of_bound"]
     if value is None or most is None or not tightest:
         return math.inf
@@ -265,7 +267,7 @@ def _share(check: Check, subject: int) -> float:
 
 
 def chain_rows(chain: Chain, convention: str) -> list[list[str]]:
-    """A table's rows as cells: joint, a, alpha, (beta,) d, theta, the joint's place marked."""
+    """Return a table's rows as cells: joint, a, alpha, (beta,) d, theta, with q at the joint's parameter."""
     table = chain["standard"] if convention == "standard" else chain["modified"]
     return [_dh_cells(row, has_beta(chain)) for row in table["rows"]]
 
@@ -281,10 +283,10 @@ def _rows(chain: Chain, convention: str) -> list[Row]:
 
 def _dh_cells(row: Row, beta: bool) -> list[str]:
     sign = "+" if row["sense"] > 0 else "−"
-    slides = row["kind"] == "prismatic"
+    is_prismatic = row["kind"] == "prismatic"
     d, theta = metres(row["d"]), angle(row["theta"])
-    d = _plus(d, f"{sign} q") if slides else d
-    theta = theta if slides else _plus(theta, f"{sign} q")
+    d = _plus(d, f"{sign} q") if is_prismatic else d
+    theta = theta if is_prismatic else _plus(theta, f"{sign} q")
     return [
         row["joint"],
         metres(row["a"]),
@@ -302,17 +304,17 @@ def _plus(constant: str, variable: str) -> str:
 
 
 def metres(value: float) -> str:
-    """A length, metres."""
+    """Format a length in metres."""
     return _READABLE.length(value).replace("-", "−")
 
 
 def angle(value: float) -> str:
-    """An angle, radians; what is a multiple of pi/12 to the last bit is shown as one."""
+    """Format an angle in radians; an exact multiple of pi/12 is shown as such."""
     return _READABLE.angle(value, pi="π").replace("-", "−")
 
 
 def judged_rows(judgement: Judgement) -> list[dict[str, Any]]:
-    """Both sides' true errors, and who is nearer."""
+    """Return the rows of the accuracy study: the errors of both libraries, and the more accurate one."""
     return [
         {
             "quantity": quantity_name(line["quantity"]),
@@ -327,7 +329,7 @@ def judged_rows(judgement: Judgement) -> list[dict[str, Any]]:
 
 
 def check_rows(robot: Robot) -> list[dict[str, Any]]:
-    """The checks, with their figures in words."""
+    """Return the rows of the checks, with numbers as text."""
     return [
         {
             "quantity": quantity_name(check["quantity"]),

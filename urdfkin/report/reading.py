@@ -1,13 +1,8 @@
-"""Whether a report's robot is one: a tree of links and joints, numbered as its coordinates say.
+"""Reader of report documents. It checks the published schema and the consistency of all entries.
 
-Whether a report agrees with itself: what is said twice is the same, what is counted adds up.
-
-A report is evidence, and may have been edited, cut short or put together by hand. Whatever follows from
-other entries is computed again here, the outcome first of all; the robot itself is looked at by
-`urdfkin.report.reading`.
-
-
-Reading a report's document: JSON that keeps to its published schema and agrees with itself.
+A report is evidence, and may have been edited or truncated. Entries that follow from other entries are
+computed again and compared: the outcome, verdicts, sums, ratios and percentiles. The robot must be a tree of
+links and joints with consistent indices of coordinates.
 """
 
 from __future__ import annotations
@@ -29,26 +24,26 @@ from urdfkin.validation.outcome import Verdict
 from urdfkin.validation.results import SCHEMA
 from urdfkin.validation.robot_summary import chain_disagreement
 
-#: Coordinates and rates of each kind of joint.
+#: nq and nv of each kind of joint.
 _SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)}
 _ONE = (1, 1)
 _WITH_AXIS = ("revolute", "continuous", "prismatic")
-#: How far a rotation or an axis may be from one: text of 6 digits was read.
+#: Tolerance of rotations and unit axes, which may come from text with 6 digits.
 _ROUNDED = 1e-5
 
 
 def frame_names(model: Model) -> list[str]:
-    """What was compared: every link, then every joint."""
+    """Return the names of the compared frames: every link, then every joint."""
     return [f"link:{name}" for name in model["links"]] + [f"joint:{j['name']}" for j in model["joints"]]
 
 
 def moving_names(model: Model) -> list[str]:
-    """The joints that move, followers too."""
+    """Return the names of the moving joints, mimic joints included."""
     return [joint["name"] for joint in model["joints"] if joint["kind"] != "fixed"]
 
 
 def column_names(model: Model) -> list[str]:
-    """For each rate of every joint, followers too, the joint's name."""
+    """Return the name of the joint of each column of the full Jacobian, mimic joints included."""
     return [joint["name"] for joint in model["joints"] for _ in range(_size(joint)[1])]
 
 
@@ -57,23 +52,23 @@ def _size(joint: Joint) -> tuple[int, int]:
 
 
 def model_contradictions(model: Model, chains: Sequence[Chain]) -> Iterator[str]:
-    """What a robot and its chains say against themselves."""
+    """Yield the contradictions in a model and its chains."""
     links, joints = model["links"], model["joints"]
     names = [joint["name"] for joint in joints]
     if len(set(links)) != len(links) or len(set(names)) != len(names):
-        yield "model: a name is there twice"
+        yield "model: a name occurs twice"
         return
     if links[1:] != [joint["child"] for joint in joints] or not links:
-        yield "model: its links are not the root and the joints' children"
+        yield "model: the links are not the root and the children of the joints"
         return
     for i, joint in enumerate(joints):
         if joint["parent"] not in links[: i + 1]:
-            yield f"model: joint {joint['name']}: parent {joint['parent']} does not stand before it"
+            yield f"model: joint {joint['name']}: parent link {joint['parent']} is not before the joint"
         yield from _joint(joint, joints)
     yield from _numbering(model)
     frames = {*links, *names, *frame_names(model)}
     ends = [model["base"], model["tip"], *(end for chain in chains for end in (chain["base"], chain["tip"]))]
-    yield from (f"model: there is no frame {end}" for end in ends if end not in frames)
+    yield from (f"model: no frame {end}" for end in ends if end not in frames)
     kinds = {joint["name"]: joint["kind"] for joint in joints}
     for chain in chains:
         for row in (*chain["standard"]["rows"], *chain["modified"]["rows"]):
@@ -86,23 +81,23 @@ def _joint(joint: Joint, joints: Sequence[Joint]) -> Iterator[str]:
     if (axis is not None) != (joint["kind"] in _WITH_AXIS):
         yield f"{where}: a {joint['kind']} joint {'with' if axis else 'without'} an axis"
     elif axis is not None and abs(math.hypot(*axis) - 1.0) > _ROUNDED:
-        yield f"{where}: axis {axis} is not of length 1"
+        yield f"{where}: axis {axis} is not a unit vector"
     rows = joint["placement"]
     R = [row[:3] for row in rows[:3]]
     dots = [sum(a * b for a, b in zip(R[i], R[j], strict=True)) - (i == j) for i, j in _PAIRS]
     if rows[3] != [0.0, 0.0, 0.0, 1.0] or max(map(abs, dots)) > _ROUNDED:
-        yield f"{where}: its placement is none"
+        yield f"{where}: its placement is not a rigid transform"
     if mimic is not None:
         leader = next((other for other in joints if other["name"] == mimic["leader"]), None)
         if leader is None or leader["mimic"] is not None or _size(leader) != _ONE or _size(joint) != _ONE:
-            yield f"{where}: it cannot follow {mimic['leader']}"
+            yield f"{where}: it cannot mimic {mimic['leader']}"
 
 
 _PAIRS = [(i, j) for i in range(3) for j in range(i + 1)]
 
 
 def _numbering(model: Model) -> Iterator[str]:
-    """Coordinates and rates are numbered joint by joint; followers have their leaders'."""
+    """Yield errors of the indices in q and v. A mimic joint has the indices of its mimicked joint."""
     q, v, places = 0, 0, dict[str, tuple[int | None, int | None]]()
     for joint in model["joints"]:
         if joint["mimic"] is None:
@@ -112,25 +107,25 @@ def _numbering(model: Model) -> Iterator[str]:
     for joint in model["joints"]:
         owner = joint["mimic"]["leader"] if joint["mimic"] else joint["name"]
         if places.get(owner) != (joint["q"], joint["v"]):
-            yield f"model: joint {joint['name']}: its coordinates begin elsewhere"
+            yield f"model: joint {joint['name']}: wrong index in q or v"
     if (model["nq"], model["nv"]) != (q, v) or (len(model["coordinates"]), len(model["rates"])) != (q, v):
-        yield f"model: not the {q} coordinates and {v} rates of its joints"
+        yield f"model: its joints have {q} coordinates and {v} joint velocities, not nq and nv"
 
 
-#: Figures that are quotients are computed again to this relative difference.
+#: Relative tolerance of recomputed quotients.
 _ALIKE = 1e-9
-#: Counts beyond this are nobody's.
+#: Maximum plausible count.
 _MOST = 2**53
 
 
 def contradictions(document: Document) -> Iterator[str]:
-    """What a document that fits the schema says against itself, each with its place."""
+    """Yield the contradictions in a document that conforms to the schema, each with its location."""
     edges, robots = document["histogram_edges"], document["robots"]
     if not edges or any(a >= b for a, b in pairwise(edges)):
         yield "histogram_edges: not in ascending order"
         return
     if document.get("asked", len(robots)) < len(robots):
-        yield f"asked: {document.get('asked')}, but {len(robots)} robots are reported on"
+        yield f"asked: {document.get('asked')}, but {len(robots)} robots have a report"
     found = outcome_of(document)
     if document["passed"] != found.passed:
         yield f"passed: {document['passed']}, but {found.reason or 'every robot was verified'}"
@@ -154,12 +149,12 @@ def _robot(robot: Robot, document: Document) -> Iterator[str]:
     yield from _verdict(robot, document["samples"] + SPECIAL)
     names = [(check["quantity"], check["reference"]) for check in robot["checks"]]
     if len(set(names)) != len(names):
-        yield "checks: a quantity is there twice"
+        yield "checks: a quantity occurs twice"
     subjects = _subjects(robot)
     if robot["checks"] and not (
         robot["joints"] == subjects["joints"] and robot["frames"] == subjects["frames"]
     ):
-        yield "joints or frames: not the model's"
+        yield "joints or frames: not those of the model"
         return
     for check in robot["checks"]:
         own = subjects[check["subjects"]]
@@ -178,10 +173,14 @@ def _subjects(robot: Robot) -> dict[str, list[str]]:
 
 
 def _verdict(robot: Robot, samples: int) -> Iterator[str]:
-    """The verdict follows from what was compared; what is not verified needs a reason."""
+    """Yield contradictions of the verdict. A robot that is not verified needs a reason."""
     verdict, reason = Verdict(robot["verdict"]), robot["reason"]
-    witnessed = any(check["witness"]["urdfkin"]["failed"] for check in robot["checks"] if "witness" in check)
-    outside = robot["failed"] > 0 or witnessed or any(chain_disagreement(chain) for chain in robot["chains"])
+    second_differs = any(
+        check["witness"]["urdfkin"]["failed"] for check in robot["checks"] if "witness" in check
+    )
+    outside = (
+        robot["failed"] > 0 or second_differs or any(chain_disagreement(chain) for chain in robot["chains"])
+    )
     if outside != (verdict is Verdict.DISAGREES):
         yield f"verdict: {verdict}, but {'something lies' if outside else 'nothing lies'} outside its bound"
     if verdict is Verdict.VERIFIED:
@@ -194,7 +193,7 @@ def _verdict(robot: Robot, samples: int) -> Iterator[str]:
     elif verdict is not Verdict.DISAGREES and not reason:
         yield f"verdict: {verdict}, but no reason"
     if robot["samples"] > samples:
-        yield f"samples: {robot['samples']}, but {samples} were asked for"
+        yield f"samples: {robot['samples']}, but {samples} were requested"
 
 
 def _check(check: Check, subjects: list[str], robot: Robot, document: Document) -> Iterator[str]:
@@ -212,16 +211,16 @@ def _check(check: Check, subjects: list[str], robot: Robot, document: Document) 
     last = max((i for i, count in enumerate(histogram) if count), default=0)
     if results and last != histogram_bin(_as_number(check["worst"]), edges):
         yield f"worst: {check['worst']}, but the histogram ends elsewhere"
-    for name, percent, said in (("median", 50.0, check["median"]), ("p99", 99.0, check["p99"])):
+    for name, percent, stated in (("median", 50.0, check["median"]), ("p99", 99.0, check["p99"])):
         computed = percentile(histogram, edges, _as_number(check["worst"]), percent)
-        if not _alike(_as_number(said), computed):
-            yield f"{name}: {said}, but {computed:g} by the histogram"
+        if not _alike(_as_number(stated), computed):
+            yield f"{name}: {stated}, but {computed:g} by the histogram"
     yield from _share(check)
     yield from _case(check, subjects, robot, document["samples"] + SPECIAL)
 
 
 def _share(check: Check) -> Iterator[str]:
-    """The largest share of a bound lies between the worst over the widest and over the tightest."""
+    """Yield contradictions of the ratio: it lies between worst / widest bound and worst / tightest bound."""
     share, largest = _as_number(check["share_of_bound"]), _as_number(check["worst"])
     low, high = _as_number(check["bound"][0]), _as_number(check["bound"][1])
     if (share > 1.0) != (check["failed"] > 0) or check["failed"] > check["results"]:
@@ -242,7 +241,7 @@ def _case(check: Check, subjects: list[str], robot: Robot, samples: int) -> Iter
             yield "worst_case: none, but something disagrees"
         return
     if case["frame"] not in subjects:
-        yield f"worst_case: {case['frame']} is none of its {check['subjects']}"
+        yield f"worst_case: {case['frame']} is not one of its {check['subjects']}"
         return
     of_frame = worst(
         units
@@ -254,7 +253,7 @@ def _case(check: Check, subjects: list[str], robot: Robot, samples: int) -> Iter
     share, low, high = _as_number(check["share_of_bound"]), check["bound"][0] or 0.0, check["bound"][1] or 0.0
     units = _as_number(case["disagreement"])
     if math.isfinite(units) and not share * low * (1 - _ALIKE) <= units <= share * high * (1 + _ALIKE):
-        yield f"worst_case: {units:g} is not {share:g} of its bound"
+        yield f"worst_case: {units:g} is not {share:g} times its bound"
     if model is not None and (len(case["q"]), len(case["v"]), len(case["a"])) != (
         model["nq"],
         model["nv"],
@@ -268,7 +267,7 @@ def _case(check: Check, subjects: list[str], robot: Robot, samples: int) -> Iter
 def _chain(chain: Chain) -> Iterator[str]:
     figures = chain["metres"], chain["worst"], chain["share_of_bound"]
     if not chain["samples"] and any(figure is not None for figure in figures):
-        yield "not compared, but with figures"
+        yield "not compared, but with results"
 
 
 def _as_number(units: Units) -> float:
@@ -279,23 +278,23 @@ def _alike(a: float, b: float) -> bool:
     return a == b or math.isclose(a, b, rel_tol=_ALIKE)
 
 
-#: How many contradictions of a report are told.
+#: Maximum number of contradictions in a message.
 _SHOWN = 3
 
 
 def read_document(path: Path) -> Document:
-    """A document from a file.
+    """Read and check a document from a file.
 
     Raises:
-        SourceError: the file cannot be read.
-        InputError: it is not JSON, not a validation report, of another version, breaks the schema, or
-            contradicts itself.
+        SourceError: The file cannot be read.
+        InputError: The file is not JSON, is not a validation report, has another version, violates the
+            schema, or contradicts itself.
     """
     return checked(read_json(path), str(path))
 
 
 def read_json(path: Path) -> object:
-    """What a file of JSON says; raises SourceError, or InputError where it is none."""
+    """Read a JSON file. Raise SourceError, or InputError if it is not JSON."""
     try:
         return json.loads(
             read_bytes(path, MOST_DATA, pipes=True), parse_constant=_number, parse_float=_number
@@ -305,27 +304,27 @@ def read_json(path: Path) -> object:
 
 
 def stored_document(folder: Path) -> Document:
-    """The document of a campaign's store, held against itself like any other: its files are evidence too.
+    """Read the document of a campaign's store and check it like a file.
 
     Raises:
-        SourceError: the store cannot be read.
-        InputError: it is none, or contradicts itself.
+        SourceError: The store cannot be read.
+        InputError: The folder is not a store, or its document contradicts itself.
     """
-    from urdfkin.validation.campaign import stored  # noqa: PLC0415  only who has a store needs it
+    from urdfkin.validation.campaign import stored  # noqa: PLC0415  needed for a store only
 
     return checked(json.loads(json.dumps(stored(folder).as_dict(), allow_nan=False)), str(folder))
 
 
 def _number(word: str) -> float:
-    """JSON has no infinity and no NaN, and a number too large for a double would become one."""
+    """Parse a number. Reject infinity, NaN and numbers too large for a double."""
     number = float(word)
     if not math.isfinite(number):
-        raise ValueError(f"{word[:20]} is no number")
+        raise ValueError(f"{word[:20]} is not a finite number")
     return number
 
 
 def checked(data: object, where: str) -> Document:
-    """`data` as a document; raises InputError as `read_document` does."""
+    """Return `data` as a checked document. Raise InputError as `read_document` does."""
     keeps_to(schema(), data, SCHEMA, where, "urdfkin validate ROBOT --json FILE")
     document = cast("Document", data)
     if against := list(islice(contradictions(document), _SHOWN + 1)):
@@ -334,23 +333,23 @@ def checked(data: object, where: str) -> Document:
             "the report contradicts itself",
             where=where,
             found="; ".join(against[:_SHOWN]) + more,
-            remedy="have it made again: urdfkin validate ROBOT --json FILE",
+            remedy="make it again: urdfkin validate ROBOT --json FILE",
         )
     return document
 
 
 def keeps_to(layout: Mapping[str, object], data: object, name: str, where: str, made_by: str) -> None:
-    """Demand that data keep to a published schema.
+    """Raise InputError if data does not conform to a published schema.
 
     Args:
         layout: The schema.
-        data: What a file says.
-        name: The layout's, which the entry "schema" must give.
+        data: The content of the file.
+        name: Name of the layout, the required value of the entry "schema".
         where: The file.
-        made_by: The command that writes one.
+        made_by: The command that writes such a file.
 
     Raises:
-        InputError: another layout, or one that is broken.
+        InputError: The data has another layout or violates this one.
     """
     found = data.get("schema") if isinstance(data, dict) else None
     if found != name:
@@ -360,11 +359,11 @@ def keeps_to(layout: Mapping[str, object], data: object, name: str, where: str, 
             found=repr(found) if found else "no 'schema' entry",
             remedy=f"write one with: {made_by}",
         )
-    from jsonschema import Draft202012Validator  # noqa: PLC0415  only who reads files needs it
+    from jsonschema import Draft202012Validator  # noqa: PLC0415  needed for reading only
     from jsonschema.exceptions import best_match  # noqa: PLC0415
 
     error = best_match(Draft202012Validator(layout).iter_errors(data))
     if error is not None:
         raise InputError(
-            f"breaks the layout {name}", where=where, found=f"{error.json_path}: {error.message}"
+            f"does not conform to the layout {name}", where=where, found=f"{error.json_path}: {error.message}"
         )

@@ -1,4 +1,7 @@
-"""The report on a terminal: two tables at 80 columns, a wide one from 100, what failed; no colour needed."""
+"""Report on a terminal: two tables at 80 columns, one wide table from 100 columns, and the failures.
+
+The text is complete without colour.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +38,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-#: From this width on a column for each quantity fits beside the robots.
+#: Minimum width for a table with a column for each quantity.
 _WIDE = 100
 
 
@@ -44,8 +47,8 @@ def print_report(document: Document, out: Console, *, cases: bool = False) -> No
 
     Args:
         document: The report's data.
-        out: Where to; its width decides the layout.
-        cases: Whether to show the line that replays each worst case; for failures it is always shown.
+        out: The console. Its width determines the layout.
+        cases: Whether to show the command that computes each worst case again. Failures always show it.
     """
     robots = document["robots"]
     out.print(
@@ -60,9 +63,7 @@ def print_report(document: Document, out: Console, *, cases: bool = False) -> No
         _print_robots(robots, out)
         _print_quantities(robots, out)
     if (title := witness_title(robots)) is not None:
-        out.print(
-            f"three sides, the largest share of each pair's bound: {title} is a second witness", style="bold"
-        )
+        out.print(f"urdfkin, Pinocchio and {title}: the largest ratio to each pair's bound", style="bold")
         out.print(_three_sides(robots, title))
     for robot in robots:
         _print_robot(robot, out, cases=cases)
@@ -74,7 +75,7 @@ def print_report(document: Document, out: Console, *, cases: bool = False) -> No
 
 
 def plain_table(heads: Sequence[str], rows: Iterable[Sequence[str]], words: Sequence[int]) -> Table:
-    """Columns in `words` on the left, the others on the right, one space between."""
+    """Return a table with the columns in `words` left-aligned and the others right-aligned."""
     from rich import box  # noqa: PLC0415  keeps --help fast
     from rich.table import Table  # noqa: PLC0415
 
@@ -116,7 +117,7 @@ def _print_robots(robots: Sequence[Robot], out: Console) -> None:
 
 
 def _print_quantities(robots: Sequence[Robot], out: Console) -> None:
-    """One row a quantity, over all robots."""
+    """Print one row for each quantity, all robots together."""
     rows = []
     for name in quantities(robots):
         checks = [check for robot in robots for check in of_quantity(robot, name)]
@@ -131,7 +132,7 @@ def _print_quantities(robots: Sequence[Robot], out: Console) -> None:
 
 
 def _three_sides(robots: Sequence[Robot], title: str) -> Table:
-    """One row a quantity, over all robots and references."""
+    """Return one row for each quantity, all robots and reference frames together."""
     rows = ([quantity_name(name), *cells] for name, cells in witness_rows(robots, title))
     heads = [head.replace(", ", ",\n") for head in witness_heads(title)]
     return plain_table(["quantity", *heads], rows, words=(0, 5))
@@ -146,7 +147,7 @@ def _figures(checks: Sequence[Check]) -> list[str]:
 
 
 def _print_checks(robot: Robot, out: Console) -> None:
-    """One robot: a row for each quantity and reference."""
+    """Print the checks of one robot: a row for each quantity and reference frame."""
     heads = ["quantity, reference", "results", "outside", "median", "99 %", "worst", "of bound"]
     rows = (
         [
@@ -165,7 +166,7 @@ def _print_checks(robot: Robot, out: Console) -> None:
 
 
 def _judged(judgement: Judgement) -> Table:
-    """Both sides' true errors, a row for each quantity and reference."""
+    """Return the errors of both libraries, a row for each quantity and reference frame."""
     heads = [
         "quantity, reference",
         "numbers",
@@ -184,7 +185,7 @@ def _judged(judgement: Judgement) -> Table:
         ]
         for line in judgement["lines"]
     )
-    return plain_table([*heads, "\nnearer"], rows, words=(0,))
+    return plain_table([*heads, "smaller\nerror"], rows, words=(0,))
 
 
 def _print_robot(robot: Robot, out: Console, *, cases: bool) -> None:
@@ -200,7 +201,8 @@ def _print_robot(robot: Robot, out: Console, *, cases: bool) -> None:
         )
     if robot["judge"] is not None:
         out.print(
-            f"{robot['source']}: true errors in eps*scale, at 50 digits, on {judged_on(robot['judge'])}",
+            f"{robot['source']}: errors in eps*scale, compared with values at 50 digits;"
+            f" {judged_on(robot['judge'])}",
             style="bold",
         )
         out.print(_judged(robot["judge"]))

@@ -1,4 +1,4 @@
-"""The words and numbers that all forms of the report share."""
+"""Texts and numbers that all forms of the report share."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from urdfkin.verify.oracles import WITNESSES
 from urdfkin.verify.quantities import QUANTITIES
 
 SIDES: tuple[Literal["urdfkin"], Literal["pinocchio"]] = ("urdfkin", "pinocchio")
-#: Worse verdicts first.
+#: The verdicts, worse ones first.
 VERDICTS = tuple(verdict.value for verdict in Verdict)
 
 
 def quantity_name(quantity: str) -> str:
-    """What a reader calls a quantity."""
+    """Return the displayed name of a quantity."""
     return QUANTITIES[quantity].title if quantity in QUANTITIES else quantity
 
 
 def check_name(check: Check) -> str:
-    """A quantity and its reference: `acceleration, local`."""
+    """Return the quantity and reference frame of a check: `acceleration, local`."""
     reference = check["reference"]
     return check["quantity"] + (f", {reference}" if reference else "")
 
 
 def units(value: Units, *, compared: bool = True) -> str:
-    """A disagreement to three digits; `inf` for what no number can say, nothing for what was not compared."""
+    """Format a disagreement: `inf` for None (infinity), an empty text if nothing was compared."""
     if not compared:
         return ""
     if value is None:
@@ -37,14 +37,14 @@ def units(value: Units, *, compared: bool = True) -> str:
 
 
 def percent(share: Units) -> str:
-    """A share of a bound."""
+    """Format a ratio to a bound, as a percentage below 10 and as a factor above."""
     if share is None:
         return "inf"
     return f"{share:.1%}" if share < 10.0 else f"{share:.2g} x"
 
 
 def worst(values: Iterable[Units]) -> Units:
-    """The largest; None, which stands for infinity, is larger than any number."""
+    """Return the largest value. None stands for infinity and is larger than any number."""
     largest = 0.0
     for value in values:
         if value is None:
@@ -54,23 +54,26 @@ def worst(values: Iterable[Units]) -> Units:
 
 
 def quantities(robots: Sequence[Robot]) -> list[str]:
-    """The quantities that were compared of any robot, known ones in their order first."""
+    """Return the compared quantities of all robots: known ones first, in their order."""
     found = {check["quantity"] for robot in robots for check in robot["checks"]}
     return [q for q in QUANTITIES if q in found] + sorted(found - set(QUANTITIES))
 
 
 def of_quantity(robot: Robot, quantity: str) -> list[Check]:
-    """A robot's checks of one quantity, one a reference."""
+    """Return a robot's checks of one quantity, one for each reference frame."""
     return [check for check in robot["checks"] if check["quantity"] == quantity]
 
 
 def in_order(robot: Robot) -> list[Check]:
-    """A robot's checks, quantity by quantity."""
+    """Return a robot's checks, sorted by quantity."""
     return [check for quantity in quantities([robot]) for check in of_quantity(robot, quantity)]
 
 
 def columns(robots: Sequence[Robot]) -> dict[str, tuple[str, ...]]:
-    """The columns that any robot fills, by their heads; a quantity that is not known has its own."""
+    """Return the columns of the table of robots: the heading and its quantities.
+
+    An unknown quantity has its own column.
+    """
     heads: dict[str, tuple[str, ...]] = {}
     for name in quantities(robots):
         head = QUANTITIES[name].head if name in QUANTITIES else name
@@ -79,51 +82,51 @@ def columns(robots: Sequence[Robot]) -> dict[str, tuple[str, ...]]:
 
 
 def column(robot: Robot, names: Sequence[str]) -> list[Check]:
-    """A robot's checks of several quantities."""
+    """Return a robot's checks of several quantities."""
     return [check for name in names for check in of_quantity(robot, name)]
 
 
 def worst_of(robot: Robot, names: Sequence[str]) -> str:
-    """The worst disagreement of quantities over their references, as a cell."""
+    """Return the text of a cell: the worst disagreement of several quantities in all reference frames."""
     checks = column(robot, names)
     return units(worst(check["worst"] for check in checks), compared=bool(checks))
 
 
 def nearer(line: Judged) -> Literal["urdfkin", "Pinocchio", "equal"]:
-    """Whose typical error is smaller; `equal` where both are the same double."""
+    """Return the library with the smaller typical error; `equal` if both errors are the same double."""
     ours, theirs = line["urdfkin"]["typical"], line["pinocchio"]["typical"]
     return "equal" if ours == theirs else "urdfkin" if ours < theirs else "Pinocchio"
 
 
 def nearer_counts(lines: Sequence[Judged]) -> str:
-    """How often urdfkin is nearer to the true values, equally near, and farther."""
+    """Return how often urdfkin's typical error is smaller, equal and larger."""
     counts = Counter(nearer(line) for line in lines)
     return (
-        f"urdfkin is nearer in {counts['urdfkin']:,} of {counted(len(lines), 'line')}, equal in "
-        f"{counts['equal']:,}, farther in {counts['Pinocchio']:,}"
+        f"urdfkin is more accurate in {counts['urdfkin']:,} of {counted(len(lines), 'line')}, equal in "
+        f"{counts['equal']:,}, less accurate in {counts['Pinocchio']:,}"
     )
 
 
 def judged_on(judgement: Judgement) -> str:
-    """The samples of a judgement, whether the base moved, and how often urdfkin is nearer."""
+    """Return the samples of an accuracy result, whether the base moved, and `nearer_counts`, as text."""
     moving = " on a moving base" if judgement.get("moving_base") else ""
     return f"{counted(judgement['samples'], 'sample')}{moving}; {nearer_counts(judgement['lines'])}"
 
 
 def witness_title(robots: Sequence[Robot]) -> str | None:
-    """What the second witness is called; None if there was none."""
+    """Return the displayed name of the second oracle; None if there was none."""
     names = (check["witness"]["by"] for robot in robots for check in robot["checks"] if "witness" in check)
     name = next(names, None)
     return next((one.title for one in WITNESSES.values() if one.name == name), name)
 
 
 def witness_heads(title: str) -> list[str]:
-    """The columns of a table of three sides: the pairs, and who stands alone."""
-    return ["results", "urdfkin, Pinocchio", f"urdfkin, {title}", f"Pinocchio, {title}", "stands alone"]
+    """Return the columns of the table with a second oracle: the three pairs, and the outlier."""
+    return ["results", "urdfkin, Pinocchio", f"urdfkin, {title}", f"Pinocchio, {title}", "outlier"]
 
 
 def witness_rows(robots: Sequence[Robot], title: str) -> Iterator[tuple[str, list[str]]]:
-    """Each quantity with its cells under `witness_heads`, over all robots and references."""
+    """Yield each quantity with its cells under `witness_heads`, over all robots and reference frames."""
     for name in quantities(robots):
         checks = [check for robot in robots for check in of_quantity(robot, name) if "witness" in check]
         if checks:
@@ -131,7 +134,7 @@ def witness_rows(robots: Sequence[Robot], title: str) -> Iterator[tuple[str, lis
 
 
 def witness_cells(checks: Sequence[Check], title: str) -> list[str]:
-    """The cells under `witness_heads`, of some checks together: the largest share of each pair's bound."""
+    """Return the cells under `witness_heads` for several checks: the largest ratio to each pair's bound."""
     found = [(check, check["witness"]) for check in checks if "witness" in check]
     return [
         f"{sum(check['results'] for check, _ in found):,}",
@@ -149,16 +152,16 @@ def _alone(found: Sequence[Witness], title: str) -> str:
         title: sum(witness["alone"]["witness"] for witness in found),
         "undecided": sum(witness["undecided"] for witness in found),
     }
-    return ", ".join(f"{who} ({count:,})" for who, count in counts.items() if count) or "nobody"
+    return ", ".join(f"{who} ({count:,})" for who, count in counts.items() if count) or "none"
 
 
 def share_of(robot: Robot) -> Units:
-    """The largest share of any bound."""
+    """Return the largest ratio of a disagreement to its bound."""
     return worst(check["share_of_bound"] for check in robot["checks"])
 
 
 def summary(document: Document) -> str:
-    """The outcome in one line."""
+    """Return the outcome in one line."""
     robots = document["robots"]
     results = sum(robot["results"] for robot in robots)
     failed = sum(robot["failed"] for robot in robots)
@@ -170,12 +173,12 @@ def summary(document: Document) -> str:
 
 
 def counted(n: int, noun: str) -> str:
-    """`1 robot`, `2 robots`."""
+    """Return a number with its noun: `1 robot`, `2 robots`."""
     return f"{n:,} {noun}" if n == 1 else f"{n:,} {noun}s"
 
 
 def verdict_counts(document: Document) -> dict[str, int]:
-    """How many robots have each verdict, worst first, zeros left out."""
+    """Return the number of robots for each verdict, worst first, without zeros."""
     counts = dict.fromkeys(VERDICTS, 0)
     for robot in document["robots"]:
         counts[robot["verdict"]] += 1
@@ -183,5 +186,5 @@ def verdict_counts(document: Document) -> dict[str, int]:
 
 
 def pinocchio(document: Document) -> str:
-    """The version that checked."""
+    """Return the version of Pinocchio."""
     return document["versions"].get("pin", "?")

@@ -1,1 +1,1 @@
-"""Validation: many samples, every frame and every joint, held against Pinocchio."""
+"""Validation: comparison of every frame and every joint with Pinocchio, on many samples."""

@@ -1,7 +1,7 @@
-"""Whose last digits are right: the true errors of urdfkin and of Pinocchio, in eps * scale.
+"""Accuracy study: the errors of urdfkin and of Pinocchio with respect to values at fifty digits.
 
-The judge's values are right to fifty digits; the scale is the one that verification uses, so that the
-numbers can be set beside a report's.
+Errors are in eps * scale. The scale is the one that verification uses, so you can compare the numbers with
+those of a report.
 """
 
 from __future__ import annotations
@@ -41,22 +41,22 @@ from urdfkin.verify.verifier import bound_of, theirs_of, urdfkins
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _FIFTY_DIGITS = np.vectorize(mp.mpf, otypes=[object])
-#: The numbers of an orientation, by what a line calls them.
+#: The representations of an orientation, by the name that a line has for them.
 _REPRESENTATIONS = {
     "euler angles": tuple(name for name in SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
 }
-#: urdfkin is called the worse when its typical error is more than this many times Pinocchio's.
+#: urdfkin counts as less accurate when its typical or worst error is more than this many times Pinocchio's.
 FACTOR = 2.0
 
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """True errors of one side, in eps * scale.
+    """Errors of one library with respect to the values at fifty digits, in eps * scale.
 
     Attributes:
-        worst: The largest.
-        typical: The root of their mean square.
+        worst: The largest error.
+        typical: The root mean square of the errors.
     """
 
     worst: float
@@ -65,14 +65,15 @@ class Errors:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One quantity in one reference.
+    """The errors of both libraries for one quantity in one reference frame.
 
     Attributes:
-        quantity: What was judged.
-        reference: Its name, empty for placements; what describes the orientation, for analytical Jacobians.
-        numbers: How many numbers were compared.
-        urdfkin: urdfkin's true errors.
-        pinocchio: Pinocchio's.
+        quantity: Name of the quantity.
+        reference: Name of the reference frame, empty for placements. For analytical Jacobians: the
+            representation of the orientation.
+        numbers: Number of compared values.
+        urdfkin: The errors of urdfkin.
+        pinocchio: The errors of Pinocchio.
     """
 
     quantity: str
@@ -83,7 +84,7 @@ class Line:
 
     @property
     def ours_is_worse(self) -> bool:
-        """Whether urdfkin's typical or worst error is more than twice Pinocchio's."""
+        """Whether the typical or worst error of urdfkin is more than twice Pinocchio's."""
         return (
             self.urdfkin.typical > FACTOR * self.pinocchio.typical
             or self.urdfkin.worst > FACTOR * self.pinocchio.worst
@@ -92,13 +93,13 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What the judge found about one robot.
+    """Result of the accuracy study of one robot.
 
     Attributes:
-        robot: Its name.
-        samples: How many configurations were judged.
-        seed: What they were drawn from.
-        lines: One for each quantity and reference.
+        robot: Name of the robot.
+        samples: Number of configurations.
+        seed: Seed of the random samples.
+        lines: One line for each quantity and reference frame.
         moving_base: Whether the root link moved.
     """
 
@@ -109,7 +110,7 @@ class Judgement:
     moving_base: bool = False
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return the result as plain data for JSON."""
         return {
             "robot": self.robot,
             "samples": self.samples,
@@ -129,29 +130,37 @@ class Judgement:
 
 
 def judge(robot: Robot, *, samples: int = 5, seed: int = 0, base: BaseMotion | None = None) -> Judgement:
-    """Evaluate every link's placement, velocity, Jacobians, their rate and acceleration at 50 digits.
+    """Compute the errors of urdfkin and of Pinocchio with respect to values at 50 digits.
 
-    Analytical Jacobians are those of the twelve sequences of Euler angles together (about fixed axes they are
-    the same, last row first), and of quaternions; left out is what is nearer to a singularity than
-    `Robot.analytical_jacobian` goes, or has a quaternion whose sign rounding hides. Pinocchio has none of its
-    own: its rotation and Jacobian go into 7.122 as urdfkin's do.
+    The quantities are each link's placement, velocity, Jacobian, analytical Jacobians, Jacobian rate and
+    acceleration.
+
+    The analytical Jacobians are those of the twelve sequences of Euler angles together, and of quaternions.
+    (Sequences about fixed axes have the same Jacobians, last row first.) Two kinds of samples are skipped:
+    those nearer to a singularity than `Robot.analytical_jacobian` accepts, and those in which rounding hides
+    the sign of the quaternion. Pinocchio computes no analytical Jacobians: its rotation and Jacobian are
+    inserted into (7.122), as urdfkin's are.
 
     Args:
-        robot: A robot that was loaded.
-        samples: Configurations, drawn as `validate` draws its first; each takes a good part of a second.
-        seed: The same seed gives the same numbers.
-        base: How the root link moves, in all samples or (samples, ...) in each; None if it stands still.
+        robot: The loaded robot.
+        samples: Number of configurations, drawn like the first ones of `validate`. Each takes most of a
+            second.
+        seed: Seed of the samples. The same seed gives the same numbers.
+        base: Motion of the root link: one for all samples, or (samples, ...). None: the root link is fixed.
+
+    Returns:
+        The errors of both libraries, one line for each quantity and reference frame.
 
     Raises:
         OracleError: Pinocchio does not accept the robot.
-        InputError: bases that are neither one nor as many as samples.
+        InputError: The number of base motions is neither one nor the number of samples.
     """
     work = _Work(robot, draw(robot.tree, samples, np.random.default_rng(seed), with_special=False), base)
     return Judgement(robot.name, samples, seed, tuple(work.lines()), base is not None)
 
 
 class _Compared(NamedTuple):
-    """Both sides' doubles, the judge's numbers of 50 digits, and the scale of their errors."""
+    """The doubles of both libraries, the values at 50 digits, and the scale of the errors."""
 
     urdfkin: FloatArray
     pinocchio: FloatArray
@@ -160,12 +169,13 @@ class _Compared(NamedTuple):
 
 
 class _Work:
-    """One batch, as urdfkin, Pinocchio and the judge are asked for it."""
+    """One batch of samples, with the inputs for urdfkin, Pinocchio and the computation at 50 digits."""
 
     def __init__(self, robot: Robot, x: Samples, base: BaseMotion | None) -> None:
         if base is not None and base.batch_shape not in ((), (len(x.q),)):
             raise InputError(
-                f"base is one, or one for each of {len(x.q)} samples", found=f"{base.batch_shape}"
+                f"base: wrong batch shape; give one motion, or {len(x.q)} (one for each sample)",
+                found=f"{base.batch_shape}",
             )
         self.oracle = robot.verifier.oracle(base)
         self.part = Call(robot.tree, robot.plan, robot.link_frames, _ALIGNED, base, (x.q, x.v, x.a)).part(
@@ -184,7 +194,7 @@ class _Work:
         ]
 
     def lines(self) -> Iterator[Line]:
-        """Quantity by quantity, reference by reference."""
+        """Yield one line for each quantity and reference frame."""
         for reference in (None, *Reference):
             for row in validated():
                 if row.exact is not None and reference in row.references:
@@ -202,14 +212,14 @@ class _Work:
         return _Compared(ours, theirs, self._true(row, reference).reshape(ours.shape), scale)
 
     def _true(self, row: Quantity, reference: Reference) -> NDArray[np.object_]:
-        """(n, links, ...) as `urdfkins`."""
+        """Return the values at 50 digits (n, links, ...), in the order of `urdfkins`."""
         return np.array(
             [[row.truth(motion, link, reference) for link in self.links] for motion in self.motions],
             dtype=object,
         )
 
     def _analytical(self, representations: Sequence[str]) -> Iterator[_Compared]:
-        """Representation by representation, each a list of Jacobians."""
+        """Yield the analytical Jacobians of each representation."""
         poses, J_v = self._compared(PLACEMENT, None), self._compared(JACOBIAN, _ALIGNED)
         plan, x = self.part.plan, self.part
         size, nearest = magnitudes(plan, x.q, None, None, x.state), max(NEAREST, nearest_singularity(plan))
@@ -235,24 +245,24 @@ class _Work:
 
 
 def _moving_columns(scale: FloatArray) -> NDArray[np.intp]:
-    """(n, links, most) the columns that move each link, filled up with others."""
+    """Return (n, links, most) the columns that move each link, padded with fixed columns."""
     idle = ~(scale > 0.0).any(axis=-2)
     most = int((~idle).sum(axis=-1).max(initial=0))
     return np.argsort(idle, axis=-1, kind="stable")[..., :most]
 
 
 def _columns(J: NDArray[Any], which: NDArray[np.intp]) -> NDArray[Any]:
-    """Some columns of (..., rows, nv)."""
+    """Return the selected columns of (..., rows, nv)."""
     return np.take_along_axis(J, which[..., np.newaxis, :], axis=-1)
 
 
 def _one(base: BaseNumbers, k: int) -> BaseNumbers:
-    """The base of one sample."""
+    """Return the base motion of one sample."""
     return BaseRows(base.placement[k], base.velocity[k], base.acceleration[k])
 
 
 def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.object_]:
-    """(m, 4) unit quaternions of rotations (m, 3, 3), of the two that each has those near to others."""
+    """Return (m, 4) unit quaternions of rotations (m, 3, 3), with the signs of the quaternions `near`."""
     K = davenport(R)
     q = (K @ near[..., np.newaxis])[..., 0] + near  # K + I is 4 q q^T
     unit: NDArray[np.object_] = q / np.sqrt((q * q).sum(axis=-1, keepdims=True))
@@ -260,18 +270,18 @@ def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.obj
 
 
 def _line(quantity: str, reference: str, compared: Sequence[_Compared]) -> Line:
-    """The errors of both sides in what was compared of one quantity."""
+    """Return the errors of both libraries for one quantity."""
     sides: tuple[list[FloatArray], list[FloatArray]] = [], []
     for ours, theirs, true, scale in compared:
         counted = scale > 0.0
         units = np.maximum(EPS * scale[counted], LEAST_UNIT)
-        # The difference of doubles that are near each other is exact; the rest of the digits follows.
+        # The difference of two close doubles is exact. The remaining digits are subtracted next.
         high = true[counted].astype(float)
         low = (true[counted] - high).astype(float)
         for errors, side in zip(sides, (ours, theirs), strict=True):
             errors.append(np.abs((side[counted] - high) - low) / units)
-    mine, other = map(np.concatenate, sides)
-    return Line(quantity, reference, len(mine), _errors(mine), _errors(other))
+    own_errors, their_errors = map(np.concatenate, sides)
+    return Line(quantity, reference, len(own_errors), _errors(own_errors), _errors(their_errors))
 
 
 def _errors(units: FloatArray) -> Errors:

@@ -1,7 +1,7 @@
-"""What the judge found, kept in a campaign's store: it takes seconds a robot, and is interrupted too.
+"""Results of the accuracy study in a campaign's store, so that an interrupted study can be resumed.
 
-What it was asked for stands in `judge.json`; a judgement lies beside the chunks, under the sha256 of
-all that its numbers depend on, and under the same seal.
+The file `judge.json` holds the settings. The result of each robot is a file in the folder of the chunks. Its
+name is the sha256 of everything that its numbers depend on, and it has the same checksum format as a chunk.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from urdfkin.validation.store import JUDGE, JUDGED, Store
 
 @dataclass(frozen=True, slots=True)
 class NotJudged:
-    """Why there is no judgement of a robot."""
+    """Reason why a robot has no accuracy result."""
 
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What the judge was asked for.
+    """Settings of the accuracy study.
 
     Attributes:
-        samples: Configurations of each robot.
-        seed: What they are drawn from.
-        moving_base: Whether the root links move, at random.
+        samples: Number of configurations of each robot.
+        seed: Seed of the random samples.
+        moving_base: Whether the root links have a random motion.
     """
 
     samples: int
@@ -44,93 +44,91 @@ class Asked:
 
     @property
     def words(self) -> str:
-        """As options."""
+        """The settings as command-line options."""
         moving = " --judge-moving-base" if self.moving_base else ""
         return f"--judge-samples {self.samples} --seed {self.seed}{moving}"
 
 
 class AccuracyResult:
-    """The judgements in a store.
+    """The accuracy results in a store.
 
     Args:
-        store: Where.
-        asked: For what.
+        store: The store.
+        asked: The settings of the study.
     """
 
     def __init__(self, store: Store, asked: Asked) -> None:
-        self._store, self._asked = store, asked
+        self._store, self._settings = store, asked
 
     @classmethod
     def merge(cls, store: Store, others: Sequence[Store]) -> None:
-        """Copy what other stores of the same campaign have and this one has not.
+        """Copy the results that other stores of the same campaign have and this one does not.
 
         Raises:
-            InputError: they were asked for different things.
+            InputError: The stores have different settings of the study.
         """
-        theirs = [judged for judged in map(cls.of, others) if judged is not None]
+        theirs = [results for results in map(cls.of, others) if results is not None]
         if theirs:
-            mine = cls.of(store) or cls(store, theirs[0]._asked)
-            for judged in theirs:
-                mine._demand_same(judged)
-            mine.begin()
-            for judged in theirs:
-                mine._take(judged)
+            own = cls.of(store) or cls(store, theirs[0]._settings)
+            for results in theirs:
+                own._demand_same(results)
+            own.begin()
+            for results in theirs:
+                own._copy_missing(results)
 
     @classmethod
     def of(cls, store: Store) -> AccuracyResult | None:
-        """Those that were asked for last; None: the judge was not asked."""
+        """Return the results with the latest settings. None: no accuracy study was requested."""
         try:
             if (content := read_if_there(store.folder / JUDGE)) is None:
                 return None
             data = json.loads(content)
             asked = Asked(int(data["samples"]), int(data["seed"]), bool(data["moving_base"]))
         except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
-            store.tell(
-                f"{store.folder / JUDGE} says nothing ({type(error).__name__}): judgements are left out"
-            )
+            store.tell(f"{store.folder / JUDGE} cannot be read ({type(error).__name__}): no accuracy results")
             return None
         return cls(store, asked)
 
     def begin(self) -> None:
-        """Write down what is asked for."""
-        self._store.write(JUDGE, (json.dumps(asdict(self._asked)) + "\n").encode())
+        """Write the settings into the store."""
+        self._store.write(JUDGE, (json.dumps(asdict(self._settings)) + "\n").encode())
 
     def found(self, robot: int) -> Judgement | NotJudged | None:
-        """What is known of a robot."""
+        """Return the result of a robot; None if the store has none."""
         return self._store.kept(self._key(robot), JUDGED, _read)
 
     def has(self, robot: int) -> bool:
-        """Whether something is known of a robot, by the file's name."""
+        """Whether the store has a file with the result of a robot. The file is not read."""
         return self._store.has(self._key(robot), JUDGED)
 
     def keep(self, robot: int, found: Judgement | NotJudged) -> None:
-        """Write it down."""
+        """Write the result of a robot into the store."""
         key = self._key(robot)
         self._store.keep_part(key, JUDGED, packed(key, {"judge": asdict(found)}))
 
     def stamp(self, robot: int) -> str:
-        """The sha256 of the text that was compared."""
+        """Return the sha256 of the robot's text that was compared."""
         return self._store.manifest.robots[robot][1]
 
-    def _take(self, other: AccuracyResult) -> None:
+    def _copy_missing(self, other: AccuracyResult) -> None:
         for robot in range(len(self._store.manifest.robots)):
             if self.found(robot) is None and (found := other.found(robot)) is not None:
                 self.keep(robot, found)
 
     def _demand_same(self, other: AccuracyResult) -> None:
-        if other._asked != self._asked:
+        if other._settings != self._settings:
             raise InputError(
-                "judged with other options",
+                "the stores have accuracy results with different options",
                 where=str(other._store.folder),
-                found=f"{other._asked.words}, and {self._asked.words} in {self._store.folder}",
-                remedy="judge all parts with the same",
+                found=f"{other._settings.words}, and {self._settings.words} in {self._store.folder}",
+                remedy="use the same options for all parts",
             )
 
     def _key(self, robot: int) -> str:
         manifest = self._store.manifest
         origin, stamp = manifest.robots[robot]
-        origin = replace(origin, oracle=None)  # a second witness is not asked
-        numbers = [manifest.provenance, version("mpmath"), asdict(self._asked), asdict(origin), stamp]
+        origin = replace(origin, oracle=None)  # a second oracle does not affect the study
+        numbers = [manifest.provenance, version("mpmath"), asdict(self._settings), asdict(origin), stamp]
         return hashlib.sha256(json.dumps([LAYOUT, "judge", *numbers], sort_keys=True).encode()).hexdigest()
 
 
@@ -145,4 +143,4 @@ def _read(key: str, content: bytes) -> Judgement | NotJudged:
         )
         return Judgement(**data | {"lines": tuple(lines)})
     except (KeyError, TypeError, AttributeError) as error:
-        raise DamagedError(f"no judgement of urdfkin's ({type(error).__name__})") from error
+        raise DamagedError(f"not an accuracy result of urdfkin ({type(error).__name__})") from error

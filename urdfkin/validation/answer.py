@@ -1,12 +1,11 @@
-"""What becomes of a chunk: its result, or why there is none. Nothing that a robot raises goes further.
+"""Answer of a chunk: its result or the reason of its failure, and the file format of both.
 
-An answer is plain data. Errors themselves need not survive the way between processes, and some do not.
+Every exception that a robot raises becomes an answer. An answer is plain data, because some exceptions cannot
+be sent between processes.
 
-
-An answer as a file's bytes: compressed JSON under the key of its chunk, sealed by a digest.
-
-Data and nothing else: what is read here may come from another machine, and must not be able to run. A file
-that was damaged, cut short, renamed or made by something else is told from a whole one before it is used.
+A file holds compressed JSON with the key of its chunk and a checksum (sha256). It may come from another
+machine, so it contains data only and no code. Damaged, truncated, renamed and foreign files are detected
+before their data is used.
 """
 
 from __future__ import annotations
@@ -34,11 +33,12 @@ class Failure:
     """Why a robot was not checked.
 
     Attributes:
-        verdict: Whether its file is at fault or something else.
-        reason: In words.
-        portrait: What can be told of it all the same.
-        error: The traceback of an error that nobody foresaw.
-        passing: Whether it was the machinery that failed, not the robot: to be tried again, not kept.
+        verdict: BAD_INPUT if the robot's file has an error, NOT_VERIFIED otherwise.
+        reason: The reason as text.
+        portrait: Summary of the robot, as far as it could be read.
+        error: The traceback of an unexpected error; None otherwise.
+        passing: Whether the process or the cluster failed and not the robot. Such a failure is not stored;
+            the chunk is computed again.
     """
 
     verdict: Verdict
@@ -48,12 +48,12 @@ class Failure:
     passing: bool = False
 
 
-#: What comes back for a chunk.
+#: The answer of a chunk.
 Answer = ChunkResult | Failure
 
 
 def answer(chunk: Chunk) -> Answer:
-    """Run a chunk; whatever it raises is an answer too, but for an interrupt."""
+    """Run a chunk. Return a `Failure` for every exception except an interrupt."""
     try:
         return run_chunk(chunk)
     except Exception as error:
@@ -61,29 +61,29 @@ def answer(chunk: Chunk) -> Answer:
 
 
 def failure(subject: RobotInput, error: Exception) -> Failure:
-    """The answer for a robot that raised something."""
+    """Return the answer for a robot that raised an exception."""
     if isinstance(error, UrdfError):
         return Failure(Verdict.BAD_INPUT, str(error), RobotSummary(findings=as_data(error.findings)))
     if isinstance(error, OracleError):
         return Failure(Verdict.NOT_VERIFIED, str(error), _portrait(subject))
     if isinstance(error, UrdfkinError):
         return Failure(Verdict.BAD_INPUT, str(error), _portrait(subject))
-    return Failure(Verdict.NOT_VERIFIED, unforeseen(error), error=traced(error))
+    return Failure(Verdict.NOT_VERIFIED, unexpected_error(error), error=format_traceback(error))
 
 
-def unforeseen(error: Exception) -> str:
-    """The words for an error that nobody foresaw."""
-    told = " ".join(str(error).split()) or "no message"
-    return f"an unforeseen error in urdfkin, please report it: {type(error).__name__}: {told}"
+def unexpected_error(error: Exception) -> str:
+    """Return the message for an unexpected error."""
+    message = " ".join(str(error).split()) or "no message"
+    return f"unexpected error in urdfkin, please report it: {type(error).__name__}: {message}"
 
 
-def traced(error: Exception) -> str:
-    """The whole traceback of an error."""
+def format_traceback(error: Exception) -> str:
+    """Return the whole traceback of an error."""
     return "".join(traceback.format_exception(error))
 
 
 def _portrait(subject: RobotInput) -> RobotSummary:
-    """A robot's parts, if it can be read; its tables are nobody's work here."""
+    """Return the summary of a robot if it can be read, with unchecked tables."""
     try:
         return RobotSummary.of(subject.read(), None)
     except Exception:
@@ -92,55 +92,55 @@ def _portrait(subject: RobotInput) -> RobotSummary:
 
 _MAGIC = b"urdfkin-chunk/1\n"
 _DIGEST = hashlib.sha256().digest_size
-#: What a file may become when it is unpacked: more is nobody's answer.
+#: Maximum size of an unpacked file, bytes. No answer of urdfkin is larger.
 _MOST = 2**27
 
 
 class DamagedError(Exception):
-    """Bytes that are no answer for the chunk; the message says how."""
+    """The bytes are not an answer of the chunk. The message states the reason."""
 
 
 def written(key: str, found: Answer) -> bytes:
-    """An answer's file."""
+    """Return an answer as the bytes of its file."""
     return packed(key, _failure(found) if isinstance(found, Failure) else _result(found))
 
 
 def read(key: str, content: bytes) -> Answer:
-    """The answer for a chunk from a file's bytes.
+    """Return the answer of a chunk from the bytes of its file.
 
     Raises:
-        DamagedError: they are not what was written for it.
+        DamagedError: The bytes are not the answer that was written for this chunk.
     """
     body = unpacked(key, content)
     try:
         return _read_failure(body["failure"]) if "failure" in body else _read_result(body["result"])
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise DamagedError(f"not a chunk of urdfkin's ({type(error).__name__})") from error
+        raise DamagedError(f"not a chunk of urdfkin ({type(error).__name__})") from error
 
 
 def packed(key: str, body: dict[str, Any]) -> bytes:
-    """Data as a file's bytes, under its key and a seal."""
+    """Return data as the bytes of a file, with its key and a checksum."""
     data = zlib.compress(json.dumps({"key": key} | body, separators=(",", ":")).encode(), 1)
     return _MAGIC + hashlib.sha256(data).digest() + data
 
 
 def unpacked(key: str, content: bytes) -> dict[str, Any]:
-    """The data in a file's bytes.
+    """Return the data in the bytes of a file.
 
     Raises:
-        DamagedError: they are not what was written under the key.
+        DamagedError: The bytes are not what was written under this key.
     """
-    seal, data = content[len(_MAGIC) :][:_DIGEST], content[len(_MAGIC) + _DIGEST :]
+    checksum, data = content[len(_MAGIC) :][:_DIGEST], content[len(_MAGIC) + _DIGEST :]
     if not content.startswith(_MAGIC):
-        raise DamagedError("not a chunk of urdfkin's")
-    if hashlib.sha256(data).digest() != seal:
-        raise DamagedError("its content is not what was written")
+        raise DamagedError("not a chunk of urdfkin")
+    if hashlib.sha256(data).digest() != checksum:
+        raise DamagedError("its checksum does not match")
     try:
         body: dict[str, Any] = json.loads(zlib.decompressobj().decompress(data, _MOST))
         if body["key"] != key:
-            raise DamagedError("it is another chunk's")
+            raise DamagedError("it belongs to another chunk")
     except (ValueError, KeyError, TypeError, zlib.error, RecursionError) as error:
-        raise DamagedError(f"not a chunk of urdfkin's ({type(error).__name__})") from error
+        raise DamagedError(f"not a chunk of urdfkin ({type(error).__name__})") from error
     return body
 
 
@@ -193,26 +193,26 @@ def _portrait_from(data: dict[str, Any]) -> RobotSummary:
 
 
 def _tally(tally: Tally) -> list[Any]:
-    """Its numbers in their order; a double's shortest decimals are read back as the same double."""
+    """Return the numbers in their order. JSON keeps a double exactly (shortest round-trip decimals)."""
     case = tally.case
     return [
         tally.results,
         tally.failed,
         tally.worst,
         tally.share,
-        [[place, count] for place, count in enumerate(tally.histogram) if count],
+        [[index, count] for index, count in enumerate(tally.histogram) if count],
         tally.by_frame,
         None if case is None else [case.share, case.units, case.sample, case.frame, case.q, case.v, case.a],
         tally.bounds,
-        asdict(tally.witness) if tally.witness else None,
+        asdict(tally.three_sides) if tally.three_sides else None,
     ]
 
 
 def _read_tally(data: list[Any]) -> Tally:
     results, failed, worst, share, counts, by_frame, case, bounds, witness = data
     histogram = [0] * (len(HISTOGRAM_EDGES) + 1)
-    for place, count in counts:
-        histogram[place] = count
+    for index, count in counts:
+        histogram[index] = count
     return Tally(
         results,
         failed,

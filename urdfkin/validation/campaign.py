@@ -1,4 +1,4 @@
-"""`validate`: cut the work into chunks, have an engine run them, and make the report of what comes back."""
+"""`validate`: split the work into chunks, run them on an engine, and make the report from their answers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Literal
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.validators import as_bool, as_str, safe_repr, whole_number
 from urdfkin.validation import memory
-from urdfkin.validation.answer import Answer, Failure, failure, traced, unforeseen
+from urdfkin.validation.answer import Answer, Failure, failure, format_traceback, unexpected_error
 from urdfkin.validation.chunk import Cut
 from urdfkin.validation.collector import Progress, ResultCollector
 from urdfkin.validation.engines import Engine, ExecutorEngine, SerialEngine, Task
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 class StoreWarning(UserWarning):
-    """A file of a store that cannot be trusted, and is computed again."""
+    """A damaged file of a store. Its chunk is computed again."""
 
 
 def validate(
@@ -56,41 +56,43 @@ def validate(
     shard: str | None = None,
     progress: Progress | None = None,
 ) -> ValidationReport:
-    """Hold every frame and joint against Pinocchio's, in all three references.
+    """Compare every frame and joint with Pinocchio in all three reference frames.
 
-    The quantities are `urdfkin.verify.quantities.compared()`; `not_compared()` names the others.
+    `urdfkin.verify.quantities.compared()` lists the quantities; `not_compared()` lists the others.
 
     Args:
-        robots: One robot or several: anything `load` takes, or robots that were loaded.
-        samples: Random configurations within limits for each robot; the neutral one and the two ends of
-            the limits are added. Every eighth sample has rates a hundred times larger.
-        seed: The same seed gives the same numbers, whatever `jobs` and `executor` are.
-        jobs: Local processes. One that dies costs the robot in its hands a second try, alone; no other robot.
+        robots: One robot or several: anything that `load` accepts, or loaded robots.
+        samples: Number of random configurations within the limits for each robot. The neutral configuration
+            and both ends of the limits are added. Every eighth sample has joint velocities and joint
+            accelerations a hundred times larger.
+        seed: Seed of the samples. The same seed gives the same numbers for every `jobs` and `executor`.
+        jobs: Number of local processes. If one crashes, its robot is tried once more, alone. Other robots are
+            not affected.
         mimic: As in `load`.
         root_joint: As in `load`.
         xacro_args: As in `load`, for each .xacro file among the robots.
-        oracle: "mujoco": MuJoCo is asked about every frame besides Pinocchio, and the report says who stands
-            alone where two of the three agree (needs the extra `mujoco`).
-        isolate: Each robot is checked in a process of its own, `jobs` at a time; when one dies, that robot is
-            reported as not verified with the reason, and the others go on.
-        executor: Runs the chunks instead of local processes: anything like those of `concurrent.futures`, or
-            a cluster (`urdfkin.validation.cluster.connected`).
-        store: A folder that keeps each chunk as soon as it is there: the same call goes on where one was
-            ended, however it was. `stored` makes a report of it at any time.
-        retry: "failed": what the store has of robots that could not be checked is computed again; their
-            texts may have changed.
-        shard: "2/4": only the second of four equal parts, into a store; the report tells of that part alone.
-        progress: Told before the work and after each chunk.
+        oracle: "mujoco": also compare every frame with MuJoCo. The report states which one disagrees where
+            two of the three agree (needs the extra `mujoco`).
+        isolate: Run each robot in its own process, `jobs` at a time. If a process crashes, its robot is
+            reported as not verified with the reason; the other robots continue.
+        executor: Runs the chunks instead of local processes: an executor with the interface of
+            `concurrent.futures`, or a cluster (`urdfkin.validation.cluster.connected`).
+        store: A folder in which each finished chunk is saved. After any interruption, the same call resumes
+            the run. `stored` makes a report from the folder at any time.
+        retry: "failed": compute again the robots in the store that could not be checked. Their texts may have
+            changed.
+        shard: "2/4": run only the second of four equal parts, with a store. The report covers that part only.
+        progress: Callback, called before the work and after each chunk.
 
     Returns:
-        The report, on every robot that was asked for. One that cannot be read or checked is reported,
-        whatever it raises; an interrupt ends the run and keeps what had finished.
+        The report on every requested robot. A robot that cannot be read or checked is reported with its
+        error. An interrupt ends the run; finished results stay in the report.
 
     Raises:
-        InputError: a negative number of samples, a negative seed or no job; an oracle that is not installed;
-            a store of another campaign, or one that somebody else is at work on.
-        InstallationError: Pinocchio is missing, or another project goes by its name.
-        SourceError: the store cannot be made.
+        InputError: The number of samples or the seed is negative; `jobs` is below one; the oracle is not
+            installed; the store belongs to another campaign, or another process uses it.
+        InstallationError: Pinocchio is missing, or another project is installed under its name.
+        SourceError: The store cannot be made.
 
     >>> report = validate("ur5", samples=10)
     >>> report.passed, report.robots[0].failed
@@ -101,46 +103,50 @@ def validate(
     shard = None if shard is None else as_str(shard, "shard")
     if retry is not None and as_str(retry, "retry") != "failed":
         raise InputError(
-            "what failed can be computed again", found=f"retry={retry!r}", remedy='retry="failed"'
+            "retry: unknown value", found=f"retry={retry!r}", remedy='give retry="failed" or None'
         )
     folder = None if store is None else _folder(store)
     if (retry or shard is not None) and store is None:
-        raise InputError("only a store has something to retry or a shard", remedy="give store=, a folder")
-    many = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
+        raise InputError("retry and shard need a store", remedy="give store=FOLDER")
+    given = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
     started = datetime.datetime.now(datetime.UTC)
-    pinocchio()  # before the work, not robot by robot
-    found, unread = subjects(many, mimic, root_joint, xacro_args)
+    pinocchio()  # once, before the work, so that a missing Pinocchio is an error at once
+    found, unread = subjects(given, mimic, root_joint, xacro_args)
     if witness_of(oracle) is not PINOCCHIO:
         found = [replace(one, origin=replace(one.origin, oracle=oracle)) for one in found]
     cut = Cut(samples)
-    gathering = ResultCollector(found, cut, shares(len(found), cut, shard), progress)
-    most = memory.share(jobs) if executor is None else None  # an executor's machines know their own
-    campaign = _Campaign(found, cut, seed, most, gathering)
-    interrupted, kept, begin = False, None, time.perf_counter()
+    collector = ResultCollector(found, cut, shares(len(found), cut, shard), progress)
+    memory_limit = (
+        memory.share(jobs) if executor is None else None
+    )  # executors: each machine has its own limit
+    campaign = _Campaign(found, cut, seed, memory_limit, collector)
+    interrupted, open_store, begin = False, None, time.perf_counter()
     with contextlib.ExitStack() as stack:
         if folder is not None:
             manifest = Manifest.of(found, samples, seed, started.isoformat(timespec="seconds"))
-            there = opened(folder, manifest, _warn, shard=shard, retry_failed=retry == "failed")
-            kept = stack.enter_context(there)
+            opening = opened(folder, manifest, _warn, shard=shard, retry_failed=retry == "failed")
+            open_store = stack.enter_context(opening)
         try:
-            if kept is not None:
-                campaign.use(kept)
+            if open_store is not None:
+                campaign.use(open_store)
             for i, error in unread.items():
-                for index in gathering.missing(i):  # the first, for then it has failed
+                for index in collector.missing(i):  # only the first: after it the robot counts as failed
                     campaign.enter(campaign.task(i, index), failure(found[i], error))
-            missing = [robot for i, robot in enumerate(found) if any(True for _ in gathering.missing(i))]
+            missing = [robot for i, robot in enumerate(found) if any(True for _ in collector.missing(i))]
             if missing and (isolate or any(map(_is_robot, missing))):
-                load_kernels()  # once, here: no worker has to compile, no robot's seconds hold it
+                load_kernels()  # once, so that no worker compiles and no robot's time includes it
                 begin = time.perf_counter()
-            gathering.begin()
+            collector.begin()
             _engine(jobs, isolate, executor).run(campaign.work(), campaign.enter)
         except KeyboardInterrupt:
             interrupted = True
         except UrdfkinError as error:
-            gathering.give_up(Failure(Verdict.NOT_VERIFIED, str(error)))
-        except Exception as error:  # what is there already stays
-            gathering.give_up(Failure(Verdict.NOT_VERIFIED, unforeseen(error), error=traced(error)))
-    reports = tuple(gathering.reports())
+            collector.give_up(Failure(Verdict.NOT_VERIFIED, str(error)))
+        except Exception as error:  # finished results stay
+            collector.give_up(
+                Failure(Verdict.NOT_VERIFIED, unexpected_error(error), error=format_traceback(error))
+            )
+    reports = tuple(collector.reports())
     return ValidationReport(
         robots=reports,
         asked=len(reports),
@@ -153,18 +159,18 @@ def validate(
 
 
 def _folder(store: str | os.PathLike[str]) -> Path:
-    """A store's path, of letters that a file system has."""
+    """Return the path of a store. Raise InputError if it is not a valid path."""
     try:
         name = os.fsencode(store)
     except (TypeError, ValueError):
         name = b""
     if not name or b"\0" in name:
-        raise InputError("a store is a folder's path", found=safe_repr(store))
+        raise InputError("store: not the path of a folder", found=safe_repr(store), remedy="give a path")
     return Path(os.fsdecode(name))
 
 
 def _is_robot(subject: RobotInput) -> bool:
-    """Whether there is something to compute with; what is wrong with it, its chunk reports."""
+    """Whether the robot can be loaded. If not, its chunk reports the error."""
     try:
         subject.load()
     except Exception:
@@ -173,20 +179,22 @@ def _is_robot(subject: RobotInput) -> bool:
 
 
 def stored(folder: str | os.PathLike[str]) -> ValidationReport:
-    """The report of what a store holds, as one run would have made it; interrupted until it is complete.
+    """Return the report of a store, equal to that of one uninterrupted run.
+
+    Until the store is complete, the report is marked as interrupted.
 
     Args:
         folder: The store.
 
     Raises:
-        SourceError, InputError: it is none.
+        SourceError, InputError: The folder is not a store.
     """
     store = Store.reading(Path(folder), _warn)
     store.check_names()
     manifest, found = store.manifest, store.manifest.subjects()
-    gathering = ResultCollector(found, manifest.cut, shares(len(found), manifest.cut))
-    _Campaign(found, manifest.cut, manifest.seed, None, gathering).use(store)
-    reports, standing = tuple(gathering.reports()), gathering.standing()
+    collector = ResultCollector(found, manifest.cut, shares(len(found), manifest.cut))
+    _Campaign(found, manifest.cut, manifest.seed, None, collector).use(store)
+    reports, standing = tuple(collector.reports()), collector.standing()
     judgements, all_judged = _judgements(store, reports)
     return ValidationReport(
         robots=reports,
@@ -202,60 +210,61 @@ def stored(folder: str | os.PathLike[str]) -> ValidationReport:
 
 
 def _judgements(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Judgement | None, ...], bool]:
-    """What the judge said of each robot that was compared, if it was asked; and whether it is through."""
+    """Return the accuracy result of each compared robot, if requested, and whether all robots have one."""
     if not store.has_judge:
         return (), True
-    from urdfkin.validation.accuracy_store import AccuracyResult, NotJudged  # noqa: PLC0415  fifty digits take a library
+    from urdfkin.validation.accuracy_store import AccuracyResult, NotJudged  # noqa: PLC0415  needs mpmath
 
-    if (judged := AccuracyResult.of(store)) is None:
+    if (results := AccuracyResult.of(store)) is None:
         return (), True
-    found = [judged.found(i) for i, report in enumerate(reports) if report.tallies]
+    found = [results.found(i) for i, report in enumerate(reports) if report.tallies]
     return tuple(None if isinstance(one, NotJudged) else one for one in found), None not in found
 
 
 @dataclass
 class _Campaign:
-    """The chunks of some robots, what is known of them and what is still to be done."""
+    """The chunks of a run: the known answers and the missing chunks."""
 
     subjects: Sequence[RobotInput]
     cut: Cut
     seed: int
     memory: int | None
-    gathering: ResultCollector
+    collector: ResultCollector
     store: Store | None = None
 
     def task(self, robot: int, index: int) -> Task:
         return Task(robot, self.cut.chunk(self.subjects[robot], self.seed, index, self.memory))
 
     def use(self, store: Store) -> None:
-        """Begin with what a store has, and keep there what comes."""
+        """Read the answers of a store, and save new answers there."""
         for robot in range(len(self.subjects)):
-            for index in self.gathering.missing(robot):
+            for index in self.collector.missing(robot):
                 if (found := store.answer(robot, index)) is not None:
-                    self.gathering.enter(self.task(robot, index), found, kept=True)
+                    self.collector.enter(self.task(robot, index), found, kept=True)
         self.store = store
 
     def work(self) -> Iterator[Iterator[Task]]:
-        """What is missing, robot by robot, made when it is asked for."""
+        """Return the missing tasks of each robot, as iterators."""
         return (self._tasks(robot) for robot in range(len(self.subjects)))
 
     def _tasks(self, robot: int) -> Iterator[Task]:
-        return (self.task(robot, index) for index in self.gathering.missing(robot))
+        return (self.task(robot, index) for index in self.collector.missing(robot))
 
     def enter(self, task: Task, found: Answer) -> None:
-        """Take an answer: what is counted was kept before."""
+        """Save an answer in the store, then count it."""
         if self.store is not None and not (isinstance(found, Failure) and found.passing):
             self.store.keep(task.robot, task.chunk.index, found)
-        self.gathering.enter(task, found)
+        self.collector.enter(task, found)
 
 
 def shares(robots: int, cut: Cut, shard: str | None = None) -> list[range]:
-    """Which chunks of each robot belong to a part of the work; without one, all.
+    """Return the chunks of each robot that belong to a shard; without a shard, all chunks.
 
-    Parts are equal and without gaps in the order of robots and chunks, so that most robots are read once.
+    The shards are equal, contiguous ranges in the order of robots and chunks, so that most robots are read
+    only once.
 
     Raises:
-        InputError: not a part.
+        InputError: `shard` is not of the form i/n.
 
     >>> shares(2, Cut(1000), "1/4"), shares(2, Cut(1000), "4/4")
     ([range(0, 4), range(0, 0)], [range(0, 0), range(4, 8)])
@@ -273,7 +282,9 @@ def shares(robots: int, cut: Cut, shard: str | None = None) -> list[range]:
 def _shard(word: str) -> tuple[int, int]:
     match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", word)
     if match is None or not 1 <= int(match[1]) <= int(match[2]):
-        raise InputError("a shard is i/n, the i-th of n parts", found=repr(word), remedy="1/4, ..., 4/4")
+        raise InputError(
+            "shard: not of the form i/n", found=repr(word), remedy="for four parts give 1/4, ..., 4/4"
+        )
     return int(match[1]), int(match[2])
 
 

@@ -1,10 +1,11 @@
-"""One chunk of a validation: a robot and a run of samples that depend on the seed and their place alone.
+"""Chunks of a validation: a range of samples of one robot.
 
-A chunk is plain data in and plain data out, so that it can run in this process, in another or on another
-machine. Samples 0, 1, 2 of a robot are the neutral configuration and the two ends of the limits.
+The samples depend on the seed and on their index only. Inputs and results of a chunk are plain data, so a
+chunk can run in this process, in another one or on another machine. Samples 0, 1 and 2 of a robot are the
+neutral configuration and the two ends of the limits.
 
-Samples are drawn 25 at a time, each draw from its own number; a chunk holds several draws and compares them
-together, so that how many it holds changes no number, only what it costs to hand it out and to keep it.
+Samples are drawn 25 at a time, each draw with its own seed. A chunk compares several draws together. Their
+number changes no result, only the cost of distributing and storing chunks.
 """
 
 from __future__ import annotations
@@ -27,27 +28,27 @@ from urdfkin.verify.oracles import PINOCCHIO
 from urdfkin.verify.pinocchio import Oracle
 from urdfkin.verify.sampling import Samples, draw
 
-#: Samples that are drawn together.
+#: Samples in one draw.
 DRAWN = 25
-#: How many special configurations come before the random ones.
+#: Number of special configurations before the random ones.
 SPECIAL = 3
-#: A robot has so many chunks, that several workers find work in it,
+#: Minimum number of chunks of a robot, so that several workers can share it (unless it has fewer draws).
 _CHUNKS = 8
-#: or more, of so many draws: a second's work on a usual robot, some kilobytes of results.
+#: Maximum number of draws in a chunk: one second of work for a typical robot, a few kilobytes of results.
 _DRAWS = 40
 
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """Which samples of which robot.
+    """A range of samples of one robot.
 
     Attributes:
         subject: The robot.
-        seed: What samples are drawn from, with the number of the draw.
-        index: The chunk's place among the robot's.
-        first: Its first draw.
-        samples: Random configurations.
-        memory: Bytes that the robot may take where it is run; None: half of what is free there.
+        seed: Seed of the samples. Each draw combines it with its own index.
+        index: Index of the chunk within the robot.
+        first: Index of its first draw.
+        samples: Number of random configurations.
+        memory: Bytes that the robot may use; None: half of the free memory of the machine.
     """
 
     subject: RobotInput
@@ -59,16 +60,16 @@ class Chunk:
 
     @property
     def configurations(self) -> int:
-        """How many samples it has, the special ones included."""
+        """Number of samples, including the special ones."""
         return self.samples + (SPECIAL if self.first == 0 else 0)
 
     @property
     def first_sample(self) -> int:
-        """The number of the chunk's first sample."""
+        """Index of the first sample of the chunk."""
         return 0 if self.first == 0 else SPECIAL + self.first * DRAWN
 
     def draw(self, tree: KinematicTree) -> Samples:
-        """The samples; the same for every machine, every number of workers and every cut."""
+        """Draw the samples. They do not depend on the machine, the number of workers or the chunk size."""
         drawn = [self._draw(tree, i) for i in range(max(1, -(-self.samples // DRAWN)))]
         return Samples(*(np.concatenate([getattr(x, name) for x in drawn]) for name in ("q", "v", "a")))
 
@@ -80,9 +81,9 @@ class Chunk:
 
 @dataclass(frozen=True, slots=True)
 class ChunkResult:
-    """What was found, about whom, and how long it took; the first chunk also says what the robot is.
+    """Result of a chunk: error statistics, names and times. The first chunk also has the robot's summary.
 
-    Results add up: those of neighbouring chunks to that of both.
+    The sum of the results of two adjacent chunks is the result of both.
     """
 
     name: str
@@ -109,7 +110,7 @@ class ChunkResult:
 
 @dataclass(frozen=True, slots=True)
 class Cut:
-    """How the samples of each robot are cut into chunks: by their number alone, whoever runs them.
+    """Division of the samples of each robot into chunks. It depends on the number of samples only.
 
     >>> len(Cut(1000)), len(Cut(10_000)), len(Cut(1_000_000)), len(Cut(0))
     (8, 10, 1000, 1)
@@ -119,21 +120,21 @@ class Cut:
 
     @property
     def _draws(self) -> int:
-        """Of a chunk."""
+        """Number of draws in a chunk."""
         return min(_DRAWS, max(1, -(-self.samples // DRAWN) // _CHUNKS))
 
     def __len__(self) -> int:
-        """Chunks of a robot; at least one, for the special configurations."""
+        """Number of chunks of a robot; at least one, for the special configurations."""
         return max(1, -(-self.samples // (self._draws * DRAWN)))
 
     def chunk(self, subject: RobotInput, seed: int, index: int, most: int | None = None) -> Chunk:
-        """One of them, for a robot that may take so many bytes."""
+        """Return one chunk of a robot. `most` is the number of bytes that the robot may use."""
         first = index * self._draws
         samples = min(self._draws * DRAWN, self.samples - first * DRAWN)
         return Chunk(subject, seed, index, first, samples, most)
 
     def configurations(self, chunks: range) -> int:
-        """How many samples a run of chunks has."""
+        """Return the number of samples in a range of chunks."""
         if not chunks:
             return 0
         size = self._draws * DRAWN
@@ -142,33 +143,33 @@ class Cut:
 
 
 def chunks(subject: RobotInput, samples: int, seed: int, most: int | None = None) -> Iterator[Chunk]:
-    """The chunks of one robot."""
+    """Yield the chunks of one robot."""
     cut = Cut(samples)
     return (cut.chunk(subject, seed, index, most) for index in range(len(cut)))
 
 
-#: The robot that was checked last. The chunks of a robot come one after another; a worker need not read it
-#: again for each, and two large ones at a time would be too much.
-_kept: dict[RobotInput, tuple[Robot, Oracle, SecondWitness | None]] = {}
+#: Cache of the latest robot. A worker gets the chunks of a robot one after another and reads the robot once.
+#: Two large robots at a time would need too much memory.
+_cache: dict[RobotInput, tuple[Robot, Oracle, SecondWitness | None]] = {}
 
 
 def _loaded(chunk: Chunk) -> tuple[Robot, Oracle, SecondWitness | None]:
-    if (found := _kept.get(chunk.subject)) is not None:
+    if (found := _cache.get(chunk.subject)) is not None:
         return found
-    _kept.clear()
+    _cache.clear()
     robot = chunk.subject.load()
     most = memory.share() if chunk.memory is None else chunk.memory
-    memory.demand(robot.tree, chunk.samples + SPECIAL, most)  # no chunk of it is larger than its first
+    memory.demand(robot.tree, chunk.samples + SPECIAL, most)  # the first chunk is the largest
     second = None
     if (by := robot.verifier.witness) is not PINOCCHIO:
         second = SecondWitness(by, robot.verifier.oracle(by=by))
     found = robot, robot.verifier.oracle(), second
-    _kept[chunk.subject] = found
+    _cache[chunk.subject] = found
     return found
 
 
 def run_chunk(chunk: Chunk) -> ChunkResult:
-    """Compute what is compared of every frame, in all references, and compare it."""
+    """Compute the quantities of every frame in all reference frames, and compare them with the oracle."""
     begin, clock = time.perf_counter(), Clock()
     robot, oracle, second = _loaded(chunk)
     portrait = RobotSummary.of(robot, oracle) if chunk.index == 0 else None

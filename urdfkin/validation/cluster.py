@@ -1,4 +1,7 @@
-"""Chunks on the workers of a dask.distributed cluster (the extra `urdfkin[cluster]`), which come and go."""
+"""Engine that runs chunks on a dask.distributed cluster (the extra `urdfkin[cluster]`).
+
+The number of workers may change during the run.
+"""
 
 from __future__ import annotations
 
@@ -26,33 +29,35 @@ from urdfkin.validation.engines import DIED_TWICE, Enter, Task, Work, died, lost
 from urdfkin.validation.results import provenance, version
 from urdfkin.validation.robot_input import RobotInput
 
-#: Chunks in flight: so many for each thread of the workers, that none waits for the next, and a few more.
+#: Chunks in flight: this number for each thread of the workers, so that no thread waits, and this many
+#: more.
 _FOR_EACH, _MORE = 2, 4
-#: How often a chunk is sent again whose worker was lost. Its robot is never to blame: that is the processes'.
+#: Maximum number of times a chunk is sent when Dask loses its worker. A robot cannot kill Dask's worker,
+#: only the process beside it.
 _TRIES = 20
 #: Seconds between two counts of the workers.
 _COUNT = 1.0
-#: What the scheduler must have as we do, if it has it.
+#: Packages whose versions must be the same on the scheduler, where it has them.
 _COMPARED = ("urdfkin", "pin")
 _NOBODY = RobotInput(b"", Origin(""))
 
 
 class ClusterError(UrdfkinError, RuntimeError):
-    """A cluster that cannot be used, or that was lost."""
+    """The cluster cannot be used, or the connection to it was lost."""
 
 
 @contextmanager
 def connected(scheduler: str, tell: Callable[[str], None] = lambda _: None) -> Iterator[Cluster]:
-    """An engine on a cluster, for `validate(executor=...)`.
+    """Yield an engine on a cluster, for `validate(executor=...)`.
 
     Args:
-        scheduler: The address of a running scheduler, `tls://host:8786`; or `local:N`, for N workers here
-            that end with it and open no port.
-        tell: Told how many workers there are, and where to watch those of a running scheduler.
+        scheduler: The address of a running scheduler, `tls://host:8786`; or `local:N` for N workers on this
+            machine, which end with the engine and open no port.
+        tell: Callback for messages: the number of workers, and the dashboard of a running scheduler.
 
     Raises:
-        ClusterError: nobody answers there, or the versions of urdfkin or Pinocchio differ.
-        InputError: `local:N` without a number.
+        ClusterError: No scheduler answers there, or the versions of urdfkin or Pinocchio differ.
+        InputError: `local:N` has no number.
     """
     with _client(scheduler) as client:
         _demand_same(client)
@@ -61,7 +66,8 @@ def connected(scheduler: str, tell: Callable[[str], None] = lambda _: None) -> I
         tell(f"{len(threads)} workers{watched}")
         if scheduler.startswith("tcp://"):
             tell(
-                "tcp:// asks for no key: who reaches the scheduler runs programs; docs/campaigns.md leads to tls://"
+                "tcp:// needs no key: anyone who reaches the scheduler can run programs;"
+                " docs/campaigns.md describes tls://"
             )
         yield Cluster(client)
 
@@ -73,7 +79,7 @@ def _client(scheduler: str) -> Iterator[Client]:
         try:
             client = Client(scheduler, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:  # TypeError: tls:// without a certificate
-            keyed = "; give Dask the cluster's certificate and key, as docs/campaigns.md says"
+            keyed = "; give Dask the cluster's certificate and key, as docs/campaigns.md describes"
             raise ClusterError(
                 "no scheduler answers",
                 where=scheduler,
@@ -84,16 +90,18 @@ def _client(scheduler: str) -> Iterator[Client]:
             yield client
         return
     if not number.isdecimal() or not int(number):
-        raise InputError("local:N starts N workers", found=repr(scheduler), remedy="local:2")
+        raise InputError(
+            "scheduler: local:N without a number N of workers", found=repr(scheduler), remedy="give local:2"
+        )
     with _without_ports(int(number)) as cluster, Client(cluster, set_as_default=False) as client:
         yield client
 
 
 class _Portless:
-    """A part of a cluster that serves no pages: they would be open to all users of the machine."""
+    """Part of a cluster without web pages. All users of the machine could open them."""
 
     def start_http_server(self, *_: object, **__: object) -> None:
-        """Dask's, left out."""
+        """Start no server (overrides Dask's method)."""
 
 
 class _Scheduler(_Portless, Scheduler):
@@ -106,23 +114,23 @@ class _Worker(_Portless, Worker):
 
 @contextmanager
 def _without_ports(number: int) -> Iterator[SpecCluster]:
-    """A scheduler and workers in this process, out of others' reach: chunks have processes of their own.
+    """Yield a scheduler and workers in this process that open no port. Chunks run in separate processes.
 
-    Dask puts its scratch folders first on the path. They lie in one of this run and this user alone, and the
-    path is what it was before anything is imported by it.
+    Dask adds its scratch folders to the front of `sys.path`. The folders are in a temporary folder of this
+    run, which only this user can access. `sys.path` is restored before any further import.
 
     Raises:
-        ClusterError: Dask listens all the same.
+        ClusterError: Dask opened a port.
     """
     with tempfile.TemporaryDirectory(prefix="urdfkin-") as scratch:
         here: dict[str, Any] = {"protocol": "inproc://", "dashboard": False}
-        mine = {"nthreads": 1, "memory_limit": 0, "local_directory": scratch, "dashboard": False}
+        local = {"nthreads": 1, "memory_limit": 0, "local_directory": scratch, "dashboard": False}
         path = list(sys.path)
         with (
             dask.config.set({"temporary-directory": scratch}),
             SpecCluster(
                 scheduler={"cls": _Scheduler, "options": here},
-                workers={place: {"cls": _Worker, "options": mine} for place in range(number)},
+                workers={place: {"cls": _Worker, "options": local} for place in range(number)},
                 silence_logs=logging.ERROR,
             ) as cluster,
         ):
@@ -141,38 +149,38 @@ def _without_ports(number: int) -> Iterator[SpecCluster]:
 
 
 def _demand_same(client: Client) -> None:
-    """Refuse a cluster that would compute something else, before anything is sent."""
+    """Raise ClusterError if a worker or the scheduler has other versions. Called before anything is sent."""
     for worker, found in client.run(remote.computes, on_error="return").items():
         if isinstance(found, BaseException):
             raise ClusterError(
-                "a worker that cannot run urdfkin", where=worker, found=str(found),
+                "a worker cannot run urdfkin", where=worker, found=str(found),
                 remedy=f"install urdfkin {version('urdfkin')} there",
             )  # fmt: skip
         _demand_code(worker, found)
     for name in _COMPARED:
         try:
             found = client.run_on_scheduler(metadata.version, name)
-        except Exception:  # it computes nothing, and need not have it
+        except Exception:  # the scheduler computes nothing and does not need the package
             continue
         if found != version(name) and version(name) != "a checkout":
             _refuse("scheduler", [f"{name} {found} there and {version(name)} here"])
 
 
 def _demand_code(worker: str, found: dict[str, str]) -> None:
-    mine = provenance()
-    said = [
-        f"{k} {found.get(k, 'none')[:12]} there and {mine[k][:12]} here"
-        for k in mine
-        if found.get(k) != mine[k]
+    local = provenance()
+    differences = [
+        f"{k} {found.get(k, 'none')[:12]} there and {local[k][:12]} here"
+        for k in local
+        if found.get(k) != local[k]
     ]
-    if said:
-        _refuse(worker, said)
+    if differences:
+        _refuse(worker, differences)
 
 
-def _refuse(where: str, said: list[str]) -> None:
+def _refuse(where: str, differences: list[str]) -> None:
     raise ClusterError(
-        "another version computes there", where=where, found=", ".join(said),
-        remedy="install the same versions everywhere; numbers of different ones are not mixed",
+        "different versions of the code", where=where, found=", ".join(differences),
+        remedy="install the same versions everywhere; results of different versions are not mixed",
     )  # fmt: skip
 
 
@@ -183,7 +191,7 @@ class _Flight:
 
 
 class Cluster:
-    """An engine: as many chunks in flight as the workers can take, whatever workers there are."""
+    """Engine that keeps as many chunks in flight as the current workers can process."""
 
     def __init__(self, client: Client) -> None:
         self._client = client
@@ -196,7 +204,7 @@ class Cluster:
         """Run the tasks.
 
         Raises:
-            ClusterError: the scheduler is lost, or a worker came that computes something else.
+            ClusterError: The connection to the scheduler is lost, or a new worker has other versions.
         """
         waiting, failed = chain.from_iterable(work), set[int]()
         landed = as_completed(loop=self._client.loop)
@@ -207,7 +215,7 @@ class Cluster:
                         continue
                     try:
                         landed.add(self._send(_Flight(task)))
-                    except (UrdfkinError, OSError) as error:  # its text cannot be had
+                    except (UrdfkinError, OSError) as error:  # its text cannot be read
                         failed.add(task.robot)
                         enter(task, failure(task.chunk.subject, error))
                 if not self._flying:
@@ -230,7 +238,7 @@ class Cluster:
             self._robots.clear()
 
     def _count(self) -> int:
-        """How many chunks may be in flight, for the workers that there are now."""
+        """Return how many chunks may be in flight for the current workers."""
         if time.monotonic() - self._counted > _COUNT and self._client.status == "running":
             threads = sum(self._client.nthreads().values())
             self._room, self._counted = _FOR_EACH * threads + _MORE, time.monotonic()
@@ -248,18 +256,18 @@ class Cluster:
         return future
 
     def _forget(self, robot: int) -> None:
-        """Have a robot forgotten of which nothing is in flight; it would be sent again."""
+        """Release a robot that has no chunk in flight. If it is needed later, it is sent again."""
         self._in_use[robot] -= 1
         if not self._in_use[robot]:
             del self._in_use[robot]
             self._robots.pop(robot, None)
 
     def _found(self, future: Future[Any], flight: _Flight) -> Answer | None:
-        """The answer; None: to be sent again."""
+        """Return the answer; None if the chunk must be sent again."""
         if future.status == "finished":
             try:
                 result = future.result()
-            except OSError as gone:  # results come by way of the scheduler: it went before this one did
+            except OSError as gone:  # results come through the scheduler, which is gone
                 raise self._lost() from gone
             return self._answer(result, flight.task)
         if self._client.status != "running":
@@ -268,14 +276,15 @@ class Cluster:
         if flight.tries < _TRIES and (error is None or isinstance(error, KilledWorker)):
             return None
         return lost(
-            "the cluster lost it", error if isinstance(error, Exception) else RuntimeError(future.status)
+            "the cluster lost the chunk",
+            error if isinstance(error, Exception) else RuntimeError(future.status),
         )
 
     def _lost(self) -> ClusterError:
         return ClusterError(
-            "the scheduler is lost",
+            "the connection to the scheduler is lost",
             where=str(self._client.scheduler.address if self._client.scheduler else "the cluster"),
-            remedy="what a store holds stays; start it again and give the same command to go on",
+            remedy="start the scheduler again and repeat the same command; a store keeps the finished chunks",
         )
 
     def _answer(self, found: remote.Found, task: Task) -> Answer:

@@ -1,10 +1,8 @@
-"""How far a campaign has come.
+"""Collector of the answers of a run: progress, and the report of each robot.
 
-What has come back of a run, and the report that it makes of each robot.
-
-Whatever was asked for is reported on: a robot of which nothing came back, or not everything, is not verified.
-Results are added up as they come, so that memory does not grow with samples: neighbours to runs of chunks, in
-the order of chunks whatever the order in which they come.
+Every requested robot has a report. A robot with missing answers is not verified. Results of adjacent chunks
+are added as they arrive, so memory does not grow with the number of samples. The sums follow the order of the
+chunks, so they do not depend on the order of arrival.
 """
 
 from __future__ import annotations
@@ -27,16 +25,16 @@ from urdfkin.verify.oracles import WITNESSES
 
 @dataclass(frozen=True, slots=True)
 class CampaignProgress:
-    """What is done and what is to do.
+    """Progress of a campaign.
 
     Attributes:
-        robots_done: Robots of which everything is there, or that failed.
-        robots: Robots in all.
-        chunks_done: Chunks that need no more waiting for.
-        chunks: Chunks in all.
-        chunks_kept: Chunks of those done that were there from an earlier run.
-        failures: Robots that disagree or could not be checked, so far.
-        label: The robot in hand.
+        robots_done: Number of robots that are complete or failed.
+        robots: Number of robots.
+        chunks_done: Number of chunks that are finished or no longer needed.
+        chunks: Number of chunks.
+        chunks_kept: Number of finished chunks from an earlier run.
+        failures: Number of robots so far that disagree or could not be checked.
+        label: Name of the current robot.
     """
 
     robots_done: int
@@ -48,7 +46,7 @@ class CampaignProgress:
     label: str
 
 
-#: Called after each chunk.
+#: Callback for the progress, called after each chunk.
 Progress = Callable[[CampaignProgress], None]
 
 
@@ -57,9 +55,9 @@ class ResultCollector:
 
     Args:
         subjects: The robots.
-        cut: Their chunks.
-        parts: Which of its chunks each robot shall have here.
-        progress: Told before the work, and after each answer.
+        cut: The division of their samples into chunks.
+        parts: The range of chunks to run for each robot.
+        progress: Callback, called before the work and after each answer.
     """
 
     def __init__(
@@ -72,39 +70,39 @@ class ResultCollector:
         self._subjects, self._cut, self._progress = subjects, cut, progress
         self._robots = [_Robot(part) for part in parts]
         self._chunks = sum(map(len, parts))
-        self._chunks_done = self._kept = self._over = self._failures = 0
+        self._chunks_done = self._from_earlier = self._robots_done = self._failures = 0
 
     def begin(self) -> None:
-        """Tell where it stands: from now on there is work, and nothing else."""
+        """Report the progress at the start of the work."""
         if self._progress is not None:
             self._progress(self.standing(self._subjects[0].label if self._subjects else ""))
 
     def enter(self, task: Task, found: Answer, *, kept: bool = False) -> None:
-        """Take an answer; one that was kept from an earlier run counts as none of this one's work."""
+        """Add an answer. With `kept` it comes from an earlier run and does not count as work of this run."""
         robot = self._robots[task.robot]
         was_over, had_failed, before = robot.over, robot.has_failed, robot.done
         robot.enter(task.chunk.index, found)
         self._chunks_done += robot.done - before
-        self._kept += kept * (robot.done - before)
-        self._over += robot.over and not was_over
+        self._from_earlier += kept * (robot.done - before)
+        self._robots_done += robot.over and not was_over
         self._failures += robot.has_failed and not had_failed
         if self._progress is not None:
             self._progress(self.standing(self._subjects[task.robot].label))
 
     def standing(self, label: str = "") -> CampaignProgress:
-        """How far it has come, with the robot in hand."""
+        """Return the progress. `label` names the current robot."""
         return CampaignProgress(
-            robots_done=self._over,
+            robots_done=self._robots_done,
             robots=sum(bool(robot.part) for robot in self._robots),
             chunks_done=self._chunks_done,
             chunks=self._chunks,
-            chunks_kept=self._kept,
+            chunks_kept=self._from_earlier,
             failures=self._failures,
             label=label,
         )
 
     def missing(self, robot: int) -> Iterator[int]:
-        """The chunks of a robot that have no answer, until it fails."""
+        """Yield the chunks of a robot that have no answer; none once the robot has failed."""
         known = self._robots[robot]
         for index in known.part:
             if known.failures:
@@ -113,13 +111,13 @@ class ResultCollector:
                 yield index
 
     def give_up(self, found: Failure) -> None:
-        """The answer for every robot that has not all of its own."""
+        """Record a failure for every robot that is not complete."""
         for robot in self._robots:
             if not robot.over:
                 robot.failures[len(self._cut)] = found
 
     def reports(self) -> Iterator[RobotReport]:
-        """A report for each robot of which something was to be done, in the order asked for."""
+        """Yield a report for each robot with chunks in this run, in the requested order."""
         for subject, robot in zip(self._subjects, self._robots, strict=True):
             if robot.part:
                 yield robot.report(subject, self._cut.configurations(robot.part))
@@ -142,7 +140,7 @@ class _Robot:
             self._add(range(index, index + 1), found)
 
     def _add(self, chunks: range, found: ChunkResult) -> None:
-        """Join it to the runs that end where it begins, or begin where it ends."""
+        """Merge a result with the adjacent ranges of chunks."""
         at = next((i for i, (run, _) in enumerate(self._runs) if run.start > chunks.start), len(self._runs))
         if at and self._runs[at - 1][0].stop == chunks.start:
             at -= 1
@@ -162,7 +160,7 @@ class _Robot:
 
     @property
     def done(self) -> int:
-        """How many of its chunks need no more waiting for."""
+        """Number of chunks that are finished or no longer needed."""
         return len(self.part) if self.failures else sum(len(run) for run, _ in self._runs)
 
     @property
@@ -170,7 +168,7 @@ class _Robot:
         return self.done == len(self.part)
 
     def report(self, subject: RobotInput, wanted: int) -> RobotReport:
-        # What others found after the chunk that failed is left out: it depends on who was how fast.
+        # Results after the failed chunk are left out: which ones exist depends on the timing of the workers.
         last = min(self.failures, default=self.part.stop)
         failure = self.failures.get(last)
         results = [result for run, result in self._runs if run.start < last]
@@ -201,7 +199,7 @@ class _Robot:
 def _verdict(
     tallies: dict[Key, Tally], portrait: RobotSummary, failure: Failure | None, samples: int, wanted: int
 ) -> tuple[Verdict, list[str]]:
-    """The verdict and every reason for it: a disagreement stays one, whatever else went wrong."""
+    """Return the verdict and all its reasons. A disagreement takes precedence over every other verdict."""
     disagreements = [*_outside(tallies), *portrait.disagreements]
     verdict, reasons = Verdict.VERIFIED, list[str]()
     if failure is not None:
@@ -219,11 +217,11 @@ def _outside(tallies: dict[Key, Tally]) -> Iterator[str]:
     if failed:
         results = sum(tally.results for tally in tallies.values())
         yield f"{failed:,} of {results:,} results lie outside their bound"
-    found = reduce(plus, (tally.witness for tally in tallies.values()), None)
+    found = reduce(plus, (tally.three_sides for tally in tallies.values()), None)
     if found is not None and found.urdfkin.failed:
         ours, theirs, witness = found.alone
         title = WITNESSES[found.by].title
         yield (
-            f"{found.urdfkin.failed:,} results disagree with {title}'s: urdfkin stands alone in {ours:,},"
-            f" Pinocchio in {theirs:,}, {title} in {witness:,}"
+            f"{found.urdfkin.failed:,} results disagree with {title}'s: urdfkin differs from the two others"
+            f" in {ours:,}, Pinocchio in {theirs:,}, {title} in {witness:,}"
         )

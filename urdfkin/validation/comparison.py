@@ -1,8 +1,8 @@
-"""Every frame of a robot, ours against Pinocchio's, for some samples.
+"""Comparison of every frame of a robot with Pinocchio, for a batch of samples.
 
-Frames are compared in blocks, so that memory is bounded whatever the robot: it is the Jacobians' arrays,
-samples * frames * 6 * rates, that grow. A frame's numbers do not depend on its neighbours, and tallies of
-blocks join to the tally of all frames: nothing that is reported depends on the blocks.
+Frames are compared in blocks, which bounds the memory for every robot. The largest arrays are the Jacobians:
+samples * frames * 6 * nv numbers. The results of a frame do not depend on its block, so the report does not
+depend on the blocks.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from urdfkin.verify.pinocchio import Oracle
 from urdfkin.verify.quantities import SCREWS, Quantity, validated
 from urdfkin.verify.sampling import Samples
 
-#: How large an array of a block may be, bytes; some ten arrays of this size are there at a time.
+#: Maximum size of one array of a block, bytes. About ten arrays of this size exist at a time.
 BLOCK_BYTES = 32 * 2**20
 
 
 @dataclass(frozen=True, slots=True)
 class SecondWitness:
-    """Who is asked besides Pinocchio, and its model of the robot."""
+    """A second oracle besides Pinocchio, and its model of the robot."""
 
     witness: Witness
     oracle: Any
@@ -42,7 +42,7 @@ class SecondWitness:
     def three_sides(
         self, block: _Block, row: Quantity, reference: Reference | None, ours: FloatArray, theirs: FloatArray
     ) -> ThreeSides:
-        """Its answers beside urdfkin's and Pinocchio's, about the block's frames or joints."""
+        """Compare its results with those of urdfkin and Pinocchio, for the frames or joints of the block."""
         inputs = block.x.q, block.x.v, block.x.a
         answers = block.clock.witness(row.theirs, self.oracle, inputs, block.asked(row)[0], reference)
         bounds = (
@@ -66,10 +66,13 @@ def tallies(
     Args:
         robot: The robot.
         oracle: Pinocchio's model of it.
-        x: What to compare at.
-        first_sample: The number of the first sample.
-        clock: Told whose work took how long.
-        second: Asked about frames too, if there is one.
+        x: The samples.
+        first_sample: Index of the first sample.
+        clock: Receives the computing times.
+        second: The second oracle; None: compare with Pinocchio only.
+
+    Returns:
+        The error statistics of each quantity in each reference frame.
     """
     found: dict[Key, Tally] = {}
     work = robot, oracle, x, first_sample, clock
@@ -80,20 +83,20 @@ def tallies(
     return found | {(SCREWS.name, Reference.WORLD.name.lower()): screws}
 
 
-def frame_bytes(samples: int, rates: int) -> int:
-    """The size of the largest array of a frame: its Jacobians, or its placements where few rates move it."""
-    return samples * 8 * max(16, 6 * rates)
+def frame_bytes(samples: int, nv: int) -> int:
+    """Return the bytes of the largest array of a frame: its Jacobians, or its placements if nv is small."""
+    return samples * 8 * max(16, 6 * nv)
 
 
 def blocks(count: int, size: int) -> Iterator[slice]:
-    """Cut so many things of a size in bytes into runs of at most `BLOCK_BYTES`; at least one run."""
+    """Divide `count` items of `size` bytes into slices of at most `BLOCK_BYTES`; at least one slice."""
     most = max(1, BLOCK_BYTES // size)
     for start in range(0, max(1, count), most):
         yield slice(start, min(count, start + most))
 
 
 class _Work:
-    """Some samples of a robot, and how their comparisons are counted."""
+    """A batch of samples of a robot, and the error statistics of its comparisons."""
 
     def __init__(self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, clock: Clock) -> None:
         self.robot, self.oracle, self.x, self.first, self.clock = robot, oracle, x, first_sample, clock
@@ -105,7 +108,7 @@ class _Work:
 
 
 class _Block(_Work):
-    """The comparisons of some frames, and of the joints whose child links are among them."""
+    """The comparisons of a block of frames, and of the joints with child links in the block."""
 
     def __init__(
         self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, clock: Clock, frames: slice
@@ -114,37 +117,41 @@ class _Block(_Work):
         tree = robot.tree
         self.frames = robot.all_frames[frames]
         links = tuple(tree.frame_link(frame) for frame in self.frames)
-        # A robot keeps the plan of all its frames for the next chunk; a block's is made when needed.
+        # The robot caches the compiled tree of all its frames. That of a block is compiled each time.
         whole = len(links) == len(robot.all_frames)
         self.plan = robot.plan(links) if whole else compile_tree(tree, links)
         self.size = magnitudes(self.plan, x.q, x.v, x.a, STILL_STATE)
-        # A joint's Jacobian is its child link's, and links come first among the frames, root before all.
+        # A joint's Jacobian is that of its child link. Links come first among the frames, the root before
+        # all.
         moving = [i + 1 for i, joint in enumerate(tree.joints) if joint.kind.nv]
         self.joints = slice(bisect_left(moving, frames.start), bisect_left(moving, frames.stop))
-        self.places = [link - frames.start for link in moving[self.joints]]
+        self.joint_rows = [link - frames.start for link in moving[self.joints]]
         self.joint_names = robot.joint_names[self.joints]
 
     def tallies(self, second: SecondWitness | None) -> Iterator[tuple[Key, Tally]]:
-        """Quantity by quantity; a joint's is its child link's, for which Pinocchio has another way."""
+        """Yield the error statistics of each quantity.
+
+        The result of a joint is that of its child link. Pinocchio computes it with another function.
+        """
         inputs = self.x.q, self.x.v, self.x.a
         for row in validated():
             joints = [joint for joint in validated("joints") if joint.compute is row.compute]
             for reference in row.references:
                 ours = self.clock.ours(row.ours, self.plan, inputs, reference)
                 bound = row.bound(self.plan, self.size, reference)
-                yield self._held(row, reference, ours, bound, second)
+                yield self._compare(row, reference, ours, bound, second)
                 for joint in joints:
-                    yield self._held(joint, reference, ours[:, self.places], self.part(bound), second)
+                    yield self._compare(joint, reference, ours[:, self.joint_rows], self.part(bound), second)
 
     def part(self, bound: Bound) -> Bound:
-        """What of a bound on the frames is one on the joints."""
-        return Bound(bound.scale[:, self.places], bound.k[:, self.places])
+        """Return the part of a bound on frames that belongs to the joints."""
+        return Bound(bound.scale[:, self.joint_rows], bound.k[:, self.joint_rows])
 
     def asked(self, row: Quantity) -> tuple[Any, tuple[str, ...]]:
-        """What an oracle is asked about for a quantity, and its names."""
+        """Return the frames or joints that a quantity compares, and their names."""
         return (self.joints, self.joint_names) if row.of == "joints" else (self.frames, self.frames)
 
-    def _held(
+    def _compare(
         self,
         row: Quantity,
         reference: Reference | None,
@@ -157,17 +164,17 @@ class _Block(_Work):
         theirs = self.clock.theirs(row.theirs, self.oracle, inputs, asked, reference)
         found = self.tally(ours, theirs, bound, names)
         if second is not None:
-            found = replace(found, witness=second.three_sides(self, row, reference, ours, theirs))
+            found = replace(found, three_sides=second.three_sides(self, row, reference, ours, theirs))
         return (row.name, reference.name.lower() if reference is not None else ""), found
 
 
 class _Screws(_Work):
-    """The whole `data.J`: each rate's column is its own joint's Jacobian column, seen from WORLD."""
+    """The whole `data.J`: each column is a column of its own joint's Jacobian in WORLD."""
 
     def tallies(self) -> Iterator[Tally]:
         robot, x = self.robot, self.x
         tree = freed(robot.tree)
-        q_free = _leaders_spread(robot.tree, tree, x.q)
+        q_free = _expand_mimic(robot.tree, tree, x.q)
         theirs = self.clock.theirs(SCREWS.ask, self.oracle, x.q).swapaxes(1, 2)
         moving = [i for i, joint in enumerate(tree.joints) if joint.kind.nv]
         column = 0
@@ -192,8 +199,8 @@ class _Screws(_Work):
         return self.tally(ours, theirs, Bound(scale, bound.k[:, frame, 0]), names)
 
 
-def _leaders_spread(tree: KinematicTree, free: KinematicTree, q: FloatArray) -> FloatArray:
-    """The configuration of the freed tree in which every follower stands where its leader puts it."""
+def _expand_mimic(tree: KinematicTree, free: KinematicTree, q: FloatArray) -> FloatArray:
+    """Return the configuration of the freed tree, with each mimic joint at the value that its rule gives."""
     spread = np.empty((len(q), free.nq))
     for joint, at, free_at in zip(tree.joints, tree.q_index, free.q_index, strict=True):
         own = q[:, at : at + joint.kind.nq]

@@ -1,14 +1,14 @@
-"""Who gets which chunk: whoever works has a robot of their own, which nobody else has to read.
+"""Engines that run chunks, and the queue that distributes chunks among workers.
 
-When no robot waits, those without one help with the robot of which most is left.
+An engine runs tasks and enters each answer once, in any order. Answers are stored by robot and chunk and
+added in that order, so no result depends on the engine. An engine may skip the remaining chunks of a robot
+that has failed, and nothing else. Tasks are created lazily, so that a million of them take no memory.
 
+The engines here run in this process, or on an executor with the interface of `concurrent.futures`.
+`urdfkin.validation.worker_processes` has an engine of local processes.
 
-Who runs the chunks: an engine takes tasks and hands their answers in, in any order, each once.
-
-Answers are kept by robot and chunk and added up in that order, so that no figure depends on the engine. An
-engine may leave out the rest of a robot that has failed, and nothing else. Tasks are made when they are asked
-for: a million of them must take no memory. What is here runs in this process or on anything with the
-interface of `concurrent.futures`; `urdfkin.validation.worker_processes` has processes.
+Each worker gets its own robot, which no other worker has to read. If no robot is waiting, a free worker takes
+chunks of the robot with the most chunks left.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from urdfkin.validation.robot_input import RobotInput
 
 
 class Row:
-    """The tasks of a robot that are still to be handed out.
+    """The remaining tasks of a robot.
 
     Attributes:
-        robot: Whose; -1 before the first was handed out.
-        index: The chunk that was handed out last; the lower, the more are left.
+        robot: Index of the robot; -1 before the first task was taken.
+        index: Index of the latest chunk that was taken. The lower it is, the more chunks are left.
     """
 
     def __init__(self, tasks: Iterable[Task]) -> None:
@@ -47,26 +47,26 @@ class Row:
         return task
 
     def put_back(self, task: Task) -> None:
-        """Have it come next."""
+        """Put a task back, so that it is the next one."""
         self._tasks = chain([task], self._tasks)
 
 
 class WorkQueue:
-    """Hands out work.
+    """Distribute tasks among workers.
 
     Args:
-        work: What is to be done.
-        shared: Whether a robot may be worked on by several.
+        work: The tasks of each robot.
+        shared: Whether several workers may work on the same robot.
     """
 
     def __init__(self, work: Work, *, shared: bool = True) -> None:
         self._waiting: Iterator[Row] = map(Row, work)
         self._shared = shared
         self._begun: list[Row] = []
-        self._over = set[int]()
+        self._ended = set[int]()
 
     def first(self) -> tuple[Task, Row] | None:
-        """A task for somebody without a robot, and the row it is from; None: there is nothing left to do."""
+        """Return a task for a worker without a robot, and its row. None: no task is left."""
         for row in self._waiting:
             self._begun.append(row)
             if (task := self.next(row)) is not None:
@@ -77,57 +77,60 @@ class WorkQueue:
         return None
 
     def next(self, row: Row) -> Task | None:
-        """The next task of a robot."""
+        """Return the next task of a row; None if it has none, or if its robot was ended."""
         task = next(row, None)
-        if task is None or task.robot in self._over:
+        if task is None or task.robot in self._ended:
             if row in self._begun:
                 self._begun.remove(row)
             return None
         return task
 
     def put_back(self, task: Task, row: Row) -> None:
-        """Hand out a row's task again, to somebody without a robot."""
+        """Put a task back into its row, for a worker without a robot."""
         row.put_back(task)
         self._begun.remove(row)
         self._waiting = chain([row], self._waiting)
 
     def end(self, robot: int) -> None:
-        """Hand out no more of a robot."""
-        self._over.add(robot)
+        """Return no more tasks of a robot."""
+        self._ended.add(robot)
 
     def withdraw(self, robot: int) -> list[Task]:
-        """Hand out no more of a robot; what there would have been."""
+        """End a robot and return its remaining tasks."""
         self.end(robot)
         return [task for row in self._begun if row.robot == robot for task in row]
 
 
-#: How many chunks an executor is given at a time: enough for any number of workers, too few to fill memory.
+#: Maximum number of chunks in an executor's queue: enough for many workers, few enough to save memory.
 IN_FLIGHT = 512
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A chunk of a robot, which is known by its place in the run."""
+    """A chunk, with the index of its robot in the run."""
 
     robot: int
     chunk: Chunk
 
 
-#: What is to be done: robot by robot, the tasks of each in their order.
+#: The tasks of each robot, in the order of its chunks.
 Work = Iterable[Iterable[Task]]
-#: Takes an answer; every task is answered at most once.
+#: Callback that receives the answer of a task. It is called at most once for each task.
 Enter = Callable[[Task, Answer], None]
 
 
 class Engine(Protocol):
-    """Runs tasks. An exception that leaves `run` is an interrupt: what was entered stays."""
+    """Interface of an engine.
+
+    An exception from `run` ends the validation. Entered answers stay in the report.
+    """
 
     def run(self, work: Work, enter: Enter) -> None:
         """Run the tasks and enter their answers."""
 
 
 class SerialEngine:
-    """One chunk after another, in this process."""
+    """Engine that runs one chunk after another in this process."""
 
     def run(self, work: Work, enter: Enter) -> None:
         """Run the tasks in their order."""
@@ -140,13 +143,13 @@ class SerialEngine:
 
 
 class ExecutorEngine:
-    """Chunks on an executor, a bounded number of them at a time."""
+    """Engine that runs chunks on an executor, a bounded number of them at a time."""
 
     def __init__(self, executor: Executor) -> None:
         self._executor = executor
 
     def run(self, work: Work, enter: Enter) -> None:
-        """Run the tasks; what the executor itself fails at is the answer for the robot in hand."""
+        """Run the tasks. An error of the executor becomes the answer of the chunk's robot."""
         waiting, failed = chain.from_iterable(work), set[int]()
         flying = deque[tuple[Task, Future[Answer]]]()
         next_task = next(waiting, None)
@@ -173,7 +176,7 @@ class ExecutorEngine:
         try:
             flying.append((task, self._executor.submit(answer, task.chunk)))
         except Exception as error:
-            return lost("the executor does not take it", error)
+            return lost("the executor did not accept the chunk", error)
         return None
 
 
@@ -181,20 +184,20 @@ def _result(future: Future[Answer]) -> Answer:
     try:
         return future.result()
     except Exception as error:
-        return lost("the executor lost it", error)
+        return lost("the executor lost the chunk", error)
 
 
 def lost(what: str, error: Exception) -> Failure:
-    """The answer for a robot whose chunk could not be run, or whose answer did not come back."""
-    told = " ".join(str(error).split()) or "no message"
-    return Failure(Verdict.NOT_VERIFIED, f"{what}: {type(error).__name__}: {told}", passing=True)
+    """Return the answer for a robot if a chunk could not be run, or its answer was lost."""
+    message = " ".join(str(error).split()) or "no message"
+    return Failure(Verdict.NOT_VERIFIED, f"{what}: {type(error).__name__}: {message}", passing=True)
 
 
-#: What is said of a robot over which processes died.
-DIED = "the process that checked it died"
-DIED_TWICE = "the process that checked it died twice, then alone"
+#: Reasons for a robot that crashed its process.
+DIED = "the process that checked it crashed"
+DIED_TWICE = "the process that checked it crashed twice, the second time alone"
 
 
 def died(subject: RobotInput, how: str, cause: str) -> Failure:
-    """The answer for a robot over which processes died."""
+    """Return the answer for a robot that crashed its process."""
     return Failure(Verdict.NOT_VERIFIED, f"{subject.label}: {how}: found {cause}")

@@ -1,14 +1,13 @@
-"""What a second witness says: three answers to each question, held against each other, and who stands alone.
+"""Error statistics of a validation, which add up over chunks, processes and machines.
 
-Two answers agree when they lie within what both sides may round by: urdfkin's and Pinocchio's within their
-bound, urdfkin's and the witness's within theirs, Pinocchio's and the witness's within the two together. Where
-one pair agrees and neither agrees with the third, the third stands alone.
+A `Tally` counts the results of one quantity in one reference frame. Addition of tallies is associative and
+commutative. (Of two equal worst cases the sum keeps the one with the earlier sample.) So the sum does not
+depend on the division of the work.
 
-
-What a validation counts, so that it can be added up: over chunks, processes and machines.
-
-Tallies form a commutative monoid under `+` except for ties of the worst case, which the earlier sample
-wins; the sum does not depend on how the work was cut.
+With a second oracle, `ThreeSides` compares three results: urdfkin's, Pinocchio's and the second oracle's. Two
+results agree when their difference lies within the bound of that pair. For Pinocchio and the second oracle,
+that bound is the sum of the two others. If one pair agrees and the third result agrees with neither, the
+third one is the outlier.
 """
 
 from __future__ import annotations
@@ -24,18 +23,18 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.bounds import Bound, result_k
 from urdfkin.verify.comparison import worst_of_each
 
-#: The three, in the order of columns; the last is the second witness, whoever that is.
+#: The three compared libraries, in the order of columns. The last is the second oracle.
 SIDES = ("urdfkin", "pinocchio", "witness")
 
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """One side's answers held against the witness's.
+    """Comparison of one library's results with the second oracle's.
 
     Attributes:
-        failed: How many results lie outside their bound.
-        worst: The largest disagreement, in eps * scale of the witness's bound.
-        share: The largest share of a bound.
+        failed: Number of results outside their bound.
+        worst: The largest disagreement, in eps * scale of the second oracle's bound.
+        share: The largest ratio of a disagreement to its bound.
     """
 
     failed: int = 0
@@ -48,14 +47,15 @@ class Pair:
 
 @dataclass(frozen=True, slots=True)
 class ThreeSides:
-    """A witness's answers for one quantity in one reference; they add up as tallies do.
+    """Comparison of three libraries for one quantity in one reference frame. Such comparisons add up.
 
     Attributes:
-        by: The witness's name.
-        urdfkin: urdfkin's against the witness's.
-        pinocchio: Pinocchio's against the witness's.
-        alone: For each of `SIDES`, how many results only it disagrees about.
-        undecided: How many of which fewer than two answers agree, or one agrees with two that do not.
+        by: Name of the second oracle.
+        urdfkin: urdfkin compared with the second oracle.
+        pinocchio: Pinocchio compared with the second oracle.
+        alone: For each of `SIDES`, the number of results in which only it differs from the two others.
+        undecided: Number of results without a majority: no two agree, or one agrees with two that do not
+            agree with each other.
     """
 
     by: str
@@ -75,7 +75,7 @@ class ThreeSides:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON, which has no infinity: None stands for it."""
+        """Return plain data for JSON, with None for infinity."""
         pairs = {
             name: {
                 "failed": pair.failed,
@@ -89,28 +89,28 @@ class ThreeSides:
 
 
 def plus(first: ThreeSides | None, second: ThreeSides | None) -> ThreeSides | None:
-    """Both together, where there is a witness."""
+    """Return the sum of two comparisons; None stands for an empty one."""
     return first if second is None else second if first is None else first + second
 
 
 def three_sides(
-    by: str, ours: FloatArray, pinocchios: FloatArray, witness: FloatArray, first: Bound, second: Bound
+    by: str, ours: FloatArray, pinocchios: FloatArray, second_oracles: FloatArray, first: Bound, second: Bound
 ) -> ThreeSides:
-    """Hold three answers (n, frames, ...) against each other.
+    """Compare three results (n, frames, ...) with each other.
 
     Args:
-        by: The witness's name.
-        ours: urdfkin's.
-        pinocchios: Pinocchio's.
-        witness: The witness's.
-        first: What urdfkin's and Pinocchio's are measured against.
-        second: What urdfkin's and the witness's are.
+        by: Name of the second oracle.
+        ours: Results of urdfkin.
+        pinocchios: Results of Pinocchio.
+        second_oracles: Results of the second oracle.
+        first: Bound of the difference of urdfkin and Pinocchio.
+        second: Bound of the difference of urdfkin and the second oracle.
     """
     if not ours.size:
         return ThreeSides(by, Pair(), Pair())
     both = _together(first, second)
-    own, units_own = _shares(ours, witness, second)
-    other, units_other = _shares(pinocchios, witness, both)
+    own, units_own = _shares(ours, second_oracles, second)
+    other, units_other = _shares(pinocchios, second_oracles, both)
     agree = _shares(ours, pinocchios, first)[0] <= 1.0, own <= 1.0, other <= 1.0
     ours_theirs, ours_witness, theirs_witness = agree
     alone = (
@@ -130,14 +130,14 @@ def three_sides(
 
 
 def _shares(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[FloatArray, FloatArray]:
-    """(n, frames) disagreements as shares of a bound, and in eps * scale."""
+    """Return (n, frames) disagreements divided by their bound, and in eps * scale."""
     units = worst_of_each(one, other, bound.scale, 2)
     share: FloatArray = np.nan_to_num(units / result_k(bound, units.shape), nan=np.inf)
     return share, units
 
 
 def _together(first: Bound, second: Bound) -> Bound:
-    """The sum of both, k eps * scale, in units of the second's scale and k where that is not 0."""
+    """Return the sum of two bounds k * eps * scale, with the k of the second bound."""
     size = first.k * first.scale + second.k * second.scale
     with np.errstate(invalid="ignore", over="ignore"):
         return Bound(size / second.k, second.k)
@@ -147,13 +147,13 @@ def _together(first: Bound, second: Bound) -> Bound:
 HISTOGRAM_EDGES = np.logspace(-3, 5, 81)
 
 
-#: q, v and a of one sample.
+#: The inputs q, v and a of one sample.
 Inputs = tuple[list[float], list[float], list[float]]
 
 
 @dataclass(frozen=True, slots=True)
 class WorstCase:
-    """The sample with the largest share of its bound, with what is needed to compute it again."""
+    """The sample with the largest ratio to its bound, with the inputs to compute it again."""
 
     share: float
     units: float
@@ -166,19 +166,20 @@ class WorstCase:
 
 @dataclass(frozen=True, slots=True)
 class Tally:
-    """One quantity in one reference.
+    """Error statistics of one quantity in one reference frame.
 
     Attributes:
-        results: How many results were compared; each is a matrix or a six-vector.
-        failed: How many of them lie outside their bound.
+        results: Number of compared results; each is a matrix or a six-vector.
+        failed: Number of results outside their bound.
         worst: The largest disagreement, in eps * scale.
-        share: The largest share of a bound.
-        histogram: (82,) how many results disagree by how much: below the first of `HISTOGRAM_EDGES`,
-            between each two, above the last.
+        share: The largest ratio of a disagreement to its bound.
+        histogram: (82,) number of results in each bin: below the first of `HISTOGRAM_EDGES`, between each two
+            adjacent edges, above the last.
         by_frame: The largest disagreement of each frame, in the robot's order.
-        case: Where the largest share was.
-        bounds: The tightest and the widest bound, in eps * scale: it grows with the joints before a frame.
-        witness: What a second witness says, where one was asked.
+        case: The sample with the largest ratio.
+        bounds: The tightest and the widest bound, in eps * scale. A bound grows with the number of joints
+            before the frame.
+        three_sides: The comparison with a second oracle; None without one.
     """
 
     results: int
@@ -189,7 +190,7 @@ class Tally:
     by_frame: tuple[float, ...]
     case: WorstCase | None
     bounds: tuple[float, float] = (math.inf, 0.0)
-    witness: ThreeSides | None = None
+    three_sides: ThreeSides | None = None
 
     def __add__(self, other: Tally) -> Tally:
         first, second = self.case, other.case
@@ -204,23 +205,23 @@ class Tally:
             tuple(max(a, b) for a, b in zip(self.by_frame, other.by_frame, strict=True)),
             first,
             (min(self.bounds[0], other.bounds[0]), max(self.bounds[1], other.bounds[1])),
-            plus(self.witness, other.witness),
+            plus(self.three_sides, other.three_sides),
         )
 
     def beside(self, other: Tally) -> Tally:
-        """The tally of the same samples and more frames."""
+        """Return the tally of the same samples with the frames of both."""
         joined = replace(self, by_frame=()) + replace(other, by_frame=())
         return replace(joined, by_frame=self.by_frame + other.by_frame)
 
     def percentile(self, percent: float) -> float:
-        """The disagreement that `percent` of the results stay below, to a histogram bin (26 %)."""
+        """Return a percentile of the disagreement, to the width of a histogram bin (26 %)."""
         return percentile(self.histogram, HISTOGRAM_EDGES, self.worst, percent)
 
 
 def percentile(
     histogram: Sequence[int], edges: Sequence[float] | FloatArray, worst: float, percent: float
 ) -> float:
-    """The disagreement that `percent` of a histogram's results stay below, to a bin."""
+    """Return a percentile of a histogram, to the width of a bin."""
     counts = np.cumsum(histogram)
     if not counts[-1]:
         return 0.0
@@ -229,7 +230,7 @@ def percentile(
 
 
 def histogram_bin(units: float, edges: Sequence[float] | FloatArray) -> int:
-    """Which place of a histogram counts a disagreement."""
+    """Return the index of the histogram bin that counts a disagreement."""
     return int(np.searchsorted(edges, units, side="right"))
 
 
@@ -245,14 +246,14 @@ def tally(
     first_sample: int,
     inputs: Sequence[Inputs],
 ) -> Tally:
-    """Compare (n, frames, ...) results.
+    """Compare results of urdfkin and Pinocchio.
 
     Args:
-        ours: Results.
-        theirs: Pinocchio's.
+        ours: (n, frames, ...) results of urdfkin.
+        theirs: (n, frames, ...) results of Pinocchio.
         bound: Scale and k, broadcastable.
         frames: A name for each frame.
-        first_sample: The number of the first of the n samples.
+        first_sample: Index of the first of the n samples.
         inputs: q, v and a of each sample, for the worst case.
     """
     n, count = ours.shape[:2]
@@ -279,5 +280,5 @@ def tally(
     )
 
 
-#: What each tally of a robot is about: a quantity and the reference it was taken in.
+#: Key of a tally: the quantity and the reference frame.
 Key = tuple[str, str]

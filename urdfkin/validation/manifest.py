@@ -1,7 +1,8 @@
-"""What a campaign is, written before anything is computed: the robots, the samples, and what computes.
+"""Manifest of a campaign: its robots, samples and versions, written before the first computation.
 
-The manifest alone says which chunks there are and the key of each: the sha256 of all that its numbers depend
-on. What was computed by other code, of another text or with other options is never met.
+The manifest defines the chunks and their keys. A key is the sha256 of everything that the numbers of the
+chunk depend on. Results of other code, another text or other options have other keys, so they are never
+reused.
 """
 
 from __future__ import annotations
@@ -21,21 +22,21 @@ from urdfkin.validation.robot_input import RobotInput
 
 #: Name and version of the layout of a store.
 LAYOUT = "urdfkin-campaign/1"
-#: How many differences between two manifests are told.
+#: Maximum number of differences in a message.
 _SHOWN = 4
 
 
 @dataclass(frozen=True)
 class Manifest:
-    """A campaign.
+    """Definition of a campaign.
 
     Attributes:
-        robots: Where each comes from, and the sha256 of its text; empty where that could not be had.
-        samples: Random configurations for each.
-        seed: What they are drawn from.
-        provenance: What computes; `urdfkin.validation.results`.
-        versions: What the report says of that.
-        started: When, ISO 8601, UTC.
+        robots: The origin of each robot and the sha256 of its text; empty if the text could not be read.
+        samples: Number of random configurations for each robot.
+        seed: Seed of the samples.
+        provenance: Versions and digests of the computing code (`urdfkin.validation.results.provenance`).
+        versions: Versions in the report.
+        started: Start time, ISO 8601, UTC.
     """
 
     robots: tuple[tuple[Origin, str], ...]
@@ -47,26 +48,26 @@ class Manifest:
 
     @classmethod
     def of(cls, subjects: Sequence[RobotInput], samples: int, seed: int, started: str) -> Manifest:
-        """The manifest of a campaign that begins here."""
+        """Return the manifest of a new campaign."""
         robots = tuple((subject.origin, subject.stamp) for subject in subjects)
         return cls(robots, samples, seed, provenance(), _versions(subjects), started)
 
     @cached_property
     def cut(self) -> Cut:
-        """The chunks of each robot."""
+        """The division of each robot's samples into chunks."""
         return Cut(self.samples)
 
     def subjects(self) -> list[RobotInput]:
-        """The robots, as far as a report needs them."""
+        """Return the robots without their texts, which a report does not need."""
         return [RobotInput(origin.source, origin, stamp) for origin, stamp in self.robots]
 
     def key(self, robot: int, index: int) -> str:
-        """The key of a chunk."""
+        """Return the key of a chunk."""
         return hashlib.sha256(f"{self._keys[robot]} {index} of {len(self.cut)}".encode()).hexdigest()
 
     @cached_property
     def _keys(self) -> list[str]:
-        """Of each robot, with all settings."""
+        """The key of each robot, with all settings."""
         settings = json.dumps([LAYOUT, self.samples, self.seed, self.provenance], sort_keys=True)
         return [
             hashlib.sha256(f"{settings}\n{json.dumps(_robot(*robot))}".encode()).hexdigest()
@@ -74,7 +75,7 @@ class Manifest:
         ]
 
     def as_json(self) -> bytes:
-        """The file."""
+        """Return the bytes of the file."""
         data = {
             "layout": LAYOUT,
             "started": self.started,
@@ -88,10 +89,10 @@ class Manifest:
 
     @classmethod
     def from_json(cls, content: bytes, where: str) -> Manifest:
-        """The manifest in a file.
+        """Read a manifest from the bytes of a file.
 
         Raises:
-            InputError: it is none, or of another layout.
+            InputError: The file is not a manifest, or has another layout.
         """
         try:
             data = json.loads(content)
@@ -110,26 +111,26 @@ class Manifest:
                 f"not the manifest of a campaign ({LAYOUT})",
                 where=where,
                 found=f"{type(error).__name__}: {error}",
-                remedy="name a folder that `urdfkin validate ... --store DIR` made",
+                remedy="give a folder that `urdfkin validate ... --store DIR` made",
             ) from error
 
     def differences(self, other: Manifest) -> list[str]:
-        """What differs from another, both values each; nothing where their chunks are the same."""
-        mine, theirs = (
+        """Return the differences from another manifest with both values; empty if the chunks are the same."""
+        own, theirs = (
             {"samples": m.samples, "seed": m.seed, "number of robots": len(m.robots)} | m.provenance
             for m in (self, other)
         )
-        said = [
-            f"{name} {_short(mine.get(name))} and {_short(theirs.get(name))}"
-            for name in mine | theirs
-            if mine.get(name) != theirs.get(name)
+        lines = [
+            f"{name} {_short(own.get(name))} and {_short(theirs.get(name))}"
+            for name in own | theirs
+            if own.get(name) != theirs.get(name)
         ]
-        said += [
+        lines += [
             f"robot {i + 1} {_called(mine_)} and {_called(theirs_)}"
             for i, (mine_, theirs_) in enumerate(zip(self.robots, other.robots, strict=False))
             if mine_ != theirs_
         ]
-        return [*said[:_SHOWN], f"{len(said) - _SHOWN} more"] if len(said) > _SHOWN + 1 else said
+        return [*lines[:_SHOWN], f"{len(lines) - _SHOWN} more"] if len(lines) > _SHOWN + 1 else lines
 
 
 def _versions(subjects: Sequence[RobotInput]) -> dict[str, str]:
@@ -155,7 +156,7 @@ def _read_robot(data: dict[str, Any]) -> tuple[Origin, str]:
 
 
 def _short(value: object) -> str:
-    """A digest by its first letters."""
+    """Shorten a digest to its first 12 characters."""
     text = str(value)
     return text[:12] if len(text) == 64 else text
 

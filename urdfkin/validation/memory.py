@@ -1,7 +1,7 @@
-"""How much memory a validation may take and a robot needs: asked before, not found out when it is gone.
+"""Memory limit of a validation, and estimate of the memory that a robot needs.
 
-A validation keeps to `SHARE` of what is free when it begins, its processes together. A robot that needs more
-is not verified, and the reason says how much it would have been.
+All processes of a validation together use at most `SHARE` of the memory that is free at the start. A robot
+that needs more is not verified; the reason states both numbers.
 """
 
 from __future__ import annotations
@@ -14,48 +14,49 @@ from urdfkin.model.tree import KinematicTree
 from urdfkin.validation.comparison import BLOCK_BYTES, frame_bytes
 from urdfkin.verify.pinocchio import OracleError
 
-#: How much of the free memory a validation keeps to.
+#: Fraction of the free memory that a validation uses.
 SHARE = 0.5
-#: Pinocchio's workspace, bytes for the cube of the rates, and what a link takes in all (measured: 4.1.0).
+#: Memory of Pinocchio (measured with 4.1.0): bytes of its workspace for each nv^3, and total bytes for each
+#: link.
 _FOR_CUBE, _FOR_LINK = 64, 24_000
-#: How many arrays of a block's size are there at a time.
+#: Number of arrays of a block's size that exist at a time.
 _ARRAYS = 12
 _PROC = Path("/proc")
 _GROUPS = Path("/sys/fs/cgroup")
 
 
 def share(processes: int = 1) -> int | None:
-    """Bytes for each of so many processes of a validation; None where the system does not tell."""
+    """Return the bytes for each process of a validation; None if the system reports no free memory."""
     free = min(_free(), default=None)
     return None if free is None else int(SHARE * free / processes)
 
 
 def needed(tree: KinematicTree, samples: int) -> int:
-    """Bytes that checking a robot takes, at most."""
-    rates, links = sum(joint.kind.nv for joint in tree.joints), len(tree.links)
-    block = min(BLOCK_BYTES, 2 * links * frame_bytes(samples, rates))
-    return _FOR_CUBE * rates**3 + _FOR_LINK * links + _ARRAYS * max(block, frame_bytes(samples, rates))
+    """Return the maximum number of bytes for checking a robot."""
+    nv, links = sum(joint.kind.nv for joint in tree.joints), len(tree.links)
+    block = min(BLOCK_BYTES, 2 * links * frame_bytes(samples, nv))
+    return _FOR_CUBE * nv**3 + _FOR_LINK * links + _ARRAYS * max(block, frame_bytes(samples, nv))
 
 
 def demand(tree: KinematicTree, samples: int, most: int | None) -> None:
-    """Refuse a robot that does not fit.
+    """Raise OracleError if a robot needs more memory than allowed.
 
     Args:
         tree: The robot.
-        samples: How many are compared at a time.
-        most: Bytes that it may take; None: no matter.
+        samples: Number of samples that are compared together.
+        most: Allowed bytes; None: no limit.
 
     Raises:
-        OracleError: it needs more.
+        OracleError: The robot needs more.
     """
     wanted = needed(tree, samples)
     if most is not None and wanted > most:
         raise OracleError(
-            f"checking it would take more memory than a validation keeps to ({SHARE:.0%} of what is free,"
-            " its processes together)",
+            f"not enough memory to check the robot (all processes of a validation use {SHARE:.0%} of the free"
+            " memory)",
             where=tree.name,
-            found=f"{_gigabytes(wanted)}, where {_gigabytes(most)} are left to each process",
-            remedy="take fewer jobs or a larger machine",
+            found=f"{_gigabytes(wanted)} needed, {_gigabytes(most)} allowed for each process",
+            remedy="use fewer jobs or a larger machine",
         )
 
 
@@ -64,7 +65,7 @@ def _gigabytes(size: int) -> str:
 
 
 def _free() -> Iterator[int]:
-    """What the machine, each control group of this process and its own limit leave free."""
+    """Yield the free bytes of the machine, of each control group of this process, and below its own limit."""
     for line in _lines(_PROC / "meminfo"):
         if line.startswith("MemAvailable:"):
             yield int(line.split()[1]) * 1024
@@ -81,7 +82,10 @@ def _free() -> Iterator[int]:
 
 
 def _group(mount: Path, group: str, limit: str, usage: str) -> Iterator[int]:
-    """A control group's limit holds for the groups within; in a container its own is the topmost."""
+    """Yield the free bytes of a control group and of its parents, whose limits apply too.
+
+    In a container the container's own group is the topmost.
+    """
     folder = mount / group.lstrip("/")
     for place in (folder, *folder.parents):
         if place == mount.parent:
@@ -92,7 +96,7 @@ def _group(mount: Path, group: str, limit: str, usage: str) -> Iterator[int]:
 
 
 def _cached(place: Path) -> int:
-    """What a control group counts as used, but gives back when it is needed: files not read of late."""
+    """Return the bytes of the inactive file cache, which count as used but are freed on demand."""
     counts = dict(line.split(maxsplit=1) for line in _lines(place / "memory.stat"))
     return int(counts.get("total_inactive_file") or counts.get("inactive_file") or 0)
 

@@ -1,7 +1,6 @@
-"""What a validation comes to: a verdict for each robot, and one outcome of the run with its reason.
+"""Verdict of each robot, and outcome of a validation run with its reason.
 
-The one place that says when a run has passed: the report as it is made and the document that is read later
-both ask here.
+Only this module decides whether a run has passed. New reports and reports from a file both use it.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from enum import StrEnum
 
 
 class Verdict(StrEnum):
-    """What a robot's validation comes to; worse ones first."""
+    """Result of the validation of a robot; worse ones first."""
 
     BAD_INPUT = "bad input"
     NOT_VERIFIED = "not verified"
@@ -21,9 +20,9 @@ class Verdict(StrEnum):
     VERIFIED = "verified"
 
 
-#: Exit codes: of a disagreement, and of nothing else; of input; of what Pinocchio did not check.
+#: Exit codes: a disagreement; a robot that cannot be read; a robot that Pinocchio did not check.
 DISAGREEMENT, INPUT, UNCHECKED = 1, 2, 3
-#: Of a run that was ended: 128 and SIGINT's number, as shells have it.
+#: Exit code of an interrupted run: 128 + SIGINT, as in shells.
 INTERRUPTED = 130
 
 
@@ -32,9 +31,9 @@ class Outcome:
     """How a run ended.
 
     Attributes:
-        exit_code: 0 everything verified; else the first that holds of 1 a disagreement, 130 interrupted, 2 a
-            robot that cannot be read, 3 a robot that was not verified, or none.
-        reason: Why it has not passed, in one line; None where it has.
+        exit_code: 0: everything verified. Otherwise the first of these that applies: 1: a disagreement. 130:
+            interrupted. 2: a robot cannot be read. 3: a robot was not verified, or there was none.
+        reason: Reason in one line if the run has not passed; None if it has.
     """
 
     exit_code: int
@@ -42,17 +41,17 @@ class Outcome:
 
     @property
     def passed(self) -> bool:
-        """Whether every robot that was asked for was verified, and there was one."""
+        """Whether every requested robot was verified, and there was at least one."""
         return self.reason is None
 
 
 def outcome(verdicts: Iterable[str], asked: int, interrupted: bool) -> Outcome:
-    """The outcome of a run.
+    """Return the outcome of a run.
 
     Args:
-        verdicts: Of the robots that are reported on.
-        asked: How many robots were to be validated.
-        interrupted: Whether the run was ended before it was done.
+        verdicts: The verdicts of the robots in the report.
+        asked: Number of requested robots.
+        interrupted: Whether the run ended early.
 
     >>> outcome(["verified", "disagrees"], asked=3, interrupted=False)
     Outcome(exit_code=1, reason='1 of 3 robots disagrees, 1 of 3 robots without a report')

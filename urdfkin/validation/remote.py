@@ -1,8 +1,9 @@
-"""What a machine of a cluster does: hand each chunk to a process of its own, which may die over it.
+"""Functions that run on the machines of a cluster: each chunk runs in a process beside Dask's worker.
 
-Dask's own worker imports nothing that computes and never dies of a robot, so that nobody's death has to be
-guessed at: what a robot kills is the process here, twice, the second time alone, and that is its answer.
-Chunks and answers pass through as bytes; the text of a robot is sent once, and stays for all of its chunks.
+Dask's worker imports no computing code, so a robot cannot crash it; only the process beside it can crash. A
+chunk that crashes its process is tried a second time in a new process. If that process crashes too, the crash
+is the answer. Chunks and answers are transferred as bytes. The text of a robot is sent once for all its
+chunks.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from urdfkin.validation.worker_processes import WorkerProcess
 if TYPE_CHECKING:
     from urdfkin.validation.chunk import Chunk
 
-#: An answer's pickle, or how the processes died that should have made it, or what computes here.
+#: The pickle of an answer; or the cause of the crashes; or the versions on this machine.
 Found = (
     tuple[Literal["answer"], bytes]
     | tuple[Literal["died"], str]
@@ -31,62 +32,62 @@ _lock = threading.Lock()
 
 
 def hold(robot: bytes) -> bytes:
-    """A robot on a worker, for the chunks that need it; made again where a worker is lost."""
+    """Keep a robot on a worker for its chunks. Dask runs this again if the worker is lost."""
     return robot
 
 
 def computes() -> dict[str, str]:
-    """What computes here."""
+    """Return the versions and digests of the code on this machine."""
     return provenance()
 
 
 def run(robot: bytes, chunk: bytes, by: dict[str, str]) -> Found:
-    """Have a chunk answered.
+    """Run a chunk in a process and return its answer.
 
     Args:
         robot: The pickle of its robot.
-        chunk: The pickle of a chunk without it.
-        by: What computes where it comes from: others' numbers are not wanted.
+        chunk: The pickle of the chunk without the robot.
+        by: Versions and digests on the client. The chunk runs only if they are the same here.
     """
     if by != computes():
         return "other code", computes()
     cause = ""
-    for child in (_any, WorkerProcess):
+    for child in (_idle_or_new, WorkerProcess):
         try:
-            return "answer", _answer(child(), _Parcel(robot, chunk))
-        except _DiedError as death:
-            cause = str(death)
+            return "answer", _run_in(child(), _Parcel(robot, chunk))
+        except _DiedError as crash:
+            cause = str(crash)
     return "died", cause
 
 
 def end_idle() -> None:
-    """End the processes that wait for chunks."""
+    """End the idle processes."""
     with _lock:
         while _idle:
             _idle.pop().end()
 
 
 class _DiedError(Exception):
-    """The process that had a chunk; the message says how."""
+    """The process that ran the chunk crashed. The message states the cause."""
 
 
 class _Parcel:
-    """Becomes a chunk where it is unpickled."""
+    """A robot and a chunk as bytes. Unpickling it gives the chunk."""
 
     def __init__(self, robot: bytes, chunk: bytes) -> None:
         self._robot, self._chunk = robot, chunk
 
     def __reduce__(self) -> tuple[Callable[[bytes, bytes], Chunk], tuple[bytes, bytes]]:
-        return _unpacked, (self._robot, self._chunk)
+        return _unpickle, (self._robot, self._chunk)
 
 
-def _unpacked(robot: bytes, chunk: bytes) -> Chunk:
+def _unpickle(robot: bytes, chunk: bytes) -> Chunk:
     made: Chunk = replace(pickle.loads(chunk), subject=pickle.loads(robot))
     return made
 
 
-def _any() -> WorkerProcess:
-    """A process that is there already and knows a robot, or another."""
+def _idle_or_new() -> WorkerProcess:
+    """Return an idle process, or start one. An idle process may have the robot in its cache."""
     with _lock:
         while _idle:
             child = _idle.pop()
@@ -96,7 +97,7 @@ def _any() -> WorkerProcess:
     return WorkerProcess()
 
 
-def _answer(child: WorkerProcess, parcel: _Parcel) -> bytes:
+def _run_in(child: WorkerProcess, parcel: _Parcel) -> bytes:
     try:
         child.connection.send(parcel)
         found = child.connection.recv_bytes()

@@ -1,6 +1,7 @@
-"""The results of a validation as data: to show, to store and to merge; and what they depend on.
+"""Report of a validation as data, and the versions that its numbers depend on.
 
-`ValidationReport.as_dict` returns the JSON document; its layout is `SCHEMA` and changes only with its number.
+`ValidationReport.as_dict` returns the JSON document. Its layout is `SCHEMA`; a changed layout has another
+version number.
 """
 
 from __future__ import annotations
@@ -35,31 +36,31 @@ if TYPE_CHECKING:
 
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-#: What only shows results, and may change between two runs of a campaign.
+#: Packages that only display results. They may change between two runs of a campaign.
 _SHOWING = ("cli", "motion", "report", "view")
-#: Libraries that compute or read.
+#: Libraries that compute results or read robots.
 LIBRARIES = ("urdfkin", "pin", "numpy", "numba", "llvmlite", "yourdfpy", "mujoco")
 
 
 @cache
 def provenance() -> dict[str, str]:
-    """Versions, and digests of urdfkin's own files: of all that compute, and of the equations."""
+    """Return versions, and digests of urdfkin's computing code and of the equations."""
     equations = hashlib.sha256(read_bytes(_PACKAGE / "kinematics" / "equations.py")).hexdigest()
     return {name: version(name) for name in LIBRARIES} | {"code": _code(), "equations": equations}
 
 
 def version(package: str) -> str:
-    """The version of an installed package; in words where there is none."""
+    """Return the version of an installed package, or a text if it has none."""
     return installed_version(package) or ("a checkout" if package == "urdfkin" else "not installed")
 
 
 def _code() -> str:
     digest = hashlib.sha256()
     for path in sorted(_PACKAGE.rglob("*")):
-        place = path.relative_to(_PACKAGE)
-        if path.suffix in (".py", ".toml", ".json") and place.parts[0] not in _SHOWING:
+        relative = path.relative_to(_PACKAGE)
+        if path.suffix in (".py", ".toml", ".json") and relative.parts[0] not in _SHOWING:
             content = read_bytes(path)
-            digest.update(f"{place.as_posix()}\0{len(content)}\0".encode() + content)
+            digest.update(f"{relative.as_posix()}\0{len(content)}\0".encode() + content)
     return digest.hexdigest()
 
 
@@ -69,21 +70,21 @@ SCHEMA = "urdfkin-validation/1"
 
 @dataclass(frozen=True, slots=True)
 class RobotReport:
-    """One robot.
+    """Report of one robot.
 
     Attributes:
-        origin: Where it comes from and how it was asked for.
+        origin: Source of the robot and its loading options.
         name: The robot's name in the URDF.
-        verdict: What it comes to.
-        reason: Why it is not verified, in words; None where it is.
-        joints: Moving joints, followers too.
-        frames: Names of the frames that were compared: every link and every joint.
-        tallies: What was compared.
-        samples: How many configurations.
-        seconds: Time spent computing and comparing.
-        portrait: What it is made of and what was found in its file.
-        clock: Where the time went; None if nothing was computed.
-        error: The traceback of an error that nobody foresaw, to be reported; None otherwise.
+        verdict: The verdict.
+        reason: Why the robot is not verified; None if it is.
+        joints: Names of the moving joints, mimic joints included.
+        frames: Names of the compared frames: every link and every joint.
+        tallies: Error statistics of each quantity in each reference frame.
+        samples: Number of compared configurations.
+        seconds: Computing time.
+        portrait: Summary of the robot and the findings in its file.
+        clock: Computing times of the parts; None if nothing was computed.
+        error: The traceback of an unexpected error, for a bug report; None otherwise.
     """
 
     origin: Origin
@@ -101,35 +102,35 @@ class RobotReport:
 
     @property
     def source(self) -> str:
-        """Where it comes from: a path, a catalogue name, `-`, `<text>`."""
+        """Source of the robot: a path, a catalogue name, `-` or `<text>`."""
         return self.origin.source
 
     @property
     def results(self) -> int:
-        """How many results were compared."""
+        """Number of compared results."""
         return sum(tally.results for tally in self.tallies.values())
 
     @property
     def failed(self) -> int:
-        """How many of them lie outside their bound."""
+        """Number of results outside their bound."""
         return sum(tally.failed for tally in self.tallies.values())
 
     def of(self, quantity: str) -> list[Tally]:
-        """The tallies of one quantity, one a reference."""
+        """Return the tallies of one quantity, one for each reference frame."""
         return [tally for (kind, _), tally in self.tallies.items() if kind == quantity]
 
     def worst(self, quantity: str) -> float | None:
-        """The largest disagreement of a quantity in eps * scale, None if it was not compared."""
+        """Return the largest disagreement of a quantity in eps * scale; None if it was not compared."""
         return max((tally.worst for tally in self.of(quantity)), default=None)
 
     def replay(self, key: Key) -> str | None:
-        """A command that computes a quantity's worst case again."""
+        """Return a command that computes the worst case of a quantity again; None without a worst case."""
         quantity, reference = key
         case = self.tallies[key].case
         return None if case is None else replay(self.origin, quantity, reference, case)
 
     def as_dict(self) -> dict[str, Any]:
-        """The robot's part of the JSON document."""
+        """Return the robot's part of the JSON document."""
         return {
             "source": self.source,
             "name": self.name,
@@ -177,38 +178,41 @@ class RobotReport:
                 "a": list(case.a),
                 "replay": self.replay(key),
             },
-        } | ({"witness": tally.witness.as_dict()} if tally.witness else {})
+        } | ({"witness": tally.three_sides.as_dict()} if tally.three_sides else {})
 
 
 def _finite(units: float) -> float | None:
-    """JSON has no infinity: None stands for a result that is no number or must agree exactly and does not."""
+    """Return None for infinity, which JSON lacks.
+
+    Infinity stands for NaN, and for a difference of two values that must be equal.
+    """
     return units if math.isfinite(units) else None
 
 
 def replay(origin: Origin, quantity: str, reference: str, case: WorstCase) -> str:
-    """The command for one case."""
+    """Return the command that computes a case again."""
     row = QUANTITIES[quantity]
-    # Joints are compared under their plain names, which a link elsewhere may have too.
+    # Joints are compared under their plain names. A link may have the same name.
     frame = case.frame if row.of == "frames" else f"joint:{case.frame}"
-    origin = replace(origin, oracle=None)  # Pinocchio is asked again, as the check was
+    origin = replace(origin, oracle=None)  # the replay compares with Pinocchio, as this check does
     return replay_line(origin, row.command, frame, reference, {x: getattr(case, x) for x in row.inputs})
 
 
 @dataclass(frozen=True, slots=True)
 class ValidationReport(Displayable):
-    """A whole run.
+    """Report of a whole run.
 
     Attributes:
-        robots: One report a robot, in the order asked for.
-        asked: How many robots were to be validated.
-        samples: Random configurations for each robot.
-        seed: What they were drawn from.
-        started: When, ISO 8601, UTC.
+        robots: One report for each robot, in the requested order.
+        asked: Number of requested robots.
+        samples: Number of random configurations for each robot.
+        seed: Seed of the samples.
+        started: Start time, ISO 8601, UTC.
         seconds: Wall time.
-        interrupted: Whether the run was stopped; what had finished is kept.
-        made_by: What computed and what checked, where it was not what is installed now.
-        judgements: The true errors of both sides, where the judge was asked for: one for each robot that was
-            compared, None where it could not be had.
+        interrupted: Whether the run ended early. Finished results are included.
+        made_by: Versions of urdfkin and the oracles, if they are not the installed ones; else None.
+        judgements: Results of the accuracy study, if requested: one for each compared robot; None where the
+            study failed.
     """
 
     robots: tuple[RobotReport, ...]
@@ -222,11 +226,11 @@ class ValidationReport(Displayable):
     judgements: tuple[Judgement | None, ...] = ()
 
     def to_html(self) -> str:
-        """The whole report as one page that opens offline, as `urdfkin validate --html` writes it."""
+        """Return the report as one offline HTML page, as `urdfkin validate --html` writes it."""
         return str(hook("a report as a page")(self.as_dict()))
 
     def to_markdown(self) -> str:
-        """The report as a pull request's comment, as `urdfkin validate --markdown` writes it."""
+        """Return the report as Markdown for a pull request, as `urdfkin validate --markdown` writes it."""
         return str(hook("a report as a comment")(self.as_dict()))
 
     def _sheet(self) -> TextDocument:
@@ -248,32 +252,32 @@ class ValidationReport(Displayable):
     def command(self) -> str:
         """The command that repeats the run.
 
-        Robots with other options have a line of their own, and so has each that came as text: standard input
-        is one file.
+        Each set of options has its own line. So has each robot that was given as text, because standard input
+        is a single file.
         """
         settings = f"--samples {self.samples} --seed {self.seed}"
         return "\n".join(
-            f"urdfkin validate {_named(origins)} {settings} {origins[0].options}".rstrip()
-            for origins in _together([robot.origin for robot in self.robots])
+            f"urdfkin validate {_source_words(origins)} {settings} {origins[0].options}".rstrip()
+            for origins in _group_by_command([robot.origin for robot in self.robots])
         )
 
     @property
     def outcome(self) -> Outcome:
-        """How the run ended, and why it has not passed if it has not."""
+        """The outcome of the run, with the reason if it has not passed."""
         return outcome((robot.verdict for robot in self.robots), self.asked, self.interrupted)
 
     @property
     def passed(self) -> bool:
-        """Whether every robot that was asked for was verified, and there was one."""
+        """Whether every requested robot was verified, and there was at least one."""
         return self.outcome.passed
 
     @property
     def exit_code(self) -> int:
-        """0 verified, 1 a disagreement, 130 interrupted, 2 bad input, 3 a robot not verified."""
+        """0: verified. 1: a disagreement. 130: interrupted. 2: bad input. 3: a robot was not verified."""
         return self.outcome.exit_code
 
     def as_dict(self) -> dict[str, Any]:
-        """The JSON document."""
+        """Return the JSON document."""
         return {
             "schema": SCHEMA,
             "versions": self.made_by or versions(robot.origin.oracle for robot in self.robots),
@@ -291,7 +295,7 @@ class ValidationReport(Displayable):
         }
 
     def _robots(self) -> list[dict[str, Any]]:
-        """Each with its judgement: those that were compared were judged, in their order."""
+        """Return the data of each robot with its accuracy result. Only compared robots have one."""
         judgements = iter(self.judgements)
         entries = []
         for robot in self.robots:
@@ -300,8 +304,8 @@ class ValidationReport(Displayable):
         return entries
 
 
-def _together(origins: Sequence[Origin]) -> list[list[Origin]]:
-    """Those that one command can validate: the same options, and standard input once."""
+def _group_by_command(origins: Sequence[Origin]) -> list[list[Origin]]:
+    """Group the robots that one command can validate: the same options, and standard input at most once."""
     groups: dict[tuple[str, int], list[Origin]] = {}
     texts = Counter[str]()
     for origin in origins:
@@ -311,14 +315,14 @@ def _together(origins: Sequence[Origin]) -> list[list[Origin]]:
     return list(groups.values())
 
 
-def _named(origins: Sequence[Origin]) -> str:
+def _source_words(origins: Sequence[Origin]) -> str:
     if tuple(origin.source for origin in origins) == examples():
         return "--all"
     return shlex.join(origin.again for origin in origins)
 
 
 def versions(witnesses: Iterable[str | None] = ()) -> dict[str, str]:
-    """What computed and what checked, second witnesses included."""
+    """Return the versions of urdfkin, its libraries and all oracles."""
     packages = ["urdfkin", "numpy", "numba", "yourdfpy", "example-robot-data"]
     packages += sorted({WITNESSES[name].package for name in witnesses if name in WITNESSES})
     found = {package: version(package) for package in packages}

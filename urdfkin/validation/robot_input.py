@@ -1,7 +1,7 @@
-"""The robots of a validation as plain data, each known by the digest of its text.
+"""Robots of a validation as plain data, each identified by the digest of its text.
 
-A path stays a path, so that thousands of robots take no memory; its text is read where it is needed, and
-refused there if it is no longer the text that the validation began with.
+A robot from a file is stored as its path, so that thousands of robots take little memory. The text is read
+when it is needed. If the text has changed since the start of the validation, reading it is an error.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from urdfkin.urdf.sources import Origin, Source, Text, as_word, is_xacro, read_s
 from urdfkin.verify.oracles import PINOCCHIO
 from urdfkin.verify.pinocchio import OracleError
 
-#: What is validated: anything that `load` takes, and robots that were loaded.
+#: Input of a validation: anything that `load` accepts, or a loaded robot.
 Given = Source | DHTable | Robot
 
 
@@ -34,12 +34,12 @@ class RobotInput:
     """A robot to validate, as plain data.
 
     Attributes:
-        source: What `load` takes: a path, a catalogue name or the URDF itself.
-        origin: Where it comes from, also where `source` is the URDF itself, and how it was asked for.
-        stamp: The sha256 of its text; empty where that cannot be had.
-        file: What findings call a text that is here itself.
-        listed: What was said of the MJCF that the text was made of.
-        made: Whether it was made of something else than a URDF.
+        source: A path, a catalogue name or the text of the URDF, as for `load`.
+        origin: Source of the robot (also if `source` is the text) and its loading options.
+        stamp: The sha256 of its text; empty if the text cannot be read.
+        file: The file name in findings, if `source` is the text.
+        listed: Findings in the MJCF that the text was converted from.
+        made: Whether the text was converted from another format than URDF.
     """
 
     source: str | bytes
@@ -51,7 +51,7 @@ class RobotInput:
 
     @classmethod
     def of(cls, robot: Robot) -> RobotInput:
-        """A robot that was loaded already."""
+        """Return the input for a loaded robot."""
         if robot.source in catalogue():
             return _word(robot.source, robot.origin.mimic, robot.origin.root_joint)
         listed = tuple(finding for finding in robot.findings if finding.code.startswith("MJCF"))
@@ -59,15 +59,15 @@ class RobotInput:
 
     @property
     def label(self) -> str:
-        """How to call it while it is not loaded."""
+        """Name of the robot before it is loaded."""
         return self.origin.source
 
     def text(self) -> Text:
-        """Its text.
+        """Return the robot's text.
 
         Raises:
-            InputError: a file that is another one than when the validation began.
-            UrdfkinError: it cannot be had.
+            InputError: The file has changed since the validation began.
+            UrdfkinError: The text cannot be read.
         """
         if isinstance(self.source, bytes):
             return Text(self.source, self.file, self.label, catalogue().get(self.label))
@@ -76,17 +76,17 @@ class RobotInput:
             raise InputError(
                 "the file has changed since the validation began",
                 where=text.label,
-                remedy="begin again when it stays as it is",
+                remedy="start the validation again when the file no longer changes",
             )
         return text
 
     def carried(self) -> RobotInput:
-        """The same with its text, for a machine that has not the file."""
+        """Return a copy that contains the text, for a machine without the file."""
         text = self.text()
         return replace(self, source=text.data, file=text.label)
 
     def read(self) -> Robot:
-        """The robot; its warnings are in its portrait."""
+        """Return the robot, without warnings. Its findings are in its summary."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)
             robot = robot_of(
@@ -97,14 +97,14 @@ class RobotInput:
                 listed=self.listed,
                 made=self.made,
             )
-        robot.verifier.origin = self.origin  # what was read here may be the text of a file
+        robot.verifier.origin = self.origin  # the text read here may come from a file
         return robot
 
     def load(self) -> Robot:
-        """The robot, to be checked.
+        """Return the robot for a comparison with Pinocchio.
 
         Raises:
-            OracleError: a finding says that Pinocchio refuses it or reads another robot.
+            OracleError: A finding states that Pinocchio refuses the file or reads a different robot.
         """
         robot = self.read()
         if robot.verifier.unverifiable is not None:
@@ -118,7 +118,7 @@ def subjects(
     root_joint: str | None = None,
     xacro_args: Mapping[str, object] | None = None,
 ) -> tuple[list[RobotInput], dict[int, Exception]]:
-    """The robots as plain data, and those whose text cannot be had: by their place, and why."""
+    """Return the robots as plain data, and the errors of those that cannot be read, by index."""
     found, errors = list[RobotInput](), dict[int, Exception]()
     for i, robot in enumerate(robots):
         try:
@@ -135,10 +135,10 @@ def subject(
     root_joint: str | None = None,
     xacro_args: Mapping[str, object] | None = None,
 ) -> RobotInput:
-    """One robot as plain data; raises what reading it raises."""
+    """Return one robot as plain data. Raise any error of reading it."""
     if isinstance(robot, DHTable) or is_table_file(robot) or is_mjcf(robot):
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UrdfWarning)  # they are in its portrait
+            warnings.simplefilter("ignore", UrdfWarning)  # the findings are in its summary
             return replace(RobotInput.of(load(robot, mimic=mimic, root_joint=root_joint)), made=True)
     if isinstance(robot, Robot):
         return RobotInput.of(robot)
@@ -155,18 +155,18 @@ def subject(
 
 
 def _called(robot: Given) -> str:
-    """What to call a robot whose text cannot be had."""
+    """Return the name of a robot that cannot be read."""
     if isinstance(robot, str | os.PathLike):
         return str(robot) if isinstance(robot, str) else as_word(Path(robot))
     return f"<{type(robot).__name__}>"
 
 
 def _word(source: str, mimic: bool | None, root_joint: str | None) -> RobotInput:
-    """A path, a name or text."""
+    """Return the input for a path, a catalogue name or a text."""
     try:
         text = read_source(source)
     except UrdfkinError:
-        return RobotInput(source, Origin(source, mimic, root_joint))  # the chunk reports what is wrong
+        return RobotInput(source, Origin(source, mimic, root_joint))  # its chunk reports the error
     return RobotInput(source, Origin(text.source, mimic, root_joint), _digest(text.data))
 
 

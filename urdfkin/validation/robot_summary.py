@@ -1,14 +1,10 @@
-"""A robot as data: what it is made of, as `urdfkin info --format json` and the validation report have it.
+"""Summary of a robot for `urdfkin info --format json` and the validation report.
 
-The Denavit-Hartenberg tables of a robot's chains for its report, each held against Pinocchio.
+The summary has the links and joints, the findings in the file, and Denavit-Hartenberg tables. It is plain
+data, which can be sent between processes and written as JSON.
 
-The chains are the catalogue's limbs; for other robots the paths from the base to the leaves, one for each
-set of moving joints. Tables are exact, in both conventions.
-
-
-What a report tells about a robot besides its checks: its parts, what was found in its file, its tables.
-
-Plain data from the start, so that it can come back from another process and go into JSON as it is.
+The chains are the limbs in the catalogue. For other robots they are the paths from the base to the leaves,
+one for each set of moving joints. The tables are exact, in both conventions, and are compared with Pinocchio.
 """
 
 from __future__ import annotations
@@ -36,7 +32,7 @@ if TYPE_CHECKING:
 
 
 def describe(robot: Robot) -> dict[str, Any]:
-    """Plain data for JSON: coordinates, frames, and every joint with its placement, axis and limits.
+    """Return plain data for JSON: coordinates, frames, and every joint with its placement, axis and limits.
 
     >>> import urdfkin
     >>> data = describe(urdfkin.load("ur5"))
@@ -78,12 +74,15 @@ def _joint(robot: Robot, i: int, narrowed: dict[str, NarrowedRange]) -> dict[str
         "v": tree.v_index[i] if joint.kind.nv else None,
         "limit": _limit(joint),
         "mimic": asdict(joint.mimic) if joint.mimic else None,
-        "kept": _kept(narrowed.get(joint.name)),
+        "kept": _remaining_range(narrowed.get(joint.name)),
     }
 
 
-def _kept(narrowed: NarrowedRange | None) -> dict[str, Any] | None:
-    """The part of a joint's range in which its mimic joints keep their limits, where they narrow it."""
+def _remaining_range(narrowed: NarrowedRange | None) -> dict[str, Any] | None:
+    """Return the part of a joint's range in which its mimic joints stay within their limits.
+
+    None: the mimic joints do not narrow the range.
+    """
     if narrowed is None:
         return None
     lower, upper = narrowed.kept or (None, None)
@@ -91,7 +90,7 @@ def _kept(narrowed: NarrowedRange | None) -> dict[str, Any] | None:
 
 
 def _limit(joint: Joint) -> dict[str, float | None] | None:
-    """Bounds; what is infinite is None, as JSON has no infinity."""
+    """Return the limits of a joint, with None for infinity, which JSON lacks."""
     limit = joint.limit
     if limit is None:
         return None
@@ -99,27 +98,27 @@ def _limit(joint: Joint) -> dict[str, float | None] | None:
     return {name: value if math.isfinite(value) else None for name, value in named.items()}
 
 
-#: A robot with more leaves shows this many chains; `urdfkin dh --all` gives them all.
+#: Maximum number of chains in a summary; `urdfkin dh --all` lists all.
 MOST = 12
 _SAMPLES = 10
 _CONVENTIONS = ("standard", "modified")
 
 
 def chains_of(robot: Robot, oracle: Oracle | None) -> tuple[dict[str, Any], ...]:
-    """Plain data for JSON: frames, both tables, and how well they agree with Pinocchio.
+    """Return each chain as plain data for JSON: frames, both tables, and their disagreement with Pinocchio.
 
     Args:
         robot: The robot.
-        oracle: Pinocchio's model; None where it cannot check the robot: then nothing is said to be checked.
+        oracle: Pinocchio's model; None if Pinocchio cannot check the robot. The tables are then unchecked.
     """
     found = []
     for limb, base, tip in _chains(robot):
         try:
             tables = {name: dh_table(robot.tree, tip, base, name) for name in _CONVENTIONS}
         except InputError:
-            continue  # a planar or floating joint on the way has no row
+            continue  # a planar or floating joint on the path has no row
         if any(table.rows for table in tables.values()):
-            found.append({"limb": limb, "base": base, "tip": tip} | _checked(robot, oracle, tables))
+            found.append({"limb": limb, "base": base, "tip": tip} | _with_check(robot, oracle, tables))
     return tuple(found)
 
 
@@ -136,7 +135,7 @@ def _chains(robot: Robot) -> Iterator[tuple[str | None, str, str]]:
             yield None, robot.base_frame, tree.link_frames[leaf]
 
 
-def _checked(robot: Robot, oracle: Oracle | None, tables: dict[str, DHTable]) -> dict[str, Any]:
+def _with_check(robot: Robot, oracle: Oracle | None, tables: dict[str, DHTable]) -> dict[str, Any]:
     data: dict[str, Any] = {name: _table(table) for name, table in tables.items()}
     if oracle is None:
         return data | {"samples": 0, "metres": None, "worst": None, "share_of_bound": None}
@@ -173,12 +172,12 @@ def _row(row: DHRow) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class RobotSummary:
-    """A robot for the reader of a report.
+    """Summary of a robot in a report.
 
     Attributes:
-        model: As `urdfkin.validation.robot_summary.describe` gives it; None if the robot could not be read.
-        findings: As `Finding.as_dict` gives them.
-        chains: Denavit-Hartenberg tables of its chains, both conventions each.
+        model: The result of `describe`; None if the robot could not be read.
+        findings: The findings in the file, as `Finding.as_dict` returns them.
+        chains: Denavit-Hartenberg tables of its chains, each in both conventions.
     """
 
     model: dict[str, Any] | None = None
@@ -187,29 +186,29 @@ class RobotSummary:
 
     @classmethod
     def of(cls, robot: Robot, oracle: Oracle | None) -> RobotSummary:
-        """The portrait of a robot that was loaded; its tables are checked where Pinocchio can."""
+        """Return the summary of a loaded robot. The tables are checked if Pinocchio accepts the robot."""
         return cls(describe(robot), as_data(robot.findings), chains_of(robot, oracle))
 
     @property
     def disagreements(self) -> tuple[str, ...]:
-        """What is said of each chain whose tables lie outside their bound."""
-        return tuple(said for chain in self.chains if (said := chain_disagreement(chain)) is not None)
+        """A message for each chain with tables outside their bound."""
+        return tuple(text for chain in self.chains if (text := chain_disagreement(chain)) is not None)
 
 
 def chain_disagreement(chain: Mapping[str, Any]) -> str | None:
-    """How a chain's tables disagree with Pinocchio; None if they do not, or were not compared."""
+    """Return how the tables of a chain disagree with Pinocchio; None if they agree or were not compared."""
     share = chain["share_of_bound"]
     if not chain["samples"] or (share is not None and share <= 1.0):
         return None
-    how = "beyond all numbers" if share is None else f"{share:.3g} times the bound"
+    how = "by an infinite amount" if share is None else f"{share:.3g} times the bound"
     off = "" if chain["metres"] is None else f", tip {chain['metres']:.2g} m off"
     return f"the Denavit-Hartenberg tables from {chain['base']} to {chain['tip']} disagree: {how}{off}"
 
 
-#: Of a robot nothing is known about.
+#: Summary of a robot that could not be read.
 NO_PORTRAIT = RobotSummary()
 
 
 def as_data(findings: Iterable[Finding]) -> tuple[dict[str, Any], ...]:
-    """Findings as JSON has them."""
+    """Return findings as plain data for JSON."""
     return tuple(finding.as_dict() for finding in findings)

@@ -1,12 +1,13 @@
-"""A campaign's folder: a manifest, and one small file a chunk, each there whole or not at all.
+"""Store of a campaign: a folder with a manifest and one small file for each chunk.
 
-    DIR/manifest.json           what the campaign is
-    DIR/chunks/4f/4f1a....chunk   what a chunk found; .failed: why its robot could not be checked
-    DIR/judge.json              what the judge was asked for; chunks/*/*.judged: what it found
-    DIR/lock                    held by who is at work
+    DIR/manifest.json             definition of the campaign
+    DIR/chunks/4f/4f1a....chunk   result of a chunk; .failed: why its robot could not be checked
+    DIR/judge.json                settings of the accuracy study; chunks/*/*.judged: its results
+    DIR/lock                      locked by the process that writes to the store
 
-It knows no engine: whoever computed a chunk, its answer lies under the chunk's key. A file that is no answer
-is reported, put aside and computed again; so is one under a name that no chunk of the campaign has.
+Files are written atomically, so a file is complete or absent. The answer of a chunk is stored under the
+chunk's key and does not depend on the engine. A damaged file is reported and moved to `damaged/`, and its
+chunk is computed again. A file with a name that no chunk of the campaign has is reported and moved too.
 """
 
 from __future__ import annotations
@@ -32,30 +33,30 @@ from urdfkin.validation.manifest import Manifest
 
 _MANIFEST, _LOCK, _CHUNKS, _ASIDE = "manifest.json", "lock", "chunks", "damaged"
 _WRITING = ".writing"
-#: What the judge was asked for; `urdfkin.validation.accuracy_store`.
+#: File with the settings of the accuracy study (`urdfkin.validation.accuracy_store`).
 JUDGE = "judge.json"
-#: How the name of a file ends that holds what the judge found; its key is the judge's.
+#: Suffix of a file with the accuracy result of a robot. The accuracy store defines its key.
 JUDGED = ".judged"
 _DONE, _FAILED = ".chunk", ".failed"
 
-#: How often a lock is asked for, a tenth of a second apart.
+#: Number of attempts to take a lock, 0.1 s apart.
 _TRIES = 10
 
 _T = TypeVar("_T")
 
-#: Told of each file that cannot be trusted.
+#: Callback for messages about damaged files.
 Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class Store:
-    """The folder of a campaign, to read from; `opened` gives one to write to.
+    """The folder of a campaign for reading; `opened` returns one for writing.
 
     Attributes:
-        folder: Where.
-        manifest: What the campaign is.
-        tell: Told of each damaged file.
-        scratch: Where files are begun; None: nothing can be written.
+        folder: The folder.
+        manifest: Definition of the campaign.
+        tell: Callback for each damaged file.
+        scratch: Folder for unfinished files; None: the store is read-only.
     """
 
     folder: Path
@@ -65,59 +66,62 @@ class Store:
 
     @classmethod
     def reading(cls, folder: Path, tell: Tell) -> Store:
-        """A store as it is now, whoever is at work on it.
+        """Return a read-only store. Another process may be writing to it.
 
         Raises:
-            SourceError, InputError: it is none.
+            SourceError, InputError: The folder is not a store.
         """
         place = folder / _MANIFEST
         return cls(folder, Manifest.from_json(read_bytes(place), str(place)), tell)
 
     def answer(self, robot: int, index: int) -> Answer | None:
-        """What is known of a chunk; a damaged file is put aside, or left where nothing can be written."""
+        """Return the answer of a chunk; None if there is none.
+
+        A damaged file is moved to `damaged/`; in a read-only store it stays.
+        """
         key = self.manifest.key(robot, index)
         return self.kept(key, _DONE, read) or self.kept(key, _FAILED, read)
 
     def kept(self, key: str, kind: str, read: Callable[[str, bytes], _T]) -> _T | None:
-        """What lies under a key; what cannot be read as that is put aside."""
+        """Return the content of the file with a key; None if it is missing or damaged."""
         place = self._place(key, kind)
         try:
             content = read_if_there(place)
             return None if content is None else read(key, content)
         except (DamagedError, OSError) as error:
             why = f"{error.what}: {error.found}" if isinstance(error, SourceError) else str(error)
-            self._put_aside(place, f"is computed again: {why}")
+            self._quarantine(place, f"is damaged and is computed again: {why}")
             return None
 
     def keep(self, robot: int, index: int, found: Answer) -> None:
-        """Write an answer: on the disc, whole, when this returns.
+        """Write an answer. When this returns, the complete file is on disk.
 
         Raises:
-            SourceError: it cannot be written.
+            SourceError: The file cannot be written.
         """
         key = self.manifest.key(robot, index)
         self.keep_part(key, _FAILED if isinstance(found, Failure) else _DONE, written(key, found))
 
     def has(self, key: str, kind: str) -> bool:
-        """Whether something lies under a key."""
+        """Whether a file with a key exists."""
         return self._place(key, kind).exists()
 
     @property
     def has_judge(self) -> bool:
-        """Whether the judge was asked."""
+        """Whether an accuracy study was requested."""
         return (self.folder / JUDGE).exists()
 
     def keep_part(self, key: str, kind: str, data: bytes) -> None:
-        """Write what `kept` reads, likewise."""
+        """Write the file with a key, atomically, for `kept` to read."""
         self._write(self._place(key, kind), data)
 
     def forget_failures(self) -> None:
-        """Have the robots that could not be checked computed again."""
+        """Delete the failures, so that those robots are computed again."""
         for place in self._files(_FAILED):
             place.unlink(missing_ok=True)
 
     def check_names(self) -> None:
-        """Report files beside the chunks that have the name of none, as a renamed one, and put them aside."""
+        """Report files with a name that no chunk has, such as renamed ones, and move them to `damaged/`."""
         keys = (
             self.manifest.key(robot, index)
             for robot in range(len(self.manifest.robots))
@@ -126,10 +130,10 @@ class Store:
         expected = {self._place(key, kind) for key in keys for kind in (_DONE, _FAILED)}
         for place in sorted((self.folder / _CHUNKS).glob("*/*")):
             if place not in expected and place.suffix != JUDGED:
-                self._put_aside(place, "is not used: no chunk of this campaign has this name")
+                self._quarantine(place, "is not used: no chunk of this campaign has this name")
 
     def counts(self) -> dict[int, tuple[int, bool]]:
-        """For each robot how many of its chunks are there, and whether it failed; by the files' names."""
+        """Return for each robot the number of stored chunks and whether it failed, from the file names."""
         names = {place.name for kind in (_DONE, _FAILED) for place in self._files(kind)}
         found = {}
         for robot in range(len(self.manifest.robots)):
@@ -139,7 +143,7 @@ class Store:
         return found
 
     def take(self, other: Store) -> int:
-        """Copy what another store of the same campaign has and this one has not; how many chunks it were."""
+        """Copy the missing chunks from another store of the same campaign; return their number."""
         other.check_names()
         taken = 0
         for robot in range(len(self.manifest.robots)):
@@ -150,21 +154,21 @@ class Store:
         return taken
 
     def demand_same(self, manifest: Manifest, where: object) -> None:
-        """Refuse another campaign, with what differs.
+        """Raise InputError with the differences if a manifest describes another campaign.
 
         Raises:
-            InputError: it is another one.
+            InputError: The manifest differs from this store's.
         """
         if differences := self.manifest.differences(manifest):
             raise InputError(
-                "another campaign's store",
+                "the store belongs to another campaign",
                 where=str(self.folder),
                 found=f"(there, and {where}) {'; '.join(differences)}",
-                remedy="give the options it was made with, or another folder",
+                remedy="use the options of that campaign, or another folder",
             )
 
     def at_work(self) -> str | None:
-        """Who is at work on it; None: nobody."""
+        """Return the process that writes to the store; None if there is none."""
         try:
             with _lock_file(self.folder / _LOCK, os.O_RDONLY) as file:
                 return None if _try_lock(file, fcntl.LOCK_SH) else _holder(file)
@@ -172,14 +176,14 @@ class Store:
             return None
 
     def write_manifest(self) -> None:
-        """Write what the campaign is."""
+        """Write the manifest."""
         self.write(_MANIFEST, self.manifest.as_json())
 
     def write(self, name: str, data: bytes) -> None:
         """Write a file beside the manifest.
 
         Raises:
-            SourceError: it cannot be written.
+            SourceError: The file cannot be written.
         """
         self._write(self.folder / name, data)
 
@@ -189,31 +193,31 @@ class Store:
     def _files(self, kind: str) -> Iterator[Path]:
         return (self.folder / _CHUNKS).glob(f"*/*{kind}")
 
-    def _put_aside(self, place: Path, why: str) -> None:
+    def _quarantine(self, place: Path, why: str) -> None:
         self.tell(f"{place} {why}")
         if self.scratch is not None:
-            aside = self.folder / _ASIDE
+            damaged = self.folder / _ASIDE
             with contextlib.suppress(OSError):
-                aside.mkdir(exist_ok=True)
-                place.replace(aside / place.name)
+                damaged.mkdir(exist_ok=True)
+                place.replace(damaged / place.name)
 
     def _write(self, place: Path, data: bytes) -> None:
         if self.scratch is None:
-            raise SourceError("a store that is only read", where=str(self.folder))
-        begun = self.scratch / place.name
+            raise SourceError("the store is read-only", where=str(self.folder))
+        unfinished = self.scratch / place.name
         try:
             place.parent.mkdir(parents=True, exist_ok=True)
-            with begun.open("wb") as file:
+            with unfinished.open("wb") as file:
                 file.write(data)
                 file.flush()
                 os.fsync(file.fileno())
-            begun.replace(place)
+            unfinished.replace(place)
         except OSError as error:
             raise SourceError(
                 "the store cannot be written",
                 where=str(self.folder),
                 found=error.strerror or str(error),
-                remedy="what it holds stays; make room and give the same command again to go on",
+                remedy="free some disk space and repeat the same command; finished chunks are kept",
             ) from error
 
 
@@ -221,39 +225,41 @@ class Store:
 def opened(
     folder: Path, manifest: Manifest, tell: Tell, *, shard: str | None = None, retry_failed: bool = False
 ) -> Iterator[Store]:
-    """The store of a campaign, made if it is not there, for this process alone.
+    """Open the store of a campaign for writing by this process only. Make it if it does not exist.
 
     Args:
-        folder: Where.
-        manifest: What the campaign is.
-        tell: Told of each damaged file.
-        shard: Only a part of it is worked on, as others are on other parts.
-        retry_failed: Forget what failed; those robots may have other texts now.
+        folder: The folder.
+        manifest: Definition of the campaign.
+        tell: Callback for each damaged file.
+        shard: Lock this part only; other processes may work on other parts.
+        retry_failed: Delete the failures. Those robots may have other texts now.
 
     Raises:
-        SourceError: it cannot be made or written.
-        InputError: it is another campaign's, or somebody else is at work on it.
+        SourceError: The store cannot be made or written.
+        InputError: The store belongs to another campaign, or another process uses it.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if not (folder / _MANIFEST).exists() and not all(map(_is_ours, folder.iterdir())):
             raise InputError(
-                "a folder that is not empty and is no campaign's",
+                "the folder is not empty and is not a store",
                 where=str(folder),
-                remedy="name a folder that is empty or not there yet",
+                remedy="give an empty or a new folder",
             )
         with _locked(folder, shard):
             if (folder / _WRITING).is_symlink():
                 raise SourceError(
-                    "a link in place of the store's folder",
+                    "a symbolic link replaces a folder of the store",
                     where=str(folder / _WRITING),
                     remedy="delete the link",
                 )
             scratch = folder / _WRITING / (shard or "all").replace("/", "-of-")
-            shutil.rmtree(scratch, ignore_errors=True)  # what a killed one had begun
+            shutil.rmtree(scratch, ignore_errors=True)  # unfinished files of a killed process
             scratch.mkdir(parents=True)
             try:
-                store = _opened(Store(folder, manifest, tell, scratch), retry_failed=retry_failed)
+                store = _check_or_write_manifest(
+                    Store(folder, manifest, tell, scratch), retry_failed=retry_failed
+                )
                 store.check_names()
                 yield store
             finally:
@@ -267,12 +273,12 @@ def opened(
 
 
 def _is_ours(path: Path) -> bool:
-    """Whether it may be there before the manifest is: other parts begin at the same time."""
+    """Whether a file may exist before the manifest, because other parts start at the same time."""
     return path.name in (_WRITING, _CHUNKS) or path.name.startswith(_LOCK)
 
 
-def _opened(store: Store, *, retry_failed: bool) -> Store:
-    """The store with its own manifest if it has one: it says when the campaign began."""
+def _check_or_write_manifest(store: Store, *, retry_failed: bool) -> Store:
+    """Return the store, with its existing manifest if it has one. That one has the start time."""
     if not (store.folder / _MANIFEST).exists():
         store.write_manifest()
         return store
@@ -288,24 +294,24 @@ def _opened(store: Store, *, retry_failed: bool) -> Store:
 
 
 def _only_failed_ones_differ(store: Store, manifest: Manifest) -> bool:
-    """Whether the manifests differ in nothing but the texts of robots that failed."""
-    mine, theirs = store.manifest, manifest
-    if len(mine.robots) != len(theirs.robots):
+    """Whether the manifests differ only in the texts of robots that failed."""
+    own, theirs = store.manifest, manifest
+    if len(own.robots) != len(theirs.robots):
         return False
-    differ = [i for i, pair in enumerate(zip(mine.robots, theirs.robots, strict=True)) if pair[0] != pair[1]]
-    robots = [theirs.robots[i] if i in differ else robot for i, robot in enumerate(mine.robots)]
-    same = Manifest(tuple(robots), mine.samples, mine.seed, mine.provenance, mine.versions, mine.started)
+    differ = [i for i, pair in enumerate(zip(own.robots, theirs.robots, strict=True)) if pair[0] != pair[1]]
+    robots = [theirs.robots[i] if i in differ else robot for i, robot in enumerate(own.robots)]
+    same = Manifest(tuple(robots), own.samples, own.seed, own.provenance, own.versions, own.started)
     counts = store.counts()
     return (
         bool(differ)
         and not same.differences(theirs)
-        and all(counts[i][1] and mine.robots[i][0] == theirs.robots[i][0] for i in differ)
+        and all(counts[i][1] and own.robots[i][0] == theirs.robots[i][0] for i in differ)
     )
 
 
 @contextlib.contextmanager
 def _locked(folder: Path, shard: str | None) -> Iterator[None]:
-    """One at a time on the whole, or one on each part."""
+    """Lock the whole store, or one part of it."""
     with contextlib.ExitStack() as stack:
         whole = stack.enter_context(_lock_file(folder / _LOCK))
         _lock(whole, fcntl.LOCK_SH if shard else fcntl.LOCK_EX, folder)
@@ -320,7 +326,7 @@ def _locked(folder: Path, shard: str | None) -> Iterator[None]:
 
 
 def _lock_file(place: Path, how: int = os.O_RDWR | os.O_CREAT | os.O_APPEND) -> IO[bytes]:
-    """A lock's file, which is never another file: a link, a pipe or a device in its place is refused."""
+    """Open the file of a lock. Raise SourceError for a link, a pipe or a device in its place."""
     try:
         descriptor = os.open(place, how | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
     except OSError as error:
@@ -335,7 +341,7 @@ def _lock_file(place: Path, how: int = os.O_RDWR | os.O_CREAT | os.O_APPEND) -> 
 
 def _no_lock(place: Path, found: str) -> SourceError:
     return SourceError(
-        "the store's lock is no file of its own", where=str(place), found=found, remedy="delete it"
+        "the store's lock is not a regular file", where=str(place), found=found, remedy="delete it"
     )
 
 
@@ -343,12 +349,12 @@ def _lock(file: IO[bytes], how: int, folder: Path) -> None:
     for _ in range(_TRIES):
         if _try_lock(file, how):
             return
-        time.sleep(0.1)  # who only asks holds it for a moment
+        time.sleep(0.1)  # a process that only checks the lock holds it for a moment
     raise InputError(
-        "somebody else is at work on this store",
+        "another process uses this store",
         where=str(folder),
         found=_holder(file),
-        remedy="wait for it, end it, or name another folder",
+        remedy="wait for it, end it, or use another folder",
     )
 
 
@@ -366,4 +372,4 @@ def _holder(file: IO[bytes]) -> str:
         data = json.loads(file.read(1000))
         return f"process {int(data['process'])} on {data['host']}"
     except (OSError, ValueError, KeyError, TypeError):
-        return "a process that has not said which"
+        return "an unknown process"

@@ -1,4 +1,4 @@
-"""Where a validation's time goes: reading, urdfkin, Pinocchio, comparing."""
+"""Computing times of a validation: reading, urdfkin, the oracles, and comparison."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ _T = TypeVar("_T")
 
 @dataclass(slots=True)
 class Clock:
-    """Seconds by whose work they were; `compare` is what remains of the whole.
+    """Seconds of each part of a validation. `compare` is the remainder of the total.
 
     Attributes:
         read: Reading the file and building both models.
-        urdfkin: Computing with urdfkin.
-        pinocchio: Computing with Pinocchio.
-        second: Computing with a second witness.
+        urdfkin: Computation with urdfkin.
+        pinocchio: Computation with Pinocchio.
+        second: Computation with a second oracle.
         compare: Bounds and comparison.
     """
 
@@ -31,34 +31,34 @@ class Clock:
     second: float = 0.0
 
     def ours(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        """Call something of urdfkin's."""
-        with self._counted("urdfkin"):
+        """Call a function of urdfkin and add its time."""
+        with self._add_time("urdfkin"):
             return function(*args, **kwargs)
 
     def theirs(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        """Call something of Pinocchio's."""
-        with self._counted("pinocchio"):
+        """Call a function of Pinocchio and add its time."""
+        with self._add_time("pinocchio"):
             return function(*args, **kwargs)
 
     def witness(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        """Call something of a second witness's."""
-        with self._counted("second"):
+        """Call a function of the second oracle and add its time."""
+        with self._add_time("second"):
             return function(*args, **kwargs)
 
     @contextmanager
-    def _counted(self, whose: str) -> Iterator[None]:
+    def _add_time(self, part: str) -> Iterator[None]:
         begin = time.perf_counter()
         try:
             yield
         finally:
-            setattr(self, whose, getattr(self, whose) + (time.perf_counter() - begin))
+            setattr(self, part, getattr(self, part) + (time.perf_counter() - begin))
 
     def close(self, seconds: float) -> None:
-        """What the whole took."""
+        """Set `compare` to the remainder of the total seconds."""
         self.compare = max(0.0, seconds - self.read - self.urdfkin - self.pinocchio - self.second)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return plain data for JSON."""
         return {
             "read": round(self.read, 4),
             "urdfkin": round(self.urdfkin, 4),
@@ -68,5 +68,5 @@ class Clock:
 
 
 def total(clocks: Iterable[Clock]) -> Clock:
-    """The sum of several."""
+    """Return the sum of several clocks."""
     return Clock(*(sum(seconds) for seconds in zip(*map(astuple, clocks), strict=True)))

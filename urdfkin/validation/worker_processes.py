@@ -1,19 +1,12 @@
-"""A process of ours that answers chunks, and how it ended. It imports no more than that takes.
+"""Engine that runs chunks on processes of this machine. A crash of a process affects only its robot.
 
-A machine of a cluster has it imported beside its own work: what computes is imported in the process alone.
+A worker process runs one chunk after another. It ends with its parent process, however that ends. It is a new
+Python interpreter that does not import the parent's main module, so a script needs no `__main__` guard. It
+imports nothing from the current folder.
 
-
-A worker: a process that answers one chunk after another, and ends with its parent, however that ends.
-
-It is an interpreter of its own that runs nothing but this: not the parent's main module, so that a script
-needs no guard, and nothing from the current folder.
-
-
-Chunks on processes of this machine. A process that dies costs its robot and nothing else.
-
-One thread hands out chunks and takes answers; a worker has a robot of its own while there are any, and one
-chunk at a time, so that it is known over which robot it died. That robot is tried once more, alone and after
-all others; in isolation, where it was alone from the start, a death is its result at once.
+One thread distributes the chunks and receives the answers. Each worker has its own robot as long as robots
+are waiting, and one chunk at a time, so a crash can be assigned to a robot. That robot is tried once more,
+alone, after all others. With `isolate` it was alone from the start, and the crash is its result at once.
 """
 
 from __future__ import annotations
@@ -35,14 +28,14 @@ from urdfkin.validation.answer import Answer, Failure, answer
 from urdfkin.validation.chunk import Chunk
 from urdfkin.validation.engines import DIED, DIED_TWICE, Enter, Row, Task, Work, WorkQueue, died, lost
 
-#: The module whose `serve` a process runs.
+#: The module with the function `serve` that a process runs.
 WORKER = "urdfkin.validation.worker_processes"
-#: Seconds that lie at most between the end of a worker's pipe and its own.
+#: Maximum seconds between the end of a worker's pipe and the end of its process.
 _GRACE = 5.0
 
 
 class WorkerProcess:
-    """A process, and the connection to it: chunks go in, answers come out."""
+    """A worker process and the connection to it, which carries chunks and answers."""
 
     def __init__(self) -> None:
         self.connection, theirs = Pipe()
@@ -52,11 +45,11 @@ class WorkerProcess:
             self.connection.close()
             raise
         finally:
-            theirs.close()  # so that the end of the process is the end of the pipe
+            theirs.close()  # so that the pipe ends with the process
 
     @property
     def alive(self) -> bool:
-        """Whether it has not ended by itself."""
+        """Whether the process is running."""
         return self._process.poll() is None
 
     def end(self) -> None:
@@ -66,7 +59,7 @@ class WorkerProcess:
         self._process.wait()
 
     def cause(self) -> str:
-        """How the process ended, which is at its end: what it said is over."""
+        """Wait for a process that is ending, and return the cause."""
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(_GRACE)
         self.end()
@@ -74,16 +67,17 @@ class WorkerProcess:
 
 
 def _interpreter(pipe: int) -> subprocess.Popen[bytes]:
-    """An interpreter that imports what this one does, but nothing from the current folder or the main module.
+    """Start an interpreter with the packages of this one, without the current folder and the main module.
 
-    It leaves an interrupt by the terminal to this process, which keeps what is there: hence its own group.
+    It has its own process group, so that Ctrl-C in the terminal interrupts only this process. This process
+    saves the finished results.
     """
     command = own_python(f"from {WORKER} import serve; serve({pipe}, {os.getpid()})")
     return subprocess.Popen(command, stdin=subprocess.DEVNULL, pass_fds=[pipe], process_group=0)
 
 
 def _cause(status: int) -> str:
-    """What an exit status says: a signal's name, or the number.
+    """Return an exit status as text: the name of a signal, or the number.
 
     >>> _cause(-11), _cause(3)
     ('signal SIGSEGV', 'exit status 3')
@@ -105,7 +99,7 @@ def serve(pipe: int, parent: int) -> None:
 
     Args:
         pipe: Descriptor of the connection to the parent.
-        parent: Its process.
+        parent: Process id of the parent.
     """
     _end_with(parent)
     connection, chunks = Connection(pipe), SimpleQueue[Chunk]()
@@ -115,7 +109,7 @@ def serve(pipe: int, parent: int) -> None:
 
 
 def _receive(connection: Connection, chunks: SimpleQueue[Chunk]) -> None:
-    """Take chunks while another is computed, so that the end of the parent is noticed at once."""
+    """Receive chunks while another one runs, so that the end of the parent is detected at once."""
     try:
         while True:
             chunks.put(connection.recv())
@@ -124,7 +118,7 @@ def _receive(connection: Connection, chunks: SimpleQueue[Chunk]) -> None:
 
 
 def _end_with(parent: int) -> None:
-    """Have the kernel end this process with its parent, where it can: even compiled code that hangs."""
+    """End this process with its parent. On Linux the kernel does so, even if compiled code hangs."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
@@ -132,49 +126,50 @@ def _end_with(parent: int) -> None:
 
 
 class ProcessEngine:
-    """An engine of processes.
+    """Engine of local processes.
 
     Args:
-        jobs: How many at a time.
-        isolate: Whether each robot has a process of its own.
+        jobs: Maximum number of processes at a time.
+        isolate: Whether each robot has its own process.
     """
 
     def __init__(self, jobs: int, *, isolate: bool = False) -> None:
         self._jobs, self._isolate = jobs, isolate
 
     def run(self, work: Work, enter: Enter) -> None:
-        """Run the tasks; those of a robot over which a worker died, alone and last."""
+        """Run the tasks. If a robot crashed a worker, its remaining tasks run last and alone."""
         if self._isolate:
             _Crew(work, self._jobs, enter, alone=DIED).work()
             return
         crew = _Crew(work, self._jobs, enter)
         crew.work()
-        doubted = [sorted(tasks, key=lambda task: task.chunk.index) for tasks in crew.doubted.values()]
-        _Crew(doubted, 1, enter, alone=DIED_TWICE).work()
+        to_retry = [sorted(tasks, key=lambda task: task.chunk.index) for tasks in crew.to_retry.values()]
+        _Crew(to_retry, 1, enter, alone=DIED_TWICE).work()
 
 
 class _Crew:
-    """Workers at work.
+    """A group of worker processes.
 
     Args:
-        work: What to do.
-        jobs: How many workers.
-        enter: Takes the answers.
-        alone: None: workers help each other. Else a worker has one robot; what is said of its death.
+        work: The tasks of each robot.
+        jobs: Maximum number of workers.
+        enter: Callback that receives the answers.
+        alone: None: several workers may share a robot. Otherwise each worker has one robot, and `alone` is
+            the reason that is reported if it crashes.
     """
 
     def __init__(self, work: Work, jobs: int, enter: Enter, *, alone: str | None = None) -> None:
         self._jobs, self._enter, self._alone = jobs, enter, alone
-        self._deal = WorkQueue(work, shared=alone is None)
+        self._queue = WorkQueue(work, shared=alone is None)
         self._workers: list[_Worker] = []
-        #: What was not answered of each robot over which a worker died.
-        self.doubted: dict[int, list[Task]] = {}
+        #: The unanswered tasks of each robot that crashed a worker.
+        self.to_retry: dict[int, list[Task]] = {}
 
     def work(self) -> None:
-        """Until nothing waits and nobody is busy; whatever ends it ends the workers."""
+        """Run until no task is left. The workers are ended in every case."""
         try:
             while True:
-                self._hand_out()
+                self._assign_tasks()
                 busy = {w.connection: (w, w.task) for w in self._workers if w.task is not None}
                 if not busy:
                     return
@@ -184,21 +179,21 @@ class _Crew:
             for worker in self._workers:
                 worker.end()
 
-    def _hand_out(self) -> None:
+    def _assign_tasks(self) -> None:
         while True:
             worker = next((worker for worker in self._workers if worker.task is None), None)
             if worker is None and len(self._workers) >= self._jobs:
                 return
-            if (found := self._deal.first()) is None:
+            if (found := self._queue.first()) is None:
                 return
             task, row = found
             try:
                 worker = worker or self._start()
             except Exception as error:
-                if self._workers:  # there is no room for another: those that are there go on
-                    self._deal.put_back(task, row)
+                if self._workers:  # no further process can start: continue with the running ones
+                    self._queue.put_back(task, row)
                     return
-                self._answered(task, lost("no process could be started for it", error))
+                self._enter_answer(task, lost("no process could be started", error))
                 continue
             self._give(worker, task, row)
 
@@ -212,42 +207,42 @@ class _Crew:
         try:
             worker.connection.send(task.chunk)
         except OSError:
-            self._died(worker, task)
+            self._handle_crash(worker, task)
 
     def _take(self, worker: _Worker, task: Task) -> None:
         try:
             found: Answer = worker.connection.recv()
         except (EOFError, OSError):
-            self._died(worker, task)
+            self._handle_crash(worker, task)
             return
         except Exception as error:
             found = lost("its answer cannot be read", error)
-        self._answered(task, found)
+        self._enter_answer(task, found)
         worker.task = None
-        if (follower := self._deal.next(worker.row)) is not None:
-            self._give(worker, follower, worker.row)
+        if (next_task := self._queue.next(worker.row)) is not None:
+            self._give(worker, next_task, worker.row)
         elif self._alone:
             self._workers.remove(worker)
             worker.end()
 
-    def _answered(self, task: Task, found: Answer) -> None:
+    def _enter_answer(self, task: Task, found: Answer) -> None:
         if isinstance(found, Failure):
-            self._deal.end(task.robot)
-            self.doubted.pop(task.robot, None)
+            self._queue.end(task.robot)
+            self.to_retry.pop(task.robot, None)
         self._enter(task, found)
 
-    def _died(self, worker: _Worker, task: Task) -> None:
-        """What is in doubt is tried again later."""
+    def _handle_crash(self, worker: _Worker, task: Task) -> None:
+        """Handle a crash: schedule the robot's tasks for a second try, or report the crash."""
         self._workers.remove(worker)
         cause = worker.cause()
         if self._alone is None:
-            self.doubted.setdefault(task.robot, []).extend([task, *self._deal.withdraw(task.robot)])
+            self.to_retry.setdefault(task.robot, []).extend([task, *self._queue.withdraw(task.robot)])
         else:
-            self._answered(task, died(task.chunk.subject, self._alone, cause))
+            self._enter_answer(task, died(task.chunk.subject, self._alone, cause))
 
 
 class _Worker(WorkerProcess):
-    """A process, the task that it is at work on, and the robot that this is of."""
+    """A worker process with its current task, and the row of tasks of its robot."""
 
     def __init__(self) -> None:
         super().__init__()
