@@ -119,7 +119,7 @@ def test_compare_exits_1_on_a_regression_and_0_the_other_way(good: Path, bad: Pa
         (("validate", "ur5", "--html", "/nowhere/a.html"), "/nowhere/a.html: cannot be written"),
         (("plot", "ur5", "-o", "a.svg"), "--to VALUES"),
         (("plot", "ur5", "--to", "neutral", "-o", "/nowhere/a.svg"), "cannot be written"),
-        (("plot", "ur5", "--to", "neutral", "-o", "a.bmp"), "unknown kind of picture"),
+        (("plot", "ur5", "--to", "neutral", "-o", "a.bmp"), "unknown picture format"),
         (("plot", "ur5", "--to", "random:3", "-o", "a.svg"), "--from and --to need one configuration each"),
     ],
 )
