@@ -1,7 +1,7 @@
-"""Write docs/conventions.md: what urdfkin, Pinocchio and MuJoCo call by the same name, found by asking them.
+"""Write docs/conventions.md: the conventions of urdfkin, Pinocchio and MuJoCo, measured from their results.
 
-Nothing here is remembered. Each row puts several readings of a number beside what a library hands out, on a
-robot and a motion drawn at random, and names the one that it is; a test holds the page to it.
+Each row compares a library's result with several interpretations, for a random robot and motion, and names
+the interpretation that fits. A test checks that the page is current.
 
     python scripts/make_conventions.py
 """
@@ -38,7 +38,7 @@ def _joint(name: str, kind: str, parent: str, child: str, more: str = "") -> str
 
 
 def _robot(*joints: str) -> str:
-    """Links `base`, `l1`, `l2`, ...; MuJoCo keeps each apart, and gives none of them weight."""
+    """Return a robot with links `base`, `l1`, `l2`, ...; MuJoCo keeps them separate and adds no mass."""
     links = "".join(f'<link name="{name}">{_BODY}</link>' for name in ("base", *(f"l{i}" for i in (1, 2, 3))))
     compiler = '<mujoco><compiler fusestatic="false"/></mujoco>'
     return f'<robot name="r">{compiler}{links}{"".join(joints)}</robot>'
@@ -48,13 +48,13 @@ def _axis(xyz: str) -> str:
     return f'<axis xyz="{xyz}"/>'
 
 
-#: An arm whose joints stand in the file against the alphabet.
+#: An arm with joints in reverse alphabetical order in the file.
 ARM = _robot(
     _joint("c", "revolute", "base", "l1", _axis("0 0 1")),
     _joint("b", "revolute", "l1", "l2", _axis("0 1 0")),
     _joint("a", "revolute", "l2", "l3", _axis("0.6 0 0.8")),
 )
-#: Two limbs on one base, and another on the first: whose coordinates come first?
+#: Two limbs on one base, and a third on the first limb: tests the order of coordinates.
 LIMBS = _robot(
     _joint("z", "revolute", "base", "l1"),
     _joint("a", "revolute", "base", "l2"),
@@ -68,16 +68,16 @@ FOLLOWS = _robot(
     _joint("b", "revolute", "l1", "l2", '<mimic joint="a" multiplier="0.5" offset="0.1"/>'),
     _joint("c", "revolute", "l2", "l3"),
 )
-#: Two kinds of joint, one behind the other.
+#: Two joints of different kinds in a chain.
 UNLIKE = _robot(
     _joint("a", "revolute", "base", "l1"),
     _joint("b", "continuous", "l1", "l2", '<mimic joint="a"/>'),
     _joint("c", "revolute", "l2", "l3"),
 )
 LIBRARIES = ("urdfkin", "pinocchio", "mujoco")
-#: What kinematics does not need.
+#: Links with an unusual mass, which kinematics does not need.
 LIGHT, NEGATIVE = ARM.replace(_BODY, ""), ARM.replace('value="1"', 'value="-1"')
-#: For MuJoCo a free joint stands on the world.
+#: In MuJoCo a free joint must be a child of the world.
 FREE = (
     '<mujoco><worldbody><body name="l1" pos="0 0 0"><freejoint name="f"/>'
     '<inertial pos="0.1 0.2 0.3" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>'
@@ -104,10 +104,10 @@ Readings = Mapping[str, FloatArray]
 
 
 def which(found: FloatArray, readings: Readings) -> str:
-    """The reading that a number is; all others have to be clearly something else.
+    """Return the name of the interpretation that fits; all others must differ clearly.
 
     Raises:
-        ValueError: none is, or more than one.
+        ValueError: no interpretation fits, or more than one.
     """
     named = [
         name for name, x in readings.items() if found.shape == x.shape and np.allclose(found, x, 1e-6, 1e-6)
@@ -119,7 +119,7 @@ def which(found: FloatArray, readings: Readings) -> str:
 
 @dataclass(frozen=True)
 class Row:
-    """A question, and what each library's own call answers."""
+    """A question, and the answer of each library."""
 
     question: str
     urdfkin: str
@@ -127,11 +127,11 @@ class Row:
     mujoco: str
 
 
-class Asked:
-    """One motion of one robot, by each library's own calls, and by difference quotients."""
+class MeasuredMotion:
+    """One motion of one robot, computed by each library and by difference quotients."""
 
     def __init__(self, seed: int = 0) -> None:
-        import mujoco  # noqa: PLC0415  everything here needs it, and nothing else does
+        import mujoco  # noqa: PLC0415  only this class needs it
         import pinocchio as pin  # noqa: PLC0415
 
         self.mj, self.pin, rng = mujoco, pin, np.random.default_rng(seed)
@@ -152,14 +152,14 @@ class Asked:
         mujoco.mj_rnePostConstraint(self.mj_model, self.mj_data)
         self.body = self.mj_model.body("l3").id
 
-    # What a number might be, from placements at times around 0 alone: no library's word is taken.
+    # Interpretations of a number, from placements at times around 0, without any library's velocities.
 
     def path(self, t: float) -> FloatArray:
-        """T_world_frame at a time, q(t) = q + v t + a t^2 / 2."""
+        """Return T_world_frame at time t, with q(t) = q + v t + a t^2 / 2."""
         return self.robot.placement(self.q + self.v * t + self.a * t * t / 2.0, "l3")
 
     def motion(self) -> tuple[FloatArray, ...]:
-        """R, p, velocity, w, acceleration and alpha of the frame's origin, in world axes."""
+        """Return R, p, velocity, w, acceleration and alpha of the frame's origin, in world axes."""
         h = 1e-3
         ps = {i: self.path(i * h)[:3, 3] for i in (-2, -1, 0, 1, 2)}
         Rs = {i: self.path(i * h)[:3, :3] for i in (-2, -1, 0, 1, 2)}
@@ -177,7 +177,7 @@ class Asked:
         return R, ps[0], first(ps), axial(R_rate @ R.T), second(ps), axial(second(Rs) @ R.T)
 
     def velocity_readings(self) -> dict[str, FloatArray]:
-        """Orders of halves, axes and points of a velocity."""
+        """Return interpretations of a velocity: order of the halves, axes and point."""
         R, p, v, w, _, _ = self.motion()
         points = {
             "of the frame's origin, in world axes": (v, w),
@@ -191,7 +191,7 @@ class Asked:
         return found
 
     def acceleration_readings(self, *, flipped: bool) -> dict[str, FloatArray]:
-        """Classical and spatial accelerations, with gravity and without, in world axes."""
+        """Return classical and spatial accelerations, with and without gravity, in world axes."""
         _, _, v, w, a, alpha = self.motion()
         up = np.array([0.0, 0.0, 9.81])
         linear = {
@@ -203,31 +203,31 @@ class Asked:
         return {name: np.concatenate((alpha, x) if flipped else (x, alpha)) for name, x in linear.items()}
 
     def pinocchios_jacobian(self) -> FloatArray:
-        """(6, 3) in LOCAL_WORLD_ALIGNED."""
+        """Return Pinocchio's Jacobian (6, 3) in LOCAL_WORLD_ALIGNED."""
         aligned = self.pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         J: FloatArray = self.pin.getFrameJacobian(self.model, self.data, self.frame, aligned)
         return J
 
     def mj_columns(self) -> FloatArray:
-        """(6, 3) `jacp` above `jacr`, at the body's origin."""
+        """Return MuJoCo's Jacobian (6, 3), `jacp` above `jacr`, at the body's origin."""
         linear, angular = np.zeros((3, 3)), np.zeros((3, 3))
         self.mj.mj_jac(self.mj_model, self.mj_data, linear, angular, self.mj_data.xpos[self.body], self.body)
         return np.vstack((linear, angular))
 
     def mujocos(self, function: Callable[..., None], local: int) -> FloatArray:
-        """(6,) as MuJoCo hands it out."""
+        """Return a six-vector (6,) as MuJoCo returns it."""
         six = np.empty(6)
         function(self.mj_model, self.mj_data, self.mj.mjtObj.mjOBJ_XBODY, self.body, six, local)
         return six
 
 
 def rows() -> list[Row]:
-    """Every question, asked."""
+    """Return the rows of all questions."""
     return [*_six_vectors(), *_accelerations(), *_layout(), *_free()]
 
 
 def _six_vectors() -> list[Row]:
-    asked = Asked()
+    asked = MeasuredMotion()
     pin, R = asked.pin, asked.pin.ReferenceFrame
     readings = asked.velocity_readings()
     found = [
@@ -264,8 +264,8 @@ def _six_vectors() -> list[Row]:
     ]
 
 
-def _about(asked: Asked) -> dict[str, FloatArray]:
-    """A velocity about other points than the frame's."""
+def _about(asked: MeasuredMotion) -> dict[str, FloatArray]:
+    """Return velocities at other points than the frame's origin."""
     _, p, v, w, _, _ = asked.motion()
     com = asked.mj_data.subtree_com[asked.mj_model.body_rootid[asked.body]]
     return {
@@ -277,7 +277,7 @@ def _about(asked: Asked) -> dict[str, FloatArray]:
 
 
 def _accelerations() -> list[Row]:
-    asked = Asked()
+    asked = MeasuredMotion()
     pin, aligned = asked.pin, asked.pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
     readings, flipped = asked.acceleration_readings(flipped=False), asked.acceleration_readings(flipped=True)
     frame = asked.model, asked.data, asked.frame, aligned
@@ -349,7 +349,7 @@ def _layout() -> list[Row]:
 
 
 def _reads(text: str) -> Callable[[str], str]:
-    """Whether each library takes a text."""
+    """Return a function that reports whether a library accepts the text."""
     import mujoco  # noqa: PLC0415
     import pinocchio as pin  # noqa: PLC0415
 
@@ -377,7 +377,7 @@ def _reads(text: str) -> Callable[[str], str]:
 
 
 def _free() -> list[Row]:
-    """A body that moves freely: which number is what, and in whose axes its rates are."""
+    """Return the rows of a free body: the layout of q, and the axes of its velocity."""
     import mujoco  # noqa: PLC0415
     import pinocchio as pin  # noqa: PLC0415
 

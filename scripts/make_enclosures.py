@@ -1,4 +1,4 @@
-"""Write docs/enclosures.md: what `Robot.enclose` proves, and how wide its intervals are."""
+"""Write docs/enclosures.md: the proof by `Robot.enclose`, and the widths of its intervals."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from urdfkin.verify.exact.enclosure import Enclosure, Enclosures
 from urdfkin.verify.pinocchio_module import version
 
 PAGE = Path(__file__).parents[1] / "docs" / "enclosures.md"
-#: Arms, a hand with followers, humanoids, a quadruped, a hobby arm.
+#: Arms, a hand with mimic joints, humanoids, a quadruped, a hobby arm.
 ROBOTS = ("panda", "ur5", "xarm7", "allegro_left_hand", "talos", "icub", "anymal", "so100")
 SAMPLES = 5
 LENGTHS = (3, 10, 30, 100)
@@ -77,7 +77,7 @@ One sample at a time: a batch is refused. What is beyond the range of doubles en
 
 
 def main() -> None:
-    """Measure and write."""
+    """Measure the widths and write the page."""
     robot = urdfkin.load("panda")
     example = robot.enclose(robot.sample(1, seed=0)[0], [0.1] * 8, [0.2] * 8, "panda_hand")
     PAGE.write_text(
@@ -116,12 +116,12 @@ def _parts(proof: Enclosures) -> tuple[Enclosure, ...]:
 
 
 def _larger_end(part: Enclosure) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    """Of the quantity's largest number: a small one is a difference of larger ones."""
+    """Return the larger end for the largest number; small numbers are differences of larger ones."""
     return np.full_like(part.lower, np.maximum(np.abs(part.lower), np.abs(part.upper)).max(initial=1e-300))
 
 
 def _inside(parts: list[Enclosure], side: str) -> str:
-    """The share of numbers inside, of those that are not the same for every q."""
+    """Return the percentage of numbers inside, among those that depend on q."""
     found = [part.contains(getattr(part, side))[part.width > 0.0] for part in parts]
     return f"{np.concatenate(found).mean():.0%}"
 
@@ -141,7 +141,7 @@ def _chains() -> str:
 
 
 def _askew(length: int) -> str:
-    """A chain of continuous joints, nothing along a coordinate axis."""
+    """Return a URDF of a chain of continuous joints, without axes along coordinate axes."""
     joints = "".join(
         f'<link name="l{i + 1}"/><joint name="j{i}" type="continuous"><parent link="l{i}"/>'
         f'<child link="l{i + 1}"/><origin xyz="0.1 0.2 0.3" rpy="1.5708 0.3 -0.2"/>'

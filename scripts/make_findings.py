@@ -1,7 +1,7 @@
-"""Write docs/findings.md: every code, and what the robots of the catalogue are told.
+"""Write docs/findings.md: all codes, and the findings of the catalogue's robots.
 
-Run it after a code or a robot has changed: `python scripts/make_findings.py`. A test holds the page against
-what this script would write.
+Run it after a change of a code or a robot: `python scripts/make_findings.py`. A test checks that the page
+is current.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ FAMILIES = {
     "7": "Inertials, geometry and materials",
 }
 
-#: Code -> what the warning means for the robots that have it, in a few words.
+#: Code -> short meaning of the warning for the robots that have it.
 REMARKS = {
     "URDF207": "A link has no origin of its own; the pose is lost, as it is for every reader.",
     "URDF405": "A slash in a name is legal; urdfkin never uses names as paths.",
@@ -82,7 +82,7 @@ the warnings; robots that are not listed have none. Notes, such as rounded multi
 
 
 def page() -> str:
-    """The page as it should be."""
+    """Return the current text of the page."""
     head = HEAD.format(limits=DEFAULT_LIMITS, written=WRITTEN_OUT)
     return head + "".join(_tables()) + "\n" + ROBOTS + "".join(_robots())
 
@@ -106,12 +106,12 @@ def _robots() -> Iterator[str]:
 
 
 def warnings_of(robot: str) -> list[Finding]:
-    """The warnings and errors of a robot of the catalogue."""
+    """Return the warnings and errors of a robot of the catalogue."""
     return [finding for finding in check(robot, fold=True) if finding.severity is not Severity.NOTE]
 
 
 def _cell(text: str) -> str:
-    """Text that cannot break out of a table's cell."""
+    """Escape text for a cell of a table."""
     return shortened(text, 200).replace("|", "\\|").replace("<", "&lt;").replace("*", "\\*")
 
 

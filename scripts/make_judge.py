@@ -1,4 +1,4 @@
-"""Write docs/judge.md: the true errors of urdfkin and of Pinocchio on eleven robots of different kinds."""
+"""Write docs/judge.md: the true errors of urdfkin and Pinocchio on eleven robots of different kinds."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from urdfkin.verify.pinocchio_module import version
 from urdfkin.verify.sampling import draw_base
 
 PAGE = Path(__file__).parents[1] / "docs" / "judge.md"
-#: Name, and what kind of robot it is.
+#: Name -> kind of robot.
 ROBOTS = {
     "panda": "arm of seven joints, a gripper with a follower",
     "ur5": "arm with six-digit angles",
@@ -29,14 +29,14 @@ ROBOTS = {
     "so100": "hobby arm, axes askew",
     "polar": "the text's polar robot",
 }
-#: Those that are judged on a moving base as well.
+#: Robots whose errors are also measured on a moving base.
 MOVING = ("talos", "anymal", "ur5")
 SAMPLES = 10
 SEED = 0
 
 
 def main() -> None:
-    """Judge and write."""
+    """Run the accuracy study and write the page."""
     judgements = {
         f"{name}: {kind}": judge(urdfkin.load(name), samples=SAMPLES, seed=SEED)
         for name, kind in ROBOTS.items()
@@ -51,7 +51,7 @@ def main() -> None:
 
 
 def page(judgements: dict[str, Judgement]) -> str:
-    """The page's text."""
+    """Return the text of the page."""
     lines = [line for judgement in judgements.values() for line in judgement.as_dict()["lines"]]
     ratios = [line["urdfkin"]["typical"] / line["pinocchio"]["typical"] for line in lines]
     parts = [

@@ -1,7 +1,6 @@
-"""Write the layout of the JSON document into docs/reports.md, from its schema.
+"""Write the layout of the JSON report into docs/reports.md, from its schema.
 
-Run it after the schema has changed: `python scripts/make_reports.py`. A test holds the page against what
-this script would write.
+Run it after a change of the schema: `python scripts/make_reports.py`. A test checks that the page is current.
 """
 
 from __future__ import annotations
@@ -13,12 +12,12 @@ from typing import Any
 from urdfkin.report.document import schema
 
 PAGE = Path(__file__).parents[1] / "docs" / "reports.md"
-#: What stands after this line is written by this script.
+#: The script writes the text after this line.
 MARK = "<!-- written by scripts/make_reports.py from the schema -->\n"
 
 
 def page() -> str:
-    """The page as it should be."""
+    """Return the current text of the page."""
     return PAGE.read_text("utf-8").partition(MARK)[0] + MARK + "".join(_tables())
 
 
@@ -37,7 +36,7 @@ def _table(title: str, part: dict[str, Any]) -> Iterator[str]:
 
 
 def _type(entry: dict[str, Any]) -> str:
-    """A type in words: `number or null`, `list of check`, one of some words."""
+    """Return a type as text: `number or null`, `list of check`, or the allowed words."""
     if "$ref" in entry:
         return _named(entry["$ref"])
     if "oneOf" in entry:

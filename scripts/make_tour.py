@@ -53,7 +53,7 @@ STYLE: Any = {
 
 
 def arrow(axes: Any, start: FloatArray, vector: FloatArray, color: str, label: str | None = None) -> None:
-    """An arrow in the plane, in data units."""
+    """Draw an arrow in the plane, in data units."""
     axes.quiver(
         *start,
         *vector,
@@ -68,7 +68,7 @@ def arrow(axes: Any, start: FloatArray, vector: FloatArray, color: str, label: s
 
 
 def plane(axes: Any, title: str) -> None:
-    """Equal scales, a quiet grid, metres."""
+    """Set equal scales in metres and a light grid."""
     axes.set_aspect("equal")
     axes.grid(color="#e6eaee", linewidth=0.8)
     axes.set_axisbelow(True)
@@ -78,7 +78,7 @@ def plane(axes: Any, title: str) -> None:
 
 
 def one_link(figure: Any) -> None:
-    """Figure 7.1: a link that turns, and its endpoint's velocity."""
+    """Draw figure 7.1: a rotating link and the velocity of its endpoint."""
     axes = figure.subplots()
     a1, rate = 0.8, 1.2
     circle = link_endpoint(np.linspace(0, 2 * np.pi, 200), a1)
@@ -93,7 +93,7 @@ def one_link(figure: Any) -> None:
 
 
 def velocity_field(figure: Any) -> None:
-    """The field w x p of a turning body, in a plane that is not perpendicular to the axis."""
+    """Draw the velocity field w x p of a rotating body, in a plane that is not perpendicular to the axis."""
     axes = figure.add_subplot(projection="3d")
     k = np.array([1.0, 0.4, 2.0]) / np.linalg.norm([1.0, 0.4, 2.0])
     x, y = np.meshgrid(np.linspace(-1, 1, 7), np.linspace(-1, 1, 7))
@@ -119,19 +119,19 @@ def velocity_field(figure: Any) -> None:
 
 
 def draw_frame(axes: Any, R: FloatArray, size: float, names: str) -> None:
-    """Three axes in red, green and blue."""
+    """Draw three axes in red, green and blue."""
     for i, color in enumerate(AXES):
         axes.quiver(0, 0, 0, *(size * R[:, i]), color=color, arrow_length_ratio=0.12, linewidth=2.2)
         axes.text(*(1.16 * size * R[:, i]), f"{names}{'xyz'[i]}", color=color, ha="center", va="center")
 
 
 def turning(first: int, second: int) -> Callable[[float], FloatArray]:
-    """A quarter turn a second, about one axis of frame 0 and then about another."""
+    """Return w(t) of a quarter turn each second, about one axis of frame 0 and then about another."""
     return lambda t: np.pi / 2 * np.eye(3)[first if t < 1.0 else second]
 
 
 def integral_of_w(figure: Any) -> None:
-    """Example 7.3 and figure 7.9: the same integral of w, two orientations."""
+    """Draw example 7.3 and figure 7.9: the same integral of w gives two orientations."""
     cases = (("case 1: about x0, then about y0", (0, 1)), ("case 2: about y0, then about x0", (1, 0)))
     for row, (title, order) in enumerate(cases):
         quats = integrate_orientation(turning(*order), [0.0, 0.0, 0.0, 1.0], np.linspace(0.0, 2.0, 201))
@@ -152,7 +152,7 @@ def integral_of_w(figure: Any) -> None:
 
 
 def euler_singularity(figure: Any) -> None:
-    """The condition number of Omega over the middle angle, ZYZ and roll-pitch-yaw."""
+    """Draw the condition number of Omega over the middle angle, for ZYZ and roll-pitch-yaw."""
     axes = figure.subplots()
     middle = np.linspace(0.0, np.pi, 1801)[1:-1]
     for name, color, label in (("ZYZ", BLUE, "ZYZ"), ("xyz", ORANGE, "roll, pitch, yaw")):
@@ -175,7 +175,7 @@ def euler_singularity(figure: Any) -> None:
 
 
 def convergence(figure: Any) -> None:
-    """The error of quaternion integration over the step."""
+    """Draw the error of quaternion integration over the step size."""
 
     def angles(t: float) -> FloatArray:
         return np.array([0.3 * t, 1.0 + 0.4 * np.sin(2.0 * t), t * t])
@@ -203,7 +203,7 @@ def convergence(figure: Any) -> None:
 
 
 def acceleration_parts(figure: Any) -> None:
-    """7.125: a point that slides on a turning arm, and the parts of its acceleration."""
+    """Draw 7.125: a point that slides on a rotating arm, and the parts of its acceleration."""
     axes = figure.subplots()
     theta, w, alpha = 0.5, 1.4, 1.8
     z = np.array([0.0, 0.0, 1.0])
@@ -228,7 +228,7 @@ def acceleration_parts(figure: Any) -> None:
 
 
 def two_link(figure: Any) -> None:
-    """The planar two-link manipulator along a line, with its velocity ellipses (7.90)."""
+    """Draw the planar two-link manipulator along a line, with its velocity ellipses (7.90)."""
     axes = figure.subplots()
     robot = urdfkin.load("planar_two_link")
     poses = np.array([[0.15, 0.35], [0.5, 1.0], [0.75, 1.7], [0.9, 2.5]])
@@ -245,7 +245,7 @@ def two_link(figure: Any) -> None:
 
 
 def breakdown(figure: Any) -> None:
-    """The elbow robot's wrist acceleration by joint and kind."""
+    """Draw the wrist acceleration of the elbow robot, split by joint and term."""
     robot = urdfkin.load("elbow")
     q, v, a = (
         [0.4, 0.5, 0.7, 0.3, 0.6, 0.2],
@@ -271,7 +271,7 @@ def breakdown(figure: Any) -> None:
         panel.set_xlabel("joint")
     axes[0].set_ylabel("linear acceleration [m/s^2]")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
-    figure.suptitle("7.130, taken apart: whose doing the tool's acceleration is", fontsize=11)
+    figure.suptitle("7.130: the tool's acceleration, split by joint and term", fontsize=11)
 
 
 PICTURES: dict[str, tuple[Callable[[Any], None], tuple[float, float]]] = {
@@ -287,7 +287,7 @@ PICTURES: dict[str, tuple[Callable[[Any], None], tuple[float, float]]] = {
 
 
 def main(folder: Path = IMAGES) -> None:
-    """Draw every picture."""
+    """Draw all pictures."""
     folder.mkdir(parents=True, exist_ok=True)
     with mpl.rc_context(STYLE):
         for name, (draw, size) in PICTURES.items():
