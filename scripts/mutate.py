@@ -63,7 +63,7 @@ class Mutant:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The result of a mutant: `noticed` (with the failed test), `survived`, `too slow`, `argued` (harmless)."""
+    """The result of a mutant: `noticed` by a test, `survived`, `too slow`, or `argued` (harmless)."""
 
     mutant: Mutant
     word: str
