@@ -56,14 +56,14 @@ class Subject:
     frames: tuple[str, ...]
 
     @classmethod
-    def of(cls, name: str, kept: Arrays | None = None) -> Subject:
+    def of(cls, name: str, stored: Arrays | None = None) -> Subject:
         """Make a subject with the inputs and frames of a file, or with new ones."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # warnings about the file do not matter here
             robot = urdfkin.load(name, mimic=catalogue()[name].mimic, verify=False)
-        if kept is not None:
-            inputs = tuple(kept[f"{name}/{x}"] for x in "qva")
-            return cls(name, robot, inputs, tuple(kept[f"{name}/frames"].tolist()))
+        if stored is not None:
+            inputs = tuple(stored[f"{name}/{x}"] for x in "qva")
+            return cls(name, robot, inputs, tuple(stored[f"{name}/frames"].tolist()))
         n = max(LENGTHS)
         v, a = np.random.default_rng(0).standard_normal((2, n, robot.nv))
         links = [f"link:{robot.link_names[i]}" for i in spread(len(robot.link_names))]
@@ -146,18 +146,20 @@ def differing_in_one_pass(subject: Subject, now: Arrays) -> Iterator[str]:
 
 def to_keep(subject: Subject) -> dict[str, Any]:
     """Return the inputs, the frames, and each result with its bound."""
-    kept: dict[str, Any] = {
+    stored: dict[str, Any] = {
         f"{subject.name}/{x}": array for x, array in zip("qva", subject.inputs, strict=True)
     }
-    kept[f"{subject.name}/frames"] = np.array(subject.frames)
+    stored[f"{subject.name}/frames"] = np.array(subject.frames)
     for what, quantity, reference, inputs in subject.results():
         few = [x[:KEPT] for x in inputs]
         parts = [computed(subject, quantity, reference, frame, few) for frame in subject.frames]
-        kept[what] = results = np.stack(parts, axis=1)
+        stored[what] = results = np.stack(parts, axis=1)
         call = Call(subject.robot.tree, subject.robot.plan, subject.frames, reference, None, few)
         bound = bound_of(quantity, call.part(slice(0, KEPT)))
-        kept[f"{what}/bound"] = np.broadcast_to(EPS * bound.k * bound.scale, results.shape).astype(np.float32)
-    return kept
+        stored[f"{what}/bound"] = np.broadcast_to(EPS * bound.k * bound.scale, results.shape).astype(
+            np.float32
+        )
+    return stored
 
 
 def digest(now: Arrays) -> str:
@@ -169,20 +171,20 @@ def digest(now: Arrays) -> str:
     return whole.hexdigest()[:16]
 
 
-def share(what: str, now: Arrays, kept: Arrays) -> float:
+def share(what: str, now: Arrays, stored: Arrays) -> float:
     """Return the difference from the stored result as a fraction of the stored bound; 0 for equal bits."""
-    if same(now[what], kept[what]):
+    if same(now[what], stored[what]):
         return 0.0
-    apart = np.abs(now[what] - kept[what])
+    apart = np.abs(now[what] - stored[what])
     with np.errstate(divide="ignore", invalid="ignore"):
-        shares = np.where(apart == 0.0, 0.0, apart / kept[f"{what}/bound"])
+        shares = np.where(apart == 0.0, 0.0, apart / stored[f"{what}/bound"])
     # Different bits without a difference: zeros of different signs.
     return float(np.nan_to_num(shares, nan=np.inf, posinf=np.inf).max()) or sys.float_info.min
 
 
-def compared(name: str, now: Arrays, kept: Arrays) -> tuple[str, float]:
+def compared(name: str, now: Arrays, stored: Arrays) -> tuple[str, float]:
     """Compare a robot's results with the stored ones; return a line and the largest fraction."""
-    shares = {what: share(what, now, kept) for what in now if what.count("/") == 2}
+    shares = {what: share(what, now, stored) for what in now if what.count("/") == 2}
     others = {what: x for what, x in shares.items() if x}
     if not others:
         return "equal", 0.0

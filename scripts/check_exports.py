@@ -85,10 +85,10 @@ def found_of(robot: Robot, frame: str) -> dict[str, Any]:
 
 def check(tips: bool, keep: Path | None) -> int:
     """Check every leaf or tip that has no stored result."""
-    kept = {(line["robot"], line["frame"]) for line in lines_of(keep)}
+    stored = {(line["robot"], line["frame"]) for line in lines_of(keep)}
     here: list[dict[str, Any]] = []
     for name, robot, frame in subjects(tips):
-        if (name, frame) in kept:
+        if (name, frame) in stored:
             continue
         here.append({"robot": name, "frame": frame, **found_of(robot, frame)})
         line = json.dumps(here[-1])

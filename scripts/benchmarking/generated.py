@@ -66,7 +66,7 @@ def columns(
 def acceleration(
     plan: CompiledTree, x: Any, sines: Any, cosines: Any, v: Any, a: Any, eq: Any = equations
 ) -> tuple[Any, Any]:
-    """Compute 7.127 to 7.130 in each link's own axes, like urdfkin; return (linear, angular) in world axes."""
+    """Compute 7.127 to 7.130 in each link's axes, like urdfkin; return (linear, angular) in world axes."""
     R, w, alpha, acc = np.eye(3).tolist(), [0.0] * 3, [0.0] * 3, [0.0] * 3
 
     def turned(S: Any) -> tuple[Any, ...]:

@@ -96,14 +96,14 @@ def _together(
     a: FloatArray,
 ) -> Iterator[tuple[str, FloatArray]]:
     """Yield each quantity of all frames in a batch, of one frame in that batch, and of one configuration."""
-    kept = dict[str, FloatArray]()
+    results = dict[str, FloatArray]()
     if reference is Reference.LOCAL_WORLD_ALIGNED:
-        kept["placement"] = robot.placement(q, frames, base=base)
-    kept["velocity"] = robot.velocity(q, v, frames, reference, base=base)
-    kept["jacobian"] = robot.jacobian(q, frames, reference, base=base)
-    kept["hessian"] = robot.hessian(q, frames, reference, base=base)
-    kept["acceleration"] = robot.acceleration(q, v, a, frames, reference, base=base)
-    yield from kept.items()
+        results["placement"] = robot.placement(q, frames, base=base)
+    results["velocity"] = robot.velocity(q, v, frames, reference, base=base)
+    results["jacobian"] = robot.jacobian(q, frames, reference, base=base)
+    results["hessian"] = robot.hessian(q, frames, reference, base=base)
+    results["acceleration"] = robot.acceleration(q, v, a, frames, reference, base=base)
+    yield from results.items()
     inputs: dict[str, tuple[FloatArray, ...]] = {
         "placement": (q,),
         "velocity": (q, v),
@@ -112,7 +112,7 @@ def _together(
         "acceleration": (q, v, a),
     }
     for frame in alone:
-        for name, every in kept.items():
+        for name, every in results.items():
             compute: Callable[..., FloatArray] = getattr(robot, name)
             words = () if name == "placement" else (reference,)
             batch = compute(*inputs[name], frame, *words, base=base)

@@ -115,7 +115,7 @@ KINDS: dict[str, Kind] = {
     "one long value": lambda n: _robot(f'<link name="l"/><material file="{"a" * n}"/>'),
     "openings of expressions": lambda n: _robot(f'<link name="l"/><material file="{"${" * (n // 2)}"/>'),
     "references in a value": lambda n: _robot(f'<link name="l"/><material file="{"&amp;" * (n // 5)}"/>'),
-    # what stands between
+    # content between elements
     "text": lambda n: _robot('<link name="l"/>' + "words " * (n // 6)),
     "lines": lambda n: _robot('<link name="l"/>' + "\n" * n),
     "lines, then a broken tag": lambda n: _robot('<link name="l"/>' + "\n" * n + "<"),

@@ -32,7 +32,14 @@ _RANDOM_SAMPLES = 1
 
 def forms(*names: str) -> Callable[[_F], _F]:
     """Make the option --format; the first format is the default."""
-    return click.option("--format", "format_", type=click.Choice(names), default=names[0], show_default=True)
+    return click.option(
+        "--format",
+        "format_",
+        type=click.Choice(names),
+        default=names[0],
+        show_default=True,
+        help="Output format.",
+    )
 
 
 def together(*decorators: Callable[[_F], _F]) -> Callable[[_F], _F]:

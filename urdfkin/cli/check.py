@@ -206,9 +206,25 @@ settings_options = together(
         help="File with the settings, in [tool.urdfkin].  [default: nearest pyproject.toml]",
     ),
 )  # fmt: skip
+#: Field of `Limits` -> help of its option.
+_MOST = {
+    "bytes": "Largest size of a file in bytes.",
+    "depth": "Largest nesting depth of elements.",
+    "elements": "Largest number of elements.",
+    "attributes": "Largest number of attributes of an element.",
+    "name": "Most characters of a name.",
+    "number": "Most characters of a number.",
+    "markup": "Most bytes of a tag, comment or instruction.",
+}
 limit_options = together(
     *(
-        click.option(f"--max-{limit.name}", type=Whole(1), default=limit.default, show_default=True)
+        click.option(
+            f"--max-{limit.name}",
+            type=Whole(1),
+            default=limit.default,
+            show_default=True,
+            help=_MOST[limit.name],
+        )
         for limit in fields(Limits)
     )
 )

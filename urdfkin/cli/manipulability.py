@@ -67,7 +67,7 @@ def command(
 
     Each value has a guaranteed lower and upper bound. The bounds include the error of the Jacobian and the
     rounding of the decomposition. Manipulability is Yoshikawa's sqrt(det J J^T), the product of the singular
-    values. Its gradient in the joint coordinates comes from the Hessian. The gradient is nan where the
+    values. Its derivative for each joint velocity comes from the Hessian. The derivative is nan where the
     smallest singular value is not distinguishable from 0.
     """
     format_ = format_from_suffix(context, output, _ENDINGS, "csv")
