@@ -80,13 +80,13 @@ def command(topic: str | None) -> None:
       urdfkin explain reference-frames
     """  # noqa: D301 - a backspace tells click not to wrap the paragraph
     if topic is None:
-        for one in (*RULES.values(), *OF_MJCF.values()):
-            click.echo(f"{one.id}  {one.severity.value:7}  {one.slug:26}  {page(one.id).title}")
+        for rule in (*RULES.values(), *OF_MJCF.values()):
+            click.echo(f"{rule.id}  {rule.severity.value:7}  {rule.slug:26}  {page(rule.id).title}")
         click.echo(f"questions: {', '.join(answers())}")
     elif (equation := explain_equation(topic)) is not None:
         click.echo(equation)
-    elif (rule := _rule(topic)) is not None:
-        click.echo(explain(rule))
+    elif (match := _rule(topic)) is not None:
+        click.echo(explain(match))
     elif (answer := answer_to(topic)) is not None:
         click.echo(as_text(answer))
     else:
