@@ -173,7 +173,7 @@ def policy(nonce: str, host: str) -> str:
 
 LOOPBACK = "127.0.0.1"
 
-#: The only message type that the server accepts: a changed control. Camera messages belong to a connection.
+#: The only message type that the server accepts: a changed control. Connections handle camera messages.
 _ACCEPTED = ("GuiUpdateMessage",)
 #: Replacements that add the nonce to viser's page: its first script, and the script that this one creates.
 _SCRIPTS = (
