@@ -45,8 +45,8 @@ def sentence(all_: int, robots: int, pinocchio: int, checking: int) -> str:
     """Return the sentence of the page from sizes in bytes."""
     return (
         f"An installation takes {all_ / 1e9:.1f} GB: {robots / 1e9:.2f} GB for the robots of"
-        f" example-robot-data, {pinocchio / 1e9:.2f} GB for Pinocchio and its\nlibraries, and the rest mostly for"
-        f" NumPy, Numba and its compiler. A job that only [checks files](ci.md)\nneeds urdfkin and click,"
+        f" example-robot-data, {pinocchio / 1e9:.2f} GB for Pinocchio and its\nlibraries, and the rest mostly"
+        f" for NumPy, Numba and its compiler. A job that only [checks files](ci.md)\nneeds urdfkin and click,"
         f" {checking / 1e6:.0f} MB."
     )
 
