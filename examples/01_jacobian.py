@@ -1,6 +1,6 @@
-"""The Jacobian at a pose given by joint names, and what one of its columns means.
+"""Compute the Jacobian at a pose given by joint names, and interpret one of its columns.
 
-Learn: joints by name, units, the order of rows and columns, that the answer was checked already.
+Learn: joints by name, units, the order of rows and columns, and the automatic check.
 """
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 import urdfkin
 
 robot = urdfkin.load("panda")  # a name that `urdfkin robots` lists, a path, or URDF text
-# A pose that the other joints keep, then radians, degrees or multiples of pi; a mapping by name does, too.
+# A named pose, then changes in radians, degrees or multiples of pi. A mapping by name also works.
 pose = "neutral, panda_joint2=-30deg, panda_joint4=-2*pi/3, panda_joint6=1.5"
 
 J = robot.jacobian(pose, "panda_hand_tcp")  # (6, nv), rows [linear; angular], eq. 7.85

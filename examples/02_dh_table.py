@@ -1,6 +1,6 @@
-"""The Denavit-Hartenberg table of a URDF, as a datasheet prints it.
+"""Derive the Denavit-Hartenberg table of a URDF, in the form of a datasheet.
 
-Learn: `snap` takes a URDF's 1.5708 for the right angle it means, and every table is held against Pinocchio.
+Learn: `snap` rounds an angle of 1.5708 in the URDF to a right angle. Every table is compared with Pinocchio.
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
-"""An acceleration, and whose doing it is: transverse, centripetal, Coriolis and sliding parts.
+"""Split an acceleration into its transverse, centripetal, Coriolis and sliding parts, by joint.
 
-Learn: accelerations are classical, and the parts of 7.130 add up to the whole.
+Learn: accelerations are classical, and the parts of 7.130 add up to the acceleration.
 """
 
 import numpy as np
@@ -8,17 +8,17 @@ import numpy as np
 import urdfkin
 from urdfkin.compiled.breakdown import KINDS
 
-robot = urdfkin.load("polar")  # the chapter's: a turning joint and a sliding one on it
+robot = urdfkin.load("polar")  # the textbook's robot: a revolute joint, then a prismatic joint
 q = np.array([0.4, 0.5])  # rad, m
 v = np.array([1.0, 0.8])
 a = np.array([0.2, -0.3])
 frame = robot.tip_frame
 
-whole = robot.acceleration(q, v, a, frame)
+total = robot.acceleration(q, v, a, frame)
 parts = robot.acceleration_breakdown(q, v, a, frame)
 print(f"{'':<14}" + "".join(f"{kind:>14}" for kind in KINDS) + "   |linear|, m/s^2")
 for joint, terms in zip(parts.joints, parts.terms, strict=True):
     print(f"{joint:<14}" + "".join(f"{np.linalg.norm(term[:3]):14.4f}" for term in terms))
 print("sum of the parts:", parts.total.round(6))
-print("acceleration:    ", whole.round(6))
-assert np.allclose(parts.total, whole)
+print("acceleration:    ", total.round(6))
+assert np.allclose(parts.total, total)

@@ -1,7 +1,7 @@
-"""A hundred thousand Jacobians at once, written into memory of your own.
+"""Compute a hundred thousand Jacobians in one call, and write them into an existing array.
 
-Learn: every function takes any leading batch shape; `out=` allocates nothing; `verify="sample"` keeps the
-check without its price.
+Learn: every function accepts any leading batch shape; `out=` avoids an allocation; `verify="sample"`
+checks only a sample, which is fast.
 """
 
 import time
@@ -13,7 +13,7 @@ import urdfkin
 robot = urdfkin.load("panda")
 q = robot.sample(100_000, seed=0)  # (100000, 8)
 J = np.empty((len(q), 6, robot.nv))
-robot.jacobian(q[:1], "panda_hand", verify=False)  # compiles, once on a machine
+robot.jacobian(q[:1], "panda_hand", verify=False)  # compiles the kernel, once on a machine
 
 start = time.perf_counter()
 robot.jacobian(q, "panda_hand", out=J, verify="sample")

@@ -1,6 +1,6 @@
-"""One velocity, told in three reference frames.
+"""Compute one velocity in three reference frames, and convert between them.
 
-Learn: LOCAL, WORLD and LOCAL_WORLD_ALIGNED have Pinocchio's names and meaning; how each becomes the next.
+Learn: LOCAL, WORLD and LOCAL_WORLD_ALIGNED have the same meaning as in Pinocchio.
 """
 
 import numpy as np
@@ -13,14 +13,14 @@ np.set_printoptions(precision=4, suppress=True)
 for reference in urdfkin.Reference:
     print(f"{reference.name:<20} {robot.velocity(q, v, 'tool0', reference)}")
 
-# LOCAL is what a sensor in the tool feels; turned by the tool's rotation it is LOCAL_WORLD_ALIGNED.
+# LOCAL is the velocity in the tool's axes. The tool's rotation converts it to LOCAL_WORLD_ALIGNED.
 R_world_tool = robot.placement(q, "tool0")[:3, :3]
 local = robot.velocity(q, v, "tool0", "local")
 aligned = robot.velocity(q, v, "tool0")  # the default
 assert np.allclose(R_world_tool @ local[:3], aligned[:3])
 
-# WORLD speaks of the point of the moving body that passes the world's origin.
+# WORLD is the velocity of the point of the moving body at the world's origin.
 p_world_tool = robot.placement(q, "tool0")[:3, 3]
 there = aligned[:3] - np.cross(aligned[3:], p_world_tool)
 assert np.allclose(there, robot.velocity(q, v, "tool0", "world")[:3])
-print("each was turned into the next by hand, and agrees")
+print("the conversions by hand agree")

@@ -1,6 +1,7 @@
-"""Mimic joints: fingers that follow a leader have no coordinate of their own.
+"""Use mimic joints: a finger that mimics another one has no coordinate.
 
-Learn: `q` holds leaders only, a follower's motion stands in its leader's column, and `mimic=False` frees it.
+Learn: `q` has no mimic joints. The motion of a mimic joint is part of the column of the mimicked joint.
+`mimic=False` makes mimic joints free.
 """
 
 import numpy as np
@@ -9,14 +10,14 @@ import urdfkin
 
 robot = urdfkin.load("panda")
 free = urdfkin.load("panda", mimic=False)
-print("coupled:", robot.nq, "coordinates; freed:", free.nq)
-print("the freed ones:", sorted(set(free.coordinate_names) - set(robot.coordinate_names)))
+print("with mimic rules:", robot.nq, "coordinates; without:", free.nq)
+print("free joints:", sorted(set(free.coordinate_names) - set(robot.coordinate_names)))
 
 q = robot.neutral()
-q[-1] = 0.04  # the leading finger, metres
+q[-1] = 0.04  # the mimicked finger, metres
 left, right = (robot.placement(q, f"panda_{side}finger")[:3, 3] for side in ("left", "right"))
 print(f"gap between the fingers: {1e3 * np.linalg.norm(left - right):.1f} mm")
 
 J = robot.jacobian(q, "panda_rightfinger")
-print("the follower's column for its leader's rate:", J[:3, -1].round(3))
+print("the mimic joint's motion in the mimicked joint's column:", J[:3, -1].round(3))
 assert np.linalg.norm(J[:3, -1]) > 0.99

@@ -1,6 +1,6 @@
-"""Does a URDF agree with the table that its vendor publishes?
+"""Compare a URDF with the Denavit-Hartenberg table that its vendor publishes.
 
-Learn: a table is compared cell by cell and in millimetres at the tip, after its free choices are fitted.
+Learn: `compare` first fits the free choices of the table. It then compares the cells, and the tip in mm.
 """
 
 from dataclasses import replace
@@ -16,12 +16,12 @@ path = robot.chain("tool0", "base")
 found = compare(path, published)
 print(f"as published: agrees {found.agrees}, {1e3 * found.metres:.2g} mm at the tip at most")
 
-# A slip of a millimetre in one cell is found, and named.
+# An error of a millimetre in one cell is found and named.
 rows = list(published.rows)
 rows[2] = replace(rows[2], a=rows[2].a + 1e-3)
 found = compare(path, replace(published, rows=tuple(rows)))
-print(f"with a slip:  agrees {found.agrees}, {1e3 * found.metres:.2g} mm at the tip at most")
+print(f"with an error: agrees {found.agrees}, {1e3 * found.metres:.2g} mm at the tip at most")
 for cell in found.differences:
     print(
-        f"  row {cell.row + 1}, {cell.cell}: {cell.reference:.5f} is published, {cell.urdf:.5f} is the URDF's"
+        f"  row {cell.row + 1}, {cell.cell}: {cell.reference:.5f} in the table, {cell.urdf:.5f} in the URDF"
     )

@@ -1,6 +1,6 @@
-"""Your own URDF, guarded in CI: strict findings first, then every quantity of every frame against Pinocchio.
+"""Check your own URDF in CI: first its text, then every quantity of every frame against Pinocchio.
 
-Learn: `check` for the text, `validate` for the numbers; the commands of the same names do it without Python.
+Learn: `check` checks the text, `validate` the numbers. Commands with the same names work without Python.
 """
 
 import urdfkin
@@ -24,4 +24,4 @@ report = urdfkin.validate(URDF, samples=100)
 robot = report.robots[0]
 print(f"{robot.name}: {robot.results} results checked, {robot.failed} outside their bound")
 if errors or not report.passed:
-    raise SystemExit(1)  # which fails the job
+    raise SystemExit(1)  # the CI job fails

@@ -1,6 +1,6 @@
-"""A frame along a trajectory: how fast, how strongly accelerated, how near to a singularity, and where.
+"""Find a frame's largest velocity, largest acceleration and smallest singular value along a trajectory.
 
-Learn: motions from rest to rest, one call for a frame's whole motion, and Pinocchio's opinion beside it.
+Learn: a motion from rest to rest, one call for the whole motion of a frame, and Pinocchio's check.
 """
 
 import numpy as np

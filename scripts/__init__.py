@@ -1,1 +1,1 @@
-"""What a maintainer runs: fuzzing, and scripts that write generated pages."""
+"""Scripts for maintainers: checks, fuzzing, benchmarks, and scripts that generate pages."""

@@ -1,13 +1,13 @@
-"""Time urdfkin against Pinocchio and other libraries at the same work, interleaved in one process.
+"""Compare the speed of urdfkin, Pinocchio and other libraries at the same work, in one process.
 
     python scripts/benchmark.py [--quick] [--json FILE] [--plot FILE] [--only batch single ...] [--no-peers]
 
-Ratios hold on a noisy machine, absolute times do not: each round times every contender once; medians, minima
-and the ratio of medians are printed. Results are compared first; a difference fails the run, a slow time
-never does. Libraries that are not installed are listed and left out.
+Each round times every library once, so ratios are reliable also on a noisy machine; absolute times are not.
+The script prints medians, minima and ratios of medians. It compares the results first. A difference fails
+the run, a slow time never does. Libraries that are not installed are listed and left out.
 
-`--only where` says where the time of a batch and of a single call goes, `--only first` what the first use of
-each quantity costs.
+`--only where` splits the time of a batch and of a single call into parts. `--only first` measures the first
+use of each quantity.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
-os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # PyTorch's threads do not spin into the next contender
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # idle threads of PyTorch must not disturb the next one
 
 from scripts.benchmarking.contenders import ALWAYS, PEERS, Contender
 from scripts.benchmarking.machine import USES, first_uses, machine, peak_over_output
@@ -46,18 +46,18 @@ SECTIONS = ("batch", "single", "verified", "where", "first", "joints", "frames",
 
 @dataclass(frozen=True)
 class Plan:
-    """How much is measured.
+    """The amount of measurements.
 
     Attributes:
-        configurations: Of a batch.
-        rounds: Of each table.
-        first: The quantities whose first use is measured.
-        joints: Of the chains.
-        numbers: Written by a chain's batch of Jacobians.
-        frames: How many placements at once.
-        frame_configurations: Of their batches.
-        sizes: Of batches.
-        memory: Configurations whose memory is measured.
+        configurations: Number of configurations of a batch.
+        rounds: Number of rounds of each table.
+        first: Quantities whose first use is measured.
+        joints: Numbers of joints of the chains.
+        numbers: Number of values in a chain's batch of Jacobians.
+        frames: Numbers of frames whose placements are computed in one pass.
+        frame_configurations: Number of configurations of these batches.
+        sizes: Sizes of batches.
+        memory: Number of configurations for the measurement of memory.
     """
 
     configurations: int = 100_000
@@ -75,10 +75,10 @@ QUICK = Plan(1_000, 3, ("placement",), (6, 12), 20_000, (1, 1000), 100, (100, 1_
 
 
 def rows(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender]) -> Iterator[Row]:
-    """Everything that contenders are timed at.
+    """Time all contenders and yield the rows of all tables.
 
     Raises:
-        DifferenceError: contenders disagree.
+        DifferenceError: the results of two contenders differ.
     """
     n, rounds = plan.configurations, plan.rounds
     ways: dict[str, Callable[[], Iterator[Row]]] = {
@@ -95,10 +95,10 @@ def rows(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender]) -
 
 
 def document(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender]) -> dict[str, Any]:
-    """Everything measured, as data.
+    """Measure everything and return it as data.
 
     Raises:
-        DifferenceError: contenders disagree.
+        DifferenceError: the results of two contenders differ.
     """
     name, frame = SUBJECTS[0]
     found: dict[str, Any] = {
@@ -131,14 +131,14 @@ def _operations() -> Iterator[tuple[str, int]]:
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Exit 1 when results differ."""
+    """Run the benchmark; return 1 if results differ."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
-    parser.add_argument("--quick", action="store_true", help="few configurations, few rounds")
-    parser.add_argument("--json", type=Path, help="write the figures as data")
-    parser.add_argument("--plot", type=Path, help="draw them: svg, png or pdf")
+    parser.add_argument("--quick", action="store_true", help="use few configurations and rounds")
+    parser.add_argument("--json", type=Path, help="write the measurements to a file")
+    parser.add_argument("--plot", type=Path, help="plot the measurements: svg, png or pdf")
     parser.add_argument("--only", nargs="+", choices=SECTIONS, default=SECTIONS, help="some sections")
-    parser.add_argument("--no-peers", action="store_true", help="urdfkin and Pinocchio alone")
-    parser.add_argument("--rounds", type=int, help="how often each is timed")
+    parser.add_argument("--no-peers", action="store_true", help="compare only urdfkin and Pinocchio")
+    parser.add_argument("--rounds", type=int, help="number of times that each library is timed")
     arguments = parser.parse_args(words)
     plan = QUICK if arguments.quick else Plan()
     if arguments.rounds:
@@ -160,7 +160,7 @@ def main(words: Sequence[str] | None = None) -> int:
 
 if __name__ == "__main__":
     status = main()
-    if "roboticstoolbox" in sys.modules:  # its bindings list a hundred lines of leaks when Python ends
+    if "roboticstoolbox" in sys.modules:  # its bindings print a hundred lines about leaks at exit
         sys.stdout.flush()
         os._exit(status)
     sys.exit(status)

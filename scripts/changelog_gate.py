@@ -1,10 +1,11 @@
-"""Fail when a branch changes the package and CHANGELOG.md says nothing of it.
+"""Fail if a branch changes the package without a new line in CHANGELOG.md.
 
     python scripts/changelog_gate.py [--base REVISION]
 
-The base is where the branch left `main` (or `origin/main`); files that only moved do not count. What no user
-notices is argued in a commit of the branch: `No-changelog: REASON`. Where there is nothing to compare with
-(main itself, a shallow clone, an unpacked archive, no git) the gate says so and passes: it guards branches.
+The base is the commit at which the branch left `main` (or `origin/main`). Files that only moved do not
+count. If no user notices the change, add `No-changelog: REASON` to a commit of the branch. If there is
+nothing to compare with (main itself, a shallow clone, an unpacked archive, no git), the script reports it
+and passes.
 """
 
 from __future__ import annotations
@@ -22,34 +23,34 @@ _ARGUED = re.compile(r"^No-changelog: +\S", re.MULTILINE | re.IGNORECASE)
 
 
 class CannotTellError(Exception):
-    """Why nothing can be compared."""
+    """The branch cannot be compared; the message has the reason."""
 
 
 def complaint(changed: Collection[str], messages: str) -> str | None:
-    """What is wrong with a branch that changes these files, its commits' messages at hand."""
+    """Return the problem of a branch with these changed files and commit messages, or None."""
     package = sorted(path for path in changed if path.startswith("urdfkin/"))
     if not package or PAGE in changed or _ARGUED.search(messages):
         return None
     more = f" and {len(package) - 1} more" if len(package) > 1 else ""
-    return f"{package[0]}{more} changed, and {PAGE} says nothing of it"
+    return f"{package[0]}{more} changed without a line in {PAGE}"
 
 
 def git(root: Path, *words: str) -> str:
-    """What git answers; raises CannotTellError if it does not."""
+    """Run git and return its output; raise CannotTellError if it fails."""
     try:
         done = subprocess.run(["git", *words], cwd=root, capture_output=True, text=True, check=True)
     except FileNotFoundError:
         raise CannotTellError("git is not installed") from None
     except subprocess.CalledProcessError as error:
-        raise CannotTellError((error.stderr.strip().splitlines() or ["git does not answer"])[-1]) from None
+        raise CannotTellError((error.stderr.strip().splitlines() or ["git has no message"])[-1]) from None
     return done.stdout
 
 
 def left_main(root: Path) -> str:
-    """The commit at which HEAD left main.
+    """Return the commit at which HEAD left main.
 
     Raises:
-        CannotTellError: HEAD is on main, or there is no main, or the clone does not reach that far back.
+        CannotTellError: HEAD is on main, main does not exist, or the clone is too shallow.
     """
     head = git(root, "rev-parse", "HEAD").strip()
     for main in ("origin/main", "main"):
@@ -63,29 +64,29 @@ def left_main(root: Path) -> str:
 
 
 def changed_files(root: Path, base: str) -> set[str]:
-    """Files that are not as they were at `base`, wherever they stood."""
+    """Return the files that changed since `base`; a moved file counts only if its text changed."""
     entries = git(root, "diff", "--numstat", "-z", "-M", base, "HEAD")
-    # added TAB deleted TAB path NUL; where the file moved, added TAB deleted TAB NUL old NUL new NUL.
+    # Format: added TAB deleted TAB path NUL; for a moved file: added TAB deleted TAB NUL old NUL new NUL.
     found = re.findall(r"(\S+)\t(\S+)\t(?:\0[^\0]*\0)?([^\0]+)\0", entries)
     return {path for added, deleted, path in found if (added, deleted) != ("0", "0")}
 
 
 def main(root: Path = ROOT, base: str | None = None) -> int:
-    """0: nothing is missing, or nothing can be told; 1: a line is missing."""
+    """Check the branch; return 1 if a line is missing, else 0."""
     try:
         base = base or left_main(root)
-        said = complaint(changed_files(root, base), git(root, "log", "--format=%B", f"{base}..HEAD"))
+        problem = complaint(changed_files(root, base), git(root, "log", "--format=%B", f"{base}..HEAD"))
     except CannotTellError as error:
         print(f"changelog not checked: {error}")
         return 0
-    if said:
-        print(f"{said}: add a line under the unreleased version, or to a commit `No-changelog: REASON`")
-    return 1 if said else 0
+    if problem:
+        print(f"{problem}: add a line under the unreleased version, or to a commit `No-changelog: REASON`")
+    return 1 if problem else 0
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--base", help="the revision to compare with")
+    parser.add_argument("--base", help="revision to compare with")
     sys.exit(main(base=parser.parse_args().base))

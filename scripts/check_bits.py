@@ -1,13 +1,14 @@
-"""Whether results are the same to the last bit: single and in a batch, and before and after a change.
+"""Check that results are equal to the last bit: single and in a batch, before and after a change.
 
-    python scripts/check_bits.py [ROBOT ...]           # single = prepared = row of a batch = one of frames
-    python scripts/check_bits.py --write before.npz    # and keep the results
-    python scripts/check_bits.py --against before.npz  # and hold them against those that were kept
+    python scripts/check_bits.py [ROBOT ...]           # compare single, prepared, batched and joint calls
+    python scripts/check_bits.py --write before.npz    # also store the results
+    python scripts/check_bits.py --against before.npz  # also compare with stored results
 
-Every robot of the catalogue, every quantity, all three references. The fusing of products and sums is written
-out and sine and cosine are urdfkin's own, so that digests are the same on every machine. Where results differ
-from the kept ones, the largest difference is told as a share of the bound that they were then held against.
-Exit 1 where a bit differs that should not, or, with `--within SHARE`, where a result differs by more.
+The script checks every robot of the catalogue, every quantity and all three reference frames. Fused
+multiply-adds are explicit, and urdfkin has its own sine and cosine, so digests are equal on every machine.
+If results differ from the stored ones, the script prints the largest difference as a fraction of the stored
+bound. Exit 1: a bit differs unexpectedly, or, with `--within SHARE`, a result differs by more than this
+fraction of its bound.
 """
 
 from __future__ import annotations
@@ -35,11 +36,11 @@ from urdfkin.verify.call import Call
 from urdfkin.verify.quantities import Quantity, walked
 from urdfkin.verify.verifier import bound_of
 
-#: Lengths of batches: less than a block of eight, one, more, and many with a rest.
+#: Sizes of batches: less than a block of eight, one block, more, and many blocks with a remainder.
 LENGTHS = (1, 2, 7, 8, 9, 100)
-#: How many threads a batch is spread over; None: as many as urdfkin takes.
+#: Numbers of threads of a batch; None: urdfkin's default.
 THREADS = (None, 1, 2, 3)
-#: How many configurations, of how many frames, are kept.
+#: Number of configurations and frames that are stored.
 KEPT, FRAMES = 9, 6
 
 Arrays = Mapping[str, Any]
@@ -47,7 +48,7 @@ Arrays = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Subject:
-    """A robot, its inputs and frames: the tip, and some all over it."""
+    """A robot, its inputs and its frames: the tip, and some frames of the whole tree."""
 
     name: str
     robot: Robot
@@ -55,21 +56,21 @@ class Subject:
     frames: tuple[str, ...]
 
     @classmethod
-    def of(cls, name: str, kept: Arrays | None = None) -> Subject:
-        """With the inputs and frames of a file, or with new ones."""
+    def of(cls, name: str, stored: Arrays | None = None) -> Subject:
+        """Make a subject with the inputs and frames of a file, or with new ones."""
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # what is said of a file is another program's business
+            warnings.simplefilter("ignore")  # warnings about the file do not matter here
             robot = urdfkin.load(name, mimic=catalogue()[name].mimic, verify=False)
-        if kept is not None:
-            inputs = tuple(kept[f"{name}/{x}"] for x in "qva")
-            return cls(name, robot, inputs, tuple(kept[f"{name}/frames"].tolist()))
+        if stored is not None:
+            inputs = tuple(stored[f"{name}/{x}"] for x in "qva")
+            return cls(name, robot, inputs, tuple(stored[f"{name}/frames"].tolist()))
         n = max(LENGTHS)
         v, a = np.random.default_rng(0).standard_normal((2, n, robot.nv))
         links = [f"link:{robot.link_names[i]}" for i in spread(len(robot.link_names))]
         return cls(name, robot, (robot.sample(n), v, a), (robot.tip_frame, *links))
 
     def results(self) -> Iterator[tuple[str, Quantity, Reference, tuple[FloatArray, ...]]]:
-        """(what, quantity, reference, the inputs that it takes)."""
+        """Yield (name, quantity, reference, inputs) of each result."""
         for quantity in walked():
             for reference in Reference if quantity.referred else (_ALIGNED,):
                 what = f"{self.name}/{quantity.name}/{reference.name}"
@@ -80,7 +81,7 @@ _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 
 
 def spread(count: int) -> list[int]:
-    """At most `FRAMES` - 1 of so many, from the first to the last."""
+    """Return at most `FRAMES` - 1 evenly spread indices below `count`."""
     return sorted({int(i) for i in np.linspace(0, count - 1, FRAMES - 1)})
 
 
@@ -92,7 +93,7 @@ def computed(
     inputs: Sequence[Any],
     **how: Any,
 ) -> FloatArray:
-    """A method's result."""
+    """Return the result of a method."""
     words = (frame, reference) if quantity.referred else (frame,)
     method = getattr(subject.robot, quantity.method)
     result: FloatArray = method(*inputs, *words, verify=False, **how)
@@ -100,7 +101,7 @@ def computed(
 
 
 def same(x: FloatArray, y: FloatArray) -> bool:
-    """To the last bit: 0 and -0 are not."""
+    """Return whether two arrays are equal to the last bit; 0 and -0 differ."""
     return x.shape == y.shape and x.tobytes() == y.tobytes()
 
 
@@ -108,7 +109,7 @@ def same(x: FloatArray, y: FloatArray) -> bool:
 
 
 def differing(subject: Subject) -> Iterator[str]:
-    """What is not the same as the single calls, in words."""
+    """Yield the names of results that differ from those of single calls."""
     frame = subject.frames[0]
     for what, quantity, reference, inputs in subject.results():
         rows = list(zip(*inputs, strict=True))
@@ -133,7 +134,7 @@ def differing(subject: Subject) -> Iterator[str]:
 
 
 def differing_in_one_pass(subject: Subject, now: Arrays) -> Iterator[str]:
-    """What is not the same for several frames in one pass as for one after the other."""
+    """Yield the results that differ between several frames in one pass and separate calls."""
     for what, quantity, reference, inputs in subject.results():
         few = [x[:KEPT] for x in inputs]
         if not same(computed(subject, quantity, reference, subject.frames, few), now[what]):
@@ -144,23 +145,25 @@ def differing_in_one_pass(subject: Subject, now: Arrays) -> Iterator[str]:
 
 
 def to_keep(subject: Subject) -> dict[str, Any]:
-    """Inputs, frames, and each result with the bound that it is held against."""
-    kept: dict[str, Any] = {
+    """Return the inputs, the frames, and each result with its bound."""
+    stored: dict[str, Any] = {
         f"{subject.name}/{x}": array for x, array in zip("qva", subject.inputs, strict=True)
     }
-    kept[f"{subject.name}/frames"] = np.array(subject.frames)
+    stored[f"{subject.name}/frames"] = np.array(subject.frames)
     for what, quantity, reference, inputs in subject.results():
         few = [x[:KEPT] for x in inputs]
         parts = [computed(subject, quantity, reference, frame, few) for frame in subject.frames]
-        kept[what] = results = np.stack(parts, axis=1)
+        stored[what] = results = np.stack(parts, axis=1)
         call = Call(subject.robot.tree, subject.robot.plan, subject.frames, reference, None, few)
         bound = bound_of(quantity, call.part(slice(0, KEPT)))
-        kept[f"{what}/bound"] = np.broadcast_to(EPS * bound.k * bound.scale, results.shape).astype(np.float32)
-    return kept
+        stored[f"{what}/bound"] = np.broadcast_to(EPS * bound.k * bound.scale, results.shape).astype(
+            np.float32
+        )
+    return stored
 
 
 def digest(now: Arrays) -> str:
-    """Of every result: the same on every machine."""
+    """Return a digest of all results, which is equal on every machine."""
     whole = hashlib.sha256()
     for what in sorted(now):
         if what.count("/") == 2:
@@ -168,20 +171,20 @@ def digest(now: Arrays) -> str:
     return whole.hexdigest()[:16]
 
 
-def share(what: str, now: Arrays, kept: Arrays) -> float:
-    """How far a result lies from the kept one, as a share of the kept bound; 0 where all bits are equal."""
-    if same(now[what], kept[what]):
+def share(what: str, now: Arrays, stored: Arrays) -> float:
+    """Return the difference from the stored result as a fraction of the stored bound; 0 for equal bits."""
+    if same(now[what], stored[what]):
         return 0.0
-    apart = np.abs(now[what] - kept[what])
+    apart = np.abs(now[what] - stored[what])
     with np.errstate(divide="ignore", invalid="ignore"):
-        shares = np.where(apart == 0.0, 0.0, apart / kept[f"{what}/bound"])
-    # Other bits and no difference: a zero has another sign.
+        shares = np.where(apart == 0.0, 0.0, apart / stored[f"{what}/bound"])
+    # Different bits without a difference: zeros of different signs.
     return float(np.nan_to_num(shares, nan=np.inf, posinf=np.inf).max()) or sys.float_info.min
 
 
-def compared(name: str, now: Arrays, kept: Arrays) -> tuple[str, float]:
-    """A robot's results beside the kept ones: in words, and the largest share."""
-    shares = {what: share(what, now, kept) for what in now if what.count("/") == 2}
+def compared(name: str, now: Arrays, stored: Arrays) -> tuple[str, float]:
+    """Compare a robot's results with the stored ones; return a line and the largest fraction."""
+    shares = {what: share(what, now, stored) for what in now if what.count("/") == 2}
     others = {what: x for what, x in shares.items() if x}
     if not others:
         return "equal", 0.0
@@ -194,13 +197,13 @@ def compared(name: str, now: Arrays, kept: Arrays) -> tuple[str, float]:
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Exit 1 where something differs that should not."""
+    """Run the checks; return 1 if results differ unexpectedly."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
-    parser.add_argument("robots", nargs="*", help="names of the catalogue; none: all of them")
-    parser.add_argument("--write", type=Path, help="keep the results in this file (.npz)")
-    parser.add_argument("--against", type=Path, help="hold the results against those in this file")
+    parser.add_argument("robots", nargs="*", help="names of the catalogue (default: all)")
+    parser.add_argument("--write", type=Path, help="store the results in this file (.npz)")
+    parser.add_argument("--against", type=Path, help="compare the results with those in this file")
     parser.add_argument(
-        "--within", type=float, default=0.0, help="a share of the bound that they may differ by"
+        "--within", type=float, default=0.0, help="allowed difference, as a fraction of the bound"
     )
     given = parser.parse_args(words)
     before = None if given.against is None else np.load(given.against)

@@ -1,13 +1,13 @@
-"""Export the catalogue's leaves to C and NumPy, compile the C without a warning, and run the test vectors.
+"""Export the catalogue's leaf frames to C and NumPy, compile the C code, and run the test vectors.
 
-    python scripts/check_exports.py --keep leaves.jsonl         # every leaf; goes on where it was ended
-    python scripts/check_exports.py --keep leaves.jsonl --tell  # what was found, nothing computed
-    python scripts/check_exports.py --tips       # the leaf of each robot that most joints lie before
-    python scripts/check_exports.py --sizes      # writes into docs/export.md how large the code is
+    python scripts/check_exports.py --keep leaves.jsonl         # every leaf; continues a stopped run
+    python scripts/check_exports.py --keep leaves.jsonl --tell  # print the stored results only
+    python scripts/check_exports.py --tips       # only the leaf with the longest path of each robot
+    python scripts/check_exports.py --sizes      # write the sizes of the code to docs/export.md
 
-Each function is held against Pinocchio as it is written, and against fifty digits as it runs: by GCC and by
-Clang, where they are installed, one configuration and in batches, and by NumPy. Exit 1 if any number is
-outside the derived bound or any compiler warns.
+Each function is compared with Pinocchio when it is written, and with results at fifty digits when it runs.
+It runs with GCC and Clang, where they are installed, for one configuration and in batches, and with NumPy.
+Exit 1: a number is outside the derived bound, or a compiler prints a warning.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ _SHARE = re.compile(r"worst error (\S+) of the bound")
 
 
 def code(robot: Robot, frame: str, quantities: Sequence[str] = QUANTITIES) -> Code:
-    """A frame's, verified."""
+    """Return the verified code of a frame."""
     return code_of(
         robot.verifier, robot.plan, frame, quantities, "local_world_aligned", name=None, verify=True
     )
 
 
 def shares(written: Code, folder: Path) -> Iterator[tuple[str, float]]:
-    """For each way to run the code, the largest error as a share of its bound."""
+    """Yield, for each way to run the code, the largest error as a fraction of its bound."""
     source, name = folder / "robot.c", written.name.upper()
     source.write_text(write(written, "c"), encoding="utf-8")
     for compiler in filter(shutil.which, ("gcc", "clang")):
@@ -63,7 +63,7 @@ def shares(written: Code, folder: Path) -> Iterator[tuple[str, float]]:
 
 
 def subjects(tips: bool) -> Iterator[tuple[str, Robot, str]]:
-    """Robots and frames: the tips first, so that what is cut short has seen every robot."""
+    """Yield robots and frames, the tips first, so that a stopped run has checked every robot."""
     robots = {name: urdfkin.load(name) for name in examples()}
     for name, robot in robots.items():
         yield name, robot, robot.tip_frame
@@ -74,7 +74,7 @@ def subjects(tips: bool) -> Iterator[tuple[str, Robot, str]]:
 
 
 def found_of(robot: Robot, frame: str) -> dict[str, Any]:
-    """A leaf's line: its largest errors as shares of the bound, and whether all is as it should be."""
+    """Return the result of a leaf: the largest errors as fractions of the bound, and whether it passes."""
     wanted = QUANTITIES if robot.nv else ("placement",)
     with tempfile.TemporaryDirectory() as folder:
         written = code(robot, frame, wanted)
@@ -84,11 +84,11 @@ def found_of(robot: Robot, frame: str) -> dict[str, Any]:
 
 
 def check(tips: bool, keep: Path | None) -> int:
-    """Every leaf, or every tip, but those whose lines are kept."""
-    kept = {(line["robot"], line["frame"]) for line in lines_of(keep)}
+    """Check every leaf or tip that has no stored result."""
+    stored = {(line["robot"], line["frame"]) for line in lines_of(keep)}
     here: list[dict[str, Any]] = []
     for name, robot, frame in subjects(tips):
-        if (name, frame) in kept:
+        if (name, frame) in stored:
             continue
         here.append({"robot": name, "frame": frame, **found_of(robot, frame)})
         line = json.dumps(here[-1])
@@ -100,14 +100,14 @@ def check(tips: bool, keep: Path | None) -> int:
 
 
 def lines_of(keep: Path | None) -> list[dict[str, Any]]:
-    """What was found before."""
+    """Return the stored results."""
     if keep is None or not keep.exists():
         return []
     return [json.loads(line) for line in keep.read_text(encoding="utf-8").splitlines()]
 
 
 def tell(lines: Sequence[dict[str, Any]]) -> int:
-    """The sum of what was found; 1 where something is wrong."""
+    """Print a summary of the results; return 1 if there is an error."""
     wrong = [line for line in lines if not line["good"]]
     for line in wrong:
         print("WRONG", line)
@@ -125,7 +125,7 @@ def tell(lines: Sequence[dict[str, Any]]) -> int:
 
 
 def sizes() -> str:
-    """A table in Markdown: three frames, each quantity by itself."""
+    """Return the sizes of the code for three frames and each quantity, as a Markdown table."""
     rows = ["| robot, frame | quantity | operations | lines of C | kB |", "|---|---|---:|---:|---:|"]
     for robot, frame in (
         (urdfkin.load("panda"), "panda_hand"),
@@ -144,7 +144,7 @@ def sizes() -> str:
 
 
 def page(text: str) -> str:
-    """The page with the table of sizes as it is now."""
+    """Return the page with the current table of sizes."""
     found, count = _SIZES.subn(lambda place: place[1] + sizes() + place[2], text)
     if count != 1:
         raise ValueError(f"the page has {count} places for the sizes")
@@ -152,11 +152,11 @@ def page(text: str) -> str:
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Exit 1 where something is wrong."""
+    """Run the checks; return 1 for an error."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
-    parser.add_argument("--keep", type=Path, help="a file of results, a line each, to go on with")
-    parser.add_argument("--tell", action="store_true", help="only add up what is kept")
-    parser.add_argument("--tips", action="store_true", help="one leaf a robot")
+    parser.add_argument("--keep", type=Path, help="file of results, one per line, to continue")
+    parser.add_argument("--tell", action="store_true", help="only summarise the stored results")
+    parser.add_argument("--tips", action="store_true", help="check one leaf of each robot")
     parser.add_argument(
         "--sizes", action="store_true", help="write the sizes of three robots' code into docs/export.md"
     )

@@ -1,12 +1,12 @@
-"""Write the catalogue's tables in every form, run what can be run here, and hold it against Pinocchio.
+"""Export the catalogue's tables in every format, run the exported code, and compare it with Pinocchio.
 
     python scripts/check_forms.py                      # the tip of every robot, standard and modified
     python scripts/check_forms.py --leaves             # every leaf of every robot
-    python scripts/check_forms.py --toolbox PYTHON     # one that has roboticstoolbox, if not this
-    python scripts/check_forms.py --forms sympy latex  # some forms only
+    python scripts/check_forms.py --toolbox PYTHON     # another interpreter, with roboticstoolbox
+    python scripts/check_forms.py --forms sympy latex  # some formats only
 
-LaTeX is compiled, and nothing may be wider than the page of an article. Exit 1 where a form computes
-something else than rounding explains, or a table does not fit.
+LaTeX tables are compiled and must fit on the page of an article. Exit 1: the difference of a format is
+larger than rounding, or a table does not fit.
 """
 
 from __future__ import annotations
@@ -34,15 +34,15 @@ from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import examples
 from urdfkin.verify.sampling import sample
 
-#: Configurations of each table.
+#: Number of configurations of each table.
 SAMPLES = 4
-#: Octave's symbolic package asks Python about each sum, 20 s for six joints: so many small tables.
+#: Number of small tables for Octave's symbolic package, which takes 20 s for six joints.
 FEW, SMALL = 6, 4
 
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """A table, its coordinates at some configurations, and where Pinocchio puts its tip in its base."""
+    """A table, its coordinates at some configurations, and Pinocchio's poses of its tip in its base."""
 
     name: str
     job: Job
@@ -54,15 +54,15 @@ class Subject:
         return self.job.table
 
     def off(self, found: FloatArray) -> tuple[float, float]:
-        """Metres from Pinocchio; and from the table's own product, as a share of what rounding may do."""
+        """Return the difference from Pinocchio in metres, and from the table as a fraction of the bound."""
         apart = np.abs(found - self.table.placement(self.job.q))[:, :3].max(axis=(-1, -2))
-        # Each rounds in its own way; a table without any length still has angles.
+        # Each rounds differently; a table without lengths still has angles.
         allowed = 2.0 * np.maximum(self.table.rounding(self.job.q), EPS * of_rows(len(self.table.rows)))
         return float(np.abs(found - self.theirs)[:, :3, 3].max()), float((apart / allowed).max())
 
 
 def subjects(leaves: bool) -> Iterator[Subject]:
-    """Tables that Pinocchio agrees with; `robot.dh` raises where it does not."""
+    """Yield tables that agree with Pinocchio; `robot.dh` raises an error otherwise."""
     for name in examples():
         robot = urdfkin.load(name)
         tips = [robot.tree.frame_name(leaf) for leaf in robot.tree.leaves()] if leaves else [robot.tip_frame]
@@ -72,7 +72,7 @@ def subjects(leaves: bool) -> Iterator[Subject]:
 
 
 def subject(robot: Robot, name: str, table: DHTable) -> Subject:
-    """One of a robot's tables."""
+    """Return one table of a robot with its configurations."""
     q = sample(robot.tree, SAMPLES, np.random.default_rng(0))
     ends = [table.base_frame, table.tip_frame]
     base, tip = np.moveaxis(robot.verifier.oracle().placements(q, ends), 1, 0)
@@ -80,7 +80,7 @@ def subject(robot: Robot, name: str, table: DHTable) -> Subject:
 
 
 def fits(form: str, table: DHTable) -> bool:
-    """Whether the form takes the table at all."""
+    """Return whether the format can represent the table."""
     try:
         export(table, form)
     except InputError:
@@ -89,10 +89,10 @@ def fits(form: str, table: DHTable) -> bool:
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Exit 1 where something is wrong."""
+    """Run the checks; return 1 for an error."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
-    parser.add_argument("--leaves", action="store_true", help="every leaf, not the tips alone")
-    parser.add_argument("--toolbox", metavar="PYTHON", help="an interpreter that has roboticstoolbox")
+    parser.add_argument("--leaves", action="store_true", help="check every leaf, not only the tips")
+    parser.add_argument("--toolbox", metavar="PYTHON", help="interpreter with roboticstoolbox")
     parser.add_argument(
         "--forms", nargs="+", choices=(*RUN, "latex"), default=(*RUN, "latex"), metavar="FORM"
     )
@@ -111,7 +111,7 @@ def main(words: Sequence[str] | None = None) -> int:
 
 
 def _checked(form: str, found: Sequence[Subject], folder: Path) -> int:
-    """One line; how many are wrong."""
+    """Print the line of a format; return the number of wrong tables."""
     begin = time.perf_counter()
     if form == "latex":
         return _compiled(found, folder)

@@ -1,10 +1,10 @@
-"""How the time and memory of a check grow with the file: seconds and megabytes for each megabyte.
+"""Measure how time and memory of a check grow with the file, in seconds and megabytes per megabyte.
 
     python scripts/check_growth.py                      # 1, 4, 16 and 64 MB of every kind of content
-    python scripts/check_growth.py --sizes 1,4 number   # kinds whose name holds "number"
+    python scripts/check_growth.py --sizes 1,4 number   # kinds with "number" in the name
 
-Linear growth is a row of equal numbers. Each document is checked in a process of its own; what takes longer
-than `--patience` ends its row.
+With linear growth, the numbers of a row are equal. Each document is checked in its own process. A check
+that takes longer than `--patience` ends its row.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from scripts.growing.kinds import KINDS
 
 
 def main() -> None:
-    """Print one row a kind, as Markdown."""
+    """Print one Markdown row for each kind of content."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("words", nargs="*", help="kinds whose name holds one of these; all without")
-    parser.add_argument("--sizes", default="1,4,16,64", help="megabytes, with commas between")
-    parser.add_argument("--patience", type=float, default=600.0, help="seconds for one document")
+    parser.add_argument("words", nargs="*", help="kinds with one of these words in the name (default: all)")
+    parser.add_argument("--sizes", default="1,4,16,64", help="sizes in megabytes, separated by commas")
+    parser.add_argument("--patience", type=float, default=600.0, help="time limit of one document in seconds")
     options = parser.parse_args()
     sizes = [float(size) for size in options.sizes.split(",")]
     heads = [f"{size:g} MB" for size in sizes]

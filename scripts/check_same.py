@@ -1,14 +1,14 @@
-"""All known changes on all robots: is the verdict right, and does the interval hold the truth?
+"""Check `urdfkin same` on all known changes of all robots: the verdicts and the distance intervals.
 
-    python scripts/check_same.py --keep pairs.jsonl          # goes on where it was ended
-    python scripts/check_same.py --keep pairs.jsonl panda    # of some robots alone
-    python scripts/check_same.py --keep pairs.jsonl --tell   # the figures of docs/same.md, nothing computed
+    python scripts/check_same.py --keep pairs.jsonl          # continues a stopped run
+    python scripts/check_same.py --keep pairs.jsonl panda    # only some robots
+    python scripts/check_same.py --keep pairs.jsonl --tell   # only print the figures of docs/same.md
 
-Twenty-one changes, eleven of which leave a robot the same (`tests/comparison/pairs.py`). Where it stays the
-same, all links are placed at random configurations as `same` says they must be. Where it does not, a global
-search of another kind than the product's looks for the largest distance of the frame that is said to be
-farthest, and computes it at fifty digits from the decimals of both texts: it must lie in the interval. Exit
-1 where it does not, or a verdict is wrong.
+There are twenty-one changes; eleven of them leave a robot the same (`tests/comparison/pairs.py`). For a
+robot that is the same, all links must have the placements that `same` predicts at random configurations.
+For a different robot, an independent global search looks for the largest distance of the farthest frame.
+This distance is computed at fifty digits from the decimals of both texts, and must lie in the interval of
+`same`. Exit 1: a distance is outside its interval, or a verdict is wrong.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ from urdfkin.comparison.result import Interval, Sameness, Verdict
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import catalogue
 
-#: What doubles may be off by, metres and entries of rotations, at configurations of some metres.
+#: Largest rounding error of placements of some metres, in metres and entries of rotations.
 ROUNDING = 1e-10
 
 
 def pair(name: str, what: str) -> dict[str, Any] | None:
-    """One robot and one change; None where there is nothing to change."""
+    """Check one change of one robot; None if the change does not apply."""
     a, b = robot(name), changed(name, what)
     if b is None:
         return None
@@ -50,7 +50,7 @@ def pair(name: str, what: str) -> dict[str, Any] | None:
     said = {"robot": name, "change": what, "verdict": found.verdict.value, "seconds": seconds}
     if what in ALIKE:
         return said | {"right": bool(found) and _places_agree(found, a, b)}
-    # A file that is rounded to four digits may be what it was; the interval tells all the same.
+    # Rounding to four digits may leave a file unchanged; the interval is right in both cases.
     right = found.verdict is Verdict.DIFFERS or what == "rounded"
     if (worst := _farthest(found)) is None:
         return said | {"right": right}
@@ -58,7 +58,7 @@ def pair(name: str, what: str) -> dict[str, Any] | None:
 
 
 def _farthest(found: Sameness) -> Interval | None:
-    """The frame that may be farthest, of those that are not another tool; None where nothing bounds it."""
+    """Return the interval of the farthest frame that is not a different tool; None without a bound."""
     frames = [frame for frame in found.frames if frame.frame_b not in _tools(found) and frame.q_a]
     worst = max(frames, key=lambda frame: (frame.upper, frame.lower), default=None)
     stands = np.array_equal(found.base, np.eye(4))
@@ -66,7 +66,7 @@ def _farthest(found: Sameness) -> Interval | None:
 
 
 def _tools(found: Sameness) -> set[str]:
-    """Frames of B that are said to be set elsewhere on their bodies."""
+    """Return the frames of B that `same` reports as moved on their bodies."""
     return {line.split()[1] for line in found.after if line.startswith("frame ")}
 
 
@@ -83,7 +83,7 @@ def _enclosed(found: Sameness, a: Robot, b: Robot, worst: Interval) -> dict[str,
 
 
 def _places_agree(found: Sameness, a: Robot, b: Robot) -> bool:
-    """Whether all links of both stand alike at random configurations, and at B's for them."""
+    """Return whether all links of both robots coincide at random configurations, and at those mapped to B."""
     q, base = a.sample(5, 1), f"link:{found.base_links[1]}"
     links = [pair for pair in found.links if pair[1] not in _tools(found)]
     T_a = a.placement(q, [f"link:{ours}" for ours, _ in links])
@@ -92,14 +92,14 @@ def _places_agree(found: Sameness, a: Robot, b: Robot) -> bool:
     return bool(np.abs(T_a - home @ np.linalg.inv(T_b[:, :1]) @ T_b[:, 1:]).max(initial=0.0) <= ROUNDING)
 
 
-def told(some: list[dict[str, Any]]) -> Iterator[str]:
+def summary(some: list[dict[str, Any]]) -> Iterator[str]:
     """The figures."""
     wrong = [one for one in some if not one["right"]]
     bounded = [one for one in some if "holds" in one]
     missed = [one for one in bounded if not one["holds"]]
     robots = len({one["robot"] for one in some})
     yield f"{len(some) - len(wrong)} of {len(some)} verdicts right, {robots} robots"
-    yield f"{len(bounded) - len(missed)} of {len(bounded)} intervals hold what the search finds"
+    yield f"{len(bounded) - len(missed)} of {len(bounded)} intervals contain the result of the search"
     for what in UNLIKE:
         widths = [one["upper"] / one["truth"] for one in bounded if one["change"] == what and one["truth"]]
         found = [one["lower"] / one["truth"] for one in bounded if one["change"] == what and one["truth"]]
@@ -114,13 +114,13 @@ def told(some: list[dict[str, Any]]) -> Iterator[str]:
 
 
 def main() -> int:
-    """The command line."""
+    """Run the checks from the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("robots", nargs="*", help="of the catalogue; all where none is named")
-    parser.add_argument("--keep", type=Path, required=True, help="a file of results, a line each")
-    parser.add_argument("--tell", action="store_true", help="tell what it has, and compute nothing")
+    parser.add_argument("robots", nargs="*", help="names of the catalogue (default: all)")
+    parser.add_argument("--keep", type=Path, required=True, help="file of results, one per line")
+    parser.add_argument("--tell", action="store_true", help="only print the stored results")
     options = parser.parse_args()
     warnings.simplefilter("ignore", urdfkin.UrdfWarning)
     lines = options.keep.read_text().splitlines() if options.keep.exists() else []
@@ -133,7 +133,7 @@ def main() -> int:
             some.append(one)
             with options.keep.open("a") as file:
                 file.write(json.dumps(one) + "\n")
-    print(*told([one for one in some if not options.robots or one["robot"] in options.robots]), sep="\n")
+    print(*summary([one for one in some if not options.robots or one["robot"] in options.robots]), sep="\n")
     return int(any(not one["right"] or not one.get("holds", True) for one in some))
 
 

@@ -1,4 +1,4 @@
-"""Docstrings for the site, as mkdocs.yml names this file: a doctest is a block of code."""
+"""An extension of mkdocs that shows doctests in docstrings as blocks of code; mkdocs.yml refers to it."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ _DOCTEST = re.compile(r"^( *)>>> .*(?:\n *\S.*)*", re.MULTILINE)
 
 
 class Doctests(griffe.Extension):
-    """Fences around doctests."""
+    """Adds code fences around doctests."""
 
     def on_object(self, *, obj: griffe.Object, **_: Any) -> None:
-        """Before the docstring is read."""
+        """Change an object's docstring before it is parsed."""
         if obj.docstring is not None:
             obj.docstring.value = fenced(obj.docstring.value)
 
 
 def fenced(docstring: str) -> str:
-    """The docstring with each doctest in a fence."""
+    """Return the docstring with each doctest in a code fence."""
     return _DOCTEST.sub(r"\1```pycon\n\g<0>\n\1```", docstring)

@@ -1,7 +1,7 @@
-r"""What the documentation site makes of the pages on its way: mkdocs.yml names this file as its hooks.
+r"""Hooks of mkdocs that generate and convert pages of the documentation site; mkdocs.yml refers to them.
 
-Commands and the library's names are read from the program, so that their pages cannot be out of date; a
-formula between $` and `$, which GitHub shows as it is, becomes MathML; a lesson is a notebook, too.
+The pages of commands and of the library are generated from the program, so they are always current. A formula
+between $` and `$ becomes MathML. A lesson is also available as a notebook.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from urdfkin.cli import cli
 LESSONS = "lessons/"
 _FORMULA = re.compile(r"(?:<p>)?\$<code>(.*?)</code>\$(?:</p>)?", re.DOTALL)
 _DISPLAYED = re.compile(r"^```math\n(.*?)\n```$", re.DOTALL | re.MULTILINE)
-#: What is before an argument without brackets.
+#: A LaTeX command before an argument without braces.
 _NAME_OF_FUNCTION = re.compile(r"(<mi>(?:cos|sin)</mi>)(?=<m(?:i|sub)>)")
 _FENCE = re.compile(r"^```(\w+)\n(.*?)^```\n?", re.DOTALL | re.MULTILINE)
 
 
 def on_config(config: Any) -> Any:
-    """No page is forgotten: those that mkdocs.yml does not name come last in the menu."""
+    """Add the pages that mkdocs.yml does not name to the end of the menu."""
     named = set(re.findall(r"[\w/-]+\.md", json.dumps(config.nav)))
     docs = Path(config.docs_dir)
     pages = sorted(str(path.relative_to(docs)) for path in docs.rglob("*.md"))
@@ -36,7 +36,7 @@ def on_config(config: Any) -> Any:
 
 
 def on_files(files: Any, config: Any) -> Any:
-    """Add the pages that are made of the program, and a notebook for each lesson."""
+    """Add the pages generated from the program, and a notebook for each lesson."""
     from mkdocs.structure.files import File  # noqa: PLC0415  of the extra `docs`
 
     made = {"cli.md": commands_page(), "api.md": library_page()}
@@ -51,7 +51,7 @@ def on_files(files: Any, config: Any) -> Any:
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Displayed formulas on lines of their own; a lesson can be had as a notebook."""
+    """Put displayed formulas on separate lines, and add the link to a lesson's notebook."""
     markdown = _DISPLAYED.sub(r"\n$`\1`$\n", markdown)
     if not page.file.src_uri.startswith(LESSONS):
         return markdown
@@ -60,7 +60,7 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 
 
 def on_page_content(content: str, **_: Any) -> str:
-    """Formulas as MathML."""
+    """Convert formulas to MathML."""
     from latex2mathml.converter import convert  # noqa: PLC0415  of the extra `docs`
 
     def mathml(found: re.Match[str]) -> str:
@@ -79,7 +79,7 @@ def on_page_content(content: str, **_: Any) -> str:
 
 
 def notebook(page: str) -> dict[str, Any]:
-    """A page as a notebook: text, code, and what the page shows below it, which a test compares."""
+    """Convert a page to a notebook with text, code, and the output on the page, which a test compares."""
     cells: list[dict[str, Any]] = []
     at = 0
     for block in _FENCE.finditer(page):
@@ -97,7 +97,7 @@ def notebook(page: str) -> dict[str, Any]:
 
 
 def _tell(cells: list[dict[str, Any]], text: str) -> None:
-    """A cell of text, formulas as notebooks write them; pictures and links stay on the site."""
+    """Add a text cell with formulas in notebook syntax, without pictures and links."""
     text = re.sub(r"\$`(.*?)`\$", r"$\1$", _DISPLAYED.sub(r"$$\1$$", text), flags=re.DOTALL)
     if text := text.strip():
         cells.append(_cell("markdown", text))
@@ -108,13 +108,13 @@ def _cell(kind: str, source: str, **more: Any) -> dict[str, Any]:
 
 
 def library_page() -> str:
-    """Every public name with its docstring."""
+    """Return the page of all public names with their docstrings."""
     names = [f"::: {urdfkin._HOMES[name]}.{name}" for name in urdfkin.__all__]
     return "\n\n".join(["# Library", "`import urdfkin` offers these names.", *names]) + "\n"
 
 
 def commands_page() -> str:
-    """Every command as `--help` prints it."""
+    """Return the page of all commands with the text of `--help`."""
     parent = click.Context(cli, info_name="urdfkin", terminal_width=80, **cli.context_settings)
     parts = ["# Commands", "`urdfkin COMMAND --help` prints each of these.", *_help(cli, parent, "##")]
     return "\n\n".join(parts) + "\n"

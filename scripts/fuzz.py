@@ -1,20 +1,22 @@
-"""Hostile URDFs, and nothing hurts: no crash, no hang, no traceback, no wrong number in silence.
+"""Test urdfkin with random hostile files: no crash, no hang, no traceback, no unreported wrong number.
 
     python scripts/fuzz.py --mutants 20000 --robots 10000 --seed 0 --jobs 2
     python scripts/fuzz.py --family names --family followers --robots 5000
 
-Mutants of the shipped robots are one family; the others are random whole robots, each odd in its own way:
-names that look like ours, prefixes, versions, followers, lengths, angles, axes, limits, roots, or everything;
-MJCF files with free bodies, equalities and default classes, which MuJoCo checks on its own; and the family
-"tables", Denavit-Hartenberg tables with damaged headers: each is refused or compared.
-The family "calibrations" has measured poses: good ones are calibrated; joint angles in degrees and shifted
-rows of q are refused.
+There are several families of files:
 
-Each goes through `check` and `load`, and every quantity of it is computed in every reference, on bases near
-and far, and held against Pinocchio, in a worker process that is restarted when it dies or takes too long.
-Number i of a family depends on the seed, the family and i alone, so `--family names --only i` replays it.
-What went wrong is kept as a file with the robot's bytes, beside a note that says what happened.
-Exit 0: nothing did.
+| family | content |
+|---|---|
+| mutants | mutants of the shipped robots |
+| names, prefixes, versions, ..., everything | random robots with one kind of unusual content, or all kinds |
+| MJCF | free bodies, equalities and default classes; MuJoCo checks them independently |
+| tables | Denavit-Hartenberg tables with damaged headers, to be rejected or compared |
+| calibrations | measured poses; joint angles in degrees and shifted rows of q must be rejected |
+
+Each robot passes through `check` and `load`. Every quantity is computed in every reference frame, on near
+and far bases, and compared with Pinocchio. A worker process does this; it is restarted after a crash or a
+timeout. File i of a family depends only on the seed, the family and i, so `--family names --only i` replays
+it. A file that causes a failure is stored, with a note about the failure. Exit 0: no failures.
 """
 
 from __future__ import annotations
@@ -38,7 +40,7 @@ from scripts.fuzzing import GOOD, Case, calibrations, mjcf, robots, tables
 from scripts.fuzzing.mutations import LARGEST, mutant
 from urdfkin.urdf.catalogue import catalogue
 
-#: What a worker answers when it is ready; the first use compiles, which may take a while.
+#: The message of a worker that is ready; the first use compiles kernels, which takes a while.
 READY, FIRST_WAIT = "ready", 300.0
 
 MUTANTS = "mutants"
@@ -47,13 +49,13 @@ FAMILIES = (MUTANTS, *robots.FAMILIES, *mjcf.FAMILIES, tables.FAMILY, calibratio
 
 @cache
 def files() -> list[Path]:
-    """The robots that are mutated."""
+    """Return the files of the robots to mutate."""
     paths = (entry.path for entry in catalogue().values())
     return [path for path in paths if path.stat().st_size <= LARGEST]
 
 
 def case(seed: int, family: str, number: int) -> Case:
-    """One document of a family."""
+    """Return one document of a family."""
     if family in mjcf.FAMILIES:
         return mjcf.robot(seed, family, number)
     if family == tables.FAMILY:
@@ -64,7 +66,7 @@ def case(seed: int, family: str, number: int) -> Case:
 
 
 class Worker:
-    """A process that judges one document after another; it may die."""
+    """A process that tests one document after another, and may crash."""
 
     def __init__(self, command: list[str], timeout: float) -> None:
         self.command, self.timeout = command, timeout
@@ -73,12 +75,12 @@ class Worker:
         self.lines: queue.Queue[str | None] = queue.Queue()
 
     def judge(self, family: str, number: int) -> tuple[str, str]:
-        """The outcome's word and details; a death and a hang are outcomes, too."""
+        """Test a document; return the outcome and its details. A crash and a hang are outcomes."""
         if self.process is None:
             self.start()
         assert self.process is not None
         assert self.process.stdin is not None
-        with contextlib.suppress(BrokenPipeError):  # dead already: the next line says so
+        with contextlib.suppress(BrokenPipeError):  # the process has ended; the next line reports it
             self.process.stdin.write(f"{family} {number}\n")
             self.process.stdin.flush()
         try:
@@ -92,7 +94,7 @@ class Worker:
         return str(word), str(details)
 
     def start(self) -> None:
-        """Start the process and wait until it has compiled what it needs."""
+        """Start the process and wait until it has compiled its kernels."""
         self.process = subprocess.Popen(
             self.command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
         )
@@ -100,7 +102,7 @@ class Worker:
         self.listener = threading.Thread(target=self._listen, args=(self.process, self.lines), daemon=True)
         self.listener.start()
         if self.lines.get(timeout=FIRST_WAIT) != READY:
-            raise RuntimeError("the worker does not start")
+            raise RuntimeError("the worker process does not start")
 
     @staticmethod
     def _listen(process: subprocess.Popen[str], lines: queue.Queue[str | None]) -> None:
@@ -110,7 +112,7 @@ class Worker:
         lines.put(None)
 
     def stop(self) -> int | None:
-        """End the process, if it has not ended by itself; its exit status."""
+        """Stop the process if it is running; return its exit status."""
         if self.process is None:
             return None
         process, self.process = self.process, None
@@ -127,7 +129,7 @@ class Worker:
 
 
 def work(seed: int) -> None:
-    """The worker's side: a family and a number in, an outcome out."""
+    """Run as the worker: read a family and a number, write the outcome, repeat."""
     from scripts.fuzzing.judge import judge  # noqa: PLC0415  only the worker needs the compiler
 
     answers = sys.stdout
@@ -144,7 +146,7 @@ def work(seed: int) -> None:
 def fuzz(
     asked: Iterable[tuple[str, int]], seed: int, jobs: int, timeout: float, keep: Path
 ) -> collections.Counter[str]:
-    """Judge documents by family and number; keep what went wrong; count the outcomes."""
+    """Test documents by family and number; store those with a failure; return the counts of outcomes."""
     waiting: queue.SimpleQueue[tuple[str, int]] = queue.SimpleQueue()
     for each in asked:
         waiting.put(each)
@@ -178,28 +180,28 @@ def fuzz(
 
 
 def shares(families: Sequence[str], mutants: int, whole: int) -> list[tuple[str, int]]:
-    """Family and number of so many mutants, and of so many whole robots in all, from each family in turn."""
+    """Return (family, number) of all mutants and of the random robots, which alternate between families."""
     chosen = [family for family in families if family != MUTANTS]
     asked = [(MUTANTS, number) for number in range(mutants) if MUTANTS in families]
     return asked + [(chosen[i % len(chosen)], i // len(chosen)) for i in range(whole) if chosen]
 
 
 def main() -> int:
-    """The command line."""
+    """Run the fuzzer from the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--mutants", type=int, default=2000, help="how many mutants")
-    parser.add_argument("--robots", type=int, default=2000, help="how many whole robots, of all families")
+    parser.add_argument("--mutants", type=int, default=2000, help="number of mutants")
+    parser.add_argument("--robots", type=int, default=2000, help="number of random robots of all families")
     parser.add_argument(
-        "--family", action="append", choices=FAMILIES, help="only this one; may be repeated; all if left out"
+        "--family", action="append", choices=FAMILIES, help="family to test; repeatable (default: all)"
     )
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--timeout", type=float, default=30.0, help="seconds for one robot")
-    parser.add_argument("--only", type=int, help="judge this number of the family alone")
+    parser.add_argument("--timeout", type=float, default=30.0, help="time limit of one robot in seconds")
+    parser.add_argument("--only", type=int, help="test only this number of the family")
     parser.add_argument(
-        "--keep", type=Path, default=Path("artefacts/fuzz"), help="folder for what goes wrong"
+        "--keep", type=Path, default=Path("artefacts/fuzz"), help="folder for files that cause a failure"
     )
     parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()

@@ -1,4 +1,4 @@
-"""Whether loading robots keeps memory or files: loads N, no two alike, and says what is held after each part.
+"""Check for leaks of memory and files: load N different robots, and print the memory in use after each part.
 
 python -m scripts.leaks 10000
 """
@@ -16,7 +16,7 @@ from pathlib import Path
 
 import urdfkin
 
-#: In how many parts a run is measured.
+#: Number of parts of a run.
 PARTS = 5
 _ROBOT = """<robot name="r{k}">
   <link name="base{k}"/><link name="arm"/><link name="{odd}tip{k}"/>
@@ -29,7 +29,7 @@ _ROBOT = """<robot name="r{k}">
 
 
 def use(k: int, folder: Path) -> None:
-    """A robot of its own: from a file, checked, computed with, verified; or one that is refused."""
+    """Load robot `k` from a file, check it and compute with it; some robots are rejected."""
     text = _ROBOT.format(k=k, x=0.1 + 1e-6 * k, odd="&lt;b&gt; " if k % 3 else "")
     path = folder / f"{k % 10}.urdf"
     path.write_text(text if k % 5 else text.replace("</robot>", ""))
@@ -42,8 +42,8 @@ def use(k: int, folder: Path) -> None:
     robot.dh()
 
 
-def held() -> dict[str, float]:
-    """Resident memory in MiB, open descriptors, objects that Python keeps account of."""
+def usage() -> dict[str, float]:
+    """Return the resident memory in MiB, the open descriptors, and the objects of the garbage collector."""
     gc.collect()
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return {
@@ -54,20 +54,20 @@ def held() -> dict[str, float]:
 
 
 def measure(n: int) -> list[dict[str, float]]:
-    """What is held after each part of N robots."""
+    """Return the memory, descriptors and objects after each part of N robots."""
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         found = []
         for k in range(n):
             use(k, Path(folder))
             if (k + 1) % (n // PARTS) == 0:
-                found.append(held())
+                found.append(usage())
                 print(f"{k + 1} robots: {json.dumps(found[-1])}", file=sys.stderr, flush=True)
     return found
 
 
 def main() -> None:
-    """Print it as JSON."""
+    """Print the measurements as JSON."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("robots", type=int, nargs="?", default=10_000)
     print(json.dumps(measure(parser.parse_args().robots)))

@@ -130,8 +130,8 @@ class Row:
     mujoco: str
 
 
-class Asked:
-    """One motion of one robot, by each library's own calls, and by difference quotients."""
+class MeasuredMotion:
+    """One motion of one robot, computed by each library and by difference quotients."""
 
     def __init__(self, seed: int = 0) -> None:
         import mujoco  # noqa: PLC0415  an optional dependency
@@ -230,7 +230,7 @@ def rows() -> list[Row]:
 
 
 def _six_vectors() -> list[Row]:
-    asked = Asked()
+    asked = MeasuredMotion()
     pin, R = asked.pin, asked.pin.ReferenceFrame
     readings = asked.velocity_readings()
     found = [
@@ -267,7 +267,7 @@ def _six_vectors() -> list[Row]:
     ]
 
 
-def _about(asked: Asked) -> dict[str, FloatArray]:
+def _about(asked: MeasuredMotion) -> dict[str, FloatArray]:
     """Return candidate velocities at other points."""
     _, p, v, w, _, _ = asked.motion()
     com = asked.mj_data.subtree_com[asked.mj_model.body_rootid[asked.body]]
@@ -280,7 +280,7 @@ def _about(asked: Asked) -> dict[str, FloatArray]:
 
 
 def _accelerations() -> list[Row]:
-    asked = Asked()
+    asked = MeasuredMotion()
     pin, aligned = asked.pin, asked.pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
     readings, flipped = asked.acceleration_readings(flipped=False), asked.acceleration_readings(flipped=True)
     frame = asked.model, asked.data, asked.frame, aligned

@@ -3,8 +3,8 @@
     python scripts/benchmark.py --json docs/performance.json
     python scripts/make_performance.py
 
-The text stands in the page; what stands between `<!-- figures: ... -->` and `<!-- end -->` is written here.
-A test holds the page against what this script would write.
+The script replaces the text between `<!-- figures: ... -->` and `<!-- end -->` on the page. A test checks
+that the page is current.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ _PLACE = re.compile(r"(<!-- figures: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 def page(text: str, figures: Mapping[str, Any]) -> str:
-    """`text` with the figures at their places; a place for what was not measured says so.
+    """Return `text` with the figures inserted; a missing measurement is reported in its place.
 
     Raises:
-        ValueError: the page has no place for what was measured, or two.
+        ValueError: the page does not have exactly one place for a measurement.
     """
     parts: dict[str, list[str]] = {"machine": [_machine(figures)]}
     for words in tables(figures):

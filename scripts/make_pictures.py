@@ -1,6 +1,6 @@
-"""Make pictures for README and site: the three references, photographs of the report and the viewer.
+"""Make pictures for the README and the site: the reference frames, and screenshots of report and viewer.
 
-Needs the extras `plots`, `view` and `test`, and Debian's chromium and chromium-driver.
+The script needs the extras `plots`, `view` and `test`, and Debian's chromium and chromium-driver.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ POSE = [0.0, -0.8, 0.0, -2.4, 0.0, 1.6, 0.8, 0.04]
 
 
 def _axes(axes: Any, at: FloatArray, R: FloatArray) -> None:
-    """Two axes in red and green."""
+    """Draw two axes in red and green."""
     for k, color in enumerate((RED, GREEN)):
         arrow(axes, at, 0.17 * R[:, k], color)
         axes.text(
@@ -49,7 +49,7 @@ def _axes(axes: Any, at: FloatArray, R: FloatArray) -> None:
 
 
 def reference_frames() -> Any:
-    """The bent planar arm of docs/reference-frames.md, a panel for each reference."""
+    """Draw the planar arm of docs/reference-frames.md, with a panel for each reference frame."""
     arm, q, v = urdfkin.load("planar_two_link"), [0.0, np.pi / 2], [1.0, 1.0]
     figure, panels = plt.subplots(1, 3, figsize=(9.6, 3.6), sharey=True, layout="constrained")
     points = arm.placement(q, ["base", "link_2", "tip"])[:, :2, 3]
@@ -68,7 +68,7 @@ def reference_frames() -> Any:
         _axes(axes, at, R)
         numbers = arm.velocity(q, v, "tip", reference)[:2]
         arrow(axes, at, 0.6 * R @ numbers, INK)
-        for k, color in enumerate((RED, GREEN)):  # the arrow's two numbers, as steps along the axes
+        for k, color in enumerate((RED, GREEN)):  # the two components of the arrow, along the axes
             begin = at + (0.6 * R[:, 0] * numbers[0] if k else 0)
             axes.plot(
                 *np.array([begin, begin + 0.6 * R[:, k] * numbers[k]]).T, color=color, linewidth=1.2, ls="--"
@@ -81,13 +81,11 @@ def reference_frames() -> Any:
 
 
 def photograph_report(folder: Path) -> None:
-    """The page of a report about two robots, the first unfolded, its robot bent."""
+    """Make a screenshot of a report about two robots, with the first one expanded."""
     page = folder / "report.html"
     found = urdfkin.validate(["panda", "ur5"], samples=1000)
     text = as_html(cast("Document", found.as_dict()))
-    installed = str(
-        Path(urdfkin.load("panda").path or "").parents[2]
-    )  # whose machine it was is nobody's business
+    installed = str(Path(urdfkin.load("panda").path or "").parents[2])  # leave out the name of the machine
     page.write_text(text.replace(installed, "example-robot-data"), encoding="utf-8")
     with opened(folder / "report", width=1000, height=1250) as browser:
         browser.open(page)
@@ -97,7 +95,7 @@ def photograph_report(folder: Path) -> None:
 
 
 def photograph_viewer(folder: Path) -> None:
-    """The viewer beside its controls, and on a phone."""
+    """Make screenshots of the viewer with its controls, and on a phone."""
     server = new_server(port=8099)
     try:
         viewer = Viewer(server, urdfkin.load("panda"), POSE)
@@ -117,13 +115,13 @@ def photograph_viewer(folder: Path) -> None:
 
 
 def keep(browser: Browser, name: str) -> None:
-    """A picture of few colours, so that it is small."""
+    """Save a screenshot with few colours, as a small file."""
     image = Image.open(io.BytesIO(browser.chrome.get_screenshot_as_png())).convert("RGB")
     image.quantize(128).save(IMAGES / f"{name}.png", optimize=True)
 
 
 def main() -> None:
-    """Make them all."""
+    """Make all pictures."""
     with mpl.rc_context(STYLE):
         figure = reference_frames()
         figure.savefig(IMAGES / "reference-frames.svg", metadata={"Date": None})

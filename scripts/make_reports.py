@@ -1,4 +1,4 @@
-"""Write the layout of the JSON document into docs/reports.md, from its schema.
+"""Write the layout of the JSON report into docs/reports.md, from its schema.
 
 Run it after a change of the schema: `python scripts/make_reports.py`. A test compares the page with the
 output of this script.

@@ -287,7 +287,7 @@ PICTURES: dict[str, tuple[Callable[[Any], None], tuple[float, float]]] = {
 
 
 def main(folder: Path = IMAGES) -> None:
-    """Draw every picture."""
+    """Draw all pictures."""
     folder.mkdir(parents=True, exist_ok=True)
     with mpl.rc_context(STYLE):
         for name, (draw, size) in PICTURES.items():

@@ -1,7 +1,7 @@
-"""What a campaign costs: serial, two processes, a store, a local cluster of two, side by side.
+"""Measure the cost of a campaign: serial, two processes, with a store, and on a local cluster of two.
 
-The ways take turns, so that what else the machine does meets them all; medians of the rounds. A second of
-processor is counted over all processes, ours and theirs, and hardly depends on what else runs.
+The variants alternate, so that other load of the machine affects all of them. The script prints medians
+over rounds. Processor time includes all processes, and hardly depends on other load.
 
     python scripts/measure_campaigns.py ur5 --samples 10000 --rounds 3
     python scripts/measure_campaigns.py --all --samples 1000 --rounds 1 --ways serial,jobs
@@ -28,7 +28,7 @@ Way = Callable[..., ValidationReport]
 
 
 def store(*robots: Any, **how: Any) -> ValidationReport:
-    """Serial, into a store."""
+    """Validate serially, with a store."""
     with tempfile.TemporaryDirectory() as folder:
         report = validate(*robots, store=folder, **how)
         files = [path.stat().st_size for path in Path(folder).glob("chunks/*/*")]
@@ -37,9 +37,9 @@ def store(*robots: Any, **how: Any) -> ValidationReport:
 
 
 def cluster(*robots: Any, **how: Any) -> ValidationReport:
-    """Two workers of dask here; their start is not counted, their end is."""
+    """Validate with two local workers of dask; the time includes their end but not their start."""
     with connected("local:2") as two:
-        validate("planar_two_link", samples=400, executor=two)  # what computes is loaded
+        validate("planar_two_link", samples=400, executor=two)  # loads the modules of the workers
         chunks = len(Cut(how["samples"])) * len(robots[0])
         begin, before = time.perf_counter(), time.process_time()
         report = validate(*robots, executor=two, **how)
@@ -58,7 +58,7 @@ WAYS: dict[str, Way] = {
 
 
 def main() -> None:
-    """Print a table."""
+    """Print the table of measurements."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("robots", nargs="*")
     parser.add_argument("--all", action="store_true")
@@ -67,7 +67,7 @@ def main() -> None:
     parser.add_argument("--ways", default=",".join(WAYS))
     given = parser.parse_args()
     robots = list(examples()) if given.all else given.robots
-    validate("planar_two_link", samples=10)  # compiled, loaded
+    validate("planar_two_link", samples=10)  # compiles and loads everything
     wall: dict[str, list[float]] = {}
     processor: dict[str, list[float]] = {}
     for _ in range(given.rounds):
@@ -88,7 +88,7 @@ def main() -> None:
 
 
 def _processor() -> float:
-    """Seconds of processor of this process and of those that have ended."""
+    """Return the processor time in seconds of this process and its finished children."""
     t = os.times()
     return t.user + t.system + t.children_user + t.children_system
 

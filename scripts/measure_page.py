@@ -1,7 +1,7 @@
-"""How soon the page of thousands of robots is on the screen: written, opened in Chromium, searched, unfolded.
+"""Measure a report of thousands of robots: writing it, opening it in Chromium, searching, expanding a robot.
 
-The robots are those of a real validation, over and over, under other names. Medians over browsers that have
-never seen the page; needs Debian's chromium and chromium-driver.
+The robots are copies of those of a real validation, with other names. The script prints medians over new
+browser profiles. It needs Debian's chromium and chromium-driver.
 
     python scripts/measure_page.py --robots 2000
 """
@@ -39,7 +39,7 @@ _UNFOLD = """
 
 
 def main() -> None:
-    """Print what each step takes."""
+    """Print the time of each step."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--robots", type=int, default=2000)
     parser.add_argument("--rounds", type=int, default=5)
@@ -59,7 +59,7 @@ def main() -> None:
 
 
 def fleet(robots: int) -> Document:
-    """The document of so many."""
+    """Return the report document of `robots` robots."""
     document = validate(list(_ROBOTS), samples=10).as_dict()
     names = (f"fleet/{i:04}.urdf" for i in range(robots))
     document["robots"] = [

@@ -1,8 +1,8 @@
-"""Write how large an installation of urdfkin is into docs/index.md: what a fresh environment of it holds.
+"""Measure the size of an installation of urdfkin in a new environment, and write it into docs/index.md.
 
     python scripts/measure_size.py
 
-The largest packages and the sums are printed too. Python, pip and bytecode are not counted.
+The script also prints the largest packages and the sums. Python, pip and bytecode are not counted.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _PLACE = re.compile(r"(<!-- size -->\n).*?(\n<!-- end -->)", re.DOTALL)
 
 
 def closure(name: str) -> dict[str, int]:
-    """A package and all that it needs without extras -> bytes of its files."""
+    """Return the sizes in bytes of a package and its dependencies without extras."""
     found: dict[str, int] = {}
     waiting = [name]
     while waiting:
@@ -35,23 +35,24 @@ def closure(name: str) -> dict[str, int]:
 
 
 def own() -> int:
-    """Bytes of urdfkin's wheel, unpacked: the package, and what pyproject.toml puts into it."""
+    """Return the size in bytes of urdfkin's unpacked wheel: the package and the files from pyproject.toml."""
     places = (ROOT / "urdfkin", ROOT / "robots", ROOT / "docs" / "questions.md")
     files = (file for place in places for file in (place.rglob("*") if place.is_dir() else (place,)))
     return sum(file.stat().st_size for file in files if file.is_file() and file.suffix != ".pyc")
 
 
 def sentence(all_: int, robots: int, pinocchio: int, checking: int) -> str:
-    """What the page says; bytes."""
+    """Return the sentence of the page from sizes in bytes."""
     return (
-        f"An installation takes {all_ / 1e9:.1f} GB: {robots / 1e9:.2f} are the robots of example-robot-data,"
-        f"\n{pinocchio / 1e9:.2f} Pinocchio with its libraries, the rest mostly NumPy, Numba and its"
-        f" compiler. A job that only [checks\nfiles](ci.md) needs urdfkin and click, {checking / 1e6:.0f} MB."
+        f"An installation takes {all_ / 1e9:.1f} GB: {robots / 1e9:.2f} GB for the robots of"
+        f" example-robot-data, {pinocchio / 1e9:.2f} GB for Pinocchio and its\nlibraries, and the rest mostly"
+        f" for NumPy, Numba and its compiler. A job that only [checks files](ci.md)\nneeds urdfkin and click,"
+        f" {checking / 1e6:.0f} MB."
     )
 
 
 def page(text: str, said: str) -> str:
-    """The page with that sentence in its place."""
+    """Return the page with the sentence inserted."""
     found, count = _PLACE.subn(lambda place: place[1] + said + place[2], text)
     if count != 1:
         raise ValueError(f"the page has {count} places for the size")
@@ -59,7 +60,7 @@ def page(text: str, said: str) -> str:
 
 
 def main() -> None:
-    """The largest, and sums."""
+    """Print the largest packages and the sums, and write the page."""
     sizes = closure("urdfkin") | {"urdfkin": own()}
     for name, size in sorted(sizes.items(), key=lambda item: -item[1])[:10]:
         print(f"{size / 1e6:7.0f} MB  {name}")

@@ -1,4 +1,4 @@
-"""What a chunk costs: to compute, to keep, to read back and to add up, in milliseconds of processor.
+"""Measure the processor time to compute, store, read and add a chunk, in milliseconds.
 
 python scripts/measure_store.py
 """
@@ -31,7 +31,7 @@ def main() -> None:
 
 
 def _cost(work: Callable[[int], object], times: int) -> float:
-    """The median, in milliseconds of processor."""
+    """Return the median processor time in milliseconds."""
     seconds = []
     for i in range(times):
         begin = time.process_time()

@@ -1,14 +1,14 @@
-"""Make small slips in the package, one at a time, and see whether a test fails for each.
+"""Make small mistakes (mutants) in the package, one at a time, and check that a test detects each.
 
-    python scripts/mutate.py --sample 40 --seed 1          forty slips, drawn from the whole package
-    python scripts/mutate.py validation dh/snapping        every slip of two parts
+    python scripts/mutate.py --sample 40 --seed 1          forty random mutants of the whole package
+    python scripts/mutate.py validation dh/snapping        all mutants of two parts
     python scripts/mutate.py --only urdfkin.validation.error_stats:17
-    python scripts/mutate.py --named                       those of tests/attacks/named_slips.toml
+    python scripts/mutate.py --named                       the mutants of tests/attacks/named_slips.toml
 
-The tests that are near the file are asked first, those that are quick; then, with --slow, the slow ones near
-it, and with --whole the whole suite. Every slip that nobody noticed is printed, and kept in --json with the
-others. What docs/mutation.md argues is not asked again. Exit 0: all were noticed or are argued. 1: some were
-not, or there was no mutant. 2: a part that does not exist.
+The script runs the quick tests near the file, then, with --slow, the slow tests near it, and with --whole
+the whole suite. It prints every undetected mutant, and writes all results to --json. It skips the mutants
+that docs/mutation.md lists as harmless. Exit 0: all mutants are detected or harmless. 1: some are not, or
+there is no mutant. 2: a part does not exist.
 """
 
 from __future__ import annotations
@@ -44,7 +44,15 @@ _QUICK, _SLOW = "not slow and not browser", "slow and not browser"
 
 @dataclass(frozen=True)
 class Mutant:
-    """A slip in a file; `name` replays it with --only, `place` finds it again when the file has changed."""
+    """A mistake in a file.
+
+    Attributes:
+        name: Name for --only.
+        file: The file.
+        line: The line.
+        what: The text before and after.
+        place: The function, which identifies the mutant also after a change of the file.
+    """
 
     name: str
     file: str
@@ -55,7 +63,7 @@ class Mutant:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What the tests said: `noticed` with the test that did, `survived`, `too slow`, or `argued`."""
+    """The result of a mutant: `noticed` by a test, `survived`, `too slow`, or `argued` (harmless)."""
 
     mutant: Mutant
     word: str
@@ -64,12 +72,12 @@ class Outcome:
 
 
 def mutants(parts: list[str]) -> list[Mutant]:
-    """Every mutant of some parts of the package, or of all."""
+    """Return all mutants of some parts of the package, or of the whole package."""
     return [mutant for path in files(parts) for mutant in mutants_of(path)]
 
 
 def mutants_of(path: Path) -> list[Mutant]:
-    """Every mutant of a file."""
+    """Return all mutants of a file."""
     tree, module = ast.parse(path.read_text(encoding="utf-8")), module_of(path)
     return [
         Mutant(
@@ -96,42 +104,42 @@ def judge(mutant: Mutant, *, timeout: float, slow: bool = False, whole: bool = F
 
 
 def judge_named(slip: Named, *, timeout: float) -> Outcome:
-    """Run the one test that a named slip must fail."""
+    """Run the test that must detect a named mutant."""
     begin = time.perf_counter()
     texts = json.dumps([slip.before, slip.after])
     word, by = _run({"URDFKIN_MUTANT": slip.module, "URDFKIN_MUTANT_TEXTS": texts}, [slip.test], timeout)
     if word == "noticed" and not by.startswith(f"FAILED {slip.test}"):
-        word = "not run"  # something else than the test's claim failed
+        word = "not run"  # another failure than the test's claim
     file = f"{slip.module.replace('.', '/')}.py"
     mutant = Mutant(slip.claim, file, 0, f"{slip.before}  ->  {slip.after}", slip.module)
     return Outcome(mutant, word, by, round(time.perf_counter() - begin, 1))
 
 
-#: Forks a process for each run of tests that has the libraries of others in it already, and nothing of ours:
-#: to import them takes longer than most tests.
+#: Forks a process with the foreign libraries already imported for each run of tests; importing them takes
+#: longer than most tests.
 _READY = multiprocessing.get_context("forkserver")
 _READY.set_forkserver_preload(["numba", "pinocchio", "pytest"])
 
 
 def _run(slip: dict[str, str], tests: list[str], timeout: float) -> tuple[str, str]:
-    with tempfile.NamedTemporaryFile("r") as said:
-        process = _READY.Process(target=_ask, args=(slip, tests, said.name))
+    with tempfile.NamedTemporaryFile("r") as output:
+        process = _READY.Process(target=_ask, args=(slip, tests, output.name))
         process.start()
         process.join(timeout)
         if process.exitcode is None:
             process.kill()
             process.join()
             return "too slow", ""
-        lines = said.read().splitlines()
+        lines = output.read().splitlines()
     if process.exitcode in (0, _NO_TESTS):
         return "survived", ""
     failed = (line for line in lines if line.startswith(("FAILED", "ERROR")))
     return "noticed", next(failed, lines[-1] if lines else "")[:300]
 
 
-def _ask(slip: dict[str, str], tests: list[str], said: str) -> None:
-    """In that process: make the slip, for what it starts too, and run the tests. Exit: as pytest."""
-    import pytest  # noqa: PLC0415  of the children alone
+def _ask(slip: dict[str, str], tests: list[str], output: str) -> None:
+    """In the new process and its children, make the mistake and run the tests; exit with pytest's code."""
+    import pytest  # noqa: PLC0415  only in child processes
 
     hook = ROOT / "scripts" / "mutating" / "hook"
     paths = [str(hook), str(ROOT), os.environ.get("PYTHONPATH", "")]
@@ -141,7 +149,7 @@ def _ask(slip: dict[str, str], tests: list[str], said: str) -> None:
         "PYTHONDONTWRITEBYTECODE": "1",
     }
     sys.dont_write_bytecode = True
-    with open(said, "w") as to, open(os.devnull) as nothing:  # noqa: PTH123  as descriptors
+    with open(output, "w") as to, open(os.devnull) as nothing:  # noqa: PTH123  as descriptors
         os.dup2(nothing.fileno(), 0)
         os.dup2(to.fileno(), 1)
         os.dup2(to.fileno(), 2)
@@ -150,25 +158,25 @@ def _ask(slip: dict[str, str], tests: list[str], said: str) -> None:
 
 
 def main() -> int:
-    """The command line."""
+    """Run the mutation tests from the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("parts", nargs="*", help="beginnings of paths below urdfkin/; none for all")
-    parser.add_argument("--sample", type=int, help="draw so many instead of all")
+    parser.add_argument("parts", nargs="*", help="beginnings of paths below urdfkin/ (default: all)")
+    parser.add_argument("--sample", type=int, help="number of random mutants (default: all)")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--timeout", type=float, default=300.0, help="seconds for one mutant's tests")
     parser.add_argument(
-        "--slow", action="store_true", help="ask the slow tests near it where those are silent"
+        "--timeout", type=float, default=300.0, help="time limit of one mutant's tests in seconds"
     )
-    parser.add_argument("--whole", action="store_true", help="ask the whole suite where those are silent")
-    parser.add_argument("--only", help="this mutant alone")
+    parser.add_argument("--slow", action="store_true", help="also run the slow tests near the file")
+    parser.add_argument("--whole", action="store_true", help="also run the whole quick suite")
+    parser.add_argument("--only", help="run only this mutant")
     parser.add_argument(
-        "--named", action="store_true", help="the named slips (of these parts), each by its own test"
+        "--named", action="store_true", help="run the named mutants (of these parts), each with its own test"
     )
-    parser.add_argument("--count", action="store_true", help="say how many there are, and end")
-    parser.add_argument("--json", type=Path, help="keep what happened to each")
+    parser.add_argument("--count", action="store_true", help="print the number of mutants and exit")
+    parser.add_argument("--json", type=Path, help="file for the results of all mutants")
     options = parser.parse_args()
     try:
         asks = _asks(options)

@@ -1,4 +1,4 @@
-"""Load every MJCF file below a folder and count who vouches for what is read: the figures of docs/mjcf.md.
+"""Load all MJCF files below a folder and count the results of the checks: the figures of docs/mjcf.md.
 
 pip install --no-deps --target models gymnasium==1.4.0 dm-control==1.0.50
 python scripts/survey_mjcf.py models
@@ -20,7 +20,7 @@ from urdfkin.urdf.mjcf import is_mjcf
 
 
 def said_of(path: Path) -> str:
-    """What becomes of one file, and what Pinocchio's MJCF reader says of it; or why it cannot be read."""
+    """Return the result of one file with the answer of Pinocchio's MJCF reader, or the reading error."""
     try:
         robot = urdfkin.load(path)
         robot.placement(robot.sample(2), robot.link_frames)
@@ -44,12 +44,12 @@ def said_of(path: Path) -> str:
 
 
 def main() -> int:
-    """The command line."""
+    """Run the survey from the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--each", action="store_true", help="a line for each file")
+    parser.add_argument("--each", action="store_true", help="print a line for each file")
     options = parser.parse_args()
     warnings.simplefilter("ignore", urdfkin.UrdfWarning)
     counts = Counter[str]()

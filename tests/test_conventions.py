@@ -20,7 +20,7 @@ def test_a_number_that_is_no_reading_or_two_is_an_error() -> None:
 
 
 def test_readings_are_clearly_apart_on_the_motion_that_is_asked_about() -> None:
-    asked = maker.Asked()
+    asked = maker.MeasuredMotion()
     for readings in (asked.velocity_readings(), asked.acceleration_readings(flipped=False)):
         values = list(readings.values())
         gaps = [np.abs(x - y).max() for i, x in enumerate(values) for y in values[:i]]

@@ -103,7 +103,7 @@ def test_the_size_of_an_installation_is_written_by_its_script() -> None:
     (checking,) = re.findall(r"needs urdfkin and click, (\d+) MB\.", text)
     assert abs(int(checking) - (measure_size.own() + measure_size.closure("click")["click"]) / 1e6) < 1.0
     said = measure_size.sentence(2_000_000_000, 10**9, 5 * 10**8, 7_000_000)
-    assert "takes 2.0 GB: 1.00 are" in measure_size.page(text, said)
+    assert "takes 2.0 GB: 1.00 GB for" in measure_size.page(text, said)
     with pytest.raises(ValueError, match="0 places"):
         measure_size.page("", said)
 

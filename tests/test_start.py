@@ -63,7 +63,7 @@ def test_why_their_pinocchio_numbers_differ_is_the_first_answer_and_its_example_
     topic, answer = next(iter(answers().items()))
     assert topic == "why-do-my-pinocchio-numbers-differ"
     assert run("explain", topic).code == 0
-    for reason in ("layout", "order", "followers", "reference", "accelerations"):
+    for reason in ("layout", "order", "mimic joints", "reference", "accelerations"):
         assert reason in answer
     kinds = [(kind, text) for kind, text in blocks("questions.md")][:3]
     names: dict[str, object] = {}

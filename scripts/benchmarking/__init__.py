@@ -1,5 +1,9 @@
 """The parts of `scripts/benchmark.py`.
 
-What is measured (`subject`, `sections`, `where`, `machine`), who (`contenders`, `peers`, `generated`), how
-(`timing`, `calls`, `operations`), and what becomes of the figures (`tables`, `picture`).
+| modules | content |
+|---|---|
+| `subject`, `sections`, `where`, `machine` | the measurements |
+| `contenders`, `peers`, `generated` | the libraries |
+| `timing`, `calls`, `operations` | the methods |
+| `tables`, `picture` | the output |
 """

@@ -1,7 +1,7 @@
-"""A library that takes one configuration at a time: its calls as lines of Python, in a loop or by themselves.
+"""Calls of a library that computes one configuration at a time, as lines of Python, in a loop or single.
 
-The lines are put into a loop's body as they stand, with their names as local variables: no contender pays
-for a function of the benchmark's around its calls.
+The lines become the body of a loop, with their names as local variables. So no library pays for a function
+call of the benchmark.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from urdfkin.model.tree import FloatArray
 
 @dataclass(frozen=True)
 class Calls:
-    """How a library computes one quantity of one configuration.
+    """The calls with which a library computes one quantity of one configuration.
 
     Attributes:
-        who: The contender.
-        names: What the lines use beside `q`, `v` and `a`.
+        who: Name of the contender.
+        names: Variables of the lines besides `q`, `v` and `a`.
         lines: The calls; the last line is an expression, the result.
         store: The lines for a batch, which write `out[k]`; None: the lines, with the last one's value
             stored.
-        order: For each of the library's coordinates, which of urdfkin's it is; None: the same order.
-        shape: Of the array that a batch is written to, for one configuration; None: urdfkin's shape.
-        read: The batch's raw results in urdfkin's conventions.
-        read_one: The last line's value as an array like a row of the raw results.
+        order: For each of the library's coordinates, the index in urdfkin; None: the same order.
+        shape: Shape of one configuration's result in a batch; None: urdfkin's shape.
+        read: Converts a batch's raw results to urdfkin's conventions.
+        read_one: Converts the last line's value to an array like a row of the raw results.
         remark: See `Work`.
     """
 
@@ -45,7 +45,7 @@ class Calls:
     remark: str = ""
 
     def batch(self, subject: Subject, quantity: str) -> Work:
-        """The calls for one configuration after the other, results stored in a reused array."""
+        """Return the work of all configurations in a loop, with results in a reused array."""
         inputs = [self._ordered(x) for x in subject.inputs(quantity, subject.loop)]
         out = np.empty((subject.loop, *(self.shape or subject.width(quantity))))
         loop = self.loop()
@@ -58,12 +58,12 @@ class Calls:
         )
 
     def loop(self) -> Callable[..., None]:
-        """A function of `out` and of q, or of q, v and a, each a batch."""
+        """Return a function of `out` and of batches of q, or of q, v and a."""
         body = self.store or (*self.lines[:-1], f"out[k] = {self.lines[-1]}")
         return _function(self.names, "out, *inputs", "for k, (q, v, a) in enumerate(rows(inputs)):", body)
 
     def single(self, subject: Subject, quantity: str) -> Work:
-        """The calls alone, results dropped; rows of the inputs are made beforehand."""
+        """Return the work of single calls without stored results; input rows are prepared beforehand."""
         inputs = [list(self._ordered(x)) for x in subject.inputs(quantity, subject.loop)]
         rows = list(_rows(inputs))
         repeat = _function(self.names, "rows_", "for q, v, a in rows_:", self.lines)
@@ -80,14 +80,14 @@ class Calls:
 
 
 def _rows(inputs: Any) -> Any:
-    """(q, v, a) for each configuration; where only q is given it stands for all three."""
+    """Yield (q, v, a) for each configuration; without v and a, q takes their place."""
     return zip(*(inputs if len(inputs) == 3 else [inputs[0]] * 3), strict=True)
 
 
 def _function(
     names: Mapping[str, Any], arguments: str, head: str, body: tuple[str, ...]
 ) -> Callable[..., Any]:
-    """A function with `names` as local variables, whose body is `head` with `body` in it."""
+    """Make a function with `names` as local variables; its body is `head` with `body` inside."""
     here = {"rows": _rows, **names}
     parameters = ", ".join((arguments, *(f"{name}={name}" for name in here)))
     source = "\n".join([f"def function({parameters}):", f"    {head}", *(f"        {line}" for line in body)])

@@ -1,4 +1,4 @@
-"""Who is measured: urdfkin, Pinocchio, code generated for one robot, and the peers that are installed."""
+"""The contenders: urdfkin, Pinocchio, code generated for one robot, and other installed libraries."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ PROCESSES = f"Pinocchio, {PROCESSORS} processes"
 
 @dataclass(frozen=True)
 class Contender:
-    """A library and its ways to a quantity.
+    """A library and its functions for a quantity.
 
     Attributes:
-        library: The distribution's name.
-        module: What Python imports.
-        calls: Its ways for one configuration.
-        batches: Its ways for a batch; None: the calls in a loop.
-        program: What must be there beside it.
+        library: Name of the distribution.
+        module: Name of the module.
+        calls: Returns its calls for one configuration.
+        batches: Returns its works for a batch; None: the calls in a loop.
+        program: Another program that it needs.
     """
 
     library: str
@@ -50,7 +50,7 @@ class Contender:
 
     @property
     def missing(self) -> str | None:
-        """Why it is left out."""
+        """Return the reason to leave it out, or None."""
         if util.find_spec(self.module) is None:
             return "not installed"
         if self.program and shutil.which(self.program) is None:
@@ -59,7 +59,7 @@ class Contender:
 
     @property
     def state(self) -> str:
-        """Its version, or why it is left out."""
+        """Return its version, or the reason to leave it out."""
         try:
             return self.missing or metadata.version(self.library)
         except metadata.PackageNotFoundError:
@@ -74,7 +74,7 @@ class Contender:
         return [one.batch(subject, quantity) for one in self.singles(subject, quantity)]
 
     def singles(self, subject: Subject, quantity: str) -> list[Calls]:
-        """Its calls for one configuration."""
+        """Return its calls for one configuration."""
         return [] if self.missing or self.calls is None else list(self.calls(subject, quantity))
 
 
@@ -82,7 +82,7 @@ class Contender:
 
 
 def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
-    """One thread, every thread, and into fresh memory; with them the floor, an array written once."""
+    """Yield one thread, all threads, new memory, and the floor: an array written once."""
     method = getattr(subject.robot, quantity)
     inputs = subject.inputs(quantity, subject.n)
     out = np.empty((subject.n, *subject.width(quantity)))
@@ -105,7 +105,7 @@ def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
 
 
 def urdfkin_calls(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """The method, and the prepared form with and without `out=`."""
+    """Yield the method, and the prepared form with and without `out=`."""
     robot, arguments = subject.robot, "q" if quantity == "jacobian" else "q, v, a"
     names = {
         "robot": robot,
@@ -129,7 +129,7 @@ def urdfkin_calls(subject: Subject, quantity: str) -> Iterator[Calls]:
 
 
 def pinocchio_calls(urdf: str, frame: str, quantity: str) -> Calls:
-    """The fewest calls: `computeFrameJacobian`; `forwardKinematics`, `getFrameClassicalAcceleration`."""
+    """Return the fewest calls: `computeFrameJacobian`, or `getFrameClassicalAcceleration` with its pass."""
     model = pin.buildModelFromXML(urdf)
     names = {
         "model": model,
@@ -153,7 +153,7 @@ def pinocchio_calls(urdf: str, frame: str, quantity: str) -> Calls:
 
 
 def oracle_calls(subject: Subject, quantity: str) -> Calls:
-    """What a check of urdfkin asks Pinocchio: `computeJointJacobians` and `getFrameJacobian`, or as above."""
+    """Return the calls of urdfkin's check: `computeJointJacobians` and `getFrameJacobian`, or as above."""
     usual = pinocchio_calls(subject.urdf, subject.frame, quantity)
     if quantity == "acceleration":
         return usual
@@ -170,12 +170,12 @@ def _pinocchio_batches(subject: Subject, quantity: str) -> Iterator[Work]:
     yield _in_processes(subject, quantity)
 
 
-#: A worker's own: the loop of each quantity, and the arrays it reads and writes.
+#: State of a worker: the loop of each quantity, and the arrays that it reads and writes.
 _here: dict[str, Any] = {}
 
 
 def _in_processes(subject: Subject, quantity: str) -> Work:
-    """The batch spread over processes that were started before, in memory that all of them see."""
+    """Return the work of a batch in several running processes with shared memory."""
     spawn: Any = multiprocessing.get_context("spawn")
     buffers, arrays = [], []
     for x in (*subject.inputs(quantity, subject.n), np.zeros((subject.n, *subject.width(quantity)))):
@@ -200,7 +200,7 @@ def _array(buffer: Any, shape: Sequence[int]) -> FloatArray:
 
 
 def _start(urdf: str, frame: str, quantity: str, buffers: Sequence[tuple[Any, tuple[int, ...]]]) -> None:
-    """In a worker: make a model and find the memory."""
+    """In a worker, make a model and open the shared memory."""
     if quantity not in QUANTITIES:
         raise ValueError(quantity)
     _here["loop"] = pinocchio_calls(urdf, frame, quantity).loop()
@@ -208,14 +208,14 @@ def _start(urdf: str, frame: str, quantity: str, buffers: Sequence[tuple[Any, tu
 
 
 def _share(start: int, stop: int) -> None:
-    """In a worker: a share of the batch."""
+    """In a worker, compute a part of the batch."""
     *inputs, out = (x[start:stop] for x in _here["arrays"])
     _here["loop"](out, *inputs)
 
 
 # -- everyone --------------------------------------------------------------------------------------------
 
-#: What must be there: what the benchmark is about.
+#: Contenders that must be installed.
 ALWAYS = (
     Contender("urdfkin", "urdfkin", urdfkin_calls, urdfkin_batches),
     Contender("pin", "pinocchio", _pinocchio, _pinocchio_batches),

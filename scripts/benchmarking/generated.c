@@ -1,5 +1,5 @@
-// The frame around the straight-line code of one robot: from memory to registers, as many configurations at a
-// time as a register holds, and back. ROBOT is a file with that code and the robot's sizes.
+// The loop around the straight-line code of one robot: from memory to registers and back, for as many
+// configurations at a time as a register has lanes. ROBOT is a file with that code and the robot's sizes.
 
 #include <string.h>
 
@@ -59,7 +59,7 @@ INLINE void read(const double *from, int width, const int *at, lanes *to) {
     }
 }
 
-// Row after row. Where a row is shorter than a register, what is written beyond it is the next row's.
+// Write row by row. If a row is shorter than a register, the excess is overwritten by the next row.
 INLINE void write(const lanes *results, double *to) {
     for (int j = 0; j < RESULTS; j += LANES) {
         int first = j + LANES <= RESULTS || RESULTS < LANES ? j : RESULTS - LANES;

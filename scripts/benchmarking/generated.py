@@ -1,11 +1,11 @@
-"""Code generated for one robot: what a kernel made for this robot, frame and quantity alone can do.
+"""Code generated for one robot, frame and quantity, as a limit for the speed of a general kernel.
 
-The chapter's equations run once on CasADi's symbols, so that the robot's constants are folded in and
-products with 0 and 1 are gone. CasADi writes what is left as straight-line C, which the system's compiler
-makes machine code of, a number being as many doubles as one register holds (`generated.c`). It reads and
-writes the arrays that everyone reads and writes: turning them over is included, sine and cosine too. What it
-leaves out is looking at its inputs, so that a number that is not finite, or an angle of a million turns,
-gives nonsense, and what urdfkin does for a sine's and a cosine's last digit.
+The textbook's equations run once on CasADi's symbols. This folds in the robot's constants and removes
+products with 0 and 1. CasADi writes the rest as straight-line C, and the system's compiler compiles it. A
+number is a vector of as many doubles as a register has (`generated.c`). The time includes sine, cosine and
+the transposition of the arrays, which are the same for all contenders. The code does not check its inputs,
+so a non-finite number or an angle of a million turns gives nonsense. It also lacks urdfkin's correction of
+the last digit of sine and cosine.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ _FLAGS = ("-std=gnu11", "-O3", "-march=native", "-shared", "-fPIC")
 def columns(
     plan: CompiledTree, x: Any, sines: Any, cosines: Any, eq: Any = equations
 ) -> Iterator[tuple[Any, Any]]:
-    """7.85 in the world's axes: (linear, angular) of each of the path's joints, one number each.
+    """Compute 7.85 in the world's axes: (linear, angular) of each joint of the path, one number each.
 
     Args:
-        plan: Of one frame.
-        x: A coordinate for each joint, any kind of number.
-        sines: Theirs.
-        cosines: Theirs.
-        eq: The equations on that kind of number.
+        plan: The compiled tree of one frame.
+        x: A coordinate for each joint, of any kind of number.
+        sines: Their sines.
+        cosines: Their cosines.
+        eq: The equations for that kind of number.
     """
     R, p, passed = np.eye(3).tolist(), [0.0] * 3, []
     for i, motion in enumerate(_motions(plan)):
@@ -66,7 +66,7 @@ def columns(
 def acceleration(
     plan: CompiledTree, x: Any, sines: Any, cosines: Any, v: Any, a: Any, eq: Any = equations
 ) -> tuple[Any, Any]:
-    """7.127 to 7.130 in each link's own axes, as in `compiled.walk`: (linear, angular) in the world's."""
+    """Compute 7.127 to 7.130 in each link's axes, like urdfkin; return (linear, angular) in world axes."""
     R, w, alpha, acc = np.eye(3).tolist(), [0.0] * 3, [0.0] * 3, [0.0] * 3
 
     def turned(S: Any) -> tuple[Any, ...]:
@@ -99,7 +99,7 @@ def _motions(plan: CompiledTree) -> list[Motion]:
 
 
 def _pose(row: FloatArray) -> tuple[list[list[float]], list[float]]:
-    """R and p of a row of a plan."""
+    """Return R and p of a row of a plan."""
     return row[:9].reshape(3, 3).tolist(), row[9:12].tolist()
 
 
@@ -107,13 +107,11 @@ def _pose(row: FloatArray) -> tuple[list[list[float]], list[float]]:
 
 
 def batches(subject: Subject, quantity: str) -> Iterator[Work]:
-    """The whole batch in one call."""
+    """Yield the work of a whole batch in one call."""
     compute = compiled(subject, quantity)
     inputs = subject.inputs(quantity, subject.n)
     out = np.empty((subject.n, *subject.width(quantity)))
-    addresses = [
-        x.ctypes.data for x in (*inputs, *inputs, *inputs)[:3]
-    ]  # a Jacobian does not look at v and a
+    addresses = [x.ctypes.data for x in (*inputs, *inputs, *inputs)[:3]]  # a Jacobian does not need v and a
 
     def run() -> None:
         compute(subject.n, *addresses, out.ctypes.data)
@@ -122,10 +120,10 @@ def batches(subject: Subject, quantity: str) -> Iterator[Work]:
 
 
 def compiled(subject: Subject, quantity: str) -> Callable[..., None]:
-    """A function of how many configurations there are and of the addresses of q, v, a and the results.
+    """Return a function of the number of configurations and the addresses of q, v, a and the results.
 
     Raises:
-        subprocess.CalledProcessError: the compiler does not take the code.
+        subprocess.CalledProcessError: the compiler rejects the code.
     """
     plan, folder = subject.plan, subject.folder
     sizes = {"NQ": plan.nq, "NV": plan.nv, "STEPS": len(plan.steps), "RESULTS": subject.numbers(quantity)}
@@ -156,7 +154,7 @@ def _listed(numbers: Sequence[float]) -> str:
 
 
 def _straight_line(plan: CompiledTree, quantity: str) -> str:
-    """CasADi's C for one configuration: a function of (x, sines, cosines, v, a) of the path's joints."""
+    """Return CasADi's C code for one configuration: a function of (x, sines, cosines, v, a) of the joints."""
     import casadi  # noqa: PLC0415  installed or not
 
     names = [casadi.SX.sym(name, len(plan.steps)) for name in ("x", "sine", "cosine", "v", "a")]
@@ -176,7 +174,7 @@ def _straight_line(plan: CompiledTree, quantity: str) -> str:
     whole = re.search(r"static int casadi_f0\(.*?\n}", generator.dump(), re.DOTALL)
     if whole is None:
         raise ValueError("CasADi wrote no function")
-    # It writes for one double, and for arguments that may be missing.
+    # CasADi writes code for one double, and for arguments that may be missing.
     text = re.sub(r"(arg\[\d+\])\? (\1\[\d+\]) : 0", r"\2", whole[0])
     text = text.replace("if (res[0]!=0) ", "")
     return re.sub(r"(a\d+)=(-?[\d.][\d.e+-]*);", r"\1=in_all_lanes(\2);", text)

@@ -1,7 +1,7 @@
-"""The machine, and what a process of its own must tell: a batch's memory, and what a first use costs.
+"""Describe the machine, and measure the memory of a batch and the time of a first use in new processes.
 
-Run as a module in a fresh process: the kernel tells the largest size that a process had since it was last
-told to forget it, and what is compiled or loaded once is not there yet.
+The module runs in a new process, in which nothing is compiled or loaded yet. Linux reports the largest
+memory size of the process since its last reset.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ import urdfkin
 from urdfkin.robot import Robot
 
 ROOT = Path(__file__).parents[2]
-#: Entries of a first use's figures: an empty cache, one with the kernels on disk.
+#: Measurements of a first use: with an empty cache, and with the kernels on disk.
 EMPTY, KEPT = "empty_ms", "kept_ms"
-#: Every quantity whose first use compiles something, and how many of q, v, a it takes.
+#: Quantity whose first use compiles a kernel -> number of its inputs among q, v, a.
 USES = {
     "placement": 1,
     "velocity": 2,
@@ -39,7 +39,7 @@ USES = {
 
 
 def machine() -> dict[str, object]:
-    """Processor, how many of them, the widest vector unit, memory, system, Python."""
+    """Return the processor, the number of processors, the widest vector unit, memory, system and Python."""
     lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
     entries = {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in lines)}
     flags = entries.get("flags", "").split()
@@ -55,25 +55,25 @@ def machine() -> dict[str, object]:
 
 
 def peak_over_output(robot: str, frame: str, quantity: str, n: int, *, out: bool) -> dict[str, Any]:
-    """Bytes that `n` results take at the most, and those of the results themselves."""
-    return _asked("memory", robot, frame, quantity, str(n), "out" if out else "fresh")
+    """Return the peak memory of computing `n` results, and the size of the results, in bytes."""
+    return _run_apart("memory", robot, frame, quantity, str(n), "out" if out else "fresh")
 
 
 def first_uses(robot: str, frame: str, uses: Sequence[str]) -> Iterator[dict[str, Any]]:
-    """Processor time of the first use of each, and of all of them in one process.
+    """Yield the processor time of the first use of each quantity, and of all of them in one process.
 
-    Once where nothing was compiled before, and once more, in another process, where kernels lie on disk.
+    It is measured with an empty cache, and in another process with the kernels on disk.
     """
     together = " + ".join(uses) if len(uses) > 1 else None
     for what in (*uses, *filter(None, [together])):
         with tempfile.TemporaryDirectory() as folder:
             words = "first", robot, frame, *what.split(" + ")
-            times = {key: _asked(*words, cache=folder)["ms"] for key in (EMPTY, KEPT)}
+            times = {key: _run_apart(*words, cache=folder)["ms"] for key in (EMPTY, KEPT)}
         yield {"robot": robot, "what": "all of them" if what == together else what, **times}
 
 
-def _asked(*words: str, cache: str | None = None) -> dict[str, Any]:
-    """What this module answers in a fresh process."""
+def _run_apart(*words: str, cache: str | None = None) -> dict[str, Any]:
+    """Run this module in a new process and return its answer."""
     command = [sys.executable, "-m", "scripts.benchmarking.machine", *words]
     given = {} if cache is None else {"NUMBA_CACHE_DIR": cache}
     done = subprocess.run(
@@ -103,15 +103,15 @@ def _use(model: Robot, frame: str, use: str) -> None:
 
 
 def _memory(robot: str, frame: str, quantity: str, count: str, kind: str) -> dict[str, object]:
-    from scripts.benchmarking.subject import Subject  # noqa: PLC0415  a first use does not pay for it
+    from scripts.benchmarking.subject import Subject  # noqa: PLC0415  not part of a first use
 
     n = int(count)
     with Subject(robot, frame, n) as subject:
         method, inputs = getattr(subject.robot, quantity), subject.inputs(quantity, n)
         out = np.ones((n, *subject.width(quantity))) if kind == "out" else None
         few = tuple(x[:64] for x in inputs)
-        method(*few, frame, verify=False, threads=2)  # compiled code and threads are there
-        Path("/proc/self/clear_refs").write_text("5")  # forget the largest size
+        method(*few, frame, verify=False, threads=2)  # loads compiled code and starts threads
+        Path("/proc/self/clear_refs").write_text("5")  # reset the largest size
         before = _bytes("VmRSS")
         result = method(*inputs, frame, out=out, verify=False)
         taken = _bytes("VmHWM") - before + (out.nbytes if out is not None else 0)
@@ -126,7 +126,7 @@ def _memory(robot: str, frame: str, quantity: str, count: str, kind: str) -> dic
 
 
 def _bytes(entry: str) -> int:
-    """VmRSS is the memory in use, VmHWM the most that was in use."""
+    """Return an entry of /proc/self/status in bytes: VmRSS (memory in use) or VmHWM (its maximum)."""
     lines = Path("/proc/self/status").read_text("utf-8").splitlines()
     return 1024 * next(int(line.split()[1]) for line in lines if line.startswith(entry))
 

@@ -1,7 +1,7 @@
-"""How many additions and multiplications one configuration takes, counted by doing them.
+"""Count the additions and multiplications of one configuration by executing them.
 
-The walk's own functions run on numbers that count. A fused multiply-add counts as two, as in the machine's
-figures; signs are free, and so is what is multiplied by a 0 or a 1 that is known beforehand.
+The functions of the forward recursion run on numbers that count their operations. A fused multiply-add
+counts as two, as in the machine's figures. Signs are free, and so are products with a known 0 or 1.
 """
 
 from __future__ import annotations
@@ -17,18 +17,19 @@ from urdfkin.compiled.plan import CompiledTree
 from urdfkin.compiled.program import KEPT_ROWS, WIDTH, Head, Op, program_of
 from urdfkin.kinematics.number_kinds import bound
 
-#: Reduction 10, z and 1 - z/2 with what they lose 8, two polynomials 20, last steps 13 (`compiled.sine`).
+#: Reduction 10, z and 1 - z/2 with their rounding errors 8, two polynomials 20, last steps 13
+#: (`compiled.sine`).
 _SINE_COSINE = 51
 
 
 @dataclass(frozen=True, eq=False)
 class Number:
-    """A number that remembers what it was made of.
+    """A number that stores its operands.
 
     Attributes:
-        known: 0 or 1 where that is known beforehand.
-        nothing: Whether nobody asks for it: what is computed from it is nothing, and costs as much.
-        made_of: What was added or multiplied; empty for what is given.
+        known: 0 or 1 if the value is known beforehand. nothing: Whether the number is not requested;
+        results computed from it are free and not requested either. made_of: The operands; empty for an
+        input.
     """
 
     known: int | None = None
@@ -64,7 +65,7 @@ class Number:
 
 
 def count(results: Any) -> int:
-    """How many operations it takes to have these numbers, each done once."""
+    """Return the number of operations for these results; shared operations count once."""
     waiting, seen = [results], set[Number]()
     while waiting:
         value = waiting.pop()
@@ -79,7 +80,7 @@ def count(results: Any) -> int:
 
 @dataclass
 class _Walk:
-    """The functions of `walk` and `outputs` on such numbers."""
+    """The functions of the forward recursion and of `outputs` on counting numbers."""
 
     written: list[Any] = field(default_factory=list)
 
@@ -109,7 +110,7 @@ class _Walk:
 
 
 def operations(plan: CompiledTree, quantity: str) -> int:
-    """For one frame in LOCAL_WORLD_ALIGNED: "jacobian", "velocity" or "acceleration"."""
+    """Count operations for one frame in LOCAL_WORLD_ALIGNED: "jacobian", "velocity" or "acceleration"."""
     columns = quantity == "jacobian"
     program, run = program_of(plan, turned=False, columns=columns), _Walk()
     words: list[int] = program.words.tolist()
@@ -124,7 +125,7 @@ def operations(plan: CompiledTree, quantity: str) -> int:
 
 
 def _cost(run: _Walk, instruction: list[int], quantity: str, state: tuple[Any, ...]) -> int:
-    """What one instruction takes, of what the quantity follows of a state."""
+    """Return the operations of one instruction for the parts of the state that the quantity needs."""
     op, row, _, how, c = instruction
     run.written.clear()
     world = run.call.world_axes

@@ -1,7 +1,7 @@
-"""Other libraries, each called as its users would; each is imported when it is asked for.
+"""Calls of other libraries, as their users write them; a library is imported when it is needed.
 
-Where a library has another order of rows or coordinates, inputs are put in its order beforehand and results
-are read in urdfkin's afterwards: neither is timed.
+If a library has another order of rows or coordinates, inputs and results are reordered outside the measured
+time.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from urdfkin.compiled.plan import Step
 from urdfkin.kinematics.number_kinds import bound
 from urdfkin.model.tree import FloatArray
 
-#: Takes [angular; linear] to [linear; angular].
+#: Row order that converts [angular; linear] to [linear; angular].
 LINEAR_FIRST = [3, 4, 5, 0, 1, 2]
 
 
 def positions(ours: Sequence[str], theirs: Sequence[str]) -> list[int]:
-    """For each of a library's coordinates, by name, which of urdfkin's it is."""
+    """Return, for each of a library's coordinates, the index of the same name in urdfkin."""
     index = {name: i for i, name in enumerate(ours)}
     return [index[name] for name in theirs]
 
 
 def spread(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
-    """(n, 6, nv) with the columns of `J` (n, 6, m) at `columns`, zeros elsewhere."""
+    """Return (n, 6, nv) with the columns of `J` (n, 6, m) at `columns`, zeros elsewhere."""
     full = np.zeros((*J.shape[:-1], nv))
     full[..., list(columns)] = J
     return full
@@ -43,7 +43,7 @@ def spread(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
 
 
 def dynibo(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """In Rust: rows come as [angular; linear], joints breadth first, a matrix column by column."""
+    """Yield the calls of dynibo (Rust): rows [angular; linear], joints breadth first, matrices by column."""
     import dynibo  # noqa: PLC0415
 
     robot = dynibo.Robot.from_urdf(str(subject.file))
@@ -71,12 +71,12 @@ def dynibo(subject: Subject, quantity: str) -> Iterator[Calls]:
 
 
 def breadth_first(urdf: str) -> list[str]:
-    """The moving joints, link after link from the root, in the file's order: as dynibo numbers them."""
+    """Return the moving joints in dynibo's order: breadth first, in the file's order."""
     joints = ET.fromstring(urdf).findall("joint")
     ends = [(_link(joint, "parent"), _link(joint, "child")) for joint in joints]
     links = sorted({parent for parent, _ in ends} - {child for _, child in ends})
     names = []
-    for link in links:  # grows while it is walked
+    for link in links:  # the list grows in the loop
         for joint, (parent, child) in zip(joints, ends, strict=True):
             if parent == link:
                 links.append(child)
@@ -89,7 +89,7 @@ def _link(joint: ET.Element, tag: str) -> str:
 
 
 def mujoco(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """Links that are welded on keep their names; accelerations come as [angular; linear], classical."""
+    """Yield the calls of MuJoCo; accelerations are classical, [angular; linear]; welded links stay."""
     import mujoco  # noqa: PLC0415
 
     flags = {"fusestatic": "false", "discardvisual": "true"}
@@ -118,7 +118,7 @@ def mujoco(subject: Subject, quantity: str) -> Iterator[Calls]:
 
 
 def _mujoco_lines(quantity: str, rows: str, result: str) -> tuple[str, ...]:
-    """The calls for one configuration, which write into arrays; the last line is the result."""
+    """Return the calls for one configuration, which write into arrays; the last line is the result."""
     place = ("qpos[:] = q", "kinematics(m, d)", "comPos(m, d)")
     if quantity == "jacobian":
         return (*place, f"jacBody(m, d, {rows}, body)", result)
@@ -134,7 +134,7 @@ def _mujoco_lines(quantity: str, rows: str, result: str) -> tuple[str, ...]:
 
 
 def drake(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """Rows come as [angular; linear]; an acceleration is J a and what the rates add to it."""
+    """Yield the calls of Drake: rows [angular; linear]; an acceleration is J a plus the velocity terms."""
     from pydrake.multibody.parsing import Parser  # noqa: PLC0415
     from pydrake.multibody.plant import MultibodyPlant  # noqa: PLC0415
     from pydrake.multibody.tree import JacobianWrtVariable  # noqa: PLC0415
@@ -171,7 +171,7 @@ def drake(subject: Subject, quantity: str) -> Iterator[Calls]:
 
 
 def toolbox(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """The Robotics Toolbox: `jacob0`; an acceleration is J a and Jdot v, as `jacob0_dot` does it."""
+    """Yield the calls of the Robotics Toolbox: `jacob0`; an acceleration is J a + Jdot v."""
     import roboticstoolbox as rtb  # noqa: PLC0415
 
     with warnings.catch_warnings():
@@ -205,14 +205,14 @@ def toolbox(subject: Subject, quantity: str) -> Iterator[Calls]:
 
 # -- batches at once -------------------------------------------------------------------------------------
 
-#: How many configurations PyTorch Kinematics gets at a time; with more it is slower for each.
+#: Number of configurations of a call to PyTorch Kinematics; more are slower per configuration.
 _MOST = 20_000
-#: It reads a URDF's angles in single precision.
+#: Tolerance: it reads a URDF's angles in single precision.
 _SINGLE = 1e-6
 
 
 def torch(subject: Subject, quantity: str) -> Iterator[Work]:
-    """PyTorch Kinematics, as it comes and through `torch.compile`; it has no accelerations."""
+    """Yield the works of PyTorch Kinematics, plain and with `torch.compile`; it has no accelerations."""
     import pytorch_kinematics as pk  # noqa: PLC0415
     import torch  # noqa: PLC0415
 
@@ -231,20 +231,20 @@ def torch(subject: Subject, quantity: str) -> Iterator[Work]:
         return Work(who, n, lambda: jacobian(q), result, _SINGLE, remark)
 
     yield work("PyTorch Kinematics", chain.jacobian)
-    if shutil.which("g++"):  # what torch.compile calls
+    if shutil.which("g++"):  # torch.compile needs it
         yield work("PyTorch Kinematics, compiled", torch.compile(chain.jacobian_tensor))
 
 
 def jax(subject: Subject, quantity: str) -> Iterator[Work]:
-    """In float64: the path written out for one configuration, `vmap` over the batch, compiled by XLA.
+    """Yield the work of JAX in float64: code for one configuration, with `vmap` and compiled by XLA.
 
-    What somebody would write who wants this robot fast in JAX: the chapter's equations on its arrays, the
-    robot's constants folded in. Inputs are JAX's arrays beforehand and results stay so.
+    This is typical fast code for one robot in JAX: the textbook's equations on JAX arrays, with the robot's
+    constants folded in. Inputs and results are JAX arrays.
     """
     import jax  # noqa: PLC0415
     import jax.numpy as jnp  # noqa: PLC0415
 
-    jax.config.update("jax_enable_x64", True)  # numbers of 64 bits, as everyone's
+    jax.config.update("jax_enable_x64", True)  # float64, as in all contenders
     array, plan = jnp.asarray, subject.plan
     eq = bound(
         plus=lambda x, y: array(x) + array(y),

@@ -1,4 +1,4 @@
-"""The figures as a picture: everyone's cost for one configuration, and how urdfkin's grows."""
+"""Plot the measurements: the time of all contenders for one configuration, and the growth of urdfkin's."""
 
 from __future__ import annotations
 
@@ -9,20 +9,21 @@ from typing import Any
 
 from urdfkin.view.figure import new_figure, save, style
 
-#: Okabe and Ito's colours, which differ for every kind of eye; then other libraries and the floor in greys.
+#: Okabe and Ito's colours, distinguishable with every colour vision deficiency; greys for others and the
+#: floor.
 OURS, THEIRS, CEILING, OTHERS, FLOOR = "#0072B2", "#D55E00", "#009E73", "#999999", "#CCCCCC"
 MARKS = {"jacobian": ("o", "-"), "acceleration": ("s", "--")}
 TITLES = {"jacobian": "Jacobian", "acceleration": "acceleration"}
 
-#: A row of the figures, as data.
+#: A row of the measurements, as data.
 Entry = Mapping[str, Any]
 
 
 def draw(figures: Mapping[str, Any], path: Path) -> bytes:
-    """A picture file in the format that `path` ends in; sections that were not measured stay empty.
+    """Write a picture in the format of the suffix of `path`; sections without measurements are empty.
 
     Raises:
-        InputError: no matplotlib, or an ending other than svg, png, pdf.
+        InputError: no matplotlib, or a suffix other than svg, png, pdf.
     """
     rows = figures["rows"]
     with style(font_size=8, svg_fonttype="none"):
@@ -36,14 +37,14 @@ def draw(figures: Mapping[str, Any], path: Path) -> bytes:
 
 
 def _light(svg: bytes) -> bytes:
-    """Without comments, indentation and fallback fonts: the same drawing in two thirds of the bytes."""
+    """Remove comments, indentation and fallback fonts, which saves a third of the bytes."""
     text = re.sub(r"<!--.*?-->", "", svg.decode(), flags=re.DOTALL)
     text = re.sub(r"('DejaVu Sans'|DejaVu Sans)(, [^;\"]*)?", "sans-serif", text)
     return re.sub(r"\s*\n\s*", "\n", text).encode()
 
 
 def _chosen(rows: Sequence[Entry], section: str, quantity: str) -> list[Entry]:
-    """A section's rows of one quantity, of the section's first robot where robots are what differs."""
+    """Return a section's rows of one quantity; if the robots differ, only those of the first one."""
     found = [row for row in rows if row["section"] == section and row["quantity"] == quantity]
     return [row for row in found if section == "joints" or row["robot"] == found[0]["robot"]]
 
@@ -54,7 +55,7 @@ def _colour(who: str) -> str:
 
 
 def _bars(axes: Any, rows: Sequence[Entry], quantity: str) -> None:
-    """The fastest on top; a logarithmic scale, because the slowest takes two hundred times as long."""
+    """Draw the fastest on top, on a logarithmic scale: the slowest takes two hundred times as long."""
     ordered = sorted(rows, key=lambda row: -float(row["median_ns"]))
     costs = [row["median_ns"] for row in ordered]
     names = [row["who"] for row in ordered]
@@ -85,6 +86,6 @@ def _growth(axes: Any, rows: Sequence[Entry], section: str, label: str, cost: st
 
 
 def _plain_powers(axes: Any) -> None:
-    """1,000 instead of 10 to the third, and nothing between the powers: a light file."""
+    """Label powers of ten as 1,000, without minor ticks, which keeps the file small."""
     axes.xaxis.set_major_formatter(lambda x, _: f"{x:,.0f}" if x >= 1 else f"{x:g}")
     axes.minorticks_off()

@@ -1,7 +1,7 @@
-"""What is measured: each section of the benchmark as rows of figures.
+"""The sections of the benchmark, each as rows of measurements.
 
-Results are compared before anything is timed: every generator here raises `DifferenceError` where contenders
-disagree.
+All generators compare the results before they measure times, and raise `DifferenceError` for different
+results.
 """
 
 from __future__ import annotations
@@ -25,24 +25,24 @@ from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, TIP, Subject, cha
 from scripts.benchmarking.timing import Row, Table, Work, agree, measure
 from urdfkin.model.tree import FloatArray
 
-#: Pinocchio's own part of a check.
+#: Pinocchio's part of a check.
 OWN = "Pinocchio's own calls, Python loop"
 FEWEST = "Pinocchio, computeFrameJacobian, Python loop"
 ONE_PASS, ONE_BY_ONE = "urdfkin, all in one pass", "urdfkin, one after the other"
 
 
 def batch_rows(n: int, contenders: Sequence[Contender], rounds: int) -> Iterator[Row]:
-    """Everyone's Jacobians and accelerations of the same configurations, beside Pinocchio's Python loop."""
+    """Measure Jacobians and accelerations of a batch, compared with Pinocchio's Python loop."""
     for subject, quantity, table in _contests("batch", n):
         works = [work for contender in contenders for work in contender.works(subject, quantity)]
         named = {work.who: work for work in works}
-        # The processes compute the whole batch, so that every row of everyone's result is held.
+        # The processes compute the whole batch, so that every row of all results is compared.
         agree(works, named[PROCESSES], f"{subject.name}, {quantity}")
         yield from measure(table, works, rounds, named[LOOP])
 
 
 def single_rows(n: int, contenders: Sequence[Contender], rounds: int) -> Iterator[Row]:
-    """Single calls from Python, all overhead included, beside Pinocchio's calls."""
+    """Measure single calls from Python with all overhead, compared with Pinocchio's calls."""
     for subject, quantity, table in _contests("single", n):
         calls = [one for contender in contenders for one in contender.singles(subject, quantity)]
         works = [one.single(subject, quantity) for one in calls]
@@ -52,7 +52,7 @@ def single_rows(n: int, contenders: Sequence[Contender], rounds: int) -> Iterato
 
 
 def verified_rows(n: int, rounds: int) -> Iterator[Row]:
-    """What it costs to have every result, or a sample, checked, beside the calls that a check makes."""
+    """Measure the check of every result and of a sample, compared with the calls of a check."""
     for subject, quantity, table in _contests("verified", n):
         own = replace(oracle_calls(subject, quantity).batch(subject, quantity), who=OWN)
         works = [*(_verified(subject, quantity, verify) for verify in (True, "sample", False)), own]
@@ -74,7 +74,7 @@ def _verified(subject: Subject, quantity: str, verify: bool | str) -> Work:
 
 
 def _contests(section: str, n: int) -> Iterator[tuple[Subject, str, Table]]:
-    """Each subject and quantity, and what their rows share."""
+    """Yield each subject and quantity with its table."""
     for source in SUBJECTS:
         with Subject(*source, n) as subject:
             for quantity in QUANTITIES:
@@ -89,9 +89,9 @@ def _table(section: str, subject: Subject, quantity: str, size: int = 0) -> Tabl
 
 
 def joint_rows(joints: Sequence[int], numbers: int, rounds: int) -> Iterator[Row]:
-    """With the joints of a chain: the tip's Jacobian and acceleration, one thread.
+    """Measure the growth with the joints of a chain: the tip's Jacobian and acceleration, one thread.
 
-    Batches are cut so that each writes `numbers` numbers of Jacobian: memory is as far away for everyone.
+    Each batch has `numbers` numbers in its Jacobians, so that all of them have the same memory traffic.
     """
     for size in joints:
         n = max(numbers // (6 * size), 16)
@@ -100,7 +100,7 @@ def joint_rows(joints: Sequence[int], numbers: int, rounds: int) -> Iterator[Row
 
 
 def size_rows(sizes: Sequence[int], rounds: int) -> Iterator[Row]:
-    """With the configurations of a batch: the first subject, one thread, `out=` given."""
+    """Measure the growth with the size of a batch: the first subject, one thread, with `out=`."""
     for size in sizes:
         with Subject(*SUBJECTS[0], size) as subject:
             yield from _growth("sizes", subject, size, rounds)
@@ -117,7 +117,7 @@ def _growth(section: str, subject: Subject, size: int, rounds: int) -> Iterator[
 
 
 def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
-    """With the frames of the humanoid: placements of links all over it in one pass, and one call for each."""
+    """Measure the growth with the frames of the humanoid: placements in one pass, and one call for each."""
     with Subject(*SUBJECTS[-1], n) as subject:
         links = subject.robot.link_names
         for count in sorted({min(count, len(links)) for count in counts}):

@@ -1,4 +1,4 @@
-"""A subject: one robot, one frame and the configurations that everyone gets."""
+"""A subject of the benchmark: one robot, one frame and the configurations, the same for all contenders."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ from urdfkin.robot import Robot
 
 #: The quantities of the tables.
 QUANTITIES = ("jacobian", "acceleration")
-#: Robot and frame: two arms, and a humanoid of which the path is a small part.
+#: Robot and frame: two arms, and a humanoid with a path that is a small part of the tree.
 SUBJECTS = (("panda", "panda_hand"), ("ur5", "tool0"), ("talos", "gripper_left_base_link"))
-#: How many configurations a library called in a loop takes; its cost for one does not depend on it.
+#: Number of configurations in a loop of calls; the time for one does not depend on it.
 LOOP = 2_000
 #: The frame at the end of a chain.
 TIP = "tip"
 
 
 class Subject:
-    """The same work for everyone.
+    """The common input of all contenders.
 
     Mimic joints are free, so that every library has the same coordinates, each a single number.
 
     Attributes:
-        name: What the tables call the robot.
-        frame: Whose Jacobian and acceleration.
-        n: How many configurations a batch has.
-        robot: urdfkin's.
-        q: (n, nq).
-        v: (n, nv).
-        a: (n, nv).
-        stack: Closes what a contender leaves open.
+        name: Name of the robot in the tables.
+        frame: Name of the frame.
+        n: Number of configurations of a batch.
+        robot: The robot in urdfkin.
+        q: (n, nq) configurations.
+        v: (n, nv) joint velocities.
+        a: (n, nv) joint accelerations.
+        stack: Closes open resources of the contenders.
     """
 
     def __init__(self, source: str, frame: str, n: int, *, name: str | None = None) -> None:
@@ -58,66 +58,66 @@ class Subject:
 
     @property
     def nv(self) -> int:
-        """How many columns a Jacobian has."""
+        """Number of columns of a Jacobian."""
         return self.robot.nv
 
     @property
     def loop(self) -> int:
-        """How many configurations a loop takes."""
+        """Number of configurations in a loop."""
         return min(self.n, LOOP)
 
     @property
     def plan(self) -> CompiledTree:
-        """The walk that meets the frame."""
+        """The compiled tree of the frame."""
         return self.robot.plan([self.robot.tree.frame_link(self.frame)])
 
     @cached_property
     def urdf(self) -> str:
-        """The robot without meshes, inertias and rules."""
+        """The URDF without meshes, inertias and mimic rules."""
         return bare_urdf(self.robot.urdf)
 
     @cached_property
     def folder(self) -> Path:
-        """For a contender's files; gone when the subject is closed."""
+        """Temporary folder for the files of a contender."""
         return Path(self.stack.enter_context(tempfile.TemporaryDirectory()))
 
     @cached_property
     def file(self) -> Path:
-        """`urdf` as a file, for libraries that read nothing else."""
+        """`urdf` as a file, for libraries that only read files."""
         file = self.folder / "robot.urdf"
         file.write_text(self.urdf, "utf-8")
         return file
 
     def width(self, quantity: str) -> tuple[int, ...]:
-        """The shape of one configuration's result."""
+        """Return the shape of one configuration's result."""
         return (6, self.nv) if quantity == "jacobian" else (6,)
 
     def numbers(self, quantity: str) -> int:
-        """How many numbers one configuration's result has."""
+        """Return the number of values of one configuration's result."""
         return int(np.prod(self.width(quantity)))
 
     def inputs(self, quantity: str, n: int) -> tuple[FloatArray, ...]:
-        """The first `n` of q, or of q, v and a: what the quantity depends on."""
+        """Return the first `n` rows of the inputs of the quantity: q, or q, v and a."""
         return tuple(x[:n] for x in ((self.q,) if quantity == "jacobian" else (self.q, self.v, self.a)))
 
 
 # -- what every library reads ----------------------------------------------------------------------------
 
 _INERTIA = {"ixx": "1", "iyy": "1", "izz": "1", "ixy": "0", "ixz": "0", "iyz": "0"}
-#: What a joint keeps.
+#: Elements of a joint that are preserved.
 _KEPT = ("origin", "parent", "child", "axis", "limit")
 
 
 def bare_urdf(urdf: str, *, flags: dict[str, str] | None = None) -> str:
-    """The links and joints of `urdf` and nothing else.
+    """Return a URDF with only the links and joints of `urdf`.
 
-    Links get the same unit inertia, since some libraries refuse a link without one; no kinematics depends on
-    it. Mimic rules are dropped: everyone computes with the same free coordinates. A link that is called world
-    gets another name, since some libraries have a body of their own that is called so.
+    All links get the same unit inertia, since some libraries need one; kinematics does not depend on it.
+    Mimic rules are dropped, so that all contenders have the same free coordinates. A link named world gets
+    another name, since some libraries have their own body of that name.
 
     Args:
         urdf: The text of a URDF.
-        flags: Attributes of MuJoCo's own element `mujoco/compiler`; None to leave it out.
+        flags: Attributes of MuJoCo's element `mujoco/compiler`; None to leave it out.
     """
     whole = ET.fromstring(urdf)
     robot = ET.Element("robot", name=whole.get("name", "robot"))
@@ -137,7 +137,7 @@ def bare_urdf(urdf: str, *, flags: dict[str, str] | None = None) -> str:
 
 
 def chain_urdf(joints: int, seed: int = 0) -> str:
-    """A serial robot of revolute joints, each axis in another direction, links of 0.1 m.
+    """Return a serial robot of revolute joints with different axes and links of 0.1 m.
 
     Joint names sort in the chain's order; the frame `TIP` is fixed to the last link.
     """

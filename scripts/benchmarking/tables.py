@@ -1,4 +1,4 @@
-"""The figures as tables of words, for the terminal and for the page."""
+"""Format the measurements as tables, for the terminal and for the page."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from scripts.benchmarking.contenders import COMPILED, FLOOR, ONE
 from scripts.benchmarking.generated import GENERATED
 from scripts.benchmarking.machine import EMPTY, KEPT
 
-#: A row of the figures, as data.
+#: A row of the measurements, as data.
 Entry = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
 class Words:
-    """One table: its section, what it is of, the columns' heads, the rows; the first column is words."""
+    """One table as text: its section, title, column heads and rows; the first column has names."""
 
     section: str
     title: str
@@ -31,13 +31,13 @@ class Words:
 
 
 def number(x: float) -> str:
-    """Three digits, and no power of ten."""
+    """Format a number with three digits and without an exponent."""
     digits = 2 if abs(x) < 10 else 1 if abs(x) < 100 else 0
     return f"{x:,.{digits}f}"
 
 
 def tables(figures: Mapping[str, Any]) -> Iterator[Words]:
-    """Every table of a run, in order."""
+    """Yield the tables of a run, in order."""
     entries = figures["rows"]
     for (section, robot, quantity), group in groupby(
         (row for row in entries if row["section"] in ("batch", "single", "verified")),
@@ -60,7 +60,7 @@ def tables(figures: Mapping[str, Any]) -> Iterator[Words]:
 
 
 def show(figures: Mapping[str, Any], console: Console | None = None) -> None:
-    """Print every table, the machine and the libraries."""
+    """Print all tables, the machine and the libraries."""
     console = console or Console(width=110, highlight=False)
     machine = figures["machine"]
     console.print(
@@ -109,17 +109,17 @@ def _contest(section: str, title: str, rows: list[Entry]) -> Words:
 
 
 _SHARE = "times generated code"
-#: The figures may come from a machine with another number of processors: `SEVERAL` is not asked.
+#: A pattern, since the measurements may come from a machine with another number of processors.
 _SEVERAL = re.compile(r"urdfkin, \d+ threads")
 
 
 def _generated(rows: Sequence[Entry]) -> float | None:
-    """What code generated for the one robot takes, if that was measured."""
+    """Return the time of code generated for the robot, or None without a measurement."""
     return next((float(row["median_ns"]) for row in rows if row["who"] == GENERATED), None)
 
 
 def _summary(rows: list[Entry]) -> Words:
-    """One thread and all; against Pinocchio, code for this robot alone, and the fastest other library."""
+    """Summarise one and all threads, compared with Pinocchio, generated code and the fastest other."""
     found = []
     for title, group in _tables_of(rows):
         who = {row["who"]: row for row in group}
@@ -152,7 +152,7 @@ def _summary(rows: list[Entry]) -> Words:
 
 
 def _floor(rows: list[Entry], operations: Mapping[str, int]) -> Words:
-    """What it takes to write the output once, how much there is to compute, and what urdfkin takes."""
+    """Compare the time to write the output once and the number of operations with urdfkin's time."""
     found = []
     for title, group in _tables_of(rows):
         who = {row["who"].partition(",")[0]: row for row in reversed(group)}
@@ -189,7 +189,7 @@ def _tables_of(rows: list[Entry]) -> Iterator[tuple[str, list[Entry]]]:
 
 
 def _where(title: str, entries: Sequence[Entry]) -> Words:
-    """One column a robot and quantity: nanoseconds, and the share of the whole."""
+    """Return one column for each robot and quantity: nanoseconds, and the fraction of the total."""
     parts = dict.fromkeys(part for entry in entries for part in entry["parts"])
 
     def cell(entry: Entry, part: str) -> str:
@@ -264,7 +264,7 @@ def _sizes(rows: list[Entry]) -> Words:
 
 
 def _together(rows: list[Entry]) -> list[Entry]:
-    """Rows of one contender and quantity beside each other, in the order in which they first come."""
+    """Group the rows by contender and quantity, in the order of their first rows."""
     seen = list(dict.fromkeys((row["quantity"], row["who"]) for row in rows))
     quantities = list(dict.fromkeys(row["quantity"] for row in rows))
     return sorted(

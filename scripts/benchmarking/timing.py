@@ -1,9 +1,9 @@
-"""What is timed, the clock, and the test that all compute the same numbers.
+"""Measure the times of contenders, and check that all of them compute the same numbers.
 
-Ratios of one run hold on a noisy machine, absolute times do not: every contender is timed once a round, so
-that what slows the machine slows everyone. In each round the order is another, and each contender computes
-once untimed before it is timed: its data are as near as they can be, and the threads of the one before have
-gone to sleep.
+Every contender is timed once in each round, so that other load affects all of them. Ratios of one run are
+therefore reliable also on a noisy machine; absolute times are not. The order changes in each round. Each
+contender computes once untimed before it is timed: its data are then in the cache, and the threads of the
+previous contender sleep.
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ import numpy as np
 
 from urdfkin.model.tree import FloatArray
 
-#: What results may differ by, in m, rad, m/s^2, rad/s^2: a guard against other work, no measure of accuracy.
+#: Allowed difference of results in m, rad, m/s^2, rad/s^2: a guard against different work, not for accuracy.
 TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
 class Work:
-    """One contender's way to one quantity.
+    """One contender's computation of one quantity.
 
     Attributes:
-        who: The contender, as the tables call it.
-        n: How many configurations `compute` computes, the first of the subject's.
-        compute: What is timed.
-        result: What it computes in urdfkin's conventions, for some of the configurations from the first on;
-            None where there is nothing to compare, as for the floor. Not timed.
-        tolerance: What a number may differ by from Pinocchio's.
-        remark: What a reader must know to read the figure.
+        who: Name of the contender in the tables.
+        n: Number of configurations of `compute`, the first ones of the subject.
+        compute: The timed function.
+        result: Returns the results in urdfkin's conventions, for the first configurations; not timed. None if
+            there is nothing to compare, as for the floor.
+        tolerance: Allowed difference from Pinocchio.
+        remark: A remark on the measurement.
     """
 
     who: str
@@ -48,14 +48,14 @@ class Work:
 
 @dataclass(frozen=True)
 class Table:
-    """What the rows of one table share.
+    """The common properties of the rows of a table.
 
     Attributes:
         section: A name of `sections.SECTIONS`.
-        robot: A name of the catalogue, or how many joints a chain has.
+        robot: A name of the catalogue, or the number of joints of a chain.
         quantity: jacobian, acceleration or placement.
-        numbers: How many float64 one configuration's result has.
-        size: What the section grows: joints, frames, configurations.
+        numbers: Number of float64 values of one configuration's result.
+        size: The varied number of joints, frames or configurations.
     """
 
     section: str
@@ -67,15 +67,15 @@ class Table:
 
 @dataclass(frozen=True)
 class Row(Table):
-    """One contender's figures.
+    """One contender's measurements.
 
     Attributes:
-        who: The contender.
-        n: How many configurations were computed at a time.
-        median_ns: For one configuration, over the rounds.
-        minimum_ns: For one configuration.
-        ratio: The baseline's median over this one's; more than 1 is faster than the baseline.
-        remark: What a reader must know to read the figure.
+        who: Name of the contender.
+        n: Number of configurations of a call.
+        median_ns: Median time for one configuration over the rounds.
+        minimum_ns: Minimum time for one configuration.
+        ratio: Median of the baseline divided by this median; above 1 is faster than the baseline.
+        remark: A remark on the measurement.
     """
 
     who: str = ""
@@ -87,14 +87,14 @@ class Row(Table):
 
 
 class DifferenceError(Exception):
-    """Contenders disagree: no time of theirs means anything."""
+    """The results of contenders differ, so their times are not comparable."""
 
 
 def agree(works: Sequence[Work], reference: Work, what: str) -> None:
-    """Compute everything once, which also warms everyone up, and hold it against `reference`'s result.
+    """Compute all results once, as a warm-up too, and compare them with the result of `reference`.
 
     Raises:
-        DifferenceError: with the contender and the largest difference.
+        DifferenceError: a result differs; the message has the contender and the largest difference.
     """
     if reference.result is None:
         raise ValueError("the reference has no result")
@@ -115,7 +115,7 @@ def agree(works: Sequence[Work], reference: Work, what: str) -> None:
 
 
 def times(works: Sequence[Work], rounds: int) -> dict[str, list[float]]:
-    """Nanoseconds for one configuration: each of `works` once a round, in another order in each round."""
+    """Return the nanoseconds for one configuration; each of `works` runs once a round, in varying order."""
     found: dict[str, list[float]] = {work.who: [] for work in works}
     shuffled, order = list(works), random.Random(0)
     collecting = gc.isenabled()
@@ -138,10 +138,10 @@ def measure(table: Table, works: Sequence[Work], rounds: int, baseline: Work | N
     """Time `works`.
 
     Args:
-        table: What the rows share.
-        works: Contenders, computed once before, so that nothing is compiled here.
-        rounds: At least one.
-        baseline: The one of `works` that the others are held against.
+        table: The common properties of the rows.
+        works: Contenders that have computed once, so that nothing is compiled here.
+        rounds: Number of rounds, at least one.
+        baseline: The one of `works` that the others are compared with.
     """
     found = times(works, rounds)
     medians = {who: statistics.median(values) for who, values in found.items()}

@@ -1,8 +1,8 @@
-"""Where the time goes: a batch's parts and a single call's, each measured by leaving it out.
+"""Measure the time of the parts of a batch and of a single call, by leaving each part out.
 
-A walk is a program of a few instructions (`urdfkin.compiled.program`), so that a part is left out by leaving
-its instructions out: what the whole takes longer is what the part takes. A single call is taken apart from
-outside: an empty function of Python's, a call that is refused, and so on.
+The forward recursion is a program of a few instructions (`urdfkin.compiled.program`). To measure a part,
+its instructions are left out; the time of the part is the difference. The parts of a single call are
+measured with an empty Python function, a rejected call, and so on.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
-#: The parts of a batch, in the order in which they come to what came before: the instructions of each.
+#: The parts of a batch -> their instructions, in the order in which they are added.
 PARTS: Mapping[str, frozenset[Op]] = {
     "reading inputs": frozenset(),
     "sines and cosines": frozenset(),
@@ -35,12 +35,12 @@ PARTS: Mapping[str, frozenset[Op]] = {
 
 
 def parts_of_batches(n: int, rounds: int) -> Iterator[dict[str, Any]]:
-    """What each part of a batch takes, ns for one configuration, one thread."""
+    """Yield the time of each part of a batch, in ns for one configuration, one thread."""
     for subject, quantity in _subjects(n):
         program = program_of(subject.plan, turned=False, columns=quantity == "jacobian")
         works = [_core(subject, quantity, cut(program, end), part) for end, part in enumerate(PARTS, start=1)]
         if quantity == "acceleration":
-            works = [work for work in works if work.who != "columns"]  # it has none
+            works = [work for work in works if work.who != "columns"]  # it has no columns
         found = _times(works, rounds)
         before, parts = np.zeros(rounds), {}
         for who, taken in found.items():
@@ -49,7 +49,7 @@ def parts_of_batches(n: int, rounds: int) -> Iterator[dict[str, Any]]:
 
 
 def cut(program: Program, parts: int) -> Program:
-    """The first so many parts of a program."""
+    """Return the first parts of a program."""
     ops = frozenset[Op]().union(*list(PARTS.values())[:parts])
     words = program.words.copy()
     code = words[words[Head.CODE] :].reshape(-1, WIDTH)
@@ -62,15 +62,15 @@ def cut(program: Program, parts: int) -> Program:
 
 
 def _core(subject: Subject, quantity: str, program: Program, who: str) -> Work:
-    """A core at work on a whole batch."""
+    """Return the work of a kernel on a whole batch."""
     inputs = [STILL_STATE, *subject.inputs(quantity, subject.n)]
     out = np.empty((subject.n, *subject.width(quantity)))
     staged = who == "writing results" and is_staged(out)
     task, memory = task_of(program, Reference.LOCAL_WORLD_ALIGNED, inputs, out, staged=staged)
     core = getattr(kernels, f"{quantity}s")
-    kept = program, memory, out, inputs  # what the task holds addresses of
+    owners = program, memory, out, inputs  # the task stores their addresses
 
-    def compute(_: object = kept) -> None:
+    def compute(_: object = owners) -> None:
         core(task.ctypes.data)
 
     compute()
@@ -81,7 +81,7 @@ def _core(subject: Subject, quantity: str, program: Program, who: str) -> Work:
 
 
 def parts_of_calls(n: int, rounds: int) -> Iterator[dict[str, Any]]:
-    """What each part of a single call of a prepared frame, and of the robot's method, takes, ns."""
+    """Yield the time of each part of a single call of a prepared frame and of the robot's method, in ns."""
     for subject, quantity in _subjects(n):
         calls = list(_calls(subject, quantity))
         works = [call.single(subject, quantity) for call in calls]
@@ -115,7 +115,7 @@ def _calls(subject: Subject, quantity: str) -> Iterator[Calls]:
     for line in (
         "q",  # an empty loop
         f"function({q_v_a}, out=out)",
-        f"compute({q_v_a}, shape)",  # a tuple is refused, after the arrays were looked at
+        f"compute({q_v_a}, shape)",  # a tuple is rejected after the check of the arrays
         "empty(shape)",
         f"compute({q_v_a}, out)",
         f"fast.{quantity}({q_v_a}, out=out)",
@@ -125,7 +125,7 @@ def _calls(subject: Subject, quantity: str) -> Iterator[Calls]:
 
 
 def _function(quantity: str) -> Callable[..., object]:
-    """A method that does nothing, called as a prepared frame's is."""
+    """Return an empty method with the arguments of a prepared frame's method."""
 
     class Empty:
         def jacobian(self, q: object, out: object = None) -> object:
@@ -155,7 +155,7 @@ def _times(works: list[Work], rounds: int) -> dict[str, FloatArray]:
 def _entry(
     kind: str, subject: Subject, quantity: str, parts: Mapping[str, FloatArray], total: FloatArray
 ) -> dict[str, Any]:
-    """Medians over the rounds; differences are taken within a round, which slows or quickens both alike."""
+    """Return medians over the rounds; differences are within a round, so that load affects both terms."""
     medians = {part: round(float(np.median(taken)), 2) for part, taken in parts.items()}
     ns = round(float(np.median(total)), 2)
     return {"kind": kind, "robot": subject.name, "quantity": quantity, "ns": ns, "parts": medians}

@@ -1,1 +1,1 @@
-"""Running the forms that tables are written in."""
+"""Run tables that are exported as code."""

@@ -1,8 +1,8 @@
-"""What a table that was written as Python computes, in whichever interpreter has its library.
+"""Compute the poses of a table exported as Python, in an interpreter that has the needed library.
 
     python scripts/forms/poses.py JOBS RESULTS     # JSON: a list of {form, text, q}; a list of poses for each
 
-It imports nothing of urdfkin: the Robotics Toolbox may live in an environment of its own.
+It does not import urdfkin, since the Robotics Toolbox may have its own environment.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from typing import Any
 
 
 def poses(form: str, text: str, q: list[list[float]]) -> list[list[list[float]]]:
-    """4 x 4 for each configuration."""
+    """Return a 4 x 4 pose for each configuration."""
     scope: dict[str, Any] = {"__name__": "table"}
     exec(compile(text, form, "exec"), scope)
     if form in ("roboticstoolbox", "ets"):
         return [scope["robot"].fkine(one).A.tolist() for one in q]
     place = scope["placement"]
     if form == "sympy":
-        from sympy import Float  # noqa: PLC0415  one library for each form
+        from sympy import Float  # noqa: PLC0415  one library for each format
 
         exact = [place([Float(x, 30) for x in one]) for one in q]
         return [[[float(x) for x in row] for row in T.tolist()] for T in exact]

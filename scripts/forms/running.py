@@ -1,6 +1,6 @@
-"""Forms of tables, run: each takes tables with configurations and gives the poses that its code computes.
+"""Run tables exported as code, and return the poses that the code computes.
 
-A form whose interpreter or library is missing here raises `Missing`.
+A format without its interpreter or library raises `Missing`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror")
 _MAIN = """
 #include <stdio.h>
 int main(void) {{
-    double q[{room}], T[16];
+    double q[{length}], T[16];
     for (int s = 0; s < {count}; ++s) {{
         for (int k = 0; k < {n}; ++k) if (scanf("%lf", &q[k]) != 1) return 1;
         table_placement(q, T);
@@ -43,8 +43,8 @@ _DOCUMENT = r"""\documentclass{article}
 """
 
 
-class Missing(Exception):  # noqa: N818  said, and gone on
-    """What a form needs is not installed."""
+class Missing(Exception):  # noqa: N818  it is reported, and the run continues
+    """An interpreter or library of a format is not installed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ Run = Callable[[Sequence[Job], Path], Poses]
 
 
 def in_python(form: str) -> Run:
-    """The forms that are Python, in this interpreter."""
+    """Run the Python formats in this interpreter."""
 
     def run(jobs: Sequence[Job], folder: Path) -> Poses:
         library = form if form != "ets" else "roboticstoolbox"
@@ -72,7 +72,7 @@ def in_python(form: str) -> Run:
 
 
 def elsewhere(form: str, interpreter: str) -> Run:
-    """The same in another interpreter."""
+    """Run the Python formats in another interpreter."""
 
     def run(jobs: Sequence[Job], folder: Path) -> Poses:
         given, found = folder / "jobs.json", folder / "poses.json"
@@ -85,11 +85,11 @@ def elsewhere(form: str, interpreter: str) -> Run:
 
 
 def in_c(jobs: Sequence[Job], folder: Path) -> Poses:
-    """Compiled with every warning an error."""
+    """Compile and run the C format, with warnings as errors."""
     compiler, found = _program("cc"), Poses()
     for job in jobs:
         n = job.q.shape[1]
-        main = _MAIN.format(room=max(n, 1), n=n, count=len(job.q))
+        main = _MAIN.format(length=max(n, 1), n=n, count=len(job.q))
         (folder / "code.c").write_text(export(replace(job.table, robot="table"), "c") + main, "utf-8")
         subprocess.run([compiler, *_STRICT, "code.c", "-o", "code", "-lm"], cwd=folder, check=True)
         numbers = "\n".join(map(repr, job.q.ravel().tolist()))
@@ -101,12 +101,12 @@ def in_c(jobs: Sequence[Job], folder: Path) -> Poses:
 
 
 def in_octave(form: str, lines_of: Callable[[int, Job], list[str]], first: str = "") -> Run:
-    """MATLAB's forms, all tables in one process.
+    """Run MATLAB's formats in Octave, all tables in one process.
 
     Args:
-        form: Its name.
-        lines_of: For the table with a number, the statements that print its poses.
-        first: What is said before.
+        form: Name of the format.
+        lines_of: Returns the statements that print the poses of a table, given its number.
+        first: Statements before all others.
     """
 
     def run(jobs: Sequence[Job], folder: Path) -> Poses:
@@ -121,7 +121,7 @@ def in_octave(form: str, lines_of: Callable[[int, Job], list[str]], first: str =
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
         if done.stdout.startswith("missing"):
             raise Missing("Octave's package symbolic")
-        # Octave's package says on the way which Python it found.
+        # Octave's package also prints the version of Python that it found.
         parts = (re.sub(r".*[a-df-z].*\n", "", part) for part in done.stdout.split("end\n")[:-1])
         return [_read(part) for part in parts]
 
@@ -148,7 +148,7 @@ def _as_bodies(k: int, job: Job) -> list[str]:
 
 
 def read_back(form: str) -> Run:
-    """The forms that urdfkin reads to the last bit."""
+    """Read back the formats that urdfkin reads without loss."""
 
     def run(jobs: Sequence[Job], folder: Path) -> Poses:
         found, file = Poses(), folder / f"table.{form}"
@@ -161,7 +161,7 @@ def read_back(form: str) -> Run:
 
 
 def as_urdf(jobs: Sequence[Job], folder: Path) -> Poses:
-    """A URDF of the table, read and computed as any other."""
+    """Load the URDF of a table and compute its poses."""
     found = Poses()
     for job in jobs:
         base, *_, tip = link_names(job.table)
@@ -176,7 +176,7 @@ RUN: dict[str, Run] = {
     "c": in_c,
     "matlab": in_octave("matlab", _plainly),
     "matlab-symbolic": in_octave("matlab-symbolic", _symbolically, _PACKAGE),
-    # On classes that stand in for the toolbox's: nobody has run it in MATLAB.
+    # Substitutes for the toolbox's classes; this format has not been run in MATLAB.
     "matlab-rst": in_octave("matlab-rst", _as_bodies, f"addpath('{Path(__file__).parent / 'octave'}');"),
     **{form: read_back(form) for form in ("toml", "json", "csv")},
     "urdf": as_urdf,
@@ -184,7 +184,7 @@ RUN: dict[str, Run] = {
 
 
 def too_wide(tables: Sequence[str], folder: Path) -> list[float]:
-    """Points by which each LaTeX table is wider than the page of an `article`: 0 where it fits."""
+    """Return the excess width of each LaTeX table on the page of an `article`, in points; 0 if it fits."""
     latex = _program("pdflatex")
     marked = (f"\\typeout{{table {k}}}\n{table}\n\\clearpage\n" for k, table in enumerate(tables))
     (folder / "tables.tex").write_text(_DOCUMENT + "".join(marked) + "\\end{document}\n", "utf-8")

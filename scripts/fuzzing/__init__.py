@@ -1,10 +1,10 @@
-"""Parts of scripts/fuzz.py: how robots are made, and what is asked of each."""
+"""Parts of scripts/fuzz.py: the generation of robots, and the tests of each robot."""
 
 from dataclasses import dataclass
 
-#: What happens to a table that can be read.
+#: Outcome of a readable table.
 COMPARED = "read and compared"
-#: What may happen to a robot.
+#: Allowed outcomes of a robot.
 GOOD = (
     "refused",
     "verified",
@@ -16,7 +16,7 @@ GOOD = (
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A document, how it is to be loaded, and in words how it was made."""
+    """A document, the options to load it, and a description of its origin."""
 
     what: str
     data: bytes
@@ -26,6 +26,6 @@ class Case:
 
     @property
     def words(self) -> str:
-        """One line for the note beside a file that is kept."""
+        """Return the line for the note beside a stored file."""
         options = f"root_joint={self.root_joint!r}, mimic={self.mimic!r}"
         return f"{self.what}; load(..., {options})"

@@ -1,7 +1,7 @@
-"""Everything that a robot can be asked: each quantity in each reference, alone and in batches, on any base.
+"""Compute every quantity of a robot in each reference frame, single and in batches, on any base.
 
-Each call is held against Pinocchio by urdfkin itself. Here it is seen that the calls agree with one another
-to the last bit, since they are one walk, and that a name that means a frame is answered.
+urdfkin compares each call with Pinocchio. This module checks that the calls agree with each other to the
+last bit, since all use the same forward recursion, and that every name of a frame is accepted.
 """
 
 from __future__ import annotations
@@ -15,24 +15,24 @@ from urdfkin.errors import InputError, RepresentationSingularityError, UnknownNa
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 
-#: Frames of one robot that are asked about together, and one by one.
+#: Number of frames of a robot that are computed together and one by one.
 TOGETHER, ALONE = 12, 2
-#: Names that are looked up.
+#: Number of names that are looked up.
 NAMES = 6
-#: How far away the second base is, metres.
+#: Distance of the second base in metres.
 FAR = 1e6
 
 
 class MismatchError(Exception):
-    """Two ways to the same number hand out different ones."""
+    """Two computations of the same number return different results."""
 
 
 def ask(robot: Robot, seed: int) -> Iterator[tuple[str, FloatArray]]:
-    """Each way to be handed numbers that are checked, and the numbers.
+    """Yield the name and the result of each checked computation.
 
     Raises:
-        MismatchError: two ways of them differ.
-        UrdfkinError: what a call raises; singular representations and paths without a table are passed over.
+        MismatchError: two computations differ.
+        UrdfkinError: an error of a call, except for singular representations and paths without a table.
     """
     generator = np.random.default_rng(seed)
     q, v, a = _inputs(robot, seed)
@@ -55,10 +55,10 @@ def ask(robot: Robot, seed: int) -> Iterator[tuple[str, FloatArray]]:
 
 
 def ask_prepared(robot: Robot, seed: int) -> None:
-    """A prepared frame's numbers, which nobody checks, are those of the checked calls.
+    """Compare a prepared frame's unchecked results with those of checked calls.
 
     Raises:
-        MismatchError: they are not.
+        MismatchError: they differ.
     """
     inputs = [x[0] for x in _inputs(robot, seed)]
     frame = robot.all_frames[-1]
@@ -77,7 +77,7 @@ def _inputs(robot: Robot, seed: int) -> tuple[FloatArray, FloatArray, FloatArray
 
 
 def _base(generator: np.random.Generator, size: float) -> BaseMotion:
-    """A base that is turned, moves, and stands so many metres away."""
+    """Return a rotated, moving base at a distance of `size` metres."""
     R = np.linalg.qr(generator.normal(size=(3, 3)))[0]
     T = np.eye(4)
     T[:3, :3] = R * np.linalg.det(R)
@@ -95,15 +95,15 @@ def _together(
     v: FloatArray,
     a: FloatArray,
 ) -> Iterator[tuple[str, FloatArray]]:
-    """Each quantity of all frames in a batch, of one frame in that batch, and of one configuration."""
-    kept = dict[str, FloatArray]()
+    """Yield each quantity of all frames in a batch, of one frame in that batch, and of one configuration."""
+    results = dict[str, FloatArray]()
     if reference is Reference.LOCAL_WORLD_ALIGNED:
-        kept["placement"] = robot.placement(q, frames, base=base)
-    kept["velocity"] = robot.velocity(q, v, frames, reference, base=base)
-    kept["jacobian"] = robot.jacobian(q, frames, reference, base=base)
-    kept["hessian"] = robot.hessian(q, frames, reference, base=base)
-    kept["acceleration"] = robot.acceleration(q, v, a, frames, reference, base=base)
-    yield from kept.items()
+        results["placement"] = robot.placement(q, frames, base=base)
+    results["velocity"] = robot.velocity(q, v, frames, reference, base=base)
+    results["jacobian"] = robot.jacobian(q, frames, reference, base=base)
+    results["hessian"] = robot.hessian(q, frames, reference, base=base)
+    results["acceleration"] = robot.acceleration(q, v, a, frames, reference, base=base)
+    yield from results.items()
     inputs: dict[str, tuple[FloatArray, ...]] = {
         "placement": (q,),
         "velocity": (q, v),
@@ -112,7 +112,7 @@ def _together(
         "acceleration": (q, v, a),
     }
     for frame in alone:
-        for name, every in kept.items():
+        for name, every in results.items():
             compute: Callable[..., FloatArray] = getattr(robot, name)
             words = () if name == "placement" else (reference,)
             batch = compute(*inputs[name], frame, *words, base=base)
@@ -133,23 +133,23 @@ def _together(
 
 
 def _names(robot: Robot, q: FloatArray, generator: np.random.Generator) -> Iterator[tuple[str, FloatArray]]:
-    """What a name stands for is looked up by urdfkin and by Pinocchio, each by itself."""
+    """Yield placements of frames by name; urdfkin and Pinocchio look up the name independently."""
     links, joints = set(robot.link_names), {joint.name for joint in robot.tree.joints}
     own = sorted(links | joints)
     asked = [f"{prefix}{name}" for name in own for prefix in ("", "link:", "joint:")]
     for i in generator.permutation(len(asked))[:NAMES]:
         try:
             yield f"placement of {asked[i]!r}", robot.placement(q, asked[i])
-        except UnknownNameError:  # `joint:NAME` where NAME is a link's alone
+        except UnknownNameError:  # `joint:NAME` where only a link has the NAME
             if asked[i] in own:
                 raise
-        except InputError:  # of two frames of one name neither comes first
+        except InputError:  # two frames have this name
             if asked[i] not in links & joints:
                 raise
 
 
 def _tables(robot: Robot, frames: list[str]) -> Iterator[tuple[str, FloatArray]]:
-    """Denavit-Hartenberg tables from the root, where no planar or floating joint is in the way."""
+    """Yield Denavit-Hartenberg tables of paths from the root without planar and floating joints."""
     for frame in frames:
         tree = robot.tree
         if any(tree.joints[i].nq > 1 for i in tree.path(tree.frame_link(frame))):

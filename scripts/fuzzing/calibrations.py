@@ -1,7 +1,7 @@
-"""Measured poses of random arms, good ones and wrong ones: joint angles in degrees, rows of q shifted.
+"""Random measured poses of arms, correct ones and wrong ones: joint angles in degrees, shifted rows of q.
 
-Good data are calibrated and verified; wrong data are refused. What is drawn depends on the seed and the
-number alone, and is kept as JSON.
+Correct data must be calibrated and verified; wrong data must be rejected. The data depend only on the seed
+and the number, and are stored as JSON.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _SHIFT = {"rows one later": 1, "rows one earlier": -1}
 
 
 def calibration(seed: int, number: int) -> Case:
-    """The data of that number."""
+    """Return the data of a number."""
     rng = random.Random(f"{seed}:{FAMILY}:{number}")
     drawn = {
         "arm": rng.choice(ARMS),
@@ -41,7 +41,7 @@ def calibration(seed: int, number: int) -> Case:
 
 
 def judge(case: Case) -> Outcome:
-    """Whether good data are calibrated, and wrong ones refused."""
+    """Test that correct data are calibrated and wrong data are rejected."""
     drawn = json.loads(case.data)
     robot = urdfkin.load(drawn["arm"])
     tip, base = robot.tip_frame, robot.base_frame

@@ -1,4 +1,4 @@
-"""What is asked of one robot: check it, load it, compute it, and have Pinocchio compute it."""
+"""Test one robot: check it, load it, compute all quantities and compare them with Pinocchio."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from urdfkin.robot import Robot
 from urdfkin.urdf.mjcf import is_mjcf
 from urdfkin.verify.verifier import NotVerifiedWarning
 
-#: Findings about sizes that arithmetic cannot carry: a result that is no number is no surprise after them.
+#: Findings about sizes beyond floating-point range; non-finite results are expected after them.
 _SIZES = {"URDF526", "URDF603", "URDF606"}
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What happened, in one of the words of `GOOD` or in words that accuse, and the details."""
+    """The outcome, one of `GOOD` or the name of a failure, and the details."""
 
     word: str
     details: str = ""
 
 
 def judge(case: Case) -> Outcome:
-    """What happens to a document on its way to numbers."""
+    """Return the outcome of a document."""
     try:
         return _judge_mjcf(case) if is_mjcf(case.data) else _judge(case)
     except UrdfkinError as error:
@@ -52,7 +52,7 @@ def _judge(case: Case) -> Outcome:
             return Outcome("load refuses what check does not", str(error))
         if errors:
             return Outcome("load takes what check refuses", str(errors[0]))
-        return _asked(robot, findings, warned) or _unverified(robot, findings, warned)
+        return _computed(robot, findings, warned) or _unverified(robot, findings, warned)
 
 
 def _judge_mjcf(case: Case) -> Outcome:
@@ -66,18 +66,18 @@ def _judge_mjcf(case: Case) -> Outcome:
             return Outcome("refused" if known else "load refuses what MuJoCo takes", str(error))
         if model is not None and (found := mjcf.difference(robot, model, 0)) is not None:
             return Outcome("MuJoCo has another robot", found)
-        return _asked(robot, robot.findings, warned) or _unverified(robot, robot.findings, warned)
+        return _computed(robot, robot.findings, warned) or _unverified(robot, robot.findings, warned)
 
 
-def _asked(robot: Robot, findings: list[Finding], warned: list[warnings.WarningMessage]) -> Outcome | None:
-    """What happens when everything is asked; None where results are handed out that are not verified."""
+def _computed(robot: Robot, findings: list[Finding], warned: list[warnings.WarningMessage]) -> Outcome | None:
+    """Return the outcome of computing everything; None if some results are not verified."""
     big = bool(_SIZES & {finding.code for finding in findings})
     too_large = "too large to compute, with a finding" if big else "a result that is no number"
     try:
         for what, result in ask(robot, seed=0):
             if not np.isfinite(result).all():
                 return Outcome(too_large, what)
-        # Of tables there is no ledger: what is not verified of them is warned of.
+        # Tables have no certificate: a warning reports an unverified table.
         doubted = any(issubclass(w.category, NotVerifiedWarning) for w in warned)
         verified = robot.certificate().verified and not doubted
         ask_prepared(robot, seed=0)
@@ -93,7 +93,7 @@ def _asked(robot: Robot, findings: list[Finding], warned: list[warnings.WarningM
 
 
 def _unverified(robot: Robot, findings: list[Finding], warned: list[warnings.WarningMessage]) -> Outcome:
-    """Whether somebody said why."""
+    """Return the outcome of unverified results: with a reported reason or without."""
     marked = [finding for finding in findings if finding.oracle is not None]
     if marked:
         return Outcome("not verified, with a finding that says why", marked[0].code)

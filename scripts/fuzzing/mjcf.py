@@ -1,7 +1,7 @@
 """Random MJCF files: free bodies that MuJoCo aligns or fuses, chains of equalities, default classes.
 
-A file depends on the seed, its family and its number alone. MuJoCo itself is asked where each body and site
-of the file is, and which equalities hold: nothing of urdfkin's reading of MJCF is used for it.
+A file depends only on the seed, its family and its number. MuJoCo computes the pose of each body and site
+and checks the equalities, independently of urdfkin's MJCF reader.
 """
 
 from __future__ import annotations
@@ -19,20 +19,22 @@ from urdfkin.robot import Robot
 
 FAMILIES = ("mjcf-free", "mjcf-equalities", "mjcf-classes")
 _CLASSES = ("outer", "inner", "other")
-#: How far two placements, or the two sides of an equality, may be apart in proportion to what is added up.
+#: Allowed relative difference of two placements, or of the two sides of an equality.
 _APART = 1e-12
 
-mujoco.set_mju_user_warning(lambda said: None)  # of dynamics; else it writes a log into the current folder
+mujoco.set_mju_user_warning(
+    lambda said: None
+)  # otherwise MuJoCo writes a log of dynamics warnings into the current folder
 
 
 def robot(seed: int, family: str, number: int) -> Case:
-    """The file of that number."""
+    """Return the file of a number."""
     rng = random.Random(f"{seed}:{family}:{number}")
     return Case(f"{family} {number}", _File(rng, family).text().encode())
 
 
 class _File:
-    """A file while it is written."""
+    """Writes a random file."""
 
     def __init__(self, rng: random.Random, family: str) -> None:
         self.rng, self.family = rng, family
@@ -59,7 +61,7 @@ class _File:
         )
 
     def defaults(self) -> str:
-        """Classes in one another, which give joints, shapes and sites what these do not say."""
+        """Return nested default classes for joints, shapes and sites."""
         if self.family != "mjcf-classes":
             return ""
 
@@ -75,7 +77,7 @@ class _File:
         return f"<default>{outer}</default>"
 
     def body(self, depth: int) -> str:
-        """A body with its joints, shapes and sites, and those that hang from it."""
+        """Return a body with its joints, shapes, sites and child bodies."""
         rng = self.rng
         name, self.bodies = f"body{self.bodies}", self.bodies + 1
         words = [f'name="{name}"', f'pos="{self.vector()}"', self.orientation()]
@@ -97,29 +99,29 @@ class _File:
         return f"<body {' '.join(words)}>{''.join(parts)}</body>"
 
     def site_words(self) -> str:
-        """Where a site is, if it says so itself."""
+        """Return the pose of a site, or nothing."""
         return f'pos="{self.vector()}" {self.orientation()}' if self.rng.random() < 0.7 else ""
 
     def of_class(self) -> str:
-        """A class of its own."""
+        """Return the attribute of a random class."""
         named = self.family == "mjcf-classes" and self.rng.random() < 0.4
         return f' class="{self.rng.choice(_CLASSES)}"' if named else ""
 
     def free_joint(self) -> str:
-        """A joint that moves freely, in its two writings."""
+        """Return a free joint, in one of its two notations."""
         name, align = f"free{self.bodies}", self.rng.choice(("true", "false", "auto"))
         if self.rng.random() < 0.5:
             return f'<joint name="{name}" type="free"/>'
         return f'<freejoint name="{name}" align="{align}"/>'
 
     def joint(self) -> str:
-        """A hinge or a slide."""
+        """Return a hinge or slide joint."""
         name = f"joint{len(self.joints)}"
         self.joints.append(name)
         return f'<joint name="{name}"{self.of_class()} {" ".join(self.joint_words(0.7))}/>'
 
     def joint_words(self, share: float) -> list[str]:
-        """What a joint, or its class, says: each thing or not."""
+        """Return random attributes of a joint or its class."""
         rng = self.rng
         lower, upper = sorted((rng.uniform(-2.0, 2.0), rng.uniform(-2.0, 2.0)))
         large = rng.random() < 0.2
@@ -133,12 +135,12 @@ class _File:
         return [word for word in words if rng.random() < share]
 
     def shape(self) -> str:
-        """A box, which gives its body an inertia that lies askew."""
+        """Return a box, which gives its body an inertia with oblique axes."""
         sizes = " ".join(repr(self.rng.uniform(0.05, 0.5)) for _ in range(3))
         return f'<geom type="box" size="{sizes}" pos="{self.vector()}" {self.orientation()}/>'
 
     def orientation(self) -> str:
-        """None, or in one of the ways of MJCF."""
+        """Return no orientation, or one in a random notation of MJCF."""
         rng = self.rng
         angle = 90.0 if self.degrees else 1.5
         return rng.choice(
@@ -156,7 +158,7 @@ class _File:
         return " ".join(repr(odd.tame_length(self.rng)) for _ in range(3))
 
     def equalities(self) -> str:
-        """Constraints between joints: chains, circles, twice, idle, bent, and others."""
+        """Return constraints between joints: chains, cycles, duplicates, inactive and nonlinear ones."""
         rng, made = self.rng, []
         count = rng.randint(1, 5) if self.family == "mjcf-equalities" else rng.randint(0, 1)
         for i in range(count if len(self.joints) > 1 else 0):
@@ -175,7 +177,7 @@ class _File:
 
 
 def compiled(data: bytes) -> mujoco.MjModel | None:
-    """MuJoCo's model of the file as it is; None where it does not accept it."""
+    """Return MuJoCo's model of the file; None if MuJoCo rejects it."""
     try:
         return mujoco.MjModel.from_xml_string(data.decode())
     except ValueError:
@@ -183,7 +185,7 @@ def compiled(data: bytes) -> mujoco.MjModel | None:
 
 
 def difference(robot: Robot, model: mujoco.MjModel, seed: int) -> str | None:
-    """Where MuJoCo has a body or a site elsewhere, or couples joints otherwise; None if it does not."""
+    """Return a difference of a body, a site or a joint coupling from MuJoCo; None if there is none."""
     data = mujoco.MjData(model)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     warned = " ".join(finding.message for finding in robot.findings if finding.code == "MJCF101")

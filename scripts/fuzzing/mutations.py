@@ -1,7 +1,7 @@
-"""Mutants of real URDFs: the same seed and number give the same bytes, on any machine.
+"""Mutants of real URDFs; the same seed and number give the same bytes on any machine.
 
-Four families, from the blunt to the sly: bytes, tokens, attributes, and structure (joints re-parented, loops
-closed, names swapped, types and mimics changed).
+There are four families: bytes, tokens, attributes, and structure (new parents, closed loops, swapped names,
+changed types and mimic rules).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from xml.etree import ElementTree as ET
 
 from scripts.fuzzing import Case
 
-#: The largest file that is mutated: larger ones take longer and add nothing.
+#: Largest size of a mutated file; larger files only take longer.
 LARGEST = 150_000
 
 ODD_NUMBERS = (
@@ -120,7 +120,7 @@ Mutator = Callable[[random.Random, bytes], bytes]
 
 
 def mutant(seed: int, number: int, files: Sequence[Path]) -> Case:
-    """What was done to which file, and the bytes it became."""
+    """Return the mutant of a number: its description and its bytes."""
     rng = random.Random(f"{seed}:{number}")
     path = rng.choice(list(files))
     data = path.read_bytes()
@@ -213,7 +213,7 @@ def _prologue(rng: random.Random, data: bytes) -> bytes:
 
 
 def _pick(rng: random.Random, data: bytes, pattern: re.Pattern[bytes]) -> re.Match[bytes] | None:
-    # A random place, then the next match: much cheaper than finding them all.
+    # Take the first match after a random position, which is faster than finding all matches.
     at = rng.randrange(len(data) + 1)
     return pattern.search(data, at) or pattern.search(data)
 

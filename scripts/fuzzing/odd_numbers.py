@@ -1,4 +1,4 @@
-"""Numbers as a hostile URDF holds them, drawn so that most of them are still allowed."""
+"""Random unusual numbers of a hostile URDF; most of them are legal."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ _TURNS = (0.0, math.pi, -math.pi, math.pi / 2, 1.5708, 3.14159, 1e-9)
 
 
 def written(rng: random.Random, x: float) -> str:
-    """A number in one of the ways that read back as it, or nearly."""
+    """Return a number in a random notation, exact or nearly exact."""
     plain = repr(x)
     if rng.random() < 0.85:
         return plain
@@ -17,17 +17,17 @@ def written(rng: random.Random, x: float) -> str:
 
 
 def vector(rng: random.Random, numbers: list[float]) -> str:
-    """Several numbers, one blank between them."""
+    """Return several numbers separated by a blank."""
     return " ".join(written(rng, x) for x in numbers)
 
 
 def tame_length(rng: random.Random) -> float:
-    """Some decimetres, often nothing."""
+    """Return a length of some decimetres, often 0."""
     return rng.choice((0.0, 0.0, round(rng.uniform(-1.0, 1.0), 3), rng.uniform(-1.0, 1.0)))
 
 
 def odd_length(rng: random.Random) -> float:
-    """From 1e-320 to 1e300, mostly where sums of several do not overflow."""
+    """Return a length from 1e-320 to 1e300; sums of several usually do not overflow."""
     exponent = rng.choice(
         (rng.uniform(-320, 300), rng.uniform(-20, 20), rng.uniform(-6, 8), rng.uniform(-320, -150), -310.0)
     )
@@ -35,19 +35,19 @@ def odd_length(rng: random.Random) -> float:
 
 
 def tame_angle(rng: random.Random) -> float:
-    """Within a turn, often a multiple of a quarter."""
+    """Return an angle within a turn, often a multiple of a quarter turn."""
     return rng.choice((*_TURNS[:4], rng.uniform(-math.pi, math.pi)))
 
 
 def odd_angle(rng: random.Random) -> float:
-    """Up to 1e15, tiny, or nearly a multiple of a quarter turn."""
+    """Return an angle up to 1e15, a tiny one, or nearly a multiple of a quarter turn."""
     near = rng.choice(_TURNS) + rng.choice((-1.0, 1.0)) * 10.0 ** rng.uniform(-18, -3)
     large = rng.choice((-1.0, 1.0)) * 10.0 ** rng.uniform(0, 15)
     return rng.choice((near, large, 10.0 ** rng.uniform(-320, 0), rng.uniform(-9.0, 9.0), 90.0, 180.0))
 
 
 def direction(rng: random.Random) -> list[float]:
-    """A unit vector, half of the time a coordinate axis."""
+    """Return a unit vector; half of them are coordinate axes."""
     if rng.random() < 0.5:
         axis = [0.0, 0.0, 0.0]
         axis[rng.randrange(3)] = rng.choice((1.0, -1.0))
@@ -57,7 +57,7 @@ def direction(rng: random.Random) -> list[float]:
 
 
 def odd_axis(rng: random.Random) -> list[float]:
-    """An axis of odd length, or one nearly along a coordinate axis."""
+    """Return an axis of unusual length, or one nearly along a coordinate axis."""
     axis = direction(rng)
     if rng.random() < 0.5:
         tilt = 10.0 ** rng.uniform(-20, -3)
@@ -66,7 +66,7 @@ def odd_axis(rng: random.Random) -> list[float]:
 
 
 def odd_quaternion(rng: random.Random) -> list[float]:
-    """Of any length, zero included; turned by nothing, by next to nothing, by anything."""
+    """Return an axis of any length, also zero, with no, a tiny or any rotation."""
     numbers = rng.choice(
         (
             [0.0, 0.0, 0.0, 1.0],
@@ -80,13 +80,13 @@ def odd_quaternion(rng: random.Random) -> list[float]:
 
 
 def odd_size(rng: random.Random) -> float:
-    """What a direction is multiplied by: mostly next to one, sometimes hardly a double."""
+    """Return the factor of a direction: mostly about one, sometimes near the limits of a double."""
     exponent = rng.choice((0.0, 0.0, rng.uniform(-1e-9, 1e-9), rng.uniform(-6, 6), rng.uniform(-170, 170)))
     return math.pow(10.0, rng.uniform(-320, 300) if rng.random() < 0.05 else exponent)
 
 
 def odd_factor(rng: random.Random) -> float:
-    """A multiplier of a follower."""
+    """Return the multiplier of a mimic joint."""
     return rng.choice(
         (
             0.0,
@@ -104,7 +104,7 @@ def odd_factor(rng: random.Random) -> float:
 
 
 def odd_range(rng: random.Random, turns: bool) -> tuple[float, float]:
-    """Limits of a joint: of a point, of one ulp, far away, without end; seldom upside down."""
+    """Return limits of a joint: equal, one ulp apart, far away or infinite; rarely reversed."""
     a = odd_angle(rng) if turns else odd_length(rng)
     b = odd_angle(rng) if turns else odd_length(rng)
     if rng.random() < 0.02:
@@ -125,7 +125,7 @@ def odd_range(rng: random.Random, turns: bool) -> tuple[float, float]:
 
 
 def odd_limit(rng: random.Random) -> str:
-    """Of effort or jerk, as a file may have it: mostly a magnitude, sometimes what urdfdom refuses."""
+    """Return a limit of effort or jerk: mostly positive, sometimes a value that urdfdom rejects."""
     refused = ("-1.0", "-5e-324", "inf", "nan", "", "1e400", "0x10", "1.0 ")
     fine = ("0", "-0.0", "1e300", "5e-324", "1e-400")
     return rng.choice(refused) if rng.random() < 0.03 else rng.choice((*fine, written(rng, rng.random())))

@@ -1,7 +1,7 @@
-"""Random whole robots: trees of every kind of joint, in which some things are odd on purpose.
+"""Random robots: trees of all kinds of joints, with some unusual content.
 
-Most of what is drawn is legal: what is refused at the door is never computed. A robot depends on the seed,
-its family and its number alone.
+Most robots are legal, because a rejected robot is not computed. A robot depends only on the seed, its
+family and its number.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from scripts.fuzzing import Case
 from scripts.fuzzing import odd_numbers as odd
 from urdfkin.urdf.records import FURTHER_LIMITS
 
-#: What may be odd about a robot: a family each. In the family "everything" each is, or is not.
+#: Kinds of unusual content, one for each family. The family "everything" has a random selection.
 ODDITIES = ("names", "prefixes", "versions", "followers", "lengths", "angles", "axes", "limits", "roots")
 FAMILIES = (*ODDITIES, "everything")
 
-#: Names that look like ours, or like Pinocchio's.
+#: Names that resemble internal names of urdfkin or Pinocchio.
 LIKE_OURS = (
     "a", "link:a", "joint:a", "link:link:a", "link:joint:a", "universe", "root_joint", "base", "link:", "1",
     "joint 1", "moving base (urdfkin)",
 )  # fmt: skip
-#: Names that a program may stumble over.
+#: Names that may break a program.
 STRANGE = (
     "-", "--", " ", " a", "a ", "\u00a0", "\u200b", "_", ".", "/", "../a", "a/b", "ä", "a\u0308", "关节",
     "\U0001f916", "\u202eba", "<a>", "&amp;", "'", '"', "#", "%s", "{0}", "$a", "=1+1", "null", "None", "nan",
@@ -35,7 +35,7 @@ KINDS = ("revolute", "continuous", "prismatic", "fixed", "planar", "floating")
 _WEIGHTS = (5, 4, 4, 3, 1, 1)
 _ONE_COORDINATE = KINDS[:3]
 
-#: Elements of other programs, which no reader of URDF may take for a joint; {p} is a prefix.
+#: Elements of other programs, which a URDF reader must not interpret as joints; {p} is a prefix.
 _FOREIGN = (
     '<{p}:joint name="j0" type="fixed"><parent link="l0"/><child link="l1"/></{p}:joint>',
     '<{p}:link name="l0"/>',
@@ -52,7 +52,7 @@ PREFIXES = ("drake", "gazebo", "link", "joint", "x", "mujoco", "ns0", "xml", "_"
 
 
 def robot(seed: int, family: str, number: int) -> Case:
-    """The robot of that number."""
+    """Return the robot of a number."""
     rng = random.Random(f"{seed}:{family}:{number}")
     if family == "everything":
         strange: Collection[str] = {name for name in ODDITIES if rng.random() < 0.4}
@@ -65,7 +65,7 @@ def robot(seed: int, family: str, number: int) -> Case:
 
 
 class _Robot:
-    """A robot while it is written."""
+    """Writes a random robot."""
 
     def __init__(self, rng: random.Random, strange: Collection[str]) -> None:
         self.rng, self.strange = rng, strange
@@ -99,7 +99,7 @@ class _Robot:
         )
 
     def names(self, letter: str, count: int) -> list[str]:
-        """As many names, no two alike."""
+        """Return `count` different names."""
         if "names" not in self.strange:
             return [f"{letter}{i}" for i in range(count)]
         names = dict[str, None]()
@@ -109,9 +109,9 @@ class _Robot:
         return list(names)
 
     def joint(self, i: int) -> str:
-        """Joint i, which carries link i + 1."""
+        """Return joint i, the parent of link i + 1."""
         rng, kind = self.rng, self.kinds[i]
-        # Mostly chains: where everything hangs from the root, nothing adds up.
+        # Mostly chains, since rounding errors add up along a chain.
         parent = i if rng.random() < 0.7 else rng.randint(0, i)
         parts = [
             f"<parent link={quoteattr(self.links[parent])}/>",
@@ -125,7 +125,7 @@ class _Robot:
         return f'<joint name={quoteattr(self.joints[i])} type="{kind}">{"".join(parts)}</joint>'
 
     def origin(self) -> str:
-        """Where the joint is."""
+        """Return the origin of the joint."""
         rng = self.rng
         length = odd.odd_length if "lengths" in self.strange and rng.random() < 0.5 else odd.tame_length
         angle = odd.odd_angle if "angles" in self.strange and rng.random() < 0.5 else odd.tame_angle
@@ -137,7 +137,7 @@ class _Robot:
         return rng.choice((f"<origin{xyz}{rpy}/>",) * 4 + (f"<origin{rpy}/>", f"<origin{xyz}/>", ""))
 
     def axis(self, kind: str) -> str:
-        """The joint's axis; that of a planar joint is z, as both sides have it."""
+        """Return the joint's axis; a planar joint has z, as in urdfkin and Pinocchio."""
         if kind == "planar":
             return '<axis xyz="0 0 1"/>'
         if kind in ("fixed", "floating"):
@@ -147,9 +147,9 @@ class _Robot:
         return f'<axis xyz="{odd.vector(self.rng, numbers)}"/>' if self.rng.random() < 0.9 else ""
 
     def limit(self, kind: str) -> str:
-        """Its limits, where the kind has them."""
+        """Return the limits of the joint, if its kind has any."""
         rng = self.rng
-        # From 1.2 on a limit counts on every kind of joint.
+        # From version 1.2 on, limits apply to all kinds of joints.
         least = 0.8 if "versions" in self.strange else 1.0
         idle = kind not in _ONE_COORDINATE and rng.random() < least
         if idle or (kind == "continuous" and rng.random() < 0.7):
@@ -170,12 +170,12 @@ class _Robot:
         return f"<limit {' '.join(words)}/>"
 
     def mimic(self, i: int) -> str:
-        """A rule that has joint i follow another: one before it, or one after it."""
+        """Return a mimic rule of joint i; it refers to an earlier or a later joint."""
         rng = self.rng
         if "followers" not in self.strange or self.kinds[i] not in _ONE_COORDINATE or rng.random() < 0.35:
             return ""
-        # Joint i follows none of its own number or higher, so that no circle closes; the order in the
-        # tree is another, since joints are sorted by name and by depth.
+        # A mimic joint only refers to lower numbers, so there is no cycle. The order in the tree differs,
+        # since joints are sorted by depth and name.
         leaders = [j for j in range(i) if self.kinds[j] in _ONE_COORDINATE]
         if not leaders:
             return ""
@@ -187,7 +187,7 @@ class _Robot:
         return f"<mimic {' '.join(words)}/>"
 
     def foreign(self) -> str:
-        """Sometimes an element of another program."""
+        """Return an element of another program, or nothing."""
         if "prefixes" not in self.strange or self.rng.random() < 0.6:
             return ""
         return self.rng.choice(_FOREIGN).format(p=self.prefix)

@@ -1,4 +1,4 @@
-"""Sheets of Denavit-Hartenberg parameters with damaged headers and cells, and what reading them comes to."""
+"""Denavit-Hartenberg tables with damaged headers and cells, and the test that reads them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from urdfkin.loading import load
 from urdfkin.model.chain import FrameChain
 
 FAMILY = "tables"
-#: A form of `urdfkin.dh.export` -> the ending of its files.
+#: Format of `urdfkin.dh.export` -> suffix of its files.
 FORMS = {
     "csv": ".csv",
     "markdown": ".md",
@@ -26,7 +26,7 @@ FORMS = {
     "toml": ".toml",
     "json": ".json",
 }
-#: What damage puts in place of a character.
+#: Replacements of a damaged character.
 PIECES = (
     *",;\t|& \"'\n\\{}[]()_^$-+*/0123456789eqadtheta.\x00\ufeffα",
     "nan",
@@ -35,7 +35,7 @@ PIECES = (
     "1e155",
     "(i-1)",
 )
-#: Of so many damages one falls anywhere; the others fall on the headings.
+#: One of this many damages is anywhere in the table; the others are in the headings.
 _ANYWHERE = 3
 
 
@@ -53,7 +53,7 @@ def _path() -> FrameChain:
 
 
 def sheet(seed: int, number: int) -> Case:
-    """A sheet of the UR5 with a few characters changed, left out or repeated."""
+    """Return a table of the UR5 with a few characters changed, removed or repeated."""
     rng = random.Random(f"{seed} {FAMILY} {number}")
     ending = rng.choice(sorted(_sheets()))
     text = list(_sheets()[ending])
@@ -72,7 +72,7 @@ def sheet(seed: int, number: int) -> Case:
 
 
 def judge(case: Case) -> Outcome:
-    """Whether a sheet is refused in words, or read and compared with the UR5."""
+    """Test that a table is rejected with a message, or read and compared with the UR5."""
     try:
         table = table_from_text(case.data.decode(), case.suffix)
         compare(_path(), table)

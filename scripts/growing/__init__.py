@@ -1,1 +1,1 @@
-"""What a check costs as a file grows: documents of every kind of content, and clocks for them."""
+"""Measure the cost of a check as a file grows: documents of many kinds, and their measurement."""

@@ -1,4 +1,4 @@
-"""What one document costs a check: processor seconds and memory, in a process of its own."""
+"""Measure the processor time and memory of one check, in a separate process."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from urdfkin.lint import check_text
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """What a check took.
+    """The cost of a check.
 
     Attributes:
         megabytes: Size of the document.
         seconds: Processor time.
-        memory: Megabytes by which the process grew at most, findings included.
-        findings: How many findings were written out.
+        memory: Largest growth of the process in megabytes, with the findings.
+        findings: Number of reported findings.
     """
 
     megabytes: float
@@ -31,7 +31,7 @@ class Cost:
 
 
 def cost_of(kind: str, size: int) -> Cost:
-    """Check a document of a kind and about `size` bytes, here and now."""
+    """Check a document of a kind and about `size` bytes, in this process."""
     document = KINDS[kind](size)
     before, start = _peak(), time.process_time()
     findings = check_text(document, fold=False)
@@ -40,7 +40,7 @@ def cost_of(kind: str, size: int) -> Cost:
 
 
 def cost_apart(kind: str, size: int, patience: float) -> Cost | None:
-    """The same in a process of its own, whose memory is nobody else's; None after `patience` seconds."""
+    """Check a document in a separate process; return None after `patience` seconds."""
     command = [sys.executable, "-m", "scripts.growing.clock", kind, str(size)]
     try:
         done = subprocess.run(command, capture_output=True, check=True, timeout=patience)

@@ -1,7 +1,7 @@
-"""URDFs that grow in one way each: a function of a size in bytes that returns a document of about that size.
+"""Functions of a size in bytes that return a URDF of about that size, each with one kind of growing content.
 
-Each is what a careless exporter or a hostile stranger could write. Most are refused; what matters is that the
-refusal takes time and memory in proportion to the file.
+A careless exporter or a hostile stranger could write such files. Most are rejected. The time and memory of
+the rejection must be proportional to the size of the file.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ def _robot(inside: str) -> bytes:
 
 
 def _filled(size: int, piece: Callable[[int], str]) -> str:
-    """`piece(0)`, `piece(1)`, ... until they fill a size."""
+    """Return `piece(0)`, `piece(1)`, ... up to a size."""
     count = max(size // len(piece(10**6)), 2)
     return "".join(map(piece, range(count)))
 
@@ -115,7 +115,7 @@ KINDS: dict[str, Kind] = {
     "one long value": lambda n: _robot(f'<link name="l"/><material file="{"a" * n}"/>'),
     "openings of expressions": lambda n: _robot(f'<link name="l"/><material file="{"${" * (n // 2)}"/>'),
     "references in a value": lambda n: _robot(f'<link name="l"/><material file="{"&amp;" * (n // 5)}"/>'),
-    # what stands between
+    # content between elements
     "text": lambda n: _robot('<link name="l"/>' + "words " * (n // 6)),
     "lines": lambda n: _robot('<link name="l"/>' + "\n" * n),
     "lines, then a broken tag": lambda n: _robot('<link name="l"/>' + "\n" * n + "<"),

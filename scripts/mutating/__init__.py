@@ -1,1 +1,1 @@
-"""Parts of scripts/mutate.py: what a slip looks like, how a process gets one, which tests would see it."""
+"""Parts of scripts/mutate.py: the mutants, their injection into a process, and the selection of tests."""

@@ -1,4 +1,4 @@
-"""Slips that went unnoticed once, by name: a text of a file, the text instead, the test that fails."""
+"""Named mutants that were once not detected: a text of a file, its replacement, and the test that fails."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from scripts.mutating.selection import TESTS
 
 @dataclass(frozen=True)
 class Named:
-    """One slip.
+    """One named mutant.
 
     Attributes:
-        claim: What must not go unnoticed.
-        module: Where, `urdfkin.validation.error_stats`.
-        before: A piece of the module's text, which stands there once.
-        after: What is put in its place.
-        test: The test that must fail then, and passes without.
+        claim: The mistake that must be detected.
+        module: The module, such as `urdfkin.validation.error_stats`.
+        before: A text that occurs exactly once in the module.
+        after: Its replacement.
+        test: The test that fails with the mutant and passes without it.
     """
 
     claim: str
@@ -28,6 +28,6 @@ class Named:
 
 
 def named_slips() -> list[Named]:
-    """Those of tests/attacks/named_slips.toml."""
+    """Return the mutants of tests/attacks/named_slips.toml."""
     text = (TESTS / "attacks" / "named_slips.toml").read_text(encoding="utf-8")
     return [Named(**slip) for slip in tomllib.loads(text)["slip"]]

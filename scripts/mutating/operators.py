@@ -1,7 +1,8 @@
-"""Every small slip that could be made in a file: one place of its syntax tree changed, one at a time.
+"""All mutants of a file: each changes one node of its syntax tree.
 
-The slips are those that tests miss most easily: a comparison's edge, a condition turned round, a number off,
-a sign, a call left out, an error not raised. Texts, types and what compiled kernels hold are left alone.
+The mutants are mistakes that tests often miss: a changed comparison, an inverted condition, another number,
+another sign, an omitted call, an error that is not raised. Texts, types and compiled kernels are not
+mutated.
 """
 
 from __future__ import annotations
@@ -26,13 +27,13 @@ _NAMES = {"min": "max", "max": "min", "any": "all", "all": "any"}
 
 @dataclass(frozen=True)
 class Slip:
-    """One change: a value put into a list's place or a node's field.
+    """One mutant: a new value in a list or in a field of a node.
 
     Attributes:
-        shown: The node whose text a person is shown.
+        shown: The node that is shown to the user.
         home: The list or the node.
-        place: The place or the field.
-        value: What comes there.
+        place: The index or the field.
+        value: The new value.
     """
 
     shown: ast.AST
@@ -47,7 +48,7 @@ class Slip:
 
     @property
     def what(self) -> str:
-        """The text as it is and as it will be, for a person."""
+        """The text before and after the change."""
         before = _short(self.shown)
         with self.made() as old:
             after = _short(self.shown if self.shown is not old else self.value)
@@ -55,7 +56,7 @@ class Slip:
 
     @contextmanager
     def made(self) -> Iterator[Any]:
-        """The tree changed in place, until the end of the block; gives what was there before."""
+        """Change the tree in place until the end of the block; yield the previous value."""
         old = self._put(self.value)
         try:
             yield old
@@ -63,11 +64,11 @@ class Slip:
             self._put(old)
 
     def make(self) -> None:
-        """Change the tree in place, for good."""
+        """Change the tree in place permanently."""
         self._put(self.value)
 
     def _put(self, value: Any) -> Any:
-        """Put a value there; what was there before."""
+        """Set a value and return the previous one."""
         if isinstance(self.place, int):
             old, self.home[self.place] = self.home[self.place], value
         else:
@@ -77,34 +78,34 @@ class Slip:
 
 
 def slips(tree: ast.Module) -> list[Slip]:
-    """Every slip of a file, always in the same order; making one changes the tree it was found in."""
+    """Return all mutants of a file in a fixed order; applying one changes this tree."""
     return [slip for node in _code(tree) for slip in (*_of_expression(node), *_of_statement(node))]
 
 
 def mutated(source: str, number: int) -> ast.Module:
-    """A file's tree with one slip in it."""
+    """Return a file's tree with one mutant applied."""
     tree = ast.parse(source)
     slips(tree)[number].make()
     return ast.fix_missing_locations(tree)
 
 
 def function_at(tree: ast.Module, line: int) -> str:
-    """The function or class in which a line stands, `Tally.percentile`; empty outside of all."""
+    """Return the function or class of a line, such as `Tally.percentile`; empty outside of all."""
     return ".".join(node.name for node in _definitions(tree) if node.lineno <= line <= (node.end_lineno or 0))
 
 
 @lru_cache(maxsize=1)
 def _definitions(tree: ast.Module) -> list[ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef]:
-    """All functions and classes, as they stand."""
+    """Return all functions and classes in their order."""
     kinds = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
     return sorted((node for node in ast.walk(tree) if isinstance(node, kinds)), key=lambda node: node.lineno)
 
 
 def rewritten(source: str, before: str, after: str) -> ast.Module:
-    """A file's tree with one piece of its text replaced.
+    """Return a file's tree with one piece of its text replaced.
 
     Raises:
-        ValueError: the text does not stand there exactly once.
+        ValueError: the text does not occur exactly once.
     """
     if source.count(before) != 1:
         raise ValueError(f"found {source.count(before)} times: {before}")
@@ -112,7 +113,7 @@ def rewritten(source: str, before: str, after: str) -> ast.Module:
 
 
 def _code(node: ast.AST) -> Iterator[ast.AST]:
-    """The nodes that do something when the program runs: no types, no texts, no decorators."""
+    """Yield the nodes that are executed: no types, texts and decorators."""
     yield node
     for name, value in ast.iter_fields(node):
         if name in ("annotation", "returns", "decorator_list", "format_spec", "type_params"):
@@ -188,7 +189,7 @@ def _other(value: bool | int | float) -> bool | int | float:
 
 
 def _of_text(node: ast.BinOp | ast.AugAssign) -> bool:
-    """Texts that are joined, and types that are united."""
+    """Return whether the operator joins texts or types."""
     parts = [node.value] if isinstance(node, ast.AugAssign) else [node.left, node.right]
     return any(
         isinstance(part, ast.JoinedStr)

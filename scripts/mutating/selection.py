@@ -1,4 +1,4 @@
-"""Which files can be mutated, and which tests are the first to ask about each."""
+"""Select the files to mutate, and the nearest tests of each."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 PACKAGE, TESTS = ROOT / "urdfkin", ROOT / "tests"
 
-#: Compiled by Numba from their files, which a slip made while they are read does not reach: their terms are
-#: changed by tests/laws/test_mutation.py, run without the compiler.
+#: Numba compiles these files itself, so a mutant made on import has no effect. tests/laws/test_mutation.py
+#: mutates them without the compiler.
 _COMPILED = {
     "numbers", "registers", "sine", "memory", "walk", "outputs", "cores", "single", "equations", "worst",
 }  # fmt: skip
 
 
-#: They make slips of their own, in processes of their own.
+#: Tests that make their own mutants, in separate processes.
 _OF_SLIPS = ("test_mutate", "test_named_slips")
 _OF_ROBOTS = ("test_robot.py", "verify", "laws")
 
 
 def files(parts: list[str]) -> list[Path]:
-    """The package's files, or those whose path below the package begins with one of the words.
+    """Return the package's files, or those with a path below the package that begins with one of the parts.
 
     Raises:
-        ValueError: no file's path begins with one of the words.
+        ValueError: no path begins with one of the parts.
     """
     found = sorted(path for path in PACKAGE.rglob("*.py") if path.stem not in _COMPILED)
     for part in parts:
@@ -35,7 +35,7 @@ def files(parts: list[str]) -> list[Path]:
 
 
 def module_of(path: Path) -> str:
-    """`urdfkin.dh.parse_table` for its file."""
+    """Return the module of a file, such as `urdfkin.dh.parse_table`."""
     return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
 
 
@@ -44,9 +44,9 @@ def _below(path: Path) -> str:
 
 
 def near_tests(path: Path) -> list[str]:
-    """Test files that name the module or are called after it, and those of its part; the nearest come first.
+    """Return the test files that mention the module or have its name, and those of its part, nearest first.
 
-    A part without tests of its own serves all the others, by way of a robot.
+    A part without its own tests is tested by all the others, through a robot.
     """
     package, _, name = module_of(path).rpartition(".")
     named = re.compile(

@@ -157,7 +157,7 @@ def test_a_viser_that_begins_its_server_in_another_way_is_not_used(monkeypatch: 
         ),
     )
     port = free_port()
-    with pytest.raises(UnguardedError, match=r"viser \d.*cannot be guarded: .*; pip install 'viser=="):
+    with pytest.raises(UnguardedError, match=r"viser \d.*cannot be secured: .*; pip install 'viser=="):
         new_server(port=port)
     with pytest.raises(OSError, match="refused"):
         socket.create_connection((LOOPBACK, port), timeout=5)
@@ -165,7 +165,7 @@ def test_a_viser_that_begins_its_server_in_another_way_is_not_used(monkeypatch: 
 
 def test_a_page_with_other_scripts_than_known_is_not_served(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "_SCRIPTS", (("<script data-other=", "{nonce}"),))
-    with pytest.raises(UnguardedError, match="its page has other scripts than it had"):
+    with pytest.raises(UnguardedError, match="its page has unexpected scripts"):
         new_server(port=free_port())
 
 
@@ -178,7 +178,7 @@ def test_a_gate_that_lets_anybody_in_is_noticed_before_a_robot_is_shown(
 
 
 def test_an_address_of_another_machine_is_an_error_and_no_search_without_end() -> None:
-    with pytest.raises(InputError, match=r"--host 192\.0\.2\.1: nothing can listen there"):
+    with pytest.raises(InputError, match=r"--host 192\.0\.2\.1: cannot listen on this address"):
         new_server("192.0.2.1")
 
 

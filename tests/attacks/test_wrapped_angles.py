@@ -146,7 +146,7 @@ def test_what_a_plot_verifies_is_the_formula_and_not_the_rates(tmp_path: Path) -
     motion = read(robot, tmp_path / "w.csv", wrapped(2.0 * T))
     words = foot(frame_motion(robot, motion.q, motion.v, motion.a, "b"), motion)
     assert "verified by Pinocchio" in words
-    assert "not whether v and a are the rates of q" in words
+    assert "not whether v and a are the derivatives of q" in words
 
 
 @pytest.mark.slow

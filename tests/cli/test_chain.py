@@ -81,7 +81,7 @@ def test_without_a_check_it_says_so_and_a_batch_is_refused() -> None:
     assert "NOT VERIFIED" in done.text
     done = urdfkin("chain", "ur5", "--q", "random:2")
     assert done.code == 2
-    assert "a chain is shown in one configuration" in done.err
+    assert "the chain needs exactly one configuration" in done.err
 
 
 def test_a_floating_joint_on_the_way_is_told() -> None:

@@ -107,7 +107,7 @@ def test_the_line_stands_below_its_finding_with_carets_below_what_is_meant(here:
     assert lines[0].startswith("arm.urdf:5:18: URDF503 [*] warning: joint 'j': the axis has length 2")
     assert lines[1] == '  5 |     <!-- \u6c49 --><axis xyz="0 0 2"/>'
     assert lines[2] == "    | " + " " * (4 + len("<!-- ") + 2 + len(" --><axis ")) + "^" * len('xyz="0 0 2"')
-    assert lines[3:] == ["1 warning in 1 file", "[*] --fix mends these, --diff shows how"]
+    assert lines[3:] == ["1 warning in 1 file", "[*] fixed by --fix; --diff shows the changes"]
     assert check("arm.urdf", "--format", "concise").text.splitlines() == [lines[0], *lines[3:]]
 
 
@@ -229,7 +229,7 @@ def test_what_a_baseline_knows_blocks_nobody_and_what_is_new_does(here: Path) ->
     arm = put("robots/arm.urdf")
     put("robots/two.urdf", BAD)
     done = check("--strict", "--write-baseline", "known.json")
-    assert (done.code, done.text, done.err) == (0, "", "wrote known.json: 2 findings known\n")
+    assert (done.code, done.text, done.err) == (0, "", "wrote known.json: 2 findings in the baseline\n")
     done = check("--strict", "--baseline", "known.json")
     assert (done.code, done.text) == (0, "no findings in 2 files (2 known before)\n")
     arm.write_text("\n\n" + LONG.replace("<axis", '<axis  shade="3"'))  # known again on another line
@@ -238,7 +238,7 @@ def test_what_a_baseline_knows_blocks_nobody_and_what_is_new_does(here: Path) ->
     assert found("--baseline", "known.json") == [("robots/arm.urdf", "URDF503")]
     arm.write_text(GOOD)
     assert (
-        "(1 known before, 1 of the baseline are gone: write it again)"
+        "(1 known before, 1 in the baseline no longer occur: write it again)"
         in check("--baseline", "known.json").text
     )
 
@@ -504,7 +504,7 @@ def test_a_patch_that_is_printed_below_the_top_of_a_repository_is_applied_there(
 def test_fixes_that_turn_a_joint_wait_for_unsafe_fixes(here: Path) -> None:
     text = LONG.replace("<axis", '<origin rpy="1.5708 0 0"/><axis')
     arm = put("arm.urdf", text)
-    assert "--unsafe-fixes mends 1 more, which turns joints by more than rounding" in check().text
+    assert "--unsafe-fixes fixes 1 more; these fixes rotate joints by more than rounding" in check().text
     done = check("--diff")
     assert done.err == "1 finding to fix in 1 file (1 more with --unsafe-fixes)\n"
     check("--fix")
@@ -551,7 +551,7 @@ def test_a_rounded_pi_says_how_far_it_turns(here: Path) -> None:
     arm = put("arm.urdf", GOOD.replace("<axis", '<origin rpy="1.5708 0 0"/><axis'))
     assert (
         check("--fix", "--unsafe-fixes").err
-        == "arm.urdf: fixed URDF601 rounded-pi, line 5; joints turned by up to 3.7e-06 rad each\n"
+        == "arm.urdf: fixed URDF601 rounded-pi, line 5; joints rotated by up to 3.7e-06 rad each\n"
     )
     assert 'rpy="1.5707963267948966 0 0"' in arm.read_text()
 

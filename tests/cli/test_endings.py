@@ -53,7 +53,7 @@ def test_a_table_goes_by_the_ending_too(tmp_path: Path) -> None:
     assert urdfkin("dh", "elbow", "--format", "roboticstoolbox", "-o", str(tmp_path / "r.py")).code == 0
     assert "roboticstoolbox" in (tmp_path / "r.py").read_text()
     done = urdfkin("dh", "elbow", "--format", "toml", "-o", str(tmp_path / "t.json"))
-    assert (done.code, "contradicts the ending" in done.err) == (2, True)
+    assert (done.code, "contradicts the file's suffix" in done.err) == (2, True)
 
 
 @pytest.mark.slow

@@ -62,7 +62,7 @@ def test_so_does_the_command_that_explains_what_it_found(tmp_path: Path) -> None
     bad.write_text('<robot name="r"><link name="a"/><link name="b"/></robot>')
     done = bare("check", str(bad))
     assert done.returncode == 1, done.stderr
-    assert "'urdfkin explain URDF411' tells more" in done.stdout
+    assert "'urdfkin explain URDF411' explains" in done.stdout
     assert bare("explain", "URDF411").returncode == 0
 
 
@@ -71,7 +71,8 @@ def test_a_command_that_needs_more_says_so() -> None:
     done = bare("placement", ROBOT)
     assert done.returncode == 2
     found = re.fullmatch(
-        r"urdfkin: error: (\w+) is not installed; pip install urdfkin with all it needs\n", done.stderr
+        r"urdfkin: error: (\w+) is not installed; install urdfkin with its dependencies: pip install urdfkin\n",
+        done.stderr,
     )
     assert found is not None
     assert found[1] not in installed()

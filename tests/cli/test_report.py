@@ -135,8 +135,8 @@ def test_compare_lists_a_changed_axis_and_states_that_changes_alone_exit_with_0(
         (("validate", "ur5", "--html", "/nowhere/a.html"), "/nowhere/a.html: cannot be written"),
         (("plot", "ur5", "-o", "a.svg"), "--to VALUES"),
         (("plot", "ur5", "--to", "neutral", "-o", "/nowhere/a.svg"), "cannot be written"),
-        (("plot", "ur5", "--to", "neutral", "-o", "a.bmp"), "unknown kind of picture"),
-        (("plot", "ur5", "--to", "random:3", "-o", "a.svg"), "one beginning and one end"),
+        (("plot", "ur5", "--to", "neutral", "-o", "a.bmp"), "unknown picture format"),
+        (("plot", "ur5", "--to", "random:3", "-o", "a.svg"), "--from and --to need one configuration each"),
     ],
 )
 def test_mistakes_are_one_line_and_exit_2(

@@ -39,7 +39,7 @@ def test_only_what_is_needed_is_compiled_and_it_is_said_once(tmp_path: Path) -> 
     words = ("placement", "elbow", "--no-verify")
     first = process(*words, XDG_CACHE_HOME=str(tmp_path))
     assert kernels(tmp_path) == ["placements"]
-    assert first.err.count("urdfkin: compiling placements for this machine; kept from now on") == 1
+    assert first.err.count("urdfkin: compiling placements for this machine, once; 'urdfkin warm'") == 1
     assert first.err.count("'urdfkin warm'") == 1
     assert first.err.count("urdfkin: compiled placements in ") == 1
     assert "compil" not in process(*words, XDG_CACHE_HOME=str(tmp_path)).err

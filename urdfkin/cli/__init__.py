@@ -1,6 +1,6 @@
-"""The command line: one file a command, loaded only when it is called.
+"""The command line: one module for each command, imported only when the command runs.
 
-`urdfkin --help` imports neither numpy nor Pinocchio: the summaries stand here, the commands in their files.
+`urdfkin --help` imports neither NumPy nor Pinocchio: the summaries are in this module.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from urdfkin.verify.quantities import by_command
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-#: Heading of the help page -> command name -> (module that holds `command`, one-line summary). The rows of
-#: the table of quantities come first under `_COMPUTE`.
+#: Heading of the help page -> command name -> (module that defines `command`, one-line summary). The
+#: commands of the table of quantities come first under `_COMPUTE`.
 _COMPUTE = "Compute"
 _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {
@@ -77,12 +77,12 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "warm": ("urdfkin.cli.warm", "Compile everything now, for container images and CI."),
     },
 }
-#: The module that makes a command of a row of the table, and the modules of rows that have their own.
+#: The module that makes a command from a row of the table of quantities, and the exceptions: name -> module.
 _QUANTITY, _OWN = "urdfkin.cli.quantity", {"placement": "urdfkin.cli.placement"}
 
 
 def groups() -> dict[str, dict[str, tuple[str, str]]]:
-    """Every command's module and summary, by heading of the help page."""
+    """Return each command's module and summary, grouped by heading of the help page."""
     rows = {
         name: (_OWN.get(name, _QUANTITY), f"Compute the {row.summary}.") for name, row in by_command().items()
     }
@@ -90,19 +90,19 @@ def groups() -> dict[str, dict[str, tuple[str, str]]]:
 
 
 def commands() -> dict[str, tuple[str, str]]:
-    """Every command's module and summary."""
+    """Return each command's module and summary."""
     return {name: entry for entries in groups().values() for name, entry in entries.items()}
 
 
 class LazyGroup(click.Group):
-    """A group whose commands are imported when they are asked for."""
+    """A command group that imports a command only when it is used."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Names in the order of the help page."""
+        """Return the command names in the order of the help page."""
         return list(commands())
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import one command's module."""
+        """Import one command's module and return the command; None for an unknown name."""
         if (found := commands().get(cmd_name)) is None:
             return None
         module = importlib.import_module(found[0])
@@ -112,23 +112,23 @@ class LazyGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """As click does, but an unknown command offers the nearest ones."""
+        """Find the command; the error for an unknown name lists the nearest names."""
         if args and args[0] not in commands() and not args[0].startswith("-"):
-            if ctx.resilient_parsing:  # a shell wants to complete something
+            if ctx.resilient_parsing:  # shell completion
                 return None, None, args
             raise UnknownNameError("command", args[0], commands())
         return super().resolve_command(ctx, args)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem[str]]:
-        """Commands with their summaries, without importing them; options."""
-        from click.shell_completion import CompletionItem  # noqa: PLC0415  only when a key is pressed
+        """Return matching commands with their summaries, and options, without importing the commands."""
+        from click.shell_completion import CompletionItem  # noqa: PLC0415  only for shell completion
 
         found = [(name, summary) for name, (_, summary) in commands().items() if name.startswith(incomplete)]
         names = [CompletionItem(name, help=summary) for name, summary in found]
         return names + click.Command.shell_complete(self, ctx, incomplete)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the commands with their summaries, grouped by task."""
+        """Write the commands with their summaries, grouped by heading."""
         width = max(map(len, commands()))
         for heading, entries in groups().items():
             with formatter.section(heading):
@@ -142,7 +142,7 @@ def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None
     from urdfkin.verify.pinocchio_module import pinocchio, version  # noqa: PLC0415
 
     click.echo(f"urdfkin {own_version()}, Pinocchio {version()}")
-    pinocchio()  # says why there is none, and what cures it
+    pinocchio()  # raises an error with the cause and the remedy if it is missing
     ctx.exit()
 
 
@@ -156,24 +156,23 @@ def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None
 def cli() -> None:
     """Textbook kinematics from any URDF, every number checked against Pinocchio.
 
-    ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. `urdfkin COMMAND --help`
-    shows a command's options and examples.
+    ROBOT is a path, a name from `urdfkin robots`, or - for standard input. `urdfkin COMMAND --help` shows a
+    command's options and examples.
     """
 
 
 def main() -> None:
-    """Entry point of the `urdfkin` command.
+    """Run the `urdfkin` command.
 
-    Exit 0: verified. 1: a disagreement. 2: bad input or usage. 3: computed, but Pinocchio did not check it.
-    70: a defect of urdfkin. 128 and its number: ended by a signal.
+    Exit 0: verified. 1: a disagreement. 2: bad input or usage. 3: computed, but not checked by Pinocchio.
+    70: a defect of urdfkin. 128 + n: stopped by signal n.
     """
     streams.prepare()
     guard()
-    # The matrices are small here: a thread for each processor costs more than it brings. NumPy's OpenBLAS
-    # reads this when it is imported.
+    # The matrices are small, so one OpenBLAS thread is fastest. OpenBLAS reads this variable on import.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    if os.environ.get("_URDFKIN_COMPLETE"):  # while a key is pressed, nothing that fails is worth a line
+    if os.environ.get("_URDFKIN_COMPLETE"):  # shell completion fails silently
         sys.stderr = io.StringIO()
-    # The line under a result says that it was not verified, and why; once is enough.
+    # The line below a result already states that it was not verified, and why.
     warnings.filterwarnings("ignore", message="not verified")
     sys.exit(run(cli, "urdfkin"))

@@ -1,4 +1,4 @@
-"""`urdfkin analytical-jacobian`: derivatives of position and orientation angles by the coordinates."""
+"""`urdfkin analytical-jacobian`: derivatives of a frame's position and orientation angles."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from urdfkin.cli.output import compiling
 from urdfkin.cli.quantity import Computing, computing_options
 from urdfkin.verify.quantities import ANALYTICAL_JACOBIAN
 
-#: They repeat `urdfkin.kinematics.rotation.SEQUENCES`, whose import --help does not need.
+#: A copy of `urdfkin.kinematics.rotation.SEQUENCES`: importing it would slow --help down.
 _TRIPLES = [a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if a != b != c]
 REPRESENTATIONS = ("quaternion", *(triple.upper() for triple in _TRIPLES), *_TRIPLES)
 
@@ -26,21 +26,21 @@ REPRESENTATIONS = ("quaternion", *(triple.upper() for triple in _TRIPLES), *_TRI
         metavar="NAME",
         default="ZYZ",
         show_default=True,
-        help="Three letters, capitals turning (ZYZ is the text's), small ones fixed (xyz is rpy);"
-        " or quaternion.",
+        help="Euler angles by their axes, or quaternion. Capitals are moving axes (ZYZ), small letters fixed"
+        " axes (xyz is rpy).",
     ),
     click.option(
         "--nearest",
         type=NumberFrom(min=0.0),
         metavar="RAD",
-        help="How near the representational singularity may be; nearer is an error.",
+        help="Smallest allowed distance to the representational singularity; nearer is an error.",
     ),
 )
 def command(context: click.Context, representation: str, nearest: float | None, **_: Any) -> None:
-    """The manipulator Jacobian J = C^-1 J_v (eq. 7.118, 7.122) of a frame.
+    """Compute a frame's analytical Jacobian J = C^-1 J_v (eq. 7.118, 7.122).
 
-    A row of the table for each rate: how fast it alone changes the frame's position and the numbers of its
-    orientation, Euler angles or a quaternion. `urdfkin jacobian` has angular velocities in their place.
+    The table has one row for each joint velocity. A row lists the derivatives of the frame's position and
+    orientation (Euler angles or a quaternion). `urdfkin jacobian` has angular velocities instead.
     """
     from urdfkin.kinematics.rotation.euler import NEAREST  # noqa: PLC0415  keeps --help fast
 
@@ -53,7 +53,7 @@ def command(context: click.Context, representation: str, nearest: float | None, 
 
 
 def labels(representation: str) -> tuple[str, ...]:
-    """What the numbers of an orientation are called.
+    """Return the names of an orientation's numbers.
 
     >>> labels("xyz"), labels("ZYZ")
     (('roll', 'pitch', 'yaw'), ('Z1', 'Y2', 'Z3'))

@@ -1,4 +1,4 @@
-"""What a command about a path or a frame answers, and the one way in which it is shown, written and ended."""
+"""Commands about a path between two frames: print or write the result, then exit with its code."""
 
 from __future__ import annotations
 
@@ -19,17 +19,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Answer:
-    """What was found.
+    """The result of a command about a path.
 
     Attributes:
-        show: Prints it.
-        written: By the name of a form, what writes it.
-        said: What the check said; None where nothing was checked.
+        show: Prints the result.
+        writers: For each format, the function that returns the result as text. Its argument is the line of
+            the check, or None.
+        check: The result of the check; None where nothing was checked.
     """
 
     show: Callable[[], None]
-    written: Mapping[str, Callable[[str | None], str]]
-    said: str | None
+    writers: Mapping[str, Callable[[str | None], str]]
+    check: str | None
 
 
 def path_command(
@@ -39,22 +40,22 @@ def path_command(
     *options: Any,
     endings: Mapping[str, tuple[str, ...]] | None = None,
 ) -> Callable[[Callable[..., Answer]], click.Command]:
-    """A command about a path: its function gets the robot and its options, and gives an answer."""
+    """Make a command from a function that receives the robot and the options and returns an `Answer`."""
 
     def decorate(function: Callable[..., Answer]) -> click.Command:
         @robot_argument
         @together(path_options, *options, forms(*names), verify_option, output_option, click.pass_context)
         def command(
-            context: click.Context, robot: str, format_: str, verify: bool, output: Any, **asked: Any
+            context: click.Context, robot: str, format_: str, verify: bool, output: Any, **values: Any
         ) -> None:
             form = format_ if endings is None else format_from_suffix(context, output, endings, "csv")
-            found = function(load_robot(robot, verify=verify), verify=verify, **asked)
-            line, code = end_of_path(found.said)
+            found = function(load_robot(robot, verify=verify), verify=verify, **values)
+            line, code = end_of_path(found.check)
             if form == names[0] and output is None:
                 found.show()
                 say(line)
             else:
-                text = found.written[form if form in found.written else "csv"](line if found.said else None)
+                text = found.writers[form if form in found.writers else "csv"](line if found.check else None)
                 hand_out(text.encode(), output) if output is not None else say_file(text)
                 say(line, err=True)
             context.exit(code)

@@ -1,4 +1,4 @@
-"""What several commands take: a robot, a frame, configurations and rates."""
+"""Arguments and options that commands share: robot, frame, configuration, joint velocity and acceleration."""
 
 from __future__ import annotations
 
@@ -26,17 +26,24 @@ if TYPE_CHECKING:
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 REFERENCES = ("local", "world", "local_world_aligned")
-#: How many samples `random` draws, unless `random:N` says otherwise.
+#: Number of samples that `random` draws; `random:N` draws N.
 _RANDOM_SAMPLES = 1
 
 
 def forms(*names: str) -> Callable[[_F], _F]:
-    """The option --format with some forms, the first of which is taken where none is said."""
-    return click.option("--format", "format_", type=click.Choice(names), default=names[0], show_default=True)
+    """Make the option --format; the first format is the default."""
+    return click.option(
+        "--format",
+        "format_",
+        type=click.Choice(names),
+        default=names[0],
+        show_default=True,
+        help="Output format.",
+    )
 
 
 def together(*decorators: Callable[[_F], _F]) -> Callable[[_F], _F]:
-    """Several click decorators as one, in the order written."""
+    """Combine several click decorators, in the order given."""
 
     def decorate(function: _F) -> _F:
         for decorator in reversed(decorators):
@@ -50,7 +57,7 @@ _HOW = "urdfkin.how_to_load"
 
 
 def _remember(context: click.Context, parameter: click.Parameter, value: object) -> None:
-    """Keep an option for `how_to_load`, so that no command has to hand it on."""
+    """Store an option for `how_to_load`, so that no command has to pass it on."""
     context.meta.setdefault(_HOW, {})[parameter.name] = value
 
 
@@ -65,7 +72,7 @@ def _remember_xacro_args(context: click.Context, _: click.Parameter, words: Sequ
 
 
 def how_to_load() -> dict[str, Any]:
-    """What the running command takes of `load`'s `mimic`, `root_joint` and `xacro_args`, as it was given."""
+    """Return the running command's options for `load`: `mimic`, `root_joint` and `xacro_args`."""
     return dict(click.get_current_context().meta.get(_HOW, {}))
 
 
@@ -75,26 +82,26 @@ xacro_option = click.option(
     metavar="NAME:=VALUE",
     expose_value=False,
     callback=_remember_xacro_args,
-    help="An argument of a .xacro file, which is expanded without trusting it; may be repeated.",
+    help="Argument of a .xacro file, which is expanded in a restricted process; repeatable.",
 )
 
 
 def mimic_option(help_: str) -> Callable[[_F], _F]:
-    """Whether followers follow, for `how_to_load`."""
+    """Make the option that turns mimic rules on or off; `how_to_load` returns it."""
     return click.option(
         "--mimic/--no-mimic", default=None, expose_value=False, callback=_remember, help=help_
     )
 
 
 def root_joint_option(help_: str) -> Callable[[_F], _F]:
-    """What the root link hangs from, for `how_to_load`."""
+    """Make the option for the joint between the world and the root link; `how_to_load` returns it."""
     joints = click.Choice(["floating", "planar"])
     return click.option("--root-joint", type=joints, expose_value=False, callback=_remember, help=help_)
 
 
 robot_options = together(
-    mimic_option("Whether mimic joints follow their leaders (the URDF's meaning, the default)."),
-    root_joint_option("Hang the root link from a moving joint."),
+    mimic_option("Move mimic joints with the mimicked joints, as the URDF demands (default)."),
+    root_joint_option("Add a moving joint between the world and the root link."),
     xacro_option,
 )
 robot_argument = together(
@@ -103,22 +110,22 @@ robot_argument = together(
 
 
 def frame_name(option: str, help_: str) -> Callable[[_F], _F]:
-    """An option that names a frame, which a shell completes."""
+    """Make an option that takes a frame's name, with shell completion."""
     return click.option(option, metavar="NAME", help=help_, shell_complete=complete_frame)
 
 
-frame_option = frame_name("--frame", "A link or joint. Default: the robot's tip.")
+frame_option = frame_name("--frame", "Link or joint. Default: the robot's tip.")
 path_options = together(
-    frame_name("--base", "A link or joint. Default: the robot's base frame."),
-    frame_name("--tip", "A link or joint. Default: the robot's tip."),
+    frame_name("--base", "Link or joint. Default: the robot's base frame."),
+    frame_name("--tip", "Link or joint. Default: the robot's tip."),
 )
 
 
 class _ReferenceName(click.Choice):  # type: ignore[type-arg]  # generic from click 8.2 on
-    """A reference frame by its name; for another word, the answer to what they mean."""
+    """The name of a reference frame; the error for another word refers to their explanation."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """The name as it is written here."""
+        """Return the name in its standard spelling."""
         try:
             return super().convert(value, param, ctx)
         except click.BadParameter as error:
@@ -130,34 +137,50 @@ reference_option = click.option(
     type=_ReferenceName(REFERENCES, case_sensitive=False),
     default="local_world_aligned",
     show_default=True,
-    help="Pinocchio's reference frames.",
+    help="Reference frame of the result, as in Pinocchio.",
 )
 verify_option = click.option(
-    "--verify/--no-verify", default=True, help="Whether Pinocchio checks each result (the default)."
+    "--verify/--no-verify", default=True, help="Check each result with Pinocchio (default)."
 )
 oracle_option = click.option(
     "--oracle",
     type=click.Choice(["pinocchio", "mujoco"]),
     default="pinocchio",
-    help="Who checks: Pinocchio (the default), or MuJoCo.",
+    help="Library that checks the results: Pinocchio (default) or MuJoCo.",
 )
-seed_option = click.option(
-    "--seed", type=Whole(0), default=0, show_default=True, help="What `random` is drawn from."
-)
+seed_option = click.option("--seed", type=Whole(0), default=0, show_default=True, help="Seed of `random`.")
 _VALUES = (
-    "Numbers '0,30deg,pi/2', by name 'shoulder=30deg,elbow=0.5', a pose 'neutral' or 'ready', with joints"
-    " moved 'ready,elbow=0.5', '@FILE.csv' for a batch, 'random' or 'random:N'."
+    "Configuration: numbers '0,30deg,pi/2', names 'shoulder=30deg,elbow=0.5', a pose 'neutral' or 'ready',"
+    " a pose with changes 'ready,elbow=0.5', a batch '@FILE.csv', 'random' or 'random:N'."
 )
 q_option = click.option("--q", metavar="VALUES", default="neutral", show_default=True, help=_VALUES)
-v_option = click.option("--v", metavar="VALUES", default="neutral", help="Rates, likewise; neutral is zero.")
-a_option = click.option("--a", metavar="VALUES", default="neutral", help="Rates of the rates, likewise.")
+v_option = click.option(
+    "--v", metavar="VALUES", default="neutral", help="Joint velocities, in the same forms; neutral is zero."
+)
+a_option = click.option(
+    "--a",
+    metavar="VALUES",
+    default="neutral",
+    help="Joint accelerations, in the same forms; neutral is zero.",
+)
 
-TRAJECTORY_HELP = "CSV: t, coordinates, v:NAME, a:NAME; or .npz: t, q, v, a."
+TRAJECTORY_HELP = "File: CSV with t, coordinates, v:NAME, a:NAME; or .npz with t, q, v, a."
 
 
 @dataclass(frozen=True, slots=True)
 class Inputs:
-    """A robot and what to compute with; along a trajectory, at what times; how the root link moves."""
+    """A robot, a frame and the values to compute with.
+
+    Attributes:
+        robot: The robot.
+        frame: Name of the frame.
+        q: (n, n_q) configurations, rad or m.
+        v: (n, n_v) joint velocities.
+        a: (n, n_v) joint accelerations.
+        t: (n,) times of a trajectory in s, or None.
+        base: Motion of the root link, or None.
+        said: More settings that the result depends on, for titles and JSON.
+    """
 
     robot: Robot
     frame: str
@@ -169,12 +192,12 @@ class Inputs:
     said: Mapping[str, Any] = field(default_factory=dict)
 
     def saying(self, **more: Any) -> Inputs:
-        """With more that the result depends on, for titles and JSON."""
+        """Return a copy with more settings that the result depends on, for titles and JSON."""
         return replace(self, said={**self.said, **more})
 
 
 def load_robot(source: str, *, verify: bool = True, oracle: WitnessName = "pinocchio", **how: Any) -> Robot:
-    """The robot of a command, loaded as its options say or `how` does; warnings go to stderr, a line each."""
+    """Load a command's robot with the command's options or `how`; write each warning to stderr as a line."""
     from urdfkin.lint.finding import UrdfWarning  # noqa: PLC0415
     from urdfkin.loading import load  # noqa: PLC0415  keeps --help fast
 
@@ -188,15 +211,15 @@ def load_robot(source: str, *, verify: bool = True, oracle: WitnessName = "pinoc
 
 
 def load_two(a: str, b: str) -> tuple[Robot, Robot]:
-    """Two robots of a command; arguments of a .xacro file go to those that are one, if either is.
+    """Load a command's two robots; `--xacro-arg` applies to those that are .xacro files.
 
     Raises:
-        UsageError: both are to come from standard input.
+        UsageError: both come from standard input.
     """
     from urdfkin.urdf.sources import is_xacro  # noqa: PLC0415  keeps --help fast
 
     if a == b == "-":
-        raise click.UsageError("standard input can be one of the two models")
+        raise click.UsageError("only one of the two models can come from standard input")
     none: dict[str, Any] = {"xacro_args": None} if is_xacro(a) or is_xacro(b) else {}
     one, other = (load_robot(source, **({} if is_xacro(source) else none)) for source in (a, b))
     return one, other
@@ -212,10 +235,13 @@ def read_inputs(
     *,
     option: str = "--q",
 ) -> Inputs:
-    """Values from the command line; batches of one length, single ones repeated; `option` is what q came by.
+    """Read the values of q, v and a from the command line.
+
+    Batches must have the same length; a single row is repeated. `option` is the name of the option of q.
 
     Raises:
-        InputError: a number that is none, a wrong count, batches of different lengths, a seed for nothing.
+        InputError: an invalid number, a wrong count, batches of different lengths, or a --seed that has no
+            effect.
         SourceError: a file that cannot be read.
     """
     import numpy as np  # noqa: PLC0415  keeps --help fast
@@ -239,7 +265,7 @@ def read_inputs(
 
 
 def _values(robot: Robot, letter: str, text: str, where: str, rng: Any) -> FloatArray:
-    """(n, width) for one option."""
+    """Return the (n, width) values of one option."""
     from urdfkin.model.configuration import places  # noqa: PLC0415  keeps --help fast
     from urdfkin.verify.sampling import sample  # noqa: PLC0415
 
@@ -256,14 +282,17 @@ def _values(robot: Robot, letter: str, text: str, where: str, rng: Any) -> Float
 def _count(where: str, text: str) -> int:
     count = parse_int(text)
     if count is None or count < 1:
-        raise InputError("random:N wants a whole number from 1 on", where=where, found=repr(text))
+        raise InputError("random:N needs a whole number from 1 on", where=where, found=repr(text))
     return count
 
 
 def read_batch(path: Path, option: str, layouts: Sequence[Sequence[str]]) -> tuple[FloatArray, Sequence[str]]:
-    """(n, width), one sample a line, and which of the layouts it is in: the one with as many columns.
+    """Read a CSV file with one sample a line.
 
     A first line of names may put the columns in any order.
+
+    Returns:
+        The (n, width) numbers, and the layout with as many columns as the file.
     """
     import numpy as np  # noqa: PLC0415  keeps --help fast
 
@@ -276,7 +305,9 @@ def read_batch(path: Path, option: str, layouts: Sequence[Sequence[str]]) -> tup
     found = np.stack([columns[name] for name in names], axis=-1) if names else np.empty((0, 0))
     if not len(found):
         raise InputError(
-            "no samples", where=str(path), remedy="one line a sample, numbers separated by commas"
+            "no samples",
+            where=str(path),
+            remedy="write one line for each sample, numbers separated by commas",
         )
     return np.ascontiguousarray(found), names
 
@@ -285,4 +316,4 @@ def _standard_input() -> str:
     try:
         return read_standard_input(MOST_DATA).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise SourceError("cannot be read", where="-", found=f"no UTF-8 text ({error})") from None
+        raise SourceError("cannot be read", where="-", found=f"text that is not UTF-8 ({error})") from None

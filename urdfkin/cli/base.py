@@ -1,4 +1,4 @@
-"""How the root link moves, as commands take it: a base's placement, velocity and acceleration."""
+"""The options --base-placement, --base-velocity and --base-acceleration: the motion of the root link."""
 
 from __future__ import annotations
 
@@ -26,33 +26,35 @@ _OPTIONS = {
     "q": click.option(
         "--base-placement",
         metavar="VALUES",
-        help="Of the root link in the world: x,y,z,roll,pitch,yaw (m, rad), x,y,z,qx,qy,qz,qw, or @FILE.csv.",
+        help="Pose of the root link in the world: x,y,z,roll,pitch,yaw (m, rad), x,y,z,qx,qy,qz,qw, or"
+        " @FILE.csv.",
     ),
     "v": click.option(
         "--base-velocity",
         metavar="VALUES",
-        help="Of the root link: vx,vy,vz,wx,wy,wz in the world's axes, m/s and rad/s, or @FILE.csv.",
+        help="Velocity of the root link: vx,vy,vz,wx,wy,wz in the world's axes, m/s and rad/s, or @FILE.csv.",
     ),
     "a": click.option(
         "--base-acceleration",
         metavar="VALUES",
-        help="Likewise, in m/s^2 and rad/s^2; classical, of the root link's origin.",
+        help="Classical acceleration of the root link's origin, in the same form, m/s^2 and rad/s^2.",
     ),
 }
 
 
 def base_options(inputs: str) -> Callable[[_F], _F]:
-    """What a quantity of q, v and a needs to know of the base; `with_base` reads it."""
+    """Make the options of the base for a quantity of q, v and a; `with_base` reads them."""
     return together(*(_OPTIONS[letter] for letter in inputs))
 
 
 def with_base(
     x: Inputs, placement: str | None = None, velocity: str | None = None, acceleration: str | None = None
 ) -> Inputs:
-    """The inputs with the motion of the base, if any of it was given; a single row goes with a batch.
+    """Return the inputs with the motion of the base, if any was given; a single row applies to a whole batch.
 
     Raises:
-        InputError: a number that is none, a wrong count, a quaternion off length 1, other numbers of samples.
+        InputError: an invalid number, a wrong count, a quaternion that is not of length 1, or batches of
+            different lengths.
         SourceError: a file that cannot be read.
     """
     import numpy as np  # noqa: PLC0415  keeps --help fast
@@ -73,13 +75,13 @@ def with_base(
             found=", ".join(str(len(part)) for part in parts),
         )
     q, v_, a_, *base = (np.ascontiguousarray(np.broadcast_to(part, (n, *part.shape[1:]))) for part in parts)
-    moved = replace(x, q=q, v=v_, a=a_, base=BaseMotion(*base))
+    inputs = replace(x, q=q, v=v_, a=a_, base=BaseMotion(*base))
     names = "base_placement", "base_velocity", "base_acceleration"
-    return moved.saying(**{name: part.tolist() for name, part in zip(names, base, strict=True)})
+    return inputs.saying(**{name: part.tolist() for name, part in zip(names, base, strict=True)})
 
 
 def _rows(text: str, option: str, layouts: Sequence[Sequence[str]]) -> tuple[FloatArray, Sequence[str]]:
-    """(n, width) numbers, and which of the layouts they are in: the one with as many."""
+    """Return the (n, width) numbers, and the layout that has as many columns."""
     import numpy as np  # noqa: PLC0415
 
     from urdfkin.motion.columns import numbers  # noqa: PLC0415

@@ -1,4 +1,4 @@
-"""`urdfkin acceleration --explain`: whose doing an acceleration is, as a table or as data."""
+"""`urdfkin acceleration --explain`: print or write the acceleration split by joint and term."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from urdfkin.model.tree import FloatArray
 
 _COLUMNS = ("joint", "kind", "lin x", "lin y", "lin z", "ang x", "ang y", "ang z")
-#: How many samples of a batch the table shows.
+#: Number of samples of a batch that the table shows.
 _SHOWN = 2
 
 
 def emit_breakdown(
     inputs: Inputs, reference: str, parts: AccelerationBreakdown, format_: str, output: Path | None
 ) -> None:
-    """Show or write (n, ...) parts with the certificate of their sum."""
+    """Print or write the (n, ...) parts with the certificate of their sum."""
     certificate = inputs.robot.certificate()
     if format_ == "table" and output is None:
         _print(inputs, reference, parts)
@@ -50,11 +50,11 @@ def _print(inputs: Inputs, reference: str, parts: AccelerationBreakdown) -> None
         print_named(out, _COLUMNS, cells, left=range(2))
     if len(parts.base) > _SHOWN:
         more = len(parts.base) - _SHOWN
-        out.print(f"... and {more} more samples: --format csv, json or npy has them all")
+        out.print(f"... and {more} more samples: --format csv, json or npy writes all")
 
 
 def _cells(six: FloatArray, noise: float) -> list[str]:
-    """Four digits: enough to compare parts, and they fit beside each other."""
+    """Return the numbers with four digits, so that a row fits on the terminal."""
     return [six_digits(x, noise, digits=4) for x in six.tolist()]
 
 

@@ -1,4 +1,4 @@
-"""`urdfkin chain`: the joints between two frames as axes, where they stand and how they point."""
+"""`urdfkin chain`: the axes, origins and interorigin vectors of the joints between two frames."""
 
 from __future__ import annotations
 
@@ -22,11 +22,12 @@ _ENDINGS = {".json": ("json",), ".csv": ("csv",)}
 
 @path_command("chain", _EXAMPLE, _FORMS, q_option, seed_option, endings=_ENDINGS)
 def command(robot: Robot, base: str | None, tip: str | None, q: str, seed: int, verify: bool) -> Answer:
-    """The joints between two frames (section 7.5), in one configuration, as they are seen from the base.
+    """List the joints between two frames (section 7.5), in one configuration and in the base's axes.
 
-    For each its axis z, its origin O and the interorigin vector d to the next origin, the last to the tip;
-    metres. The path may run up the tree: a joint that is passed backwards has its axis reversed, so that its
-    coordinate counts as the URDF's. Fixed joints are folded in. --q is the whole robot's.
+    Each joint has its axis z, its origin O and the interorigin vector d to the next origin, in metres. The
+    last vector d leads to the tip. The path may run up the tree: such a joint is marked "backwards", and its
+    axis is reversed so that its coordinate keeps the URDF's sign. Fixed joints are folded in. --q is the
+    configuration of the whole robot.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
@@ -35,7 +36,7 @@ def command(robot: Robot, base: str | None, tip: str | None, q: str, seed: int, 
     path = robot.chain(tip, base)
     at = read_inputs(robot, path.tip, seed, q).q
     if len(at) != 1:
-        raise InputError("a chain is shown in one configuration", where="--q", found=str(len(at)))
+        raise InputError("the chain needs exactly one configuration", where="--q", found=str(len(at)))
     own = path.coupling.select(robot.tree, at)[0]
     axes, origins, ways = path.axes(own), path.origins(own), path.interorigin(own)
     joints = list(zip(path.joints, axes, origins, ways, strict=False))
@@ -86,8 +87,8 @@ def command(robot: Robot, base: str | None, tip: str | None, q: str, seed: int, 
             rows.append([i, csv_cell(joint.name), joint.kind.value, int(joint.backwards), *numbers])
         return csv_text(rows)
 
-    said = check_chain(robot.verifier, path, at) if verify else None
-    return Answer(show, {"json": as_json, "csv": as_csv}, said)
+    check = check_chain(robot.verifier, path, at) if verify else None
+    return Answer(show, {"json": as_json, "csv": as_csv}, check)
 
 
 def _kind(joint: Any) -> str:
@@ -96,5 +97,5 @@ def _kind(joint: Any) -> str:
 
 
 def _vector(numbers: FloatArray) -> str:
-    """Six digits, and what is rounding of a metre as 0."""
+    """Return the numbers with six digits; rounding errors of a metre appear as 0."""
     return " ".join(six_digits(x) for x in numbers.tolist())

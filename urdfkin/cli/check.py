@@ -1,7 +1,4 @@
-"""What `urdfkin check` prints: findings in every form, what was mended, what would be.
-
-`urdfkin check`: findings about URDFs, as a linter prints them.
-"""
+"""`urdfkin check`: check URDF files, print the findings in several formats, and apply automatic fixes."""
 
 from __future__ import annotations
 
@@ -43,19 +40,19 @@ _COLOURS = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.NOTE: "b
 
 @dataclass(slots=True)
 class Outcome:
-    """What was found in all files.
+    """The results of all files.
 
     Attributes:
-        files: Those that were read, as they were named.
-        findings: What is told.
-        silenced: What comments silence, each with its reason.
-        excerpts: Of each finding, the file's line with a caret.
-        unreadable: Why files could not be read.
-        unchanged: How many files say what they said before.
-        known: How many findings a baseline knows, and how many more it knows that are gone.
-        to_fix: How many findings --diff would mend.
-        patches: What --diff prints.
-        unsafe: How many more findings --unsafe-fixes would mend.
+        files: Names of the files that were read, as given.
+        findings: Findings to print.
+        silenced: Findings that a comment suppresses, each with its reason.
+        excerpts: For each finding, the line of the file with a caret below.
+        unreadable: One error for each file that could not be read.
+        unchanged: Number of files that are unchanged since the version of --changed-since.
+        known: Number of findings in the baseline, and number of baseline entries that no longer occur.
+        to_fix: Number of findings that --fix would fix.
+        patches: The patches of --diff.
+        unsafe: Number of further findings that --unsafe-fixes would fix.
     """
 
     files: list[str] = field(default_factory=list)
@@ -70,7 +67,7 @@ class Outcome:
     unsafe: int = 0
 
     def add(self, file: str, found: Examined) -> None:
-        """One more file."""
+        """Add the results of one file."""
         excerpts = Excerpts(found.data)
         self.files.append(file)
         self.findings += found.findings
@@ -79,7 +76,7 @@ class Outcome:
 
 
 def print_outcome(outcome: Outcome, style: str, *, statistics: bool) -> None:
-    """All that was found, in one form."""
+    """Print all findings in one format."""
     findings, version = outcome.findings, installed_version("urdfkin") or "0+unknown"
     if style == "json":
         click.echo(as_json(findings, outcome.files, version, outcome.silenced))
@@ -106,12 +103,12 @@ def _print_terminal(outcome: Outcome, *, excerpts: bool) -> None:
             say_styled((caret, colour))
     _print_summary(outcome)
     if any(finding.fix and finding.fix.is_safe for finding in outcome.findings):
-        say("[*] --fix mends these, --diff shows how")
+        say("[*] fixed by --fix; --diff shows the changes")
     if unsafe := sum(bool(finding.fix and not finding.fix.is_safe) for finding in outcome.findings):
-        say(f"--unsafe-fixes mends {unsafe} more, which turns joints by more than rounding")
+        say(f"--unsafe-fixes fixes {unsafe} more; these fixes rotate joints by more than rounding")
     worst = next((f.code for f in outcome.findings if f.severity is Severity.ERROR), None)
     if worst is not None:
-        say(f"'urdfkin explain {worst}' tells more: {page(worst).title}")
+        say(f"'urdfkin explain {worst}' explains: {page(worst).title}")
 
 
 def _print_summary(outcome: Outcome) -> None:
@@ -119,7 +116,7 @@ def _print_summary(outcome: Outcome) -> None:
         f"{len(outcome.silenced)} silenced by comments" if outcome.silenced else "",
         f"{outcome.unchanged} files unchanged" if outcome.unchanged else "",
         f"{outcome.known[0]} known before" if outcome.known[0] else "",
-        f"{outcome.known[1]} of the baseline are gone: write it again" if outcome.known[1] else "",
+        f"{outcome.known[1]} in the baseline no longer occur: write it again" if outcome.known[1] else "",
     ]
     aside = ", ".join(filter(None, asides))
     say(summary(outcome.findings, len(outcome.files)) + (f" ({aside})" if aside else ""))
@@ -132,30 +129,30 @@ def _print_statistics(outcome: Outcome) -> None:
 
 
 def say_fixed(file: str, fixed: Sequence[Finding]) -> None:
-    """One line for each code that was mended in a file."""
+    """Print one line for each code that was fixed in a file."""
     for code in sorted({finding.code for finding in fixed}):
         these = [finding for finding in fixed if finding.code == code]
         turns = max(finding.fix.turns for finding in these if finding.fix)
         lines = sorted({finding.line for finding in these})
         more = f" and {len(lines) - 4} more" if len(lines) > 4 else ""
         where = f"line{'s' if len(lines) > 1 else ''} {', '.join(map(str, lines[:4]))}{more}"
-        moved = f"; joints turned by up to {turns:.1e} rad each" if turns else "; the robot is the same"
+        moved = f"; joints rotated by up to {turns:.1e} rad each" if turns else "; the robot is the same"
         say(f"{file}: fixed {code} {RULES[code].slug}, {where}{moved}", err=True)
 
 
 def difference(file: str, before: bytes, after: bytes) -> str:
-    """What would be changed, as a patch."""
+    """Return the change as a patch."""
     return patch(file, before, after, harmless)
 
 
 _SETTINGS = "urdfkin.settings"
-#: Settings that are called as options.
+#: Settings with the same name as an option.
 _OPTIONS = ("select", "ignore", "exclude", "strict", "notes")
 _FILE = click.Path(path_type=Path, dir_okay=False)
 
 
 def _take_settings(context: click.Context, _: click.Parameter, file: Path | None) -> None:
-    """The repository's settings, or those of a file: what the command line does not say, they do."""
+    """Read the settings of the repository or of `file`; they are the defaults of the options."""
     isolated = "--isolated" in context.meta
     settings = Settings() if isolated else find_settings(Path()) if file is None else read_settings(file)
     values = dict(settings.values)
@@ -177,37 +174,57 @@ choice_options = together(
         multiple=True,
         metavar="CODE",
         shell_complete=complete_code,
-        help="Only these: codes, names or families, URDF5.",
+        help="Report only this code, name or family (URDF5); repeatable.",
     ),
     click.option(
         "--ignore",
         multiple=True,
         metavar="CODE",
         shell_complete=complete_code,
-        help="Leave out a code; may be repeated, or a,b,c.",
+        help="Leave out a code; repeatable, or a,b,c.",
     ),
     click.option("--strict/--no-strict", default=False, help="Turn warnings into errors."),
-    click.option("--notes/--no-notes", default=True, help="Whether notes are told.  [default: they are]"),
-    click.option("--exclude", multiple=True, metavar="GLOB", help="Leave out files and folders of a folder."),
-    click.option("--baseline", type=_FILE, help="Leave out the findings that this file knows."),
-    click.option("--write-baseline", type=_FILE, help="Make all that is found known to this file; exit 0."),
+    click.option("--notes/--no-notes", default=True, help="Show notes.  [default: notes]"),
+    click.option("--exclude", multiple=True, metavar="GLOB", help="Leave out matching files and folders."),
+    click.option("--baseline", type=_FILE, help="Leave out the findings listed in this file."),
     click.option(
-        "--changed-since", metavar="VERSION", help="Only what is new since a branch, tag or commit."
+        "--write-baseline", type=_FILE, help="Write all findings to this file, as a baseline; exit 0."
+    ),
+    click.option(
+        "--changed-since",
+        metavar="VERSION",
+        help="Report only findings that are new since a branch, tag or commit.",
     ),
 )
 settings_options = together(
     click.option(
         "--isolated", is_flag=True, is_eager=True, expose_value=False, callback=_isolate,
-        help="Take no settings from pyproject.toml.",
+        help="Ignore the settings in pyproject.toml.",
     ),
     click.option(
         "--config", type=_FILE, is_eager=True, expose_value=False, callback=_take_settings,
-        help="Take [tool.urdfkin] of this file.  [default: of the nearest pyproject.toml]",
+        help="File with the settings, in [tool.urdfkin].  [default: nearest pyproject.toml]",
     ),
 )  # fmt: skip
+#: Field of `Limits` -> help of its option.
+_MOST = {
+    "bytes": "Largest size of a file in bytes.",
+    "depth": "Largest nesting depth of elements.",
+    "elements": "Largest number of elements.",
+    "attributes": "Largest number of attributes of an element.",
+    "name": "Most characters of a name.",
+    "number": "Most characters of a number.",
+    "markup": "Most bytes of a tag, comment or instruction.",
+}
 limit_options = together(
     *(
-        click.option(f"--max-{limit.name}", type=Whole(1), default=limit.default, show_default=True)
+        click.option(
+            f"--max-{limit.name}",
+            type=Whole(1),
+            default=limit.default,
+            show_default=True,
+            help=_MOST[limit.name],
+        )
         for limit in fields(Limits)
     )
 )
@@ -217,31 +234,35 @@ limit_options = together(
 @click.argument("files", nargs=-1, metavar="[FILE|FOLDER|GLOB]...", shell_complete=complete_file)
 @click.option(
     "--format", "--output-format", "style", type=click.Choice(STYLES), default="terminal", show_default=True,
-    help="How to print the findings.",
+    help="Output format.",
 )  # fmt: skip
 @click.option("--output", "-o", type=_FILE, help="Write the findings, or the patch of --diff, to a file.")
-@click.option("--fix", is_flag=True, help="Cure what needs no judgement, in the files.")
+@click.option("--fix", is_flag=True, help="Apply the automatic fixes to the files.")
 @click.option(
-    "--unsafe-fixes", is_flag=True, help="Apply also fixes that turn a joint by more than rounding."
+    "--unsafe-fixes", is_flag=True, help="Also apply fixes that rotate a joint by more than rounding."
 )
-@click.option("--diff", is_flag=True, help="Print what --fix would change, and change nothing.")
-@click.option("--statistics", is_flag=True, help="Print how many there are of each code.")
+@click.option("--diff", is_flag=True, help="Print the changes of --fix as a patch, without applying them.")
+@click.option("--statistics", is_flag=True, help="Print the number of findings of each code.")
 @choice_options
-@click.option("--each", is_flag=True, help="Print each place instead of folding many of a kind into one.")
-@mimic_option("Whether mimic joints follow.  [default: they do]")
-@root_joint_option("Check the names this joint needs, too.")
+@click.option(
+    "--each", is_flag=True, help="Print every finding; by default, many of the same kind are one line."
+)
+@mimic_option("Apply the mimic rules.  [default: mimic]")
+@root_joint_option("Also check the names that this root joint needs.")
 @xacro_option
 @settings_options
 @limit_options
 @click.pass_context
 def command(context: click.Context, /, files: Sequence[str], **options: Any) -> None:
-    """Check URDFs and print what is wrong with them: code, place, what was found, what to do.
+    """Check URDF files and print the findings, each with its code, line, cause and remedy.
 
-    A FILE is a path, a name of the catalogue, or - for standard input; a FOLDER stands for all *.urdf in it;
-    with neither, the current folder is checked. A .xacro file is expanded by a process that can compute and
-    read its package's files, no more (docs/xacro.md). --changed-since origin/main tells what a pull request
-    brings; settings stand in [tool.urdfkin] of pyproject.toml (docs/check.md). Exit 0 when there is no error,
-    1 when there is, or something to --diff, 2 when a file cannot be read or an option is wrong.
+    A FILE is a path, a name from `urdfkin robots`, or - for standard input. A FOLDER means all *.urdf files
+    in it. Without FILE and FOLDER, the current folder is checked. A .xacro file is expanded in a restricted
+    process that can only compute and read the files of its package (docs/xacro.md). --changed-since
+    origin/main reports the new findings of a pull request. Settings are in [tool.urdfkin] of pyproject.toml
+    (docs/check.md).
+
+    Exit 0: no error. 1: an error, or changes with --diff. 2: an unreadable file or a wrong option.
 
     \b
     Example:
@@ -250,7 +271,7 @@ def command(context: click.Context, /, files: Sequence[str], **options: Any) -> 
       urdfkin check --statistics
       urdfkin check --select URDF503 --fix arm.urdf
       urdfkin explain URDF502
-    """  # noqa: D301 - click's mark for a paragraph to leave alone is a backspace
+    """  # noqa: D301 - a backspace tells click not to wrap the paragraph
     if options["fix"] and options["diff"]:
         reject_unused_options(context, ("fix",), "with --diff")
     if not (options["fix"] or options["diff"]):
@@ -290,10 +311,10 @@ def _put_outcome(outcome: Outcome, style: str, path: Path | None, *, statistics:
     if path is None:
         print_outcome(outcome, style, statistics=statistics)
         return
-    kept = io.StringIO()
-    with contextlib.redirect_stdout(kept):
+    text = io.StringIO()
+    with contextlib.redirect_stdout(text):
         print_outcome(outcome, style, statistics=statistics)
-    write_file(path, kept.getvalue().encode())
+    write_file(path, text.getvalue().encode())
 
 
 def _run(settings: Settings, options: dict[str, Any]) -> Run:
@@ -336,7 +357,20 @@ def _chosen(options: dict[str, Any]) -> frozenset[str]:
 
 @dataclass(slots=True)
 class Run:
-    """One check of many files."""
+    """One check of many files.
+
+    Attributes:
+        look: Examines one file.
+        choice: Selects the findings to report.
+        strict: Whether warnings become errors.
+        fold: Whether many findings of one kind become one.
+        fix: Whether to apply fixes.
+        diff: Whether to collect fixes as patches.
+        unsafe: Whether to include the fixes of --unsafe-fixes.
+        version: The version of --changed-since, or None.
+        accepting: Whether a baseline is written.
+        outcome: The results so far.
+    """
 
     look: partial[Examined]
     choice: Choice
@@ -351,7 +385,7 @@ class Run:
     _taken: set[str] = field(default_factory=set)
 
     def take(self, word: str, exclude: Sequence[str]) -> None:
-        """All files that a word means, each once."""
+        """Check the files that an argument matches, each once."""
         settings = self.choice.settings
         try:
             files = collected(word, settings, settings.values.get("include", INCLUDE), exclude)
@@ -362,7 +396,7 @@ class Run:
             if file not in self._taken:
                 self._taken.add(file)
                 try:
-                    if file not in (word, f"./{word}"):  # found in a folder, not named
+                    if file not in (word, f"./{word}"):  # found in a folder, not named by the user
                         demand_regular(Path(file))
                     self._check(file)
                 except (SourceError, UnknownNameError, XacroError) as error:
@@ -377,12 +411,12 @@ class Run:
                 self.outcome.unchanged += 1
                 return
         if self.fix or self.diff:
-            text = self._mended(file, text, lambda: self.choice.again(text, before))
+            text = self._fix(file, text, lambda: self.choice.again(text, before))
         found = self.look(text, fold=self.fold, wanted=self.choice.of(text, before))
-        judged = [self._judged(finding) for finding in found.findings]
-        self.outcome.add(file, replace(found, findings=tuple(judged)))
+        findings = [self._with_severity(finding) for finding in found.findings]
+        self.outcome.add(file, replace(found, findings=tuple(findings)))
 
-    def _mended(self, file: str, text: Text, choose: Any) -> Text:
+    def _fix(self, file: str, text: Text, choose: Any) -> Text:
         path = None if text.entry is not None or is_xacro(text.source) else file_of(text)
         if path is None:
             return text
@@ -404,19 +438,19 @@ class Run:
         return mended.text
 
     def _safe(self, chosen: Callable[[Finding], bool]) -> Callable[[Finding], bool]:
-        """Those of the chosen findings whose fix may be applied."""
+        """Restrict a choice to the findings with an allowed fix."""
         return lambda finding: chosen(finding) and (self.unsafe or finding.fix is None or finding.fix.is_safe)
 
-    def _judged(self, finding: Finding) -> Finding:
-        # A baseline knows findings by what they are, whatever is made of them.
+    def _with_severity(self, finding: Finding) -> Finding:
+        # A baseline stores the original severity: --strict must not change it.
         raised = self.strict and not self.accepting and finding.severity is Severity.WARNING
         return replace(finding, severity=Severity.ERROR) if raised else finding
 
     def exit_code(self) -> int:
-        """2 where a file could not be read, 1 for an error or something to mend, 0 otherwise."""
+        """Return 2 if a file could not be read, 1 for an error or a change of --diff, 0 otherwise."""
         failed = any(finding.severity is Severity.ERROR for finding in self.outcome.findings)
-        asked = self.outcome.to_fix > 0 if self.diff else failed and not self.accepting
-        return 2 if self.outcome.unreadable else int(asked)
+        bad = self.outcome.to_fix > 0 if self.diff else failed and not self.accepting
+        return 2 if self.outcome.unreadable else int(bad)
 
 
 def _write_baseline(run: Run, path: Path) -> None:
@@ -425,4 +459,4 @@ def _write_baseline(run: Run, path: Path) -> None:
         return
     write_file(path, baseline_text(outcome.findings, outcome.files, path).encode())
     many = sum(finding.count for finding in outcome.findings)
-    say(f"wrote {path}: {many} finding{'s' * (many != 1)} known", err=True)
+    say(f"wrote {path}: {many} finding{'s' * (many != 1)} in the baseline", err=True)

@@ -1,4 +1,4 @@
-"""`urdfkin completion`: what makes a shell complete commands, options, robots, frames, tables and codes."""
+"""`urdfkin completion`: shell completion of commands, options, robots, frames, tables and codes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from click.shell_completion import get_completion_class
 from urdfkin.cli.streams import say_file
 
 SHELLS = ("bash", "zsh", "fish")
-#: What a shell's script asks by; click looks for it under this name.
+#: Environment variable with which a shell's script asks click for completions.
 VARIABLE = "_URDFKIN_COMPLETE"
 
 
@@ -18,11 +18,11 @@ VARIABLE = "_URDFKIN_COMPLETE"
 @click.argument("shell", type=click.Choice(SHELLS))
 @click.pass_context
 def command(context: click.Context, shell: Literal["bash", "zsh", "fish"]) -> None:
-    """Print the script that makes a shell complete what is typed after urdfkin.
+    """Print the completion script for a shell.
 
-    Commands, options and their choices, robots and files, frames of the robot that was typed, shipped tables,
-    codes and equations. Frames are read from a URDF's text; a .xacro file is not expanded for it. Put the
-    line for your shell where it is read at the start:
+    The script completes commands, options and their choices, robots and files, the frames of the given robot,
+    shipped tables, codes and equations. Frames are read from a URDF file; a .xacro file is not expanded. Add
+    the line for your shell to its startup file:
 
     \b
     bash  ~/.bashrc   eval "$(urdfkin completion bash)"
@@ -32,6 +32,6 @@ def command(context: click.Context, shell: Literal["bash", "zsh", "fish"]) -> No
     \b
     Example:
       urdfkin completion bash
-    """  # noqa: D301 - click's mark for a paragraph to leave alone is a backspace
+    """  # noqa: D301 - a backspace tells click not to wrap the paragraph
     script = get_completion_class(shell)
     say_file(script(context.find_root().command, {}, "urdfkin", VARIABLE).source())

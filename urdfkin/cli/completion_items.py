@@ -1,8 +1,8 @@
-"""What a shell offers where a robot, a frame, a table or a code is to be typed; click's completion asks.
+"""Shell completion of robots, files, frames, tables, codes and equations.
 
-It runs at each press of the key, so nothing heavy is imported, and of a file only the names are read. A name
-that a shell would take for more than a name is not offered: a robot's file may come from a stranger, and what
-is put on a command line is carried out.
+Completion runs at each press of the Tab key, so it imports nothing heavy and reads only the names in a file.
+Names with characters that a shell interprets are not offered. A robot's file may come from a stranger, and
+the shell runs the completed command line.
 """
 
 from __future__ import annotations
@@ -21,49 +21,49 @@ from urdfkin.urdf.catalogue import catalogue
 if TYPE_CHECKING:
     Items = list[CompletionItem[str]]
 
-#: No quotes, no blanks, nothing that is expanded; no colon, at which bash would begin a new word.
+#: Names without quotes, blanks and characters that a shell expands; no colon, which separates words in bash.
 _HARMLESS = re.compile(r"(?=\w)[\w./+-]+")
-#: Bytes of a file that are read for its names.
+#: Largest file that is read for its names, in bytes.
 _MOST = 10_000_000
-#: What names a frame: of a URDF the children of its root, of an MJCF file anything.
+#: Elements that name a frame: children of the root in a URDF, at any depth in an MJCF file.
 _URDF, _MJCF = ("link", "joint"), ("body", "site", "joint")
 
 
 def complete_robot(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
-    """Files, and the catalogue's names."""
+    """Return files and the names of the catalogue."""
     return [CompletionItem(incomplete, type="file"), *_offered(catalogue(), incomplete)]
 
 
 def complete_file(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
-    """Files."""
+    """Return files."""
     return [CompletionItem(incomplete, type="file")]
 
 
 def complete_frame(context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
-    """Links and joints of the robot that stands on the line already."""
-    # Where an option still waits for its value, click has not told arguments apart yet.
+    """Return the links and joints of the robot on the command line."""
+    # While an option has no value yet, click has not assigned the arguments.
     robot = context.params.get("robot") or next(iter(context.args), "")
     return _offered(_frames(robot), incomplete)
 
 
 def complete_table(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
-    """Files, and the tables that are shipped."""
-    from urdfkin.system.resources import robots_dir  # noqa: PLC0415  only for those who ask
+    """Return files and the shipped tables."""
+    from urdfkin.system.resources import robots_dir  # noqa: PLC0415  only for completion
 
     shipped = sorted(path.stem for path in (robots_dir() / "dh").glob("*.toml"))
     return [CompletionItem(incomplete, type="file"), *_offered(shipped, incomplete)]
 
 
 def complete_code(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
-    """Codes of findings, and their short names."""
-    from urdfkin.lint.pages import RULES  # noqa: PLC0415  only for those who ask
+    """Return the codes of findings and their short names."""
+    from urdfkin.lint.pages import RULES  # noqa: PLC0415  only for completion
 
     return _offered((name for rule in RULES.values() for name in (rule.id, rule.slug)), incomplete)
 
 
 def complete_topic(context: click.Context, parameter: click.Parameter, incomplete: str) -> Items:
-    """What `explain` takes: codes, and equations."""
-    from urdfkin.kinematics.registry import equations  # noqa: PLC0415  only for those who ask
+    """Return the topics of `explain`: codes and equations."""
+    from urdfkin.kinematics.registry import equations  # noqa: PLC0415  only for completion
 
     return [*complete_code(context, parameter, incomplete), *_offered(equations(), incomplete)]
 
@@ -77,7 +77,7 @@ def _offered(names: Iterable[str], incomplete: str) -> Items:
 
 
 def _frames(word: str) -> Iterator[str]:
-    """A robot's names, as far as its file says them without being expanded or computed."""
+    """Yield the frame names in a robot's file, without expanding or computing anything."""
     from urdfkin.lint.reporter import Reporter  # noqa: PLC0415
     from urdfkin.lint.rules.document import read_document  # noqa: PLC0415
     from urdfkin.urdf.sources import is_xacro, read_source  # noqa: PLC0415

@@ -1,8 +1,7 @@
-"""Signals that ask a command to end do so as an interrupt does: what had finished is kept and written.
+"""Exit codes of the commands, error messages, and a clean stop on SIGTERM and SIGHUP.
 
-How the command ends: what everybody may raise, in words and exit codes; a crash is one of its own.
-
-Exit 1 is a disagreement and nothing else; Python's own exit code of an uncaught exception is 1 as well.
+SIGTERM and SIGHUP stop a command like an interrupt: finished results are saved. Exit code 1 always means a
+disagreement. Python also exits with 1 after an uncaught exception, so a crash has a code of its own here.
 """
 
 from __future__ import annotations
@@ -20,30 +19,30 @@ from urdfkin.cli import streams
 from urdfkin.cli.streams import say
 from urdfkin.errors import UrdfkinError
 
-#: From a scheduler, `kill` or a shutdown; and from a terminal that is closed.
+#: Sent by a scheduler, `kill` or a shutdown (SIGTERM), and by a terminal that closes (SIGHUP).
 _SIGNALS = (signal.SIGTERM, signal.SIGHUP)
 
 
 @dataclass(slots=True)
 class Stop:
-    """Which signal asked to end; None: none did.
+    """The signal that stopped the command.
 
     Attributes:
-        signal: Its number.
+        signal: Its number, or None.
     """
 
     signal: int | None = None
 
     def exit_code(self, otherwise: int) -> int:
-        """128 and the signal's number, as shells have it; a disagreement that was found stays one."""
+        """Return 128 + the signal's number, as shells do; a disagreement keeps exit code 1."""
         return otherwise if self.signal is None or otherwise == 1 else 128 + self.signal
 
 
 @contextmanager
 def stoppable() -> Iterator[Stop]:
-    """While open, the first SIGTERM or SIGHUP raises KeyboardInterrupt; from then on there is time to write.
+    """Raise KeyboardInterrupt at the first SIGTERM or SIGHUP; ignore later ones so that results are saved.
 
-    A signal that the parent had ignored (`nohup`) stays ignored.
+    A signal that the parent process ignores (`nohup`) stays ignored.
     """
     stop = Stop()
 
@@ -66,18 +65,18 @@ def stoppable() -> Iterator[Stop]:
 
 #: EX_SOFTWARE of sysexits.h.
 CRASH = 70
-#: 128 and SIGINT's number, as shells have it.
+#: 128 + the number of SIGINT, as in shells.
 _INTERRUPTED = 130
 
 
 def run(command: click.Command, name: str) -> int:
-    """Run a command; its exit code.
+    """Run a command and return its exit code.
 
-    0: done, and verified where it could be. 1: a disagreement. 2: bad input or usage. 3: computed, but
-    Pinocchio did not check it. 70: a defect of urdfkin. 130: interrupted.
+    0: done, and verified where possible. 1: a disagreement. 2: bad input or usage. 3: computed, but not
+    checked by Pinocchio. 70: a defect of urdfkin. 130: interrupted.
     """
     try:
-        # click's own way out gives 1 to an interrupt.
+        # In standalone mode, click would exit with 1 after an interrupt.
         try:
             code = command.main(prog_name=name, standalone_mode=False)
         finally:
@@ -95,13 +94,13 @@ def run(command: click.Command, name: str) -> int:
 
 
 def refuse(error: UrdfkinError) -> int:
-    """Say an error that was raised on purpose; its exit code."""
+    """Print an error of urdfkin and return its exit code."""
     click.echo(f"urdfkin: error: {error}", err=True)
     return 1 if error.is_disagreement else 2
 
 
 def _refuse_usage(error: click.ClickException) -> int:
-    """Say what click refused, as everything else is said."""
+    """Print a usage error of click in our format and return its exit code."""
     context = getattr(error, "ctx", None)
     page = f"; see: {context.command_path} --help" if context is not None else ""
     say(f"urdfkin: error: {error.format_message().rstrip('.')}{page}", err=True)
@@ -109,16 +108,16 @@ def _refuse_usage(error: click.ClickException) -> int:
 
 
 def crash(error: Exception) -> int:
-    """Say an error that nobody foresaw, and what to do about it; its exit code."""
+    """Print an unexpected error with its traceback and return its exit code."""
     if isinstance(error, ModuleNotFoundError) and not str(error.name).startswith("urdfkin"):
-        # Installed with --no-deps, as pre-commit does.
-        missing = f"{error.name} is not installed; pip install urdfkin with all it needs"
+        # urdfkin was installed with --no-deps, for example by pre-commit.
+        missing = f"{error.name} is not installed; install urdfkin with its dependencies: pip install urdfkin"
         click.echo(f"urdfkin: error: {missing}", err=True)
         return 2
     click.echo("".join(traceback.format_exception(error)), err=True, nl=False)
     click.echo(
-        f"urdfkin: this is a defect of urdfkin, not of what it was given: {type(error).__name__}."
-        f" Please report it, with the lines above and the command, in urdfkin's repository (exit {CRASH}).",
+        f"urdfkin: this is a defect of urdfkin, not of your input: {type(error).__name__}."
+        f" Please report it in urdfkin's repository, with the lines above and the command (exit {CRASH}).",
         err=True,
     )
     return CRASH

@@ -1,6 +1,6 @@
-"""The sections of docs/questions.md, as `urdfkin explain` prints them.
+"""`urdfkin explain`: print the page of a finding's code, an equation, or a common question.
 
-`urdfkin explain`: the page of a finding's code, of an equation, or of a question.
+The answers to questions are the sections of docs/questions.md.
 """
 
 from __future__ import annotations
@@ -24,52 +24,53 @@ _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def answers() -> dict[str, str]:
-    """Each question's section, by the anchor of its heading, without the targets of links."""
+    """Return each question's section, without link targets, by the anchor of its heading."""
     return {anchor(text.partition("\n")[0]): _LINK.sub(r"\1", text).rstrip() for text in _sections()[1:]}
 
 
 def answer_to(topic: str) -> str | None:
-    """The section of an anchor, or of words that one anchor alone has."""
+    """Return the section of an anchor, or the only section with these words in its anchor; None otherwise."""
     known, words = answers(), set(topic.lower().replace("-", " ").split())
     found = [name for name in known if words and words <= set(name.split("-"))]
     return known.get("-".join(topic.lower().split())) or (known[found[0]] if len(found) == 1 else None)
 
 
 def as_text(answer: str) -> str:
-    """A section for a terminal: filled paragraphs, code set in, and last what the code takes for granted."""
-    words = _BLOCK.split(answer)
-    prose, kinds, codes = words[::3], words[1::3], words[2::3]
+    """Format a section for a terminal: wrapped paragraphs, indented code, and last the setup of the code."""
+    pieces = _BLOCK.split(answer)
+    prose, kinds, codes = pieces[::3], pieces[1::3], pieces[2::3]
     parts = []
     for text, code in zip(prose, [*codes, ""], strict=True):
         parts += [textwrap.fill(one, WIDTH, break_on_hyphens=False) for one in text.strip("\n").split("\n\n")]
-        parts.append(_set_in(code))
+        parts.append(_indent(code))
     if "python" in kinds:
-        parts += ["It runs after:", _set_in("".join(code for _, code in _BLOCK.findall(_sections()[0])))]
+        parts += ["It runs after:", _indent("".join(code for _, code in _BLOCK.findall(_sections()[0])))]
     return "\n\n".join(filter(None, parts))
 
 
 def anchor(heading: str) -> str:
-    """What a heading is called in an address."""
+    """Return the anchor of a heading in a web address."""
     return re.sub(r"[^a-z0-9 -]", "", heading.lower()).replace(" ", "-")
 
 
 def _sections() -> list[str]:
-    """The page, cut at its headings; before the first stands what every example begins with."""
+    """Split the page at its headings; the first part is the setup of every example."""
     return re.split(r"^## ", read_text(questions_page()), flags=re.MULTILINE)
 
 
-def _set_in(code: str) -> str:
+def _indent(code: str) -> str:
     return textwrap.indent(code.rstrip(), "    ")
 
 
 @click.command("explain")
 @click.argument("topic", metavar="CODE|EQUATION|QUESTION", required=False, shell_complete=complete_topic)
 def command(topic: str | None) -> None:
-    """Explain a code: why it matters, a bad and a good example, and what other programs do with it.
+    """Explain a finding's code, an equation, or a common question.
 
-    CODE is a finding's code or its short name. EQUATION is a number of the chapter: what it says, which
-    function computes it, and what checks it. QUESTION is one that people ask, or a word of it. Without any,
-    all codes and questions are listed.
+    CODE is a finding's code or its short name. The page has the reason, a bad and a good example, and the
+    behaviour of other programs. EQUATION is a number in the textbook chapter. The page has the equation, the
+    function that computes it, and its check. QUESTION is a question's name, or a word of it. Without an
+    argument, all codes and questions are listed.
 
     \b
     Example:
@@ -77,15 +78,15 @@ def command(topic: str | None) -> None:
       urdfkin explain rounded-pi
       urdfkin explain 7.130
       urdfkin explain reference-frames
-    """  # noqa: D301 - click's mark for a paragraph to leave alone is a backspace
+    """  # noqa: D301 - a backspace tells click not to wrap the paragraph
     if topic is None:
         for rule in (*RULES.values(), *OF_MJCF.values()):
             click.echo(f"{rule.id}  {rule.severity.value:7}  {rule.slug:26}  {page(rule.id).title}")
         click.echo(f"questions: {', '.join(answers())}")
     elif (equation := explain_equation(topic)) is not None:
         click.echo(equation)
-    elif (asked := _rule(topic)) is not None:
-        click.echo(explain(asked))
+    elif (match := _rule(topic)) is not None:
+        click.echo(explain(match))
     elif (answer := answer_to(topic)) is not None:
         click.echo(as_text(answer))
     else:

@@ -1,4 +1,4 @@
-"""`urdfkin imu`: what an accelerometer and a gyroscope in a frame read."""
+"""`urdfkin imu`: readings of an accelerometer and a gyroscope on a frame."""
 
 from __future__ import annotations
 
@@ -28,20 +28,22 @@ _TRAJECTORY = f"{TRAJECTORY_HELP[:-1]}, base_placement, base_velocity, base_acce
         metavar="X,Y,Z",
         default="0,0,-9.81",
         show_default=True,
-        help="In the world's axes, m/s^2.",
+        help="Gravity in the world's axes, m/s^2.",
     ),
     click.option("--trajectory", type=click.Path(path_type=Path), help=_TRAJECTORY),
 )
 def command(
     context: click.Context, frame: str | None, gravity: str, trajectory: Path | None, **_: Any
 ) -> None:
-    """What an accelerometer and a gyroscope in a frame read, in the frame's own axes.
+    """Compute the readings of an accelerometer and a gyroscope on a frame, in the frame's own axes.
 
-    The proper acceleration, m/s^2: the second derivative of the frame's position less gravity, so that a
-    sensor at rest reads 9.81 upwards; and the angular velocity, rad/s. For one configuration --q with its
-    rates --v and their rates --a, for batches of them, or along a --trajectory. A base that moves is said by
-    --base-velocity and the like, stands in the .npz file, or is --root-joint floating, whose pose is then
-    among the coordinates. `urdfkin explain gravity-in-an-acceleration` says more.
+    The accelerometer reads the proper acceleration in m/s^2: the second derivative of the frame's position
+    minus gravity. A sensor at rest reads 9.81 upwards. The gyroscope reads the angular velocity in rad/s.
+
+    The input is a configuration --q with joint velocities --v and joint accelerations --a, a batch of them,
+    or a --trajectory. For a moving base, use --base-velocity and the other --base options, or arrays in the
+    .npz file. With --root-joint floating, the pose of the base is part of --q. For details, run `urdfkin
+    explain gravity-in-an-acceleration`.
     """
     from urdfkin.motion.columns import numbers  # noqa: PLC0415  keeps --help fast
 
@@ -49,8 +51,8 @@ def command(
     if trajectory is None:
         x = run.inputs()
     else:
-        moved = ("base_placement", "base_velocity", "base_acceleration")
-        reject_unused_options(context, ("q", "v", "a", *moved, "seed"), "along a --trajectory")
+        base = ("base_placement", "base_velocity", "base_acceleration")
+        reject_unused_options(context, ("q", "v", "a", *base, "seed"), "along a --trajectory")
         x = _along(run.robot, frame, trajectory)
     g = numbers(gravity.split(","), "--gravity", ("x", "y", "z"))
     with compiling():

@@ -1,4 +1,4 @@
-"""`urdfkin info`: what a robot is made of, as one table that is also its tree."""
+"""`urdfkin info`: a robot's links, joints, limits and coordinates, as a table that shows the tree."""
 
 from __future__ import annotations
 
@@ -23,11 +23,12 @@ EXAMPLE = "urdfkin info panda"
 @robot_argument
 @forms("table", "json")
 def command(robot: str, format_: str) -> None:
-    """A robot's tree: links, joints, axes, limits, places in q and v, and who follows whom.
+    """Show a robot's links, joints, axes, limits, indices in q and v, and mimic rules.
 
-    Joints stand in the order of q, v and of a Jacobian's columns, which is Pinocchio's; where the file has
-    another, a line says so. Limits are in rad and rad/s, of prismatic joints in m and m/s. A link that is not
-    indented hangs from the one above it; where several hang from one link, lines lead to them.
+    Joints are in the order of q, of v and of a Jacobian's columns, which is Pinocchio's order. A line reports
+    it if the file has another order. Limits are in rad and rad/s; those of prismatic joints are in m and m/s.
+    A link that is not indented is a child of the link above it. If a link has several children, lines lead
+    to them.
     """
     loaded = load_robot(robot)
     if format_ == "json":
@@ -40,7 +41,7 @@ def command(robot: str, format_: str) -> None:
 
 
 def _print(robot: Robot) -> None:
-    """What a robot says of itself, in tables that fit the terminal."""
+    """Print the robot's summary in tables that fit the terminal."""
     from urdfkin.cli.output import console  # noqa: PLC0415  json needs no tables
 
     out = console()

@@ -1,4 +1,4 @@
-"""`urdfkin manipulability`: singular values between guaranteed bounds, their condition and product."""
+"""`urdfkin manipulability`: singular values, condition number and manipulability, with guaranteed bounds."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from urdfkin.verify.singular_values import SingularValues
 
 _ENDINGS = {".json": ("json",), ".csv": ("csv",)}
-#: How many samples of a batch a table shows.
+#: Number of samples of a batch that a table shows.
 _SHOWN = 5
 
 
@@ -44,7 +44,7 @@ _SHOWN = 5
     type=click.Choice(["all", "linear", "angular"]),
     default="all",
     show_default=True,
-    help="Of the Jacobian; all mix metres and radians.",
+    help="Rows of the Jacobian; 'all' mixes metres and radians.",
 )
 @q_option
 @seed_option
@@ -63,12 +63,12 @@ def command(
     format_: str,
     output: Path | None,
 ) -> None:
-    """Singular values of a frame's Jacobian, their condition and product, and the product's gradient.
+    """Compute the singular values, condition number and manipulability of a frame's Jacobian.
 
-    Each value with two numbers that the true one is guaranteed to lie between: how far the Jacobian can be
-    off and what the decomposition rounds are in them. The product is Yoshikawa's manipulability
-    sqrt(det J J^T); its derivatives by the rates come from the Hessian, and are nan where the smallest
-    singular value cannot be told from 0.
+    Each value has a guaranteed lower and upper bound. The bounds include the error of the Jacobian and the
+    rounding of the decomposition. Manipulability is Yoshikawa's sqrt(det J J^T), the product of the singular
+    values. Its derivative for each joint velocity comes from the Hessian. The derivative is nan where the
+    smallest singular value is not distinguishable from 0.
     """
     format_ = format_from_suffix(context, output, _ENDINGS, "csv")
     loaded = load_robot(robot, verify=verify)
@@ -107,7 +107,7 @@ def _print(out: Console, x: Inputs, rows: str, found: SingularValues, gradient: 
         slopes = zip(x.robot.rate_names, gradient[k].tolist(), strict=True)
         print_named(out, ["joint", "manipulability changes by"], slopes)
     if len(gradient) > _SHOWN:
-        out.print(f"... and {len(gradient) - _SHOWN} more samples: --format csv or json has them all")
+        out.print(f"... and {len(gradient) - _SHOWN} more samples: --format csv or json writes all")
 
 
 def _as_json(x: Inputs, rows: str, found: SingularValues, gradient: FloatArray, check: str) -> str:
@@ -122,7 +122,7 @@ def _as_json(x: Inputs, rows: str, found: SingularValues, gradient: FloatArray, 
     }
     for name in ("values", "condition", "manipulability"):
         sides = getattr(found, name)._asdict()
-        # JSON has no word for infinity or for what is no number.
+        # JSON has no infinity and no nan.
         document["singular_values" if name == "values" else name] = {
             side: _finite(numbers.tolist()) for side, numbers in sides.items()
         }

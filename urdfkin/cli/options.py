@@ -1,11 +1,8 @@
-"""Numbers on the command line: decimal digits in ASCII, by the parser of every other number a user writes.
+"""Shared rules for options: number types, the output format, and options without effect.
 
-Click's own types take `1_000`, Arabic digits, `nan` and `inf`.
-
-
-Which form a file gets: its ending says so, or --format, and never the two against each other.
-
-An option that does nothing where it stands is an error: whoever gave it believes that it did something.
+- Numbers are decimal digits in ASCII. Click's own types also accept `1_000`, Arabic digits, `nan` and `inf`.
+- The suffix of a file or --format selects the output format. A contradiction between them is an error.
+- An option that has no effect in a command line is an error.
 """
 
 from __future__ import annotations
@@ -22,28 +19,28 @@ from urdfkin.system.files import shortened
 
 
 class Whole(click.IntRange):
-    """A whole number in a range."""
+    """The type of a whole number in a range."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """What was typed, as an int."""
+        """Return the text as an int."""
         if isinstance(value, str) and parse_int(value) is None:
             self.fail(f"{value!r} is not a whole number.", param, ctx)
         return super().convert(value, param, ctx)
 
 
 class Number(click.types.FloatParamType):
-    """A finite number."""
+    """The type of a finite number."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """What was typed, as a float."""
+        """Return the text as a float."""
         return super().convert(_finite(self, value, param, ctx), param, ctx)
 
 
 class NumberFrom(click.FloatRange):
-    """A finite number in a range."""
+    """The type of a finite number in a range."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """What was typed, as a float."""
+        """Return the text as a float."""
         return super().convert(_finite(self, value, param, ctx), param, ctx)
 
 
@@ -57,53 +54,53 @@ def _finite(kind: Any, value: Any, param: click.Parameter | None, ctx: click.Con
 def format_from_suffix(
     context: click.Context, output: Path | None, endings: Mapping[str, Sequence[str]], plain: str
 ) -> str:
-    """The form in which the running command writes.
+    """Return the output format of the running command.
 
     Args:
-        context: The command's, with a parameter `format_`.
+        context: Context of the command, which has a parameter `format_`.
         output: The file, or None for standard output.
-        endings: The forms that go with each ending, the usual one first.
-        plain: What a file without an ending gets.
+        endings: For each suffix, its formats; the first one is the default.
+        plain: Format of a file without a suffix.
 
     Raises:
-        InputError: --format contradicts the ending, or no form has it.
+        InputError: --format contradicts the suffix, or the suffix has no format.
     """
-    asked: str = context.params["format_"]
+    format_: str = context.params["format_"]
     if output is None:
-        return asked
+        return format_
     chosen = context.get_parameter_source("format_") is click.core.ParameterSource.COMMANDLINE
     ending = output.suffix.lower()
     if ending not in endings:
         if not chosen and ending:
             raise InputError(
-                "no form has that ending",
+                "no output format has this suffix",
                 where=shortened(output),
-                remedy=f"there are {', '.join(endings)}; or say --format",
+                remedy=f"use {', '.join(endings)}, or add --format",
             )
-        return asked if chosen else plain
+        return format_ if chosen else plain
     if not chosen:
         return endings[ending][0]
-    if asked not in endings[ending]:
+    if format_ not in endings[ending]:
         raise InputError(
-            f"--format {asked} contradicts the ending",
+            f"--format {format_} contradicts the file's suffix",
             where=str(output),
             remedy="leave out --format, or give the file another name",
         )
-    return asked
+    return format_
 
 
 def typed(context: click.Context, name: str) -> bool:
-    """Whether a parameter of the running command was given on the command line."""
+    """Return whether a parameter of the running command was given on the command line."""
     return context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
 
 
 def reject_unused_options(context: click.Context, idle: Collection[str], because: str) -> None:
-    """Refuse options of the running command that were typed and have no effect.
+    """Reject options that were given on the command line but have no effect.
 
     Args:
-        context: The command's.
-        idle: Names of its parameters, as its function calls them.
-        because: Where they have no effect, to follow "does nothing".
+        context: Context of the command.
+        idle: Names of the parameters without effect.
+        because: The condition under which they have no effect; it follows "does nothing" in the message.
 
     Raises:
         InputError: one of them was given on the command line.

@@ -1,4 +1,7 @@
-"""Results on the terminal or as json, csv and npy; files are written whole or not at all."""
+"""Print results as tables or write them as JSON, CSV and npy.
+
+A file is written completely or not at all.
+"""
 
 from __future__ import annotations
 
@@ -32,9 +35,9 @@ if TYPE_CHECKING:
 
 FORMATS = ("table", "json", "csv", "npy")
 ENDINGS = {".json": ("json",), ".csv": ("csv",), ".npy": ("npy",)}
-#: Columns beyond which a table gets no wider: padding takes memory.
+#: Largest width of a table in columns: padding takes memory.
 _WIDEST = 10_000
-#: How many samples of a batch a table shows.
+#: Number of samples of a batch that a table shows.
 _SHOWN = 5
 
 format_option = click.option(
@@ -43,23 +46,23 @@ format_option = click.option(
     type=click.Choice(FORMATS),
     default="table",
     show_default=True,
-    help="Output format; a file's ending says it, too.",
+    help="Output format; the suffix of --output also selects it.",
 )
 output_option = click.option(
     "--output",
     "-o",
     type=click.Path(path_type=Path),
     callback=lambda _context, _parameter, path: None if path == Path("-") else path,
-    help="Write to a file instead of standard output, in the form of its ending.",
+    help="Write to a file instead of standard output, in the format of its suffix.",
 )
 
 
 @contextmanager
 def compiling() -> Iterator[None]:
-    """Say what takes so long when a kernel is compiled, once on a machine, and how long it took."""
+    """Print a line when a kernel is compiled, which happens once on a machine, and the time it took."""
     from urdfkin.compiled.compiling import listen_to_compile_events  # noqa: PLC0415  keeps --help fast
 
-    hints = ["; kept from now on, 'urdfkin warm' compiles all kernels at once"]
+    hints = [", once; 'urdfkin warm' compiles all kernels"]
 
     def tell(name: str, seconds: float | None) -> None:
         if seconds is None:
@@ -73,7 +76,7 @@ def compiling() -> Iterator[None]:
 
 
 def console(*, err: bool = False) -> Console:
-    """A terminal as wide as it is, a pipe as wide as COLUMNS says or, if it does not, as a line takes."""
+    """Return the console: as wide as the terminal; for a pipe, as wide as COLUMNS or without wrapping."""
     from urdfkin.cli.terminal import Terminal  # noqa: PLC0415  keeps --help fast
 
     stream = sys.stderr if err else sys.stdout
@@ -81,7 +84,7 @@ def console(*, err: bool = False) -> Console:
 
 
 def _columns() -> int:
-    """How wide a pipe is, as COLUMNS says; a shell may leave it empty, and 0 stands for what nobody knows."""
+    """Return the width of a pipe from COLUMNS; if it is empty or 0, the largest width."""
     wanted = parse_int(os.environ.get("COLUMNS", "")) or 0
     return min(wanted, _WIDEST) if wanted > 0 else _WIDEST
 
@@ -94,7 +97,7 @@ def emit(
     format_: str,
     output: Path | None,
 ) -> None:
-    """Show or write (n, ...) results with their certificate."""
+    """Print or write (n, ...) results with their certificate."""
     certificate = inputs.robot.certificate()
     if format_ == "table" and output is None:
         _print_table(inputs, quantity, reference, result, certificate)
@@ -108,7 +111,7 @@ def emit(
 
 
 def hand_out(data: bytes, output: Path | None) -> None:
-    """Write to a file, or to standard output as it is."""
+    """Write bytes to a file or, unchanged, to standard output."""
     if output is not None:
         write_file(output, data)
     else:
@@ -117,7 +120,7 @@ def hand_out(data: bytes, output: Path | None) -> None:
 
 
 def npy(array: FloatArray) -> bytes:
-    """An array as NumPy's own file."""
+    """Return an array in NumPy's .npy format."""
     import numpy as np  # noqa: PLC0415  keeps --help fast
 
     stream = io.BytesIO()
@@ -126,7 +129,7 @@ def npy(array: FloatArray) -> bytes:
 
 
 def check_line(certificate: Certificate) -> str:
-    """One line: what was checked and how closely, or why not."""
+    """Return one line: number of checked results and worst disagreement, or the reason for no check."""
     by = certificate.oracle
     if certificate.not_verified:
         return f"NOT VERIFIED by {by}: {'; '.join(certificate.not_verified)}"
@@ -139,7 +142,11 @@ def check_line(certificate: Certificate) -> str:
 
 
 def end_of_path(said: str | None) -> tuple[str, int]:
-    """The last line of a command about a path, of what its check said or None, and its exit code."""
+    """Return the last line and the exit code of a command about a path.
+
+    Args:
+        said: The result of the check, or None if nothing was checked.
+    """
     from urdfkin.verify.pinocchio import version  # noqa: PLC0415  keeps --help fast
 
     by = f"Pinocchio {version()}"
@@ -147,7 +154,7 @@ def end_of_path(said: str | None) -> tuple[str, int]:
 
 
 def exit_code(certificate: Certificate) -> int:
-    """0 verified; 3 where results were handed out without a check."""
+    """Return 0 for verified results, 3 for results without a check."""
     return 0 if certificate.verified else 3
 
 
@@ -186,7 +193,7 @@ def _as_csv(
     rows: list[list[object]]
     if quantity.columns:
         rates = [csv_cell(name) for name in inputs.robot.rate_names]
-        # A Hessian's lines say which column of the Jacobian they are of, and its columns by which rate.
+        # A Hessian's line is for one column of the Jacobian; its columns are for the joint velocities.
         keys = [[row] for row in quantity.labels]
         for _ in range(2, quantity.axes):
             keys = [[*key, rate] for key in keys for rate in rates]
@@ -227,12 +234,12 @@ def _print_table(
         else:
             out.print(_table(inputs, quantity, value))
     if len(result) > _SHOWN:
-        out.print(f"... and {len(result) - _SHOWN} more samples: --format csv, json or npy has them all")
+        out.print(f"... and {len(result) - _SHOWN} more samples: --format csv, json or npy writes all")
     out.print(check_line(certificate), style="green" if certificate.verified else "bold yellow")
 
 
 def _print_columns(out: Console, quantity: Quantity, rates: Sequence[str], value: FloatArray) -> None:
-    """A line for each rate; of a Hessian, for each column of the Jacobian and each rate that changes it."""
+    """Print a line for each joint velocity; for a Hessian, one for each non-zero pair of them."""
     import numpy as np  # noqa: PLC0415
 
     if quantity.axes == len(("row", "rate")):

@@ -1,4 +1,4 @@
-"""`urdfkin placement`: the pose of a frame, in the world or in another, as a matrix or in few numbers."""
+"""`urdfkin placement`: the pose of a frame, as a matrix, as x, y, z, rpy or with a quaternion."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from urdfkin.model.tree import FloatArray
 
 _POSITION = ("x", "y", "z")
-#: How a pose is written, besides as a matrix.
+#: Forms of a pose besides the matrix.
 _FORMS = {
     "rpy": replace(
         PLACEMENT,
@@ -40,26 +40,28 @@ _FORMS = {
 @click.command("placement", epilog=f"Example: {PLACEMENT.example}")
 @computing_options(
     PLACEMENT.inputs,
-    frame_name("--relative-to", "Seen from this link or joint. Default: the world."),
+    frame_name("--relative-to", "Link or joint relative to which the pose is given. Default: the world."),
     click.option(
         "--as",
         "written",
         type=click.Choice(["matrix", *_FORMS]),
         default="matrix",
         show_default=True,
-        help="rpy: x, y, z, roll, pitch, yaw as in a URDF's origin; quaternion: x, y, z, qx, qy, qz, qw.",
+        help="Form of the pose. rpy: x, y, z, roll, pitch, yaw as in a URDF's <origin>."
+        " quaternion: x, y, z, qx, qy, qz, qw.",
     ),
 )
 def command(context: click.Context, relative_to: str | None, written: str, verify: bool, **_: Any) -> None:
-    """Pose of a frame (eq. 7.77): its axes and its origin in the world, or in another frame, in metres.
+    """Compute the pose of a frame (eq. 7.77) in the world or in another frame, in metres.
 
-    As a matrix T; with --as rpy or quaternion as few numbers, of which Pinocchio makes the same rotation.
+    The pose is a matrix T with the frame's axes and origin, or, with --as, six or seven numbers. Pinocchio
+    checks that these numbers give the same rotation.
 
-    ROBOT is a path (a table, .toml, .json or .csv, is made a robot), a name that `urdfkin robots` lists, or -
-    for standard input.
+    ROBOT is a path, a name from `urdfkin robots`, or - for standard input. The path can also be a table of a
+    robot: .toml, .json or .csv.
     """
     if relative_to is not None:
-        reject_unused_options(context, ("base_placement",), "with --relative-to, which moves with the base")
+        reject_unused_options(context, ("base_placement",), "with --relative-to")
     run = Computing(context)
     x = run.inputs()
     with compiling():
@@ -75,7 +77,7 @@ def command(context: click.Context, relative_to: str | None, written: str, verif
 
 
 def _numbers(x: Inputs, T: FloatArray, written: str, *, verify: bool) -> FloatArray:
-    """(n, 6 or 7) position and orientation, confirmed by Pinocchio where the poses were checked."""
+    """Return the (n, 6) or (n, 7) position and orientation; Pinocchio checks them if it checked the poses."""
     import numpy as np  # noqa: PLC0415  keeps --help fast
 
     from urdfkin.kinematics.rotation import quaternion_of, rpy_of  # noqa: PLC0415
@@ -90,7 +92,7 @@ def _numbers(x: Inputs, T: FloatArray, written: str, *, verify: bool) -> FloatAr
 
 
 def _again(x: Inputs, k: int, written: str) -> str:
-    """The command that computes sample `k` again."""
+    """Return the command that computes sample `k` again."""
     line = replay_line(x.robot.origin, "placement", x.frame, None, {"q": x.q[k].tolist()})
     given = click.get_current_context().params
     for name in ("relative_to", "base_placement"):

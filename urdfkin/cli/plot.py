@@ -1,4 +1,4 @@
-"""`urdfkin plot`: a frame's motion along a trajectory, as a picture."""
+"""`urdfkin plot`: plot a frame's motion along a trajectory."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from urdfkin.motion.trajectory import Trajectory
     from urdfkin.robot import Robot
 
-#: They repeat those of `urdfkin.view.plot`, whose import --help does not need.
+#: A copy of the names in `urdfkin.view.plot`: importing it would slow --help down.
 PANELS = (
     *("q", "v", "a", "position", "orientation", "velocity", "angular-velocity", "acceleration"),
     *("angular-acceleration", "parts", "singular-values", "angular-singular-values", "manipulability"),
@@ -40,24 +40,32 @@ EXAMPLE = "urdfkin plot ur5 --to 1,-1,1.2,0.3,0.5,0 --duration 2 --output ur5.sv
 @frame_option
 @reference_option
 @click.option("--trajectory", type=click.Path(path_type=Path), help=TRAJECTORY_HELP)
-@click.option("--from", "start", default="neutral", show_default=True, help="Where a line begins, as --q.")
-@click.option("--to", "end", help="Where a line ends, likewise.")
-@click.option("--duration", type=Number(), default=1.0, show_default=True, help="Of a line, seconds.")
-@click.option("--samples", type=Whole(3), default=201, show_default=True, help="Of a line.")
+@click.option(
+    "--from",
+    "start",
+    default="neutral",
+    show_default=True,
+    help="Start configuration of a line, in the forms of --q.",
+)
+@click.option("--to", "end", help="End configuration of a line, in the forms of --q.")
+@click.option(
+    "--duration", type=Number(), default=1.0, show_default=True, help="Duration of a line in seconds."
+)
+@click.option("--samples", type=Whole(3), default=201, show_default=True, help="Number of samples of a line.")
 @seed_option
 @click.option(
     "--panel",
     "panels",
     multiple=True,
     type=click.Choice(PANELS),
-    help="What to draw; repeatable. Default: everything.",
+    help="Panel to draw; repeatable. Default: all panels.",
 )
 @click.option(
     "--output",
     "-o",
     type=click.Path(path_type=Path),
     required=True,
-    help="The picture; its ending says what: svg, png, pdf.",
+    help="File of the picture: .svg, .png or .pdf.",
 )
 @click.pass_context
 def command(
@@ -74,14 +82,16 @@ def command(
     panels: tuple[str, ...],
     output: Path,
 ) -> None:
-    """Draw a frame's position, velocity, acceleration and its parts, singular values and the check over time.
+    """Plot a frame's motion along a trajectory.
 
-    So are q, v and a, with their limits; an axis has one unit. Along a CSV or .npz file, or along a line in
-    joint space from rest to rest, on which a floating base moves along a screw. Exit 0: verified. 1: a
-    disagreement. 3: Pinocchio could not check it.
+    The panels show q, v and a with their limits, the frame's position, velocity, acceleration and its parts,
+    the singular values and the check. Each axis has one unit. The trajectory is a CSV or .npz file, or a line
+    in joint space from rest to rest, with --to. A floating base moves along a screw.
+
+    Exit 0: verified. 1: a disagreement. 3: Pinocchio could not check it.
     """
     if (trajectory is None) == (end is None):
-        raise click.UsageError("say --trajectory FILE.csv, or --to VALUES for a line")
+        raise click.UsageError("add either --trajectory FILE.csv, or --to VALUES for a line")
     from urdfkin.motion.frame_motion import frame_motion  # noqa: PLC0415
     from urdfkin.motion.trajectory import read_trajectory  # noqa: PLC0415
     from urdfkin.view.figure import save  # noqa: PLC0415  keeps --help fast
@@ -109,5 +119,7 @@ def _line(robot: Robot, start: str, end: str, duration: float, samples: int, see
     given = (("--from", start), ("--to", end))
     ends = [read_inputs(robot, None, seed, text, option=option).q for option, text in given]
     if any(len(q) != 1 for q in ends):
-        raise InputError("a line has one beginning and one end", found=f"{len(ends[0])} and {len(ends[1])}")
+        raise InputError(
+            "--from and --to need one configuration each", found=f"{len(ends[0])} and {len(ends[1])}"
+        )
     return line(robot, ends[0][0], ends[1][0], duration, samples)

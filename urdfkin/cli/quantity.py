@@ -1,6 +1,6 @@
-"""What commands that compute a quantity of a frame share: their options, and what they begin and end with.
+"""Commands that compute a quantity of a frame, such as `urdfkin jacobian`.
 
-Commands that compute a quantity of a frame, such as `urdfkin jacobian`: one for each row of the table.
+Each row of the table of quantities gives one command. All share their options, their input and their output.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _VALUES = {"q": q_option, "v": v_option, "a": a_option}
 
 
 def computing_options(inputs: str, *own: Any, last: tuple[Any, ...] = ()) -> Callable[[_F], _F]:
-    """Robot and frame, the command's own, what is computed with, who checks it, its last ones, the form."""
+    """Combine the options: robot and frame, `own`, values, base, seed, checks, `last`, format and output."""
     return together(
         *(robot_argument, frame_option, *own, *(_VALUES[letter] for letter in inputs), base_options(inputs)),
         *(seed_option, verify_option, oracle_option, *last, format_option, output_option, click.pass_context),
@@ -49,52 +49,58 @@ def computing_options(inputs: str, *own: Any, last: tuple[Any, ...] = ()) -> Cal
 
 
 class Computing:
-    """A running command that computes something of a frame: its robot, and how it answers."""
+    """A running command that computes a quantity of a frame.
+
+    Attributes:
+        robot: The robot of the command.
+        format_: The output format.
+        output: The output file, or None.
+    """
 
     def __init__(self, context: click.Context) -> None:
-        self._context, self._asked = context, context.params
-        self.output = self._asked["output"]
+        self._context, self._options = context, context.params
+        self.output = self._options["output"]
         self.format_ = format_from_suffix(context, self.output, ENDINGS, "csv")
         check_writable(self.output)
-        asked = self._asked
-        self.robot = load_robot(asked["robot"], verify=asked["verify"], oracle=asked["oracle"])
+        options = self._options
+        self.robot = load_robot(options["robot"], verify=options["verify"], oracle=options["oracle"])
 
     def inputs(self) -> Inputs:
-        """What to compute with."""
-        asked, base = self._asked, ("base_placement", "base_velocity", "base_acceleration")
-        values = {letter: asked[letter] for letter in "qva" if letter in asked}
+        """Read the values of q, v, a and the base."""
+        options, base = self._options, ("base_placement", "base_velocity", "base_acceleration")
+        values = {letter: options[letter] for letter in "qva" if letter in options}
         return with_base(
-            read_inputs(self.robot, asked["frame"], asked["seed"], **values), *map(asked.get, base)
+            read_inputs(self.robot, options["frame"], options["seed"], **values), *map(options.get, base)
         )
 
     def answer(
         self, x: Inputs, quantity: Quantity, result: FloatArray, reference: str | None = None
     ) -> NoReturn:
-        """Show or write the result, and end."""
+        """Print or write the result, and exit."""
         emit(x, quantity, reference, result, self.format_, self.output)
         self.end()
 
     def end(self) -> NoReturn:
-        """Exit as the checks say."""
+        """Exit with the code of the checks."""
         self._context.exit(exit_code(self.robot.certificate()))
 
 
 _ROBOT = (
-    "ROBOT is a path (a table, .toml, .json or .csv, is made a robot), a name that `urdfkin robots` lists, or"
-    " - for standard input."
+    "ROBOT is a path, a name from `urdfkin robots`, or - for standard input. The path can also be a table"
+    " of a robot: .toml, .json or .csv."
 )
 _explain = click.option(
-    "--explain", is_flag=True, help="Break it down by joint and kind; the parts sum to it."
+    "--explain", is_flag=True, help="Split the acceleration by joint and term; the parts add up to it."
 )
 
 
 def command_of(quantity: Quantity) -> click.Command:
-    """The command that computes a quantity."""
-    explained = ACCELERATION_BREAKDOWN.command == f"{quantity.command} --explain"
+    """Make the command that computes a quantity."""
+    has_breakdown = ACCELERATION_BREAKDOWN.command == f"{quantity.command} --explain"
 
     own = [reference_option] if quantity.referred else []
 
-    @computing_options(quantity.inputs, *own, last=(_explain,) if explained else ())
+    @computing_options(quantity.inputs, *own, last=(_explain,) if has_breakdown else ())
     def compute(
         context: click.Context, /, reference: str = "local_world_aligned", explain: bool = False, **_: Any
     ) -> None:

@@ -1,4 +1,4 @@
-"""`urdfkin robots`: the catalogue."""
+"""`urdfkin robots`: list the robots that have a short name."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ _FAMILIES = sorted({entry.family for entry in catalogue().values()})
 
 
 @click.command(epilog=f"Example: {EXAMPLE}")
-@click.option("--family", metavar="NAME", help=f"Only one of: {', '.join(_FAMILIES)}.")
+@click.option("--family", metavar="NAME", help=f"Show only one family: {', '.join(_FAMILIES)}.")
 @forms("table", "json")
 def command(family: str | None, format_: str) -> None:
-    """Robots that can be called by a short name.
+    """List the robots that have a short name.
 
-    The URDF files of example-robot-data and urdfkin's own. A limb's base and tip are the defaults of
-    commands that take frames; the first limb's tip is the default --frame.
+    They are the URDF files of example-robot-data and urdfkin's own. The base and tip of a robot's first limb
+    are the defaults of --base, --tip and --frame.
     """
     entries = [entry for entry in catalogue().values() if family in (None, entry.family)]
     if not entries:
-        raise click.UsageError(f"no robot of family {family!r}; there are: {', '.join(_FAMILIES)}")
+        raise click.UsageError(f"no robots of family {family!r}; the families are: {', '.join(_FAMILIES)}")
     if format_ == "json":
         json.dump([_as_dict(entry) for entry in entries], sys.stdout, indent=2)
         click.echo()
@@ -39,7 +39,7 @@ def command(family: str | None, format_: str) -> None:
     out.print(f"{len(entries)} robots")
     for entry in entries:
         if entry.reason:
-            out.print(f"{entry.name}: mimic joints are off: {entry.reason}")
+            out.print(f"{entry.name}: mimic rules are off: {entry.reason}")
 
 
 def _as_dict(entry: Entry) -> dict[str, object]:

@@ -1,4 +1,4 @@
-"""`urdfkin screws`: the product of exponentials of a path, checked, as text and code."""
+"""`urdfkin screws`: a path's product of exponentials, checked, as text and code."""
 
 from __future__ import annotations
 
@@ -14,15 +14,18 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
 FORMS = ("terminal", "latex", "toml", "json", "numpy", "matlab")
-_digits = click.option("--digits", type=Whole(3, 17), default=10, show_default=True, help="Significant.")
+_digits = click.option(
+    "--digits", type=Whole(3, 17), default=10, show_default=True, help="Number of significant digits."
+)
 
 
 @path_command("screws", "urdfkin screws ur5 --tip tool0", FORMS, _digits)
 def command(robot: Robot, base: str | None, tip: str | None, digits: int, verify: bool) -> Answer:
-    """Home pose M and a screw for each joint, in space and body, as Lynch and Park have them.
+    """Derive the product of exponentials of a path in the notation of Lynch and Park.
 
-    Screws are (w, v), angular first; code has them as columns, Slist and Blist. A file that is written as
-    toml or json is a robot for every command, and so is one with M and space, or body, written by hand.
+    The result is the pose M in the zero configuration, and each joint's screw in space and body axes. A
+    screw is (w, v), angular part first; generated code has the screws as columns of Slist and Blist. Every
+    command accepts the toml or json output as a robot. A handwritten file needs M, and space or body.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
@@ -32,13 +35,13 @@ def command(robot: Robot, base: str | None, tip: str | None, digits: int, verify
 
     screws = robot.screws(tip, base, verify=False)
 
-    def written(form: str, line: str | None) -> str:
+    def write(form: str, line: str | None) -> str:
         text = write_screws(screws, form, digits)
         return f"{text}\n{line}\n" if form == "terminal" else text
 
     def show() -> None:
-        for one in written("terminal", "").splitlines()[:-1]:
+        for one in write("terminal", "").splitlines()[:-1]:
             say(one)
 
-    said = check_screws(robot.verifier, screws) if verify else None
-    return Answer(show, {form: partial(written, form) for form in FORMS}, said)
+    check = check_screws(robot.verifier, screws) if verify else None
+    return Answer(show, {form: partial(write, form) for form in FORMS}, check)

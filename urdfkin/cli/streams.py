@@ -1,14 +1,11 @@
-"""The standard streams as commands find them: there, able to hold any name, and in one line when they fail.
+"""Safe standard streams: robust against stream failures, and against control characters in names.
 
-A shell can close a stream, connect it to a full disc or to a reader that leaves, or give it an encoding
-without the letters of a name; none of these is a reason for a traceback.
+A shell can close a stream, connect it to a full disk or to a reader that exits, or give it an encoding that
+lacks a name's letters. None of these causes a traceback here.
 
-
-The one way out to a terminal or a log: nothing that passes it can act on what shows it.
-
-`guard` puts a door before standard output and standard error, so that no message can forget it: click's own
-and Python's last words pass it as well. It lets line ends through, and it cannot know which of them a name
-brought: whoever prints a line says it with `say` or to the console, which write those as escapes, too.
+`guard` wraps standard output and standard error in a `SafeStream`, which escapes control characters and
+commands of CI services. All output passes through it, also that of click and Python. Line feeds pass,
+because the stream cannot detect a line feed inside a name. `say` and the console escape these as well.
 """
 
 from __future__ import annotations
@@ -27,37 +24,41 @@ import click
 from urdfkin.errors import SourceError
 from urdfkin.errors.escape import COMMAND_ANYWHERE, COMMANDS, escape, printable
 
-#: How a process ends that its reader has left: as shells report it of programs that a signal ends.
+#: Exit code when the reader of a pipe has exited: 128 + SIGPIPE, as in shells.
 READER_GONE = 128 + signal.SIGPIPE
 
 
 def prepare() -> None:
-    """Once, before a command begins."""
+    """Prepare the standard streams; call it once, before a command begins."""
     _occupy_closed()
-    sys.stdout = _told(sys.stdout, 1)
-    sys.stderr = _told(sys.stderr, 2)
+    sys.stdout = _with_errors(sys.stdout, 1)
+    sys.stderr = _with_errors(sys.stderr, 2)
     warnings.showwarning = _warn
 
 
 def finish() -> None:
-    """Write what is still held back, while a failure can be told.
+    """Flush standard output while an error can still be reported.
 
     Raises:
-        SourceError: it cannot be written.
+        SourceError: standard output cannot be written.
     """
     sys.stdout.flush()
 
 
 class _Raw(io.FileIO):
-    """Standard output, whose failures are told once and end the command; of standard error's, none is."""
+    """Standard output or standard error as a raw file.
+
+    The first failure of standard output ends the command with an error. Failures of standard error are
+    ignored.
+    """
 
     def __init__(self, descriptor: int) -> None:
         super().__init__(descriptor, "w", closefd=False)
         self._failed = False
 
     def write(self, data: Any) -> Any:
-        """As a file does, until it fails."""
-        if self._failed:  # Python tries again when it ends
+        """Write to the file until a write fails, then discard the data."""
+        if self._failed:  # Python writes again at exit
             return len(memoryview(data).cast("B"))
         try:
             return super().write(data)
@@ -72,8 +73,8 @@ class _Raw(io.FileIO):
             ) from None
 
 
-def _told(stream: Any, descriptor: int) -> Any:
-    """A stream of this process in place of Python's; others, as those of a test, stay."""
+def _with_errors(stream: Any, descriptor: int) -> Any:
+    """Replace a stream of this process by one that reports errors; keep other streams, such as a test's."""
     try:
         if stream.fileno() != descriptor:
             return stream
@@ -90,9 +91,9 @@ def _told(stream: Any, descriptor: int) -> Any:
 
 
 def _occupy_closed() -> None:
-    """Put something where a stream is closed: the next file that is opened would take its number.
+    """Open the null device for each closed stream; otherwise the next opened file would get its descriptor.
 
-    Nothing can be written to that output, or read from that input; what is said on standard error is lost.
+    Such an output cannot be written and such an input cannot be read. Text for standard error is lost.
     """
     for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
@@ -108,26 +109,28 @@ def _occupy_closed() -> None:
 def _warn(
     message: Warning | str, category: type[Warning], filename: str, lineno: int, *_: Any, **__: Any
 ) -> None:
-    """Urdfkin's own warnings in a line; others as Python shows them."""
+    """Print a warning of urdfkin as one line, and other warnings in Python's format."""
     if category.__module__.startswith("urdfkin."):
         say(f"urdfkin: warning: {message}", err=True)
     else:
         sys.stderr.write(warnings.formatwarning(message, category, filename, lineno))
 
 
-#: What rich writes to a terminal: colours, and moves of the cursor for a bar.
+#: Escape sequences of rich: colours, and cursor movements of a progress bar.
 _STYLE = re.compile(r"(\x1b\[[0-9;?]*[A-Za-z]|\r)")
-#: How much of a line is remembered for what is written to it next.
-_KEPT = 64
+#: Number of characters of a line that are stored to check the next piece written to it.
+_STORED = 64
 
 
 class SafeStream:
-    """A text stream that hands on what is harmless; machine formats go to its `buffer`, as bytes.
+    """A text stream that escapes control characters and CI commands.
+
+    Machine formats are written to its `buffer`, as bytes.
 
     Args:
-        stream: Where to.
-        styled: Whether styles pass: only for a stream to which nothing is written but by rich.
-        encoding: What it says of itself.
+        stream: The stream to write to.
+        styled: Whether styles pass; only for a stream that nothing but rich writes to.
+        encoding: The encoding that this stream reports.
     """
 
     def __init__(self, stream: TextIO, *, styled: bool = False, encoding: str | None = None) -> None:
@@ -137,50 +140,52 @@ class SafeStream:
         self._line = ""
 
     def write(self, text: str) -> int:
-        """As a stream does."""
+        """Write text with control characters and CI commands escaped."""
         pieces = _STYLE.split(text) if self.styled else [text]
-        self._hand_on(
-            "".join(piece if k % 2 else self._tamed(_plain(piece)) for k, piece in enumerate(pieces))
+        self._pass(
+            "".join(
+                piece if k % 2 else self._without_commands(_plain(piece)) for k, piece in enumerate(pieces)
+            )
         )
         return len(text)
 
     def write_commands(self, text: str) -> None:
-        """What is meant as commands for a CI service."""
-        self._hand_on(COMMAND_ANYWHERE.sub(lambda found: found[0][:-1] + escape("["), _plain(text)))
+        """Write commands for a CI service."""
+        self._pass(COMMAND_ANYWHERE.sub(lambda found: found[0][:-1] + escape("["), _plain(text)))
 
     def write_file(self, text: str) -> None:
-        """A file's text: the same bytes whatever letters the stream knows."""
+        """Write a file's text as UTF-8, whatever the encoding of the stream."""
         self.stream.flush()
         self.stream.buffer.write(self.tamed_file(text).encode())
         self.stream.buffer.flush()
 
     def tamed_file(self, text: str) -> str:
-        """A file's text as `write_file` writes it: a carriage return before a line feed acts on nothing."""
+        """Return a file's text as `write_file` writes it; a carriage return before a line feed stays."""
         *lines, last = text.split("\n")
         plain = [_plain(line.removesuffix("\r")) + "\r" * line.endswith("\r") for line in lines]
-        return self._tamed("\n".join([*plain, _plain(last)]))
+        return self._without_commands("\n".join([*plain, _plain(last)]))
 
-    def _hand_on(self, text: str) -> None:
+    def _pass(self, text: str) -> None:
         encoding = self.stream.encoding or "utf-8"
         if not text.isascii():
             text = text.encode(encoding, "backslashreplace").decode(encoding)
         self.stream.write(text)
 
-    def _tamed(self, text: str) -> str:
-        """Without commands, also where one is written in pieces."""
+    def _without_commands(self, text: str) -> str:
+        """Escape CI commands, also those that are written in pieces."""
         first, *rest = text.split("\n")
-        lines = [self._tamed_line(first)]
+        lines = [self._line_without_commands(first)]
         for line in rest:
             self._line = ""
-            lines.append(self._tamed_line(line))
+            lines.append(self._line_without_commands(line))
         return "\n".join(lines)
 
-    def _tamed_line(self, piece: str) -> str:
+    def _line_without_commands(self, piece: str) -> str:
         before = len(self._line)
         whole = self._line + piece
         at = [m.start(1) for command in COMMANDS for m in command.finditer(whole) if m.start(1) >= before]
-        # Where the line is long, what was blank from its beginning must still be so.
-        self._line = whole if len(whole) <= _KEPT else ("x" if whole.strip() else "") + whole[-16:]
+        # Of a long line, keep the end, and whether the line was blank so far.
+        self._line = whole if len(whole) <= _STORED else ("x" if whole.strip() else "") + whole[-16:]
         return "".join(escape(c) if before + k in at else c for k, c in enumerate(piece)) if at else piece
 
     def __getattr__(self, name: str) -> Any:
@@ -188,45 +193,45 @@ class SafeStream:
 
 
 def _plain(text: str) -> str:
-    """Line ends and tabs pass; what else cannot be seen is written as JSON, TOML and Python would."""
+    """Escape unprintable characters as in JSON, TOML and Python, except line feeds and tabs."""
     if text.isprintable():
         return text
     return "".join(c if c in "\n\t" or c.isprintable() else escape(c) for c in text)
 
 
 def guard() -> None:
-    """From here on everything passes, until Python has said its last word."""
+    """Wrap standard output and standard error in `SafeStream` until the process ends."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is not None and not isinstance(stream, SafeStream):
-            # Click would go round a stream that cannot hold everything; this one can, by escapes.
+            # With another encoding, click would bypass the stream; this one escapes missing characters.
             setattr(sys, name, SafeStream(stream, encoding="utf-8"))
 
 
 def say(line: str, *, err: bool = False) -> None:
-    """One line, whatever names are in it."""
+    """Print one line; control characters are escaped."""
     click.echo(printable(line), err=err)
 
 
 def say_styled(*words: tuple[str, dict[str, Any]]) -> None:
-    """One line of words in several styles, where there is a terminal."""
-    door = SafeStream(sys.stdout, styled=sys.stdout.isatty())
+    """Print one line of words, with styles on a terminal."""
+    stream = SafeStream(sys.stdout, styled=sys.stdout.isatty())
     texts = (
-        click.style(printable(text), **style) if door.styled else printable(text) for text, style in words
+        click.style(printable(text), **style) if stream.styled else printable(text) for text, style in words
     )
-    door.write("".join(texts) + "\n")
+    stream.write("".join(texts) + "\n")
 
 
 def say_file(text: str) -> None:
-    """What would be a file, were one named."""
+    """Write a file's text to standard output."""
     SafeStream(sys.stdout).write_file(text)
 
 
 def harmless(text: str) -> str:
-    """A file's text of whole lines, as `say_file` writes it."""
+    """Return a file's text, of whole lines, as `say_file` writes it."""
     return SafeStream(sys.stdout).tamed_file(text)
 
 
 def command_lines(text: str) -> None:
-    """Lines that a CI service shall take for commands: findings for GitHub."""
+    """Write lines that a CI service interprets as commands: findings for GitHub."""
     SafeStream(sys.stdout).write_commands(text + "\n")

@@ -1,4 +1,4 @@
-"""`urdfkin structure`: what kind of arm it is, how nearly, and what can be solved in closed form."""
+"""`urdfkin structure`: classify an arm by its parallel and intersecting axes; list closed-form solvers."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     "--opw",
     type=Number(),
     metavar="MM",
-    help="Parameters for OPW solvers, as YAML, if they leave no more than MM (and mrad) at the tip.",
+    help="Print parameters for OPW solvers as YAML; an error if the tip deviates by more than MM (and mrad).",
 )
-@click.option("--json", "as_json", is_flag=True, help="Plain data, metres and radians.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON, in metres and radians.")
 @verify_option
 @click.pass_context
 def command(
@@ -38,10 +38,10 @@ def command(
     as_json: bool,
     verify: bool,
 ) -> None:
-    """Which consecutive axes are parallel or meet, and what follows: wrist, SCARA, gantry, solvers.
+    """Classify an arm by its consecutive parallel and intersecting axes: wrist, SCARA, gantry, solvers.
 
-    Kinds are said up to 0.02 rad or 5 mm off, with how far off they are: a calibrated arm is of none exactly.
-    The screws that this is read from are held against Pinocchio.
+    An arm counts as a kind within 0.02 rad or 5 mm. The deviation is printed, since a calibrated arm is never
+    exactly of a kind. The screws are compared with Pinocchio.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """

@@ -1,4 +1,4 @@
-"""The console that tables and coloured lines are printed on: words are words, whatever is in them."""
+"""The console for tables and coloured lines; markup and control characters in names have no effect."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ _TRAILING = re.compile(r" +$", re.MULTILINE)
 
 
 class Terminal(Console):
-    """Rich's console, on which each text that is printed is one line without markup."""
+    """Rich's console without markup; each printed text is one line."""
 
     def __init__(self, stream: TextIO, **options: Any) -> None:
-        door = SafeStream(stream, styled=True)
-        super().__init__(file=cast("TextIO", door), highlight=False, emoji=False, markup=False, **options)
-        door.styled = self.is_terminal
+        safe = SafeStream(stream, styled=True)
+        super().__init__(file=cast("TextIO", safe), highlight=False, emoji=False, markup=False, **options)
+        safe.styled = self.is_terminal
 
     def print(self, *objects: Any, **options: Any) -> None:
-        """As rich does; tables bring their own cells. Text is never wrapped: what is copied stays whole."""
+        """Print tables and texts; texts are never wrapped, so that they can be copied."""
         texts = [printable(o) if isinstance(o, str) else o for o in objects]
-        lines_alone = all(isinstance(o, str) for o in objects)
-        if self.is_terminal or lines_alone:
-            super().print(*texts, **{"soft_wrap": lines_alone} | options)
+        only_text = all(isinstance(o, str) for o in objects)
+        if self.is_terminal or only_text:
+            super().print(*texts, **{"soft_wrap": only_text} | options)
             return
-        # A table is padded to its width: blanks that a file and a pasted text are better without.
-        with self.capture() as held:
+        # Remove the blanks with which rich pads the lines of a table.
+        with self.capture() as capture:
             super().print(*texts, **options)
-        self.file.write(_TRAILING.sub("", held.get()))
+        self.file.write(_TRAILING.sub("", capture.get()))

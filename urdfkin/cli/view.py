@@ -1,4 +1,4 @@
-"""`urdfkin view`: a robot in a browser tab."""
+"""`urdfkin view`: show a robot in a browser tab."""
 
 from __future__ import annotations
 
@@ -22,20 +22,23 @@ EXAMPLE = "urdfkin view panda --q 0,-0.8,0,-2.4,0,1.6,0.8,0.04"
     "--host",
     default="127.0.0.1",
     show_default=True,
-    help="Whom to listen to: this machine alone, or 0.0.0.0 for the whole network.",
+    help="Address to listen on (127.0.0.1: this machine; 0.0.0.0: the whole network).",
 )
 @q_option
 @seed_option
-@click.option("--browser/--no-browser", default=None, help="Whether to open it.  [default: on a screen]")
-@click.option("--port", type=Whole(1, 65535), default=8080, show_default=True)
+@click.option(
+    "--browser/--no-browser", default=None, help="Open the browser.  [default: if there is a screen]"
+)
+@click.option("--port", type=Whole(1, 65535), default=8080, show_default=True, help="Port to listen on.")
 def command(robot: str, q: str, seed: int, host: str, port: int, browser: bool | None) -> None:
-    """Show a robot in a browser tab: sliders, shapes, frames, DH frames, velocity and acceleration arrows.
+    """Show a robot in a browser tab, with sliders, shapes, frames, DH frames and arrows.
 
-    It begins at --q, or in the neutral configuration, moved to within the limits. The numbers of the chosen
-    frame are checked by Pinocchio as the robot moves. Needs the extra `urdfkin[view]`. Ctrl-C ends it.
+    The viewer starts at --q, or in the neutral configuration moved to within the limits. Pinocchio checks the
+    numbers of the chosen frame as the robot moves. The viewer needs the extra `urdfkin[view]`. Ctrl-C stops
+    it.
 
-    The address that is printed holds a key: open it as it stands, and show it to nobody who should not see
-    or move the robot. Other pages and other users of this machine are refused.
+    The printed address contains a key. Open the whole address, and show it only to people who may see and
+    move the robot. Other web pages and other users of this machine are refused.
     """
     from urdfkin.view.server import (  # noqa: PLC0415
         has_screen,
@@ -47,13 +50,15 @@ def command(robot: str, q: str, seed: int, host: str, port: int, browser: bool |
     loaded = load_robot(robot)
     begin = None if q == "neutral" else read_inputs(loaded, None, seed, q).q
     if begin is not None and len(begin) != 1:
-        raise InputError("the viewer begins at one configuration", where="--q", found=str(len(begin)))
+        raise InputError(
+            "the viewer needs exactly one start configuration", where="--q", found=str(len(begin))
+        )
     server = new_server(host, port)
     with compiling():
         Viewer(server, loaded, None if begin is None else begin[0])
     try:
         say(f"{loaded.name}: {server.address}")
-        sys.stdout.flush()  # whoever reads a pipe wants the address now
+        sys.stdout.flush()  # the reader of a pipe needs the address now
         wanted = sys.stdout.isatty() and has_screen() if browser is None else browser
         with opened_page(server.address) if wanted else nullcontext():
             server.sleep_forever()

@@ -1,4 +1,4 @@
-"""`urdfkin warm`: compile everything now, so that nothing is compiled later."""
+"""`urdfkin warm`: compile every kernel now, so that later commands start fast."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ EXAMPLE = "urdfkin warm"
 
 @click.command(epilog=f"Example: {EXAMPLE}")
 def command() -> None:
-    """Compile every kernel for this machine, and keep it: for container images and CI.
+    """Compile every kernel for this machine and store it, for container images and CI.
 
-    Commands and programs compile each kernel when they first need it, some seconds each. XDG_CACHE_HOME says
-    where they are kept; kernels of another processor are compiled again. Exit 2: they cannot be kept.
+    Otherwise a command or program compiles a kernel at its first use, which takes some seconds. Kernels are
+    stored below XDG_CACHE_HOME. Kernels from another processor are compiled again. Exit 2: the kernels cannot
+    be stored.
     """
     from urdfkin.compiled.compiling import cache_folder, listen_to_compile_events  # noqa: PLC0415
     from urdfkin.compiled.single import one_configuration  # noqa: PLC0415
@@ -26,18 +27,19 @@ def command() -> None:
     folder = cache_folder()
     if folder is None:
         raise SourceError(
-            "there is no folder to keep kernels in", remedy="set XDG_CACHE_HOME to one that is yours alone"
+            "no folder to store kernels in",
+            remedy="set XDG_CACHE_HOME to a folder that only you can write to",
         )
     begin, before = time.perf_counter(), set(folder.glob("*.kernel"))
 
-    def tell(name: str, seconds: float | None) -> None:
+    def report(name: str, seconds: float | None) -> None:
         say(f"compiling {name} ..." if seconds is None else f"compiled {name} in {seconds:.1f} s", err=True)
 
-    with listen_to_compile_events(tell):
+    with listen_to_compile_events(report):
         load_kernels()
         _ = one_configuration.compiled
-    kept = set(folder.glob("*.kernel"))
-    if new := kept - before:
-        say(f"{len(new)} of {len(kept)} kernels compiled in {time.perf_counter() - begin:.0f} s: {folder}")
+    stored = set(folder.glob("*.kernel"))
+    if new := stored - before:
+        say(f"{len(new)} of {len(stored)} kernels compiled in {time.perf_counter() - begin:.0f} s: {folder}")
     else:
-        say(f"all {len(kept)} kernels are compiled: {folder}")
+        say(f"all {len(stored)} kernels are compiled: {folder}")

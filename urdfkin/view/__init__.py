@@ -1,1 +1,1 @@
-"""The viewer in a browser tab (the extra `urdfkin[view]`): a robot that moves, its numbers checked live."""
+"""Pictures of robots: the viewer in a browser tab (`urdfkin[view]`), and plots (`urdfkin[plots]`)."""

@@ -1,8 +1,8 @@
-"""A chain drawn with its Denavit-Hartenberg frames, joint axes and common normals, as SVG.
+"""Draw a chain with its Denavit-Hartenberg frames, joint axes and common normals, as SVG.
 
-Needs the extra `urdfkin[plots]`. The picture is an orthographic view:
-joint axes are dashed lines along z, the offsets d run along them in grey, the lengths a along the common
-normals in orange; each frame shows its x and z. Arrows that end at one place share a label.
+This needs the extra `urdfkin[plots]`. The picture is an orthographic view. Joint axes are dashed lines along
+z. Offsets d are grey and lie on the joint axes. Lengths a are orange and lie on the common normals. Each
+frame shows its x and z axes. Arrows that end at the same point share a label.
 """
 
 from __future__ import annotations
@@ -23,33 +23,35 @@ from urdfkin.view.figure import label, new_figure, style
 
 _X, _Z, _D, _A, _AXIS, _TEXT = "#c0392b", "#2456a6", "#6b7280", "#d97904", "#9aa7b5", "#222222"
 
-#: Of the eye, degrees: above the base's x-y plane, and about its z.
+#: View direction in degrees: elevation above the base's x-y plane, and azimuth about its z axis.
 _ELEVATION, _AZIMUTH = 20.0, -55.0
 
 
 def drawing(table: DHTable, q: ArrayLike | Mapping[str, float] | None = None) -> str:
-    """An SVG of the table's chain.
+    """Return an SVG of the table's chain.
 
     Args:
-        table: Any table.
-        q: (coordinates,) rad and m, or a mapping by name; None is all zero.
+        table: The table.
+        q: (coordinates,) rad and m, or a mapping by name; None is the zero configuration.
 
     Raises:
         InputError: matplotlib is not installed, or `q` has the wrong length.
     """
     frames = table.frames(q)
     if frames.ndim != 3:
-        raise InputError("a drawing shows one configuration", found=f"a batch of shape {frames.shape[:-3]}")
+        raise InputError(
+            "a drawing needs exactly one configuration", found=f"a batch of shape {frames.shape[:-3]}"
+        )
     with style(font_size=9):
         axes: Any = new_figure(10.0, 9.0).add_subplot()
         tip = frames[-1] @ table.tool
         points = np.concatenate(
             [frames[:, :3, 3], _corners(table, frames), tip[None, :3, 3], np.zeros((1, 3))]
         )
-        eye = _view(math.radians(_ELEVATION), math.radians(_AZIMUTH))
-        sheet = _Sheet(axes, eye, max(float(np.ptp(points, axis=0).max()), 1e-3))
-        _draw(sheet, table, frames, tip)
-        sheet.write_labels()
+        projection = _view(math.radians(_ELEVATION), math.radians(_AZIMUTH))
+        canvas = _Canvas(axes, projection, max(float(np.ptp(points, axis=0).max()), 1e-3))
+        _draw(canvas, table, frames, tip)
+        canvas.write_labels()
         axes.set_aspect("equal")
         axes.set_axis_off()
         title = label(f"{table.robot}: {table.base_frame} to {table.tip_frame}")
@@ -60,28 +62,35 @@ def drawing(table: DHTable, q: ArrayLike | Mapping[str, float] | None = None) ->
 
 
 def _view(elevation: float, azimuth: float) -> FloatArray:
-    """(2, 3): right and up of the sheet in the base's axes."""
+    """Return (2, 3): the right and up directions of the picture in the base's axes."""
     ca, sa, ce, se = math.cos(azimuth), math.sin(azimuth), math.cos(elevation), math.sin(elevation)
     return np.array([[-sa, ca, 0.0], [-se * ca, -se * sa, ce]])
 
 
 @dataclass
-class _Sheet:
-    """Points in space drawn on paper; labels are collected and written last."""
+class _Canvas:
+    """A picture that projects points in space; labels are collected and written last.
+
+    Attributes:
+        axes: Matplotlib's axes.
+        projection: (2, 3) right and up directions of the picture in the base's axes.
+        size: Size of the chain, m.
+        labels: (position, direction, text, colour) of each label.
+    """
 
     axes: Any
-    eye: FloatArray
+    projection: FloatArray
     size: float
     labels: list[tuple[FloatArray, FloatArray, str, str]] = field(default_factory=list)
 
     def line(self, start: FloatArray, end: FloatArray, **style: Any) -> None:
-        """A straight line."""
-        (x, y), (u, v) = self.eye @ start, self.eye @ end
+        """Draw a straight line."""
+        (x, y), (u, v) = self.projection @ start, self.projection @ end
         self.axes.plot([x, u], [y, v], solid_capstyle="round", **style)
 
     def arrow(self, start: FloatArray, along: FloatArray, color: str, name: str) -> None:
-        """An arrow with its label ahead of it; one that points at the eye is a dot."""
-        a, b = self.eye @ start, self.eye @ (start + along)
+        """Draw an arrow with its label beyond the tip; an arrow towards the viewer appears as a dot."""
+        a, b = self.projection @ start, self.projection @ (start + along)
         self.axes.annotate(
             "",
             xy=b,
@@ -92,15 +101,15 @@ class _Sheet:
         self.label(start + 1.25 * along, along, name, color)
 
     def mark(self, point: FloatArray, **style: Any) -> None:
-        """A joint or the tip."""
-        self.axes.plot(*(self.eye @ point)[:, None], zorder=5, **style)
+        """Mark a joint or the tip."""
+        self.axes.plot(*(self.projection @ point)[:, None], zorder=5, **style)
 
     def label(self, point: FloatArray, along: FloatArray, text: str, color: str) -> None:
-        """Text at a point, to be written later."""
-        self.labels.append((self.eye @ point, self.eye @ along, text, color))
+        """Add a label at a point; `write_labels` writes it."""
+        self.labels.append((self.projection @ point, self.projection @ along, text, color))
 
     def write_labels(self) -> None:
-        """Labels of one colour at one place become one, and neighbours step aside."""
+        """Write the labels: merge those of the same colour and place, and move the others apart."""
         merged: list[tuple[FloatArray, FloatArray, list[str], str]] = []
         for place, along, text, color in self.labels:
             for other, _, texts, other_color in merged:
@@ -119,11 +128,13 @@ class _Sheet:
                 spot = spot + step * side
             taken.append(spot)
             words = {"color": color, "ha": "center", "va": "center", "zorder": 6}
-            self.axes.text(*spot, ", ".join(texts), parse_math=color in (_X, _Z), **words)  # ours, not names
+            self.axes.text(
+                *spot, ", ".join(texts), parse_math=color in (_X, _Z), **words
+            )  # our own text, not names
 
 
 def _corners(table: DHTable, frames: FloatArray) -> FloatArray:
-    """(n, 3): for each row, the corner between its d and its a."""
+    """Return (n, 3): for each row, the point between its offset d and its length a."""
     corners = np.empty((len(table.rows), 3))
     for i, row in enumerate(table.rows):
         if table.convention is Convention.STANDARD:  # along z, then along the common normal
@@ -135,26 +146,26 @@ def _corners(table: DHTable, frames: FloatArray) -> FloatArray:
     return corners
 
 
-def _draw(sheet: _Sheet, table: DHTable, frames: FloatArray, tip: FloatArray) -> None:
-    size, standard = sheet.size, table.convention is Convention.STANDARD
+def _draw(canvas: _Canvas, table: DHTable, frames: FloatArray, tip: FloatArray) -> None:
+    size, standard = canvas.size, table.convention is Convention.STANDARD
     for i, (row, corner) in enumerate(zip(table.rows, _corners(table, frames), strict=True)):
         first, second = (_D, _A) if standard else (_A, _D)
-        sheet.line(frames[i, :3, 3], corner, color=first, linewidth=2.6)
-        sheet.line(corner, frames[i + 1, :3, 3], color=second, linewidth=2.6)
+        canvas.line(frames[i, :3, 3], corner, color=first, linewidth=2.6)
+        canvas.line(corner, frames[i + 1, :3, 3], color=second, linewidth=2.6)
         carrier = frames[i if standard else i + 1]
         origin, z = carrier[:3, 3], carrier[:3, 2]
         dashes = {"color": _AXIS, "linestyle": (0, (6, 4)), "linewidth": 0.9, "zorder": 1}
-        sheet.line(origin - 0.2 * size * z, origin + 0.28 * size * z, **dashes)
+        canvas.line(origin - 0.2 * size * z, origin + 0.28 * size * z, **dashes)
         marker = {"marker": "o" if row.kind.turns else "s", "color": _TEXT, "markerfacecolor": "white"}
-        sheet.mark(origin, markersize=5.5, **marker)
-        sheet.label(origin - 0.24 * size * z, z, label(row.joint), "#6f7d8c")
+        canvas.mark(origin, markersize=5.5, **marker)
+        canvas.label(origin - 0.24 * size * z, z, label(row.joint), "#6f7d8c")
     dots = {"color": _D, "linewidth": 1.2, "linestyle": ":"}
-    sheet.line(np.zeros(3), frames[0, :3, 3], **dots)
-    sheet.line(frames[-1, :3, 3], tip[:3, 3], **dots)
+    canvas.line(np.zeros(3), frames[0, :3, 3], **dots)
+    canvas.line(frames[-1, :3, 3], tip[:3, 3], **dots)
     for i, T in enumerate(frames):
-        sheet.arrow(T[:3, 3], 0.13 * size * T[:3, 0], _X, f"$x_{{{i}}}$")
-        sheet.arrow(T[:3, 3], 0.13 * size * T[:3, 2], _Z, f"$z_{{{i}}}$")
-    sheet.mark(tip[:3, 3], marker="D", color=_TEXT, markersize=4.5)
-    sheet.label(
+        canvas.arrow(T[:3, 3], 0.13 * size * T[:3, 0], _X, f"$x_{{{i}}}$")
+        canvas.arrow(T[:3, 3], 0.13 * size * T[:3, 2], _Z, f"$z_{{{i}}}$")
+    canvas.mark(tip[:3, 3], marker="D", color=_TEXT, markersize=4.5)
+    canvas.label(
         tip[:3, 3] - 0.07 * size * (tip[:3, 0] + tip[:3, 2]), tip[:3, 2], label(table.tip_frame), _TEXT
     )

@@ -1,6 +1,6 @@
-"""The border to matplotlib (the extra `urdfkin[plots]`): figures without a display, as files or inline SVG.
+"""Figures with matplotlib (the extra `urdfkin[plots]`), without a display, as files or inline SVG.
 
-Inline SVG takes its colours from the page's style, so that one drawing serves light, dark and print.
+Inline SVG uses the colours of the page's style, so one drawing fits light pages, dark pages and print.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     Axes = matplotlib.axes.Axes
     Figure = matplotlib.figure.Figure
 
-#: Colours in a drawing that stand for the page's own: what to draw with -> what the page gets.
+#: Placeholder colours in a drawing -> colours of the page's style that replace them.
 PAGE_COLOURS = {
     "#010101": "var(--plot-text)",
     "#020202": "var(--plot-grid)",
@@ -39,7 +39,7 @@ _STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "urdfkin",
     "font.family": "DejaVu Sans",
-    # A name is text: neither mathematics between dollars nor TeX, whatever the user's own settings are.
+    # Names are plain text for all settings of the user: no mathematics between dollar signs, no TeX.
     "text.parse_math": False,
     "text.usetex": False,
     "axes.spines.top": False,
@@ -48,7 +48,11 @@ _STYLE: dict[Any, Any] = {
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure, inches; it belongs to no window and no global state.
+    """Return an empty figure without a window and without global state.
+
+    Args:
+        width: Width in inches.
+        height: Height in inches.
 
     Raises:
         InputError: matplotlib is not installed.
@@ -60,23 +64,23 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def style(**more: Any) -> Any:
-    """The context to draw in: text stays text, and the same drawing gives the same file."""
+    """Return the matplotlib context: text remains text, and the same drawing gives the same file."""
     return _matplotlib().rc_context(_STYLE | {key.replace("_", "."): value for key, value in more.items()})
 
 
 def label(name: str) -> str:
-    """A name as a drawing can show it: what the font has no glyph for and XML no place is an escape."""
+    """Return a name for a drawing; characters that are missing in the font or illegal in XML are escaped."""
     return printable(name)
 
 
 def installed() -> bool:
-    """Whether matplotlib is there."""
+    """Return whether matplotlib is installed."""
     return importlib.util.find_spec("matplotlib") is not None
 
 
 @cache
 def _matplotlib() -> Any:
-    """The library, without the settings of a file `matplotlibrc` in the current folder."""
+    """Import matplotlib without the settings of a file `matplotlibrc` in the current folder."""
     if not installed():
         raise InputError("drawing needs matplotlib", remedy="pip install 'urdfkin[plots]'")
     with not_reading("matplotlibrc"):
@@ -84,14 +88,18 @@ def _matplotlib() -> Any:
 
 
 def save(figure: Figure, path: Path) -> bytes:
-    """The figure as the bytes of a file whose format its name's ending says; the same input, the same bytes.
+    """Return the figure as the bytes of a file.
+
+    The suffix of `path` selects the format. The same input gives the same bytes.
 
     Raises:
-        InputError: an ending other than svg, png, pdf.
+        InputError: a suffix other than svg, png, pdf.
     """
     ending = path.suffix.removeprefix(".").lower()
     if ending not in FORMATS:
-        raise InputError("unknown kind of picture", where=str(path), remedy=f"end it in {', '.join(FORMATS)}")
+        raise InputError(
+            "unknown picture format", where=str(path), remedy=f"use the suffix {', '.join(FORMATS)}"
+        )
     stream = io.BytesIO()
     metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {}}[ending]
     with style():
@@ -100,20 +108,20 @@ def save(figure: Figure, path: Path) -> bytes:
 
 
 def inline_svg(figure: Figure, prefix: str, title: str, description: str) -> str:
-    """The figure as an element of a page.
+    """Return the figure as an SVG element of a page.
 
     Args:
-        figure: Drawn with `PAGE_COLOURS`.
-        prefix: Set before the ids that stay, so that no two figures of a page share one.
-        title: What it shows, for who cannot see it; plain text.
-        description: What it says; plain text.
+        figure: A figure drawn with `PAGE_COLOURS`.
+        prefix: Prefix of the ids, so that ids are unique on a page with several figures.
+        title: Title for screen readers; plain text.
+        description: Description for screen readers; plain text.
     """
     stream = io.StringIO()
     nothing = dict.fromkeys(("Date", "Creator", "Format", "Type"))
     with style():
         figure.savefig(stream, format="svg", metadata=nothing, transparent=True)
     text = stream.getvalue()
-    # A style element would reach beyond the drawing: the page sets line joins itself.
+    # A style element would affect the whole page; the page sets line joins itself.
     text = re.sub(r"<(metadata|style)\b.*?</\1>", "", text[text.index("<svg") :], flags=re.DOTALL)
     text = _with_ids(text, prefix)
     for colour, page in PAGE_COLOURS.items():
@@ -122,12 +130,12 @@ def inline_svg(figure: Figure, prefix: str, title: str, description: str) -> str
     text = re.sub(r"<!--.*?-->|\n\s*", lambda found: "\n" if found[0][0] == "\n" else "", text)
     head, _, body = text.partition(">")
     size = re.search(r'viewBox="[^"]*"', head)
-    described = f"<title>{_escaped(title)}</title><desc>{_escaped(description)}</desc>"
-    return f'<svg class="plot" {size[0] if size else ""} role="img">{described}{body}'
+    labels = f"<title>{_escaped(title)}</title><desc>{_escaped(description)}</desc>"
+    return f'<svg class="plot" {size[0] if size else ""} role="img">{labels}{body}'
 
 
 def _with_ids(text: str, prefix: str) -> str:
-    """Only ids that something refers to, each with the prefix."""
+    """Keep only ids that are referred to, and add the prefix to them."""
     used = set(re.findall(r"url\(#([^)]+)\)", text)) | set(re.findall(r'href="#([^"]+)"', text))
     text = re.sub(
         r' id="([^"]*)"', lambda found: f' id="{prefix}{found[1]}"' if found[1] in used else "", text

@@ -1,8 +1,6 @@
-"""Pictures of a frame's motion along a trajectory (the extra `urdfkin[plots]`).
+"""Plot a frame's motion along a trajectory (the extra `urdfkin[plots]`).
 
-The panels of `urdfkin plot`: what each draws of a frame's motion over time.
-
-One sheet with the panels that were asked for, and a foot that says what was checked.
+The figure has the requested panels, each over time, and a footer with the result of the check.
 """
 
 from __future__ import annotations
@@ -31,17 +29,17 @@ if TYPE_CHECKING:
     from urdfkin.view.figure import Axes, Figure
 
 
-#: Draws into axes: motion and seconds.
+#: A function that draws a motion over time, in seconds, into axes.
 Panel = Callable[["Axes", FrameMotion, FloatArray], None]
 
-#: Okabe and Ito's colours, which differ for every kind of eye; line styles differ as well.
+#: Okabe and Ito's colours, distinguishable with every colour vision deficiency; line styles differ as well.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), "-")
 
 
 _LINEAR, _ANGULAR = slice(0, 3), slice(3, 6)
-#: With more lines than this none is named: nobody could tell them apart.
-_NAMED = 14
+#: Largest number of lines with a legend; more lines are not distinguishable.
+_MOST_NAMES = 14
 
 
 def _lines(axes: Axes, t: FloatArray, rows: FloatArray, names: Sequence[str]) -> None:
@@ -50,54 +48,54 @@ def _lines(axes: Axes, t: FloatArray, rows: FloatArray, names: Sequence[str]) ->
 
 
 def position(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """The origin in the world."""
+    """Draw the frame's origin in the world, m."""
     _lines(axes, t, x.placement[:, :3, 3], ("x", "y", "z"))
     axes.set_ylabel("position [m]")
 
 
 def orientation(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """The turn since the start: axis times angle, in world axes."""
+    """Draw the rotation since the start: axis times angle, in world axes, rad."""
     R = x.placement[:, :3, :3]
     _lines(axes, t, log_rotation(R @ R[0].T), ("x", "y", "z"))
-    axes.set_ylabel("turned [rad]")
+    axes.set_ylabel("rotation [rad]")
 
 
 def velocity(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """Linear rows."""
+    """Draw the linear velocity, m/s."""
     _lines(axes, t, x.velocity[:, :3], ("x", "y", "z"))
     axes.set_ylabel("velocity [m/s]")
 
 
 def angular_velocity(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """Angular rows."""
+    """Draw the angular velocity, rad/s."""
     _lines(axes, t, x.velocity[:, 3:], ("x", "y", "z"))
     axes.set_ylabel("angular velocity [rad/s]")
 
 
 def acceleration(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """Linear rows, classical."""
+    """Draw the classical linear acceleration, m/s^2."""
     _lines(axes, t, x.acceleration[:, :3], ("x", "y", "z"))
     axes.set_ylabel("acceleration [m/s²]")
 
 
 def angular_acceleration(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """Angular rows."""
+    """Draw the angular acceleration, rad/s^2."""
     _lines(axes, t, x.acceleration[:, 3:], ("x", "y", "z"))
     axes.set_ylabel("ang. acceleration [rad/s²]")
 
 
 def parts(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """How large each kind of contribution to the linear acceleration is, and their sum."""
+    """Draw the magnitude of each part of the linear acceleration and of their sum, m/s^2."""
     sizes = np.linalg.norm(x.parts.by_kind[..., :3], axis=-1)
     total = np.linalg.norm(x.acceleration[:, :3], axis=-1)
     used = [k for k in range(len(KINDS)) if sizes[:, k].any()]
     names = tuple(KINDS[k] for k in used)
-    _lines(axes, t, np.column_stack([sizes[:, used], total]), (*names, "all together"))
-    axes.set_ylabel("parts, size [m/s²]")
+    _lines(axes, t, np.column_stack([sizes[:, used], total]), (*names, "sum"))
+    axes.set_ylabel("size of parts [m/s²]")
 
 
 def singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit: str) -> None:
-    """Of the Jacobian's linear or its angular rows: together they would add metres to radians."""
+    """Draw the singular values of the Jacobian's linear or angular rows; all rows would mix units."""
     values = x.singular_values_of(rows)
     largest = values.max(initial=1.0)
     shown = np.where(values > EPS * largest, values, np.nan)
@@ -106,18 +104,21 @@ def singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     lower, upper = axes.get_ylim()
     axes.yaxis.set_minor_formatter(lambda value, _: f"{value:g}" if upper < 10.0 * lower else "")
-    axes.set_ylabel(f"singular values, {unit}\nper unit of rates")
+    axes.set_ylabel(f"singular values, {unit}\nper unit joint velocity")
 
 
 def manipulability(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit: str) -> None:
-    """Yoshikawa's: the product of the singular values of the linear or of the angular rows."""
+    """Draw Yoshikawa's manipulability: the product of the singular values of the linear or angular rows."""
     _lines(axes, t, x.manipulability(rows)[:, np.newaxis], ("",))
     axes.set_ylabel(f"manipulability\n[{unit}]")
     axes.set_ylim(bottom=0.0)
 
 
 def disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """With Pinocchio at the same q, v and a, in eps * scale; thin, the bound; a cross where it is outside."""
+    """Draw the difference from Pinocchio at the same q, v and a, in eps * scale.
+
+    Thin lines are the bounds. A cross marks a sample outside its bound.
+    """
     axes.set_ylabel("disagreement [eps·scale]\nthin: bound")
     if x.not_verified is not None:
         axes.text(0.5, 0.5, "not verified", transform=axes.transAxes, ha="center", va="center")
@@ -128,13 +129,13 @@ def disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
         outside = check.share > 1.0
         if outside.any():
             axes.plot(t[outside], check.units[outside], "x", color="#B00020", label="outside the bound")
-    # Bounds are a hundred times what is usual: below 1, which a rounding gives, the scale is plain.
+    # Bounds are about a hundred times the usual disagreement. Below 1 (one rounding), the scale is linear.
     axes.set_yscale("symlog", linthresh=1.0)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_ylim(bottom=0.0)
 
 
-#: Every panel by name, in the order of the sheet.
+#: All panels by name, in the order of the figure.
 PANELS: dict[str, Panel] = {
     "position": position,
     "orientation": orientation,
@@ -150,14 +151,14 @@ PANELS: dict[str, Panel] = {
     "disagreement": disagreement,
 }
 
-#: What is put behind a unit in the panels of q, v and a.
+#: The suffix of a unit in the panels of q, v and a.
 _PER = {"q": "", "v": "/s", "a": "/s²"}
-#: The panels of the coordinates, each an axis for each unit.
+#: Names of the panels of coordinates; each of them has one plot for each unit.
 COORDINATES = tuple(_PER)
 
 
 def coordinate_panels(robot: Robot, trajectory: Trajectory, what: str) -> list[Panel]:
-    """q, v or a over time: a panel for each unit that its numbers have, with the limits of what moves."""
+    """Return the panels of q, v or a over time, one for each unit, with the limits of the moving joints."""
     units = np.array(configuration.units(robot.tree, what))
     return [
         partial(_coordinates, robot, trajectory, what, unit, np.flatnonzero(units == unit).astype(np.int64))
@@ -171,31 +172,37 @@ def _coordinates(
     trajectory: Trajectory,
     what: str,
     unit: str,
-    places: IntArray,
+    indices: IntArray,
     axes: Axes,
     x: FrameMotion,
     t: FloatArray,
 ) -> None:
-    """Those that move, or all where none does; thin, their limits; a cross where one is outside."""
+    """Draw the coordinates that change, or all if none does.
+
+    Thin lines are the limits. A cross marks a sample outside its limits.
+    """
     del x
     values: FloatArray = getattr(trajectory, what)
     names = robot.coordinate_names if what == "q" else robot.rate_names
-    moves = [i for i in places if (values[:, i] != values[0, i]).any()] or list(places)
+    moves = [i for i in indices if (values[:, i] != values[0, i]).any()] or list(indices)
     _lines(
-        axes, t, values[:, moves], [names[i] for i in moves] if len(moves) <= _NAMED else [""] * len(moves)
+        axes,
+        t,
+        values[:, moves],
+        [names[i] for i in moves] if len(moves) <= _MOST_NAMES else [""] * len(moves),
     )
     bounded, crosses = False, "outside the limits"
     for k, (i, lower, upper) in enumerate((i, *_limits(robot, what, i)) for i in moves):
         for bound in filter(np.isfinite, (lower, upper)):
             axes.axhline(bound, color=COLOURS[k % 7], linestyle=STYLES[k % 7], linewidth=0.6)
             bounded = True
-        # As everywhere, a bound printed in decimal is no violation where it is one unit in the last place.
+        # A deviation of one unit in the last place is no violation, since limits are printed in decimal.
         outside = (values[:, i] < np.nextafter(lower, -np.inf)) | (values[:, i] > np.nextafter(upper, np.inf))
         if outside.any():
             axes.plot(t[outside], values[outside, i], "x", color="#B00020", markersize=3.0, label=crosses)
             crosses = ""
-    said = f"{unit}{_PER[what]}" if unit else "quaternion"
-    axes.set_ylabel(f"{what} [{said}]" + ("\nthin: limits" if bounded else ""))
+    name = f"{unit}{_PER[what]}" if unit else "quaternion"
+    axes.set_ylabel(f"{what} [{name}]" + ("\nthin: limits" if bounded else ""))
 
 
 def _limits(robot: Robot, what: str, i: int) -> tuple[float, float]:
@@ -206,28 +213,30 @@ def _limits(robot: Robot, what: str, i: int) -> tuple[float, float]:
 
 
 _PANEL = (5.2, 2.3)
-#: Letters of the foot that an inch has room for.
+#: Letters of the footer that fit into an inch.
 _LETTERS = 15
-#: Letters that an axis' width has room for in its legend, and how many of them a line's own mark takes.
+#: Letters that fit into the width of a legend, and the width of a line's marker in letters.
 _LETTERS_OF_LEGEND, _HANDLE = 80, 8
-#: What a check says nothing about.
-_RATES_UNCHECKED = "Pinocchio checks the formulas at these q, v and a, not whether v and a are the rates of q"
+#: Limit of the check when v and a were not computed exactly from q.
+_RATES_UNCHECKED = (
+    "Pinocchio checks the formulas at these q, v and a, not whether v and a are the derivatives of q"
+)
 
 
 def sheet(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Sequence[str] = ()) -> Figure:
-    """A figure of two columns.
+    """Return a figure with the panels in two columns.
 
     Args:
         robot: The robot.
         x: The frame's motion along the trajectory.
-        trajectory: When, and how its rates were found.
-        panels: Names out of `COORDINATES` and `PANELS`; none means all.
+        trajectory: The trajectory, with the source of v and a.
+        panels: Names from `COORDINATES` and `PANELS`; empty means all.
 
     Raises:
-        UnknownNameError: no such panel.
+        UnknownNameError: an unknown panel.
         InputError: matplotlib is not installed.
     """
-    drawn = _drawn(robot, trajectory, list(panels) or [*COORDINATES, *PANELS])
+    drawn = _panels(robot, trajectory, list(panels) or [*COORDINATES, *PANELS])
     columns = min(2, len(drawn))
     rows = -(-len(drawn) // columns)
     with style(font_size=9):
@@ -254,7 +263,7 @@ def sheet(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Sequence
     return figure
 
 
-def _drawn(robot: Robot, trajectory: Trajectory, names: Sequence[str]) -> list[Panel]:
+def _panels(robot: Robot, trajectory: Trajectory, names: Sequence[str]) -> list[Panel]:
     found = list[Panel]()
     for name in names:
         if name in COORDINATES:
@@ -267,7 +276,7 @@ def _drawn(robot: Robot, trajectory: Trajectory, names: Sequence[str]) -> list[P
 
 
 def way(x: FrameMotion, trajectory: Trajectory) -> str:
-    """From where to where the frame goes, and in which time."""
+    """Return a line with the start, the end and the duration of the frame's motion."""
     ends = [
         "({})".format(", ".join(f"{p:.3g}" for p in x.placement[k, :3, 3].round(9) + 0.0)) for k in (0, -1)
     ]
@@ -275,7 +284,7 @@ def way(x: FrameMotion, trajectory: Trajectory) -> str:
 
 
 def foot(x: FrameMotion, trajectory: Trajectory) -> str:
-    """What was checked, and what was not, in a line."""
+    """Return a line with the result of the check, and the values that were not checked."""
     rates = f"rates {trajectory.rates}" + (", exactly" if trajectory.exact else f"; {_RATES_UNCHECKED}")
     if x.not_verified is not None:
         return f"NOT VERIFIED by Pinocchio {version()}: {x.not_verified}; {rates}"

@@ -1,6 +1,6 @@
-"""The border to trimesh: mesh files as vertices and faces.
+"""Read the visual shapes of a URDF's links, and load mesh files with trimesh.
 
-What a URDF says about the looks of its links; kinematics never asks.
+Only the viewer uses this module; kinematics needs no shapes.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.packages import find_package, split_uri
 from urdfkin.urdf.plain_xml import plain_xml
 
-#: Bytes of a mesh, a material or a texture; what is larger is not shown.
+#: Largest size of a mesh, material or texture file in bytes; larger files are not shown.
 LARGEST_FILE = 200_000_000
 
 
 @lru_cache(maxsize=256)
 def _read(file: Path) -> Any:
-    import trimesh  # noqa: PLC0415  half a second
+    import trimesh  # noqa: PLC0415  the import takes half a second
 
-    class Beside(trimesh.resolvers.FilePathResolver):
-        """Materials and textures: regular files in the mesh's folder or below it."""
+    class SameFolder(trimesh.resolvers.FilePathResolver):
+        """Finds materials and textures: regular files in the mesh's folder or below it."""
 
         def get(self, name: str) -> bytes:
             folder = Path(self.parent).resolve()
@@ -46,11 +46,11 @@ def _read(file: Path) -> Any:
 
     data = io.BytesIO(read_bytes(file, LARGEST_FILE))
     kind = file.suffix.lower().removeprefix(".")
-    return trimesh.load(data, file_type=kind, resolver=Beside(str(file)), force="scene", process=False)
+    return trimesh.load(data, file_type=kind, resolver=SameFolder(str(file)), force="scene", process=False)
 
 
 def mesh(shape: Shape) -> Any | None:
-    """A trimesh.Trimesh in the link's axes, coloured as the URDF or the file says; None if unreadable."""
+    """Return a coloured trimesh.Trimesh in the link's axes; None if the file is unreadable."""
     import trimesh  # noqa: PLC0415
 
     if shape.file is None:
@@ -69,7 +69,7 @@ def mesh(shape: Shape) -> Any | None:
     return whole
 
 
-#: The colour of what has none, as people expect metal.
+#: Default colour: that of metal.
 GREY = (0.72, 0.74, 0.78, 1.0)
 
 
@@ -81,9 +81,9 @@ class Shape:
         link: The link's name.
         kind: "box", "cylinder", "sphere" or "mesh".
         size: Box: x, y, z; cylinder: radius, length; sphere: radius; mesh: scale x, y, z. Metres.
-        T_link_shape: (4, 4).
-        colour: Red, green, blue, opacity in 0 to 1; None leaves it to a mesh's own.
-        file: The mesh's file; None for the others, and where it cannot be found.
+        T_link_shape: (4, 4) pose of the shape in the link's frame.
+        colour: Red, green, blue, opacity in 0 to 1; None: the colours of the mesh file.
+        file: The mesh's file; None for other kinds, and for a file that is not found.
     """
 
     link: str
@@ -95,29 +95,30 @@ class Shape:
 
     @property
     def missing(self) -> bool:
-        """Whether it is a mesh whose file is not there."""
+        """Whether the shape is a mesh without a file."""
         return self.kind == "mesh" and self.file is None
 
 
 def shapes(robot: Robot) -> list[Shape]:
-    """Every visual of a robot that was loaded: its text passed every check, so that it can be read plainly.
+    """Return all visuals of a robot.
 
-    What is malformed about a visual is skipped: it says nothing about motion.
+    The URDF of a loaded robot is already checked, so the plain XML parser is safe. A malformed visual is
+    skipped, because it does not affect the kinematics.
     """
     root = plain_xml(robot.urdf)
-    beside = _file_of(robot)
+    urdf_file = _file_of(robot)
     materials = {m.get("name"): _rgba(m) for m in root.findall("material") if m.find("color") is not None}
     found = []
     for link in root.findall("link"):
         for visual in link.findall("visual"):
-            shape = _shape(link.get("name", ""), visual, materials, beside)
+            shape = _shape(link.get("name", ""), visual, materials, urdf_file)
             if shape is not None:
                 found.append(shape)
     return found
 
 
 def _file_of(robot: Robot) -> Path | None:
-    """The file a robot came from, beside which meshes are looked for."""
+    """Return the file of a robot, whose folder is searched for meshes, or None."""
     entry = catalogue().get(robot.source)
     path = entry.path if entry is not None else Path(robot.source)
     try:
@@ -130,7 +131,7 @@ def _shape(
     link: str,
     visual: Element,
     materials: dict[str | None, tuple[float, float, float, float] | None],
-    beside: Path | None,
+    urdf_file: Path | None,
 ) -> Shape | None:
     geometry = visual.find("geometry")
     if geometry is None or len(geometry) == 0:
@@ -141,7 +142,7 @@ def _shape(
     size = _size(element)
     if T is None or size is None:
         return None
-    file = mesh_file(element.get("filename", ""), beside) if element.tag == "mesh" else None
+    file = mesh_file(element.get("filename", ""), urdf_file) if element.tag == "mesh" else None
     return Shape(link, element.tag, size, T, colour, file)
 
 
@@ -179,25 +180,28 @@ def _rgba(material: Element) -> tuple[float, float, float, float] | None:
     return r, g, b, a
 
 
-def mesh_file(address: str, beside: Path | None) -> Path | None:
-    """The file of a mesh's address, or None: `package://`, `file://`, or a path beside the URDF."""
-    candidates = list(_candidates(address, beside))
+def mesh_file(address: str, urdf_file: Path | None) -> Path | None:
+    """Return the file of a mesh's address, or None.
+
+    The address is `package://`, `file://`, or a path relative to the URDF's folder.
+    """
+    candidates = list(_candidates(address, urdf_file))
     try:
         return next((path for path in candidates if path.is_file()), None)
     except OSError:
         return None
 
 
-def _candidates(address: str, beside: Path | None) -> Iterator[Path]:
+def _candidates(address: str, urdf_file: Path | None) -> Iterator[Path]:
     if not address or "\0" in address:
         return
     if (parts := split_uri(address)) is not None:
-        # Some files write a third slash before the package's name.
+        # Some files have a third slash before the package's name.
         name, path = parts if parts[0] else parts[1].partition("/")[::2]
-        package = find_package(name, beside)
+        package = find_package(name, urdf_file)
         if package is not None:
             yield package / path
     elif address.startswith("file://"):
         yield Path(unquote(urlsplit(address).path))
     elif "://" not in address:
-        yield (beside.parent if beside is not None else Path()) / address
+        yield (urdf_file.parent if urdf_file is not None else Path()) / address

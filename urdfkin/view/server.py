@@ -1,28 +1,25 @@
-"""Open the viewer's page in the user's browser, without telling its key to others.
+"""Start viser's web server so that only this user's browser can use it, and open its page.
 
-What a program is started with, every user of a machine can see; what lies in a folder of this user's alone,
-nobody else can read. So the browser is started with a file that sends it on.
+A web server on 127.0.0.1 can be reached by every page in the user's browser and by every user of the machine.
+Four independent measures keep them out:
 
+| measure | protects against |
+|---|---|
+| a **key** of 128 random bits in the address | other users of the machine, other pages |
+| a check of the **Host** header | another host name that an attacker points at this machine (DNS rebinding) |
+| a check of the **Origin** header | another page that opens a WebSocket, which browsers allow |
+| security **headers** of the page | embedding in a frame, foreign scripts, connections to other servers |
 
-Who may talk to the viewer: this user's browser, on the viewer's own page, and nobody else.
+`RequestFilter` decides about requests; it does not depend on viser or a network.
 
-A web server on 127.0.0.1 is within reach of every page that the user has open and of every user of the
-machine. Four things keep them out, and none relies on another:
+Viser checks neither Host nor Origin and has no option for it. It starts its web server by a call of
+`websockets.asyncio.server.serve`. This module replaces that call and answers the requests itself. Before a
+robot is shown, the module tests the running server with requests that it must refuse. It stops the server if
+one of them is accepted.
+A new version of viser can therefore make the viewer fail, but it cannot make it insecure.
 
-- the **key**, 128 random bits in the address: other users of the machine do not know it, nor do other pages;
-- the **Host** that is asked for, which a name that an attacker points at this machine is not (DNS rebinding);
-- the **Origin** of a connection, which is the viewer's own page (a browser lets any page open a WebSocket);
-- **headers** for the page: shown in no frame, running no script but its own, connecting to nothing but this.
-
-This module knows neither viser nor a network: a request goes in, a refusal comes out.
-
-
-The border to viser's server: it answers through the gate or not at all.
-
-Viser checks neither Host nor Origin and offers no way to: its web server is begun inside a method, by a call
-of `websockets.asyncio.server.serve`. That one call is made through here, with an answer of our own in place
-of viser's. Nothing is taken on trust: before a robot is shown, the server that runs is asked what it must
-refuse, and it is ended if it does not. A new version of viser can make the viewer fail, but not open it.
+The address is not passed to the browser on its command line, which every user of the machine can read. The
+browser opens a file in a private folder instead, which redirects it.
 """
 
 from __future__ import annotations
@@ -53,14 +50,14 @@ from urdfkin.system.processes import lock_over_forks
 
 
 def has_screen() -> bool:
-    """Whether a browser that is started can be seen: not over ssh, nor in a container."""
+    """Return whether a started browser is visible: not over ssh and not in a container."""
     return sys.platform == "darwin" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 @contextmanager
 def opened_page(address: str) -> Iterator[None]:
-    """While open, a file stands that leads to the address, and the user's browser was asked to show it."""
-    with tempfile.TemporaryDirectory(prefix="urdfkin-") as folder:  # of this user alone
+    """Open the address in the user's browser, by a temporary file that redirects to it."""
+    with tempfile.TemporaryDirectory(prefix="urdfkin-") as folder:  # readable by this user only
         page = Path(folder) / "view.html"
         page.write_text(f'<meta http-equiv="refresh" content="0; url={html.escape(address)}">', "utf-8")
         webbrowser.open(page.as_uri())
@@ -69,7 +66,7 @@ def opened_page(address: str) -> Iterator[None]:
 
 _HOST = re.compile(r"(?:\[(?P<six>[0-9a-fA-F:.]+)\]|(?P<name>[A-Za-z0-9._-]+))(?P<port>:[0-9]{1,5})?")
 
-#: For every answer: nothing is kept, guessed, embedded elsewhere or told to others, the key least of all.
+#: Headers of every response: no caching, no type guessing, no embedding, no leak of the key by a referrer.
 HEADERS = {
     "Cache-Control": "no-store",
     "Cross-Origin-Opener-Policy": "same-origin",
@@ -82,46 +79,46 @@ HEADERS = {
 
 @dataclass(frozen=True, slots=True)
 class RequestFilter:
-    """What a request must have.
+    """Accepts or refuses requests.
 
     Attributes:
-        host: The address the server listens on, as the user gave it.
-        key: The first and only part of every path.
+        host: The address that the server listens on, as given by the user.
+        key: The key, which must be the whole path of every request.
     """
 
     host: str
     key: str
 
     def refusal(self, path: str, hosts: list[str], origins: list[str], *, connects: bool) -> str | None:
-        """Why a request is refused, in one sentence; None when it may pass.
+        """Return the reason to refuse a request, or None for an allowed request.
 
         Args:
-            path: As it was asked for.
-            hosts: Every Host header.
-            origins: Every Origin header.
-            connects: Whether it asks for a WebSocket, which needs an Origin; a page that is opened has none.
+            path: The requested path.
+            hosts: All Host headers.
+            origins: All Origin headers.
+            connects: Whether the request opens a WebSocket, which needs an Origin; a page request has none.
 
         Example:
-            >>> gate = RequestFilter("127.0.0.1", "key")
-            >>> gate.refusal("/key/", ["localhost:8080"], [], connects=False)
-            >>> gate.refusal("/key/", ["rebound.example:8080"], [], connects=False)
-            'this address is not known by that name'
-            >>> gate.refusal("/key", ["localhost:8080"], ["http://localhost:3000"], connects=True)
-            'another page may not use this viewer'
+            >>> requests = RequestFilter("127.0.0.1", "key")
+            >>> requests.refusal("/key/", ["localhost:8080"], [], connects=False)
+            >>> requests.refusal("/key/", ["rebound.example:8080"], [], connects=False)
+            'the Host name in the request is not the name of this viewer'
+            >>> requests.refusal("/key", ["localhost:8080"], ["http://localhost:3000"], connects=True)
+            'another page may not connect to this viewer'
         """
         if len(hosts) != 1 or not self._is_known(hosts[0]):
-            return "this address is not known by that name"
+            return "the Host name in the request is not the name of this viewer"
         if not hmac.compare_digest(path.partition("?")[0].strip("/").encode(), self.key.encode()):
-            return "open the whole address that `urdfkin view` has printed: it holds the key"
+            return "open the whole address that `urdfkin view` printed, with its key"
         if origins != [f"http://{hosts[0]}"] and (connects or origins):
-            return "another page may not use this viewer"
+            return "another page may not connect to this viewer"
         return None
 
     def _is_known(self, host: str) -> bool:
-        """Whether a browser that was sent here on purpose would ask for this name.
+        """Return whether a Host header may name this server.
 
-        A number cannot be pointed elsewhere; a name can, if it is not this machine's. The port may differ:
-        it does when it is forwarded.
+        An IP address cannot be redirected by DNS; a foreign host name can. The port is not checked, because
+        it differs when it is forwarded.
         """
         found = _HOST.fullmatch(host)
         if found is None:
@@ -142,7 +139,7 @@ class RequestFilter:
             return self.host.lower() == "localhost"
 
     def address(self, port: int) -> str:
-        """What to open in a browser on this machine."""
+        """Return the address to open in a browser on this machine."""
         name = "127.0.0.1" if self.host in ("", "0.0.0.0", "::") else self.host
         return f"http://{f'[{name}]' if ':' in name else name}:{port}/{self.key}/"
 
@@ -152,11 +149,11 @@ def _own_name() -> str:
 
 
 def policy(nonce: str, host: str) -> str:
-    """The page's Content-Security-Policy.
+    """Return the page's Content-Security-Policy.
 
-    Scripts need the nonce, which nothing knows that was written before this server began: names in a URDF
-    cannot bring their own. The page connects to this server alone, although viser's client would follow
-    `?websocket=` in its address to any other. Styles and images are drawn by the page itself.
+    Scripts need the nonce, which is random for each page, so names in a URDF cannot inject a script. The page
+    can connect only to this server; viser's client would otherwise connect to any server in `?websocket=`.
+    The page draws its styles and images itself.
     """
     return "; ".join(
         [
@@ -176,9 +173,9 @@ def policy(nonce: str, host: str) -> str:
 
 LOOPBACK = "127.0.0.1"
 
-#: What a client may say: that a control was moved. Where it looks from is told to its own connection.
-_HEARD = ("GuiUpdateMessage",)
-#: Where viser's page gets its nonce: its first script, and the script that this one makes.
+#: The only message type that the server accepts: a changed control. Connections handle camera messages.
+_ACCEPTED = ("GuiUpdateMessage",)
+#: Replacements that add the nonce to viser's page: its first script, and the script that this one creates.
 _SCRIPTS = (
     ("<script data-p=", '<script nonce="{nonce}" data-p='),
     ('e.type="module";', 'e.type="module";e.nonce="{nonce}";'),
@@ -187,22 +184,22 @@ _swapping = lock_over_forks()
 
 
 class UnguardedError(UrdfkinError, RuntimeError):
-    """Viser is not what this version of urdfkin knows how to guard: the viewer does not start."""
+    """The installed viser cannot be secured by this version of urdfkin, so the viewer does not start."""
 
     def __init__(self, what: str) -> None:
         super().__init__(
-            f"the viewer cannot be guarded: {what}",
+            f"the viewer cannot be secured: {what}",
             where=f"viser {_version()}",
-            remedy="pip install 'viser==1.1.1', with which it can, and report this",
+            remedy="pip install 'viser==1.1.1', which can be secured, and report this",
         )
 
 
 def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
-    """Viser's server behind the gate; `server.address` is what to open.
+    """Start viser's server with the request filter; `server.address` is the address to open.
 
     Raises:
-        InputError: viser is not installed, or the address is none of this machine's.
-        UnguardedError: viser has changed, and what must be refused would be answered.
+        InputError: viser is not installed, or `host` is not an address of this machine.
+        UnguardedError: this version of viser cannot be secured.
     """
     try:
         import viser  # noqa: PLC0415  an extra
@@ -210,47 +207,47 @@ def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
         raise InputError("the viewer needs viser", remedy="pip install 'urdfkin[view]'") from None
 
     class PrivateServer(viser.ViserServer):
-        """Viser's server, which publishes nothing."""
+        """Viser's server without sharing."""
 
         address: str
 
         def request_share_url(self, verbose: bool = True) -> str | None:
-            """Nothing: sharing would open a tunnel to a third party."""
+            """Return None: sharing would open a tunnel to a third party."""
             del verbose
             return None
 
     _require_address(host)
-    gate = RequestFilter(host, secrets.token_urlsafe(16))
-    # Viser prints an address without the key, which nobody can use.
-    with _answering(_answer(gate, _page())), contextlib.redirect_stdout(io.StringIO()):
+    requests = RequestFilter(host, secrets.token_urlsafe(16))
+    # Viser prints an address without the key, which is useless.
+    with _responding_with(_answer(requests, _page())), contextlib.redirect_stdout(io.StringIO()):
         server = PrivateServer(host=host, port=port, label="urdfkin", verbose=False)
     try:
         _silence(server)
-        _try_the_gate(gate, server.get_port())
+        _test_the_filter(requests, server.get_port())
     except BaseException:
         server.stop()
         raise
-    server.address = gate.address(server.get_port())
+    server.address = requests.address(server.get_port())
     return server
 
 
 def _require_address(host: str) -> None:
-    """Viser would look for a free port for ever."""
+    """Reject an address that cannot be listened on; viser would search for a free port forever."""
     try:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         with socket.create_server((host, 0), family=family):
             pass
     except OSError as error:
         raise InputError(
-            "nothing can listen there", where=f"--host {host}", found=error.strerror or str(error)
+            "cannot listen on this address", where=f"--host {host}", found=error.strerror or str(error)
         ) from error
 
 
-# -- the answer --------------------------------------------------------------------------------------
+# -- the response ------------------------------------------------------------------------------------
 
 
-def _answer(gate: RequestFilter, page: Callable[[str], bytes]) -> Callable[[Any, Any], Any]:
-    """What websockets asks before it connects anybody: a response, or None to go on."""
+def _answer(requests: RequestFilter, page: Callable[[str], bytes]) -> Callable[[Any, Any], Any]:
+    """Return websockets' callback for requests; the callback returns a response, or None to connect."""
     from websockets.datastructures import Headers  # noqa: PLC0415  with viser
     from websockets.http11 import Response  # noqa: PLC0415
 
@@ -261,7 +258,7 @@ def _answer(gate: RequestFilter, page: Callable[[str], bytes]) -> Callable[[Any,
     def answer(_: Any, request: Any) -> Response | None:
         hosts, origins = request.headers.get_all("Host"), request.headers.get_all("Origin")
         connects = bool(request.headers.get_all("Upgrade"))
-        refusal = gate.refusal(request.path, hosts, origins, connects=connects)
+        refusal = requests.refusal(request.path, hosts, origins, connects=connects)
         if refusal is not None:
             return response(http.HTTPStatus.FORBIDDEN, "text/plain", f"urdfkin: {refusal}\n".encode())
         if connects:
@@ -274,16 +271,16 @@ def _answer(gate: RequestFilter, page: Callable[[str], bytes]) -> Callable[[Any,
 
 
 def _page() -> Callable[[str], bytes]:
-    """Viser's page, the one file that its client is, for any nonce."""
+    """Return a function that returns viser's page, a single file, with a given nonce."""
     import viser  # noqa: PLC0415  an extra
 
     file = Path(viser.__file__).parent / "client" / "build" / "index.html"
     try:
         text = file.read_text(encoding="utf-8")
     except OSError as error:
-        raise UnguardedError("its page is not where it was") from error
+        raise UnguardedError("its page is not at the expected path") from error
     if text.count("<script") != 1 or any(text.count(plain) != 1 for plain, _ in _SCRIPTS):
-        raise UnguardedError("its page has other scripts than it had")
+        raise UnguardedError("its page has unexpected scripts")
 
     def page(nonce: str) -> bytes:
         marked = text
@@ -295,8 +292,8 @@ def _page() -> Callable[[str], bytes]:
 
 
 @contextlib.contextmanager
-def _answering(answer: Callable[[Any, Any], Any]) -> Iterator[None]:
-    """While viser starts, the server that it begins answers as we say, and logs nothing of strangers."""
+def _responding_with(answer: Callable[[Any, Any], Any]) -> Iterator[None]:
+    """While viser starts its server, make it answer with `answer` and log nothing about refused requests."""
     from websockets.asyncio import server as module  # noqa: PLC0415  with viser
 
     plain: Any = module.serve
@@ -307,37 +304,37 @@ def _answering(answer: Callable[[Any, Any], Any]) -> Iterator[None]:
         return plain(*words, **(options | {"process_request": answer, "logger": logger}))
 
     with _swapping:
-        setattr(module, "serve", serve)  # noqa: B010  a function of a module, says mypy
+        setattr(module, "serve", serve)  # noqa: B010  mypy rejects a plain assignment
         try:
             yield
         finally:
             setattr(module, "serve", plain)  # noqa: B010
 
 
-# -- what is made sure of ----------------------------------------------------------------------------
+# -- checks of the server -----------------------------------------------------------------------------
 
 
 def _silence(server: Any) -> None:
-    """Take away what viser would do for a client and nothing here has use for: sharing, uploads, commands."""
+    """Remove viser's handlers of client messages that are not needed: sharing, uploads, commands."""
     try:
         known = server._websock_server
         for message in list(known._incoming_handlers):
-            if message.__name__ not in _HEARD:
+            if message.__name__ not in _ACCEPTED:
                 known.unregister_handler(message)
         left = {message.__name__ for message in known._incoming_handlers}
     except (AttributeError, AssertionError) as error:
-        raise UnguardedError("what it listens to cannot be told") from error
-    if left != set(_HEARD):
-        raise UnguardedError(f"it listens to {', '.join(sorted(left)) or 'nothing'}")
+        raise UnguardedError("its message handlers cannot be listed") from error
+    if left != set(_ACCEPTED):
+        raise UnguardedError(f"it accepts the messages {', '.join(sorted(left)) or '(none)'}")
 
 
-def _try_the_gate(gate: RequestFilter, port: int) -> None:
-    """Ask the server that runs: it must know its page, and refuse three kinds of strangers.
+def _test_the_filter(requests: RequestFilter, port: int) -> None:
+    """Test the running server: it must return its own page and refuse four kinds of foreign requests.
 
     Raises:
-        UnguardedError: it does not.
+        UnguardedError: a response was not as expected.
     """
-    host = gate.address(port).split("/")[2]
+    host = requests.address(port).split("/")[2]
     socket_ = {
         "Upgrade": "websocket",
         "Connection": "Upgrade",
@@ -346,10 +343,15 @@ def _try_the_gate(gate: RequestFilter, port: int) -> None:
     }
     here, there = {"Host": host}, {"Host": "rebound.invalid"}
     cases: tuple[tuple[str, str, dict[str, str], int], ...] = (
-        ("its own page", f"/{gate.key}/", here, 200),
+        ("its own page", f"/{requests.key}/", here, 200),
         ("a page without the key", "/", here, 403),
-        ("a page under another name", f"/{gate.key}/", there, 403),
-        ("another page's connection", f"/{gate.key}", here | socket_ | {"Origin": "http://x.invalid"}, 403),
+        ("a page under another name", f"/{requests.key}/", there, 403),
+        (
+            "another page's connection",
+            f"/{requests.key}",
+            here | socket_ | {"Origin": "http://x.invalid"},
+            403,
+        ),
         ("a connection without the key", "/", here | socket_ | {"Origin": f"http://{host}"}, 403),
     )
     for what, path, headers, expected in cases:

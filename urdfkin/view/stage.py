@@ -1,11 +1,9 @@
-"""What is drawn over a robot: joint velocities, the ellipsoid of velocity, the acceleration's parts.
+"""Draw a robot in viser's scene, with arrows, the velocity ellipsoid and Denavit-Hartenberg frames.
 
-The columns of the Jacobian are the frame's velocities for unit rates (7.85); joint rates of length one fill
-an ellipsoid whose axes are the left singular vectors, its half-lengths the singular values; the acceleration
-is the sum of its transverse, centripetal, Coriolis and sliding parts (7.125, 7.130).
-
-
-The border to viser: a robot's picture, which is told where things are and draws them.
+- The columns of the Jacobian are the frame's velocities for unit joint velocities (7.85).
+- The frame velocities for joint velocities of length one fill an ellipsoid. Its axes are the left singular
+  vectors, its half-lengths the singular values.
+- The acceleration is the sum of its transverse, centripetal, Coriolis and sliding parts (7.125, 7.130).
 """
 
 from __future__ import annotations
@@ -33,7 +31,7 @@ PART_COLOURS = {
     "sum": (30, 30, 30),
 }
 LINEAR, ANGULAR = (0, 114, 178), (204, 121, 167)
-#: The largest arrow is this part of the robot's reach.
+#: Length of the longest arrow as a fraction of the robot's reach.
 _SHARE = 0.3
 
 
@@ -42,9 +40,9 @@ class Arrows:
     """Arrows in the world.
 
     Attributes:
-        points: (n, 2, 3) from and to, metres.
-        colours: (n, 3) 0 to 255.
-        names: One for each.
+        points: (n, 2, 3) start and end of each arrow, metres.
+        colours: (n, 3) red, green, blue, 0 to 255.
+        names: (n,) name of each arrow.
     """
 
     points: FloatArray
@@ -54,7 +52,13 @@ class Arrows:
 
 @dataclass(frozen=True, eq=False)
 class Ellipsoid:
-    """Half-lengths (3,) in metres as drawn, centre (3,), orientation (4,) scalar first."""
+    """An ellipsoid in the world.
+
+    Attributes:
+        half: (3,) half-lengths in metres, as drawn.
+        centre: (3,) metres.
+        wxyz: (4,) orientation, scalar first.
+    """
 
     half: FloatArray
     centre: FloatArray
@@ -62,27 +66,29 @@ class Ellipsoid:
 
 
 def jacobian_arrows(x: FrameMotion, rates: tuple[str, ...], reach: float, *, angular: bool) -> Arrows:
-    """The frame's velocity for a unit rate of each joint alone, in world axes, from the frame's origin.
+    """Return arrows for the columns of the Jacobian, in world axes, starting at the frame's origin.
+
+    Each column is the frame's velocity when one joint moves with unit velocity.
 
     Args:
         x: A motion of one sample in LOCAL_WORLD_ALIGNED.
-        rates: A name for each column.
-        reach: The robot's size, for the arrows' scale.
-        angular: Angular velocities instead of linear ones.
+        rates: The name of each column.
+        reach: The robot's size in metres; it scales the arrows.
+        angular: Whether to draw angular instead of linear velocities.
     """
     rows = slice(3, 6) if angular else slice(0, 3)
     columns = x.jacobian[0, rows].T
     keep = np.linalg.norm(columns, axis=1) > 1e-9
     colour = ANGULAR if angular else LINEAR
-    names = tuple(name for name, kept in zip(rates, keep, strict=True) if kept)
+    names = tuple(name for name, used in zip(rates, keep, strict=True) if used)
     return _arrows(x, columns[keep], [colour] * int(keep.sum()), names, reach)
 
 
 def acceleration_arrows(x: FrameMotion, reach: float) -> Arrows:
-    """The parts of the frame's linear acceleration and their sum, in world axes, from the frame's origin."""
+    """Return arrows for the parts of the frame's linear acceleration and their sum, in world axes."""
     parts = np.vstack([x.parts.by_kind[0, :, :3], x.acceleration[0, :3]])
     keep = np.linalg.norm(parts, axis=1) > 1e-9
-    names = tuple(name for name, kept in zip((*KINDS, "sum"), keep, strict=True) if kept)
+    names = tuple(name for name, used in zip((*KINDS, "sum"), keep, strict=True) if used)
     return _arrows(x, parts[keep], [PART_COLOURS[name] for name in names], names, reach)
 
 
@@ -101,14 +107,14 @@ def _arrows(
 
 
 def velocity_ellipsoid(x: FrameMotion, reach: float, *, angular: bool = False) -> Ellipsoid:
-    """Where the frame's velocity can point for joint rates of length one.
+    """Return the ellipsoid of the frame's velocities for joint velocities of length one.
 
-    A direction that no joint moves is drawn as thin as can be seen.
+    A direction without motion is drawn with the smallest visible thickness.
 
     Args:
         x: A motion of one sample in LOCAL_WORLD_ALIGNED.
-        reach: The robot's size, for the scale.
-        angular: Of the angular velocity.
+        reach: The robot's size in metres; it scales the ellipsoid.
+        angular: Whether to use the angular instead of the linear velocity.
     """
     J = x.jacobian[0, slice(3, 6) if angular else slice(0, 3)]
     full = np.hstack([J, np.zeros((3, max(0, 3 - J.shape[1])))])
@@ -121,25 +127,25 @@ def velocity_ellipsoid(x: FrameMotion, reach: float, *, angular: bool = False) -
 
 
 def scalar_first(R: FloatArray) -> FloatArray:
-    """(..., 4) quaternions (w, x, y, z), as viewers want them."""
+    """Return (..., 4) quaternions (w, x, y, z) of rotations, in viser's order."""
     return np.asarray(np.roll(quaternion_of(R), 1, axis=-1), dtype=np.float64)
 
 
 _BONE, _TURN, _SLIDE = (142, 153, 168), (47, 111, 208), (208, 122, 28)
-#: How the shapes can be seen, and which names stand beside the frames.
+#: Display modes of the shapes, and names that can be shown beside the frames.
 SOLID, SEE_THROUGH = "solid", "see-through"
 SHAPES = (SOLID, SEE_THROUGH, "hidden")
 NAMES = ("none", "links", "joints")
-#: How much of what lies behind a shape that is seen through it hides.
-_THIN = 0.3
+#: Opacity of transparent shapes.
+_OPACITY = 0.3
 _NORMAL, _OFFSET = (194, 52, 139), (22, 128, 138)
 
 
 class Stage:
-    """A robot in viser's scene: links as frames, shapes or a skeleton below them, overlays beside them.
+    """A robot in viser's scene: frames of the links with shapes or a skeleton, and overlays.
 
     Attributes:
-        missing: Meshes that could not be shown.
+        missing: Meshes that cannot be shown.
         reach: The robot's size in metres.
     """
 
@@ -169,14 +175,14 @@ class Stage:
         self._labels = {kind: self._add_names(kind, tree) for kind in NAMES[1:]}
         self._skeleton: list[Any] = []
         self._shapes: list[tuple[Shape, Any]] = []
-        self._ghosts: list[Any] = []
+        self._transparent: list[Any] = []
         bare = self._add_shapes(tree)
         self._add_skeleton(tree, Ts)
         self.show(shapes=SOLID, skeleton=bare, axes=False, names=NAMES[0])
         self._dh: list[Any] = []
 
     def _add_shapes(self, tree: KinematicTree) -> bool:
-        """Returns whether so little can be shown that the skeleton is wanted."""
+        """Add the shapes; return whether some are missing, so that the skeleton is needed."""
         self.missing: list[Shape] = []
         for k, shape in enumerate(shapes(self.robot)):
             handle = self._add_shape(f"/robot/{tree.link_index(shape.link)}/shape{k}", shape)
@@ -227,7 +233,7 @@ class Stage:
                 )
 
     def _add_names(self, kind: str, tree: KinematicTree) -> list[Any]:
-        """Names of links, or of the joints that move, each where its frame is."""
+        """Add labels of the links or the moving joints at their frames."""
         of_joints = [joint.name if joint.kind.nv else "" for joint in tree.joints]
         words = tree.links if kind == "links" else ("", *of_joints)
         return [
@@ -242,25 +248,25 @@ class Stage:
             if word
         ]
 
-    def _add_ghosts(self) -> list[Any]:
-        """The shapes once more, to be seen through: made when somebody first asks for them."""
-        ghosts = []
+    def _add_transparent(self) -> list[Any]:
+        """Add transparent copies of the shapes; this happens at their first use."""
+        copies = []
         for shape, solid in self._shapes:
-            name = f"{solid.name}-ghost"
+            name = f"{solid.name}-transparent"
             if shape.kind != "mesh":
-                ghosts.append(self._add_shape(name, replace(shape, colour=(*GREY[:3], _THIN))))
+                copies.append(self._add_shape(name, replace(shape, colour=(*GREY[:3], _OPACITY))))
             elif (whole := mesh(shape)) is not None:
-                look = {"color": tuple(round(255 * x) for x in GREY[:3]), "opacity": _THIN}
-                ghosts.append(self._scene.add_mesh_simple(name, whole.vertices, whole.faces, **look))
-        return ghosts
+                look = {"color": tuple(round(255 * x) for x in GREY[:3]), "opacity": _OPACITY}
+                copies.append(self._scene.add_mesh_simple(name, whole.vertices, whole.faces, **look))
+        return copies
 
     def look(self) -> None:
-        """Everybody looks from where they began."""
+        """Reset the camera of every client."""
         for client in self._server.get_clients().values():
             self._look(client)
 
     def _look(self, client: Any) -> None:
-        """Past the panel, which covers the lower half of a telephone."""
+        """Set the camera of a client; on a phone, shift the robot above the panel in the lower half."""
         down = np.zeros(3)
         if client.camera.aspect < 1.0:
             down[2] = -0.35 * float(np.linalg.norm(self._camera - self._middle))
@@ -269,13 +275,13 @@ class Stage:
             client.camera.position, client.camera.look_at = self._camera + down, self._middle + down
 
     def show(self, *, shapes: str, skeleton: bool, axes: bool, names: str) -> None:
-        """Which parts are seen: `shapes` is one of `SHAPES`, `names` one of `NAMES`."""
+        """Show or hide parts: `shapes` is one of `SHAPES`, `names` one of `NAMES`."""
         self.skeleton_shown = skeleton
-        if shapes == SEE_THROUGH and not self._ghosts:
-            self._ghosts = self._add_ghosts()
+        if shapes == SEE_THROUGH and not self._transparent:
+            self._transparent = self._add_transparent()
         for _, handle in self._shapes:
             handle.visible = shapes == SOLID
-        for handle in self._ghosts:
+        for handle in self._transparent:
             handle.visible = shapes == SEE_THROUGH
         for kind, labels in self._labels.items():
             for handle in labels:
@@ -285,7 +291,7 @@ class Stage:
         self._axes.visible = axes
 
     def move(self, Ts: FloatArray) -> None:
-        """Put every link where (links, 4, 4) says."""
+        """Move all links to the placements (links, 4, 4)."""
         wxyzs, positions = scalar_first(Ts[:, :3, :3]), Ts[:, :3, 3]
         with self._server.atomic():
             for link, wxyz, position in zip(self._links, wxyzs, positions, strict=True):
@@ -295,7 +301,7 @@ class Stage:
     # -- overlays ------------------------------------------------------------------------------------
 
     def arrows(self, name: str, arrows: Arrows | None) -> None:
-        """Draw arrows in place of what had the same name; None draws none."""
+        """Replace the arrows of a name; None removes them."""
         size = 0.008 * self.reach
         none = arrows is None or not len(arrows.points)
         self._scene.add_arrows(
@@ -309,7 +315,7 @@ class Stage:
         )
 
     def ellipsoid(self, shape: Ellipsoid | None) -> None:
-        """Draw the ellipsoid of velocity; None draws none."""
+        """Draw the velocity ellipsoid; None removes it."""
         self._scene.add_icosphere(
             "/ellipsoid",
             radius=1.0,
@@ -322,7 +328,7 @@ class Stage:
         )
 
     def table(self, table: DHTable | None, q: FloatArray, T_world_base: FloatArray) -> None:
-        """Draw a table's frames, offsets d and common normals a at its own coordinates; None draws none."""
+        """Draw a table's frames, offsets d and lengths a at the table's coordinates; None removes them."""
         for handle in self._dh:
             handle.remove()
         self._dh = []
@@ -355,10 +361,10 @@ class Stage:
 
 
 def _segments(table: DHTable, q: FloatArray, frames: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """(rows, 3) each: where a row's frame begins, turns from its first axis to its second, and ends."""
+    """Return the start, the corner between the two segments, and the end of each row, (rows, 3) each."""
     starts, ends = frames[:-1, :3, 3], frames[1:, :3, 3]
     if str(table.convention) == "standard":
-        # d along the old z, then a along the new x.
+        # d along the previous z axis, then a along the new x axis.
         a = np.array([row.a for row in table.rows]).reshape(-1, 1)
         return starts, ends - a * frames[1:, :3, 0], ends
     a = np.array([row.a for row in table.rows]).reshape(-1, 1)
@@ -366,7 +372,7 @@ def _segments(table: DHTable, q: FloatArray, frames: FloatArray) -> tuple[FloatA
 
 
 def _towards(axis: FloatArray) -> FloatArray:
-    """(3, 3) a rotation whose z is `axis`."""
+    """Return a (3, 3) rotation with z axis `axis`."""
     side = np.eye(3)[int(np.abs(axis).argmin())]
     x = np.cross(side, axis)
     x = x / np.linalg.norm(x)

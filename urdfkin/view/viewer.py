@@ -1,12 +1,7 @@
-"""Sliders in a panel: numbers, each within its own limits, in degrees or radians, that follow what is set.
+"""The viewer: a panel with sliders and checked numbers beside the robot's picture.
 
-A slider says something only when a hand moves it, and then of its own number alone. What a program sets is
-shown by all of them and comes back from none.
-
-
-The numbers beside the picture, as Markdown, with what Pinocchio says of them.
-
-The viewer: controls on one side, the robot on the other, and between them the library with its check.
+A slider reports only changes by the user, and only of its own number. The sliders show values that the
+program sets, but do not report them.
 """
 
 from __future__ import annotations
@@ -41,24 +36,24 @@ from urdfkin.view.stage import (
     velocity_ellipsoid,
 )
 
-#: Limits further apart than this are those of wheels: as good as none.
+#: A joint with a larger range than this counts as unlimited, like a wheel.
 _FAR = 100.0
-#: How a slider steps: radians or metres, and degrees.
+#: Step of a slider: in radians or metres, and in degrees.
 _STEP, _DEGREES = 0.001, 0.1
 _DIGITS, _DIGITS_OF_DEGREES = 4, 2
-#: What is offered where a file says nothing: rad/s or m/s, and of their rates, for a joint and a base.
+#: Default ranges: joint velocity in rad/s or m/s, and joint acceleration in rad/s^2 or m/s^2.
 _RATE, _SECOND_RATE = 3.0, 5.0
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One number.
+    """The number of one slider.
 
     Attributes:
-        at: Its place among all.
-        name: What it is called.
-        turns: Whether it is an angle, or an angle's rate.
-        lower, upper: Between which it is offered.
+        at: Index in the vector.
+        name: Name of the number.
+        turns: Whether it is an angle or a derivative of an angle.
+        lower, upper: Range of the slider.
     """
 
     at: int
@@ -72,11 +67,11 @@ class Sliders:
     """A slider for each row, in a folder of a panel.
 
     Args:
-        gui: Viser's.
-        folder: Where they stand.
-        rows: What they are for.
-        rate: What stands after a unit: "", "/s" or "/s²".
-        moved: Told the place and the number when a hand moved one.
+        gui: Viser's GUI.
+        folder: The folder of the sliders.
+        rows: The numbers to show.
+        rate: Suffix of a unit: "", "/s" or "/s²".
+        moved: Called with the index and the number when the user moves a slider.
     """
 
     def __init__(
@@ -87,18 +82,18 @@ class Sliders:
         self.handles: list[Any] = []
 
     def build(self, values: FloatArray, *, degrees: bool) -> None:
-        """Put them there, in these units, in place of those that stand there."""
-        places = [handle.order for handle in self.handles] or [None] * len(self.rows)
+        """Create the sliders in the given unit, in place of the previous ones."""
+        orders = [handle.order for handle in self.handles] or [None] * len(self.rows)
         for handle in self.handles:
             handle.remove()
         self._degrees = degrees
         with self._folder:
             self.handles = [
-                self._slider(row, float(values[row.at]), place)
-                for row, place in zip(self.rows, places, strict=True)
+                self._slider(row, float(values[row.at]), order)
+                for row, order in zip(self.rows, orders, strict=True)
             ]
 
-    def _slider(self, row: Row, value: float, place: float | None) -> Any:
+    def _slider(self, row: Row, value: float, order: float | None) -> Any:
         scale = self._scale(row)
         lower, upper = self._range(row, value)
         unit = ("deg" if self._degrees else "rad") if row.turns else "m"
@@ -108,18 +103,18 @@ class Sliders:
             max=scale * upper,
             step=_DEGREES if row.turns and self._degrees else min(_STEP, (upper - lower) / 100),
             initial_value=scale * value,
-            order=place,
+            order=order,
         )
         handle.precision = _DIGITS_OF_DEGREES if row.turns and self._degrees else _DIGITS
-        handle.on_update(lambda _: self._said(row, handle))
+        handle.on_update(lambda _: self._report(row, handle))
         return handle
 
-    def _said(self, row: Row, handle: Any) -> None:
+    def _report(self, row: Row, handle: Any) -> None:
         if not self._setting:
             self._moved(row.at, float(handle.value) / self._scale(row))
 
     def show(self, values: FloatArray) -> None:
-        """Put every slider where its number is; one beyond its limits moves the slider's end."""
+        """Set all sliders to their numbers; a number beyond the range extends the range."""
         self._setting = True
         try:
             for row, handle in zip(self.rows, self.handles, strict=True):
@@ -127,7 +122,7 @@ class Sliders:
                 lower, upper = (scale * end for end in self._range(row, value))
                 if (handle.min, handle.max) != (lower, upper):
                     handle.min, handle.max = lower, upper
-                # A slider that a hand has just put there keeps what it says, to the digit.
+                # A slider that the user has just moved keeps its exact value.
                 if float(handle.value) / scale != value:
                     handle.value = scale * value
         finally:
@@ -143,7 +138,7 @@ class Sliders:
 
 
 def coordinate_rows(robot: Robot) -> list[Row]:
-    """A row for each coordinate that a slider can hold, within its joint's own limits: no quaternion's."""
+    """Return a row for each coordinate, with its joint's limits; quaternions have none."""
     rows = []
     for joint, at in zip(robot.tree.joints, robot.tree.q_index, strict=True):
         for k in range(min(joint.nq, 3)):
@@ -154,7 +149,7 @@ def coordinate_rows(robot: Robot) -> list[Row]:
 
 
 def rate_rows(robot: Robot, *, second: bool) -> list[Row]:
-    """A row for each rate, or rate of a rate."""
+    """Return a row for each joint velocity or, with `second`, for each joint acceleration."""
     rows = []
     for joint, at in zip(robot.tree.joints, robot.tree.v_index, strict=True):
         for k in range(joint.nv):
@@ -178,7 +173,7 @@ def _limits(joint: Joint, otherwise: float) -> tuple[float, float]:
 
 
 def within_limits(robot: Robot, q: FloatArray) -> FloatArray:
-    """The configuration nearest to `q` that every joint's limits allow, leaving quaternions alone."""
+    """Return the configuration nearest to `q` within all joint limits; quaternions are unchanged."""
     out = np.array(q, dtype=np.float64)
     for row in coordinate_rows(robot):
         out[row.at] = min(max(out[row.at], row.lower), row.upper)
@@ -186,12 +181,12 @@ def within_limits(robot: Robot, q: FloatArray) -> FloatArray:
 
 
 def written(values: FloatArray) -> str:
-    """Numbers as `--q` and `set_q` take them, to the last bit."""
+    """Return numbers in the exact form that `--q` and `set_q` read."""
     return ",".join(repr(float(value)) for value in values)
 
 
 def numbers(x: FrameMotion) -> str:
-    """Position, velocity, acceleration, singular values, and the check, of a motion of one sample."""
+    """Return position, velocity, acceleration, singular values and check of one sample, as Markdown."""
     rows = [
         ("position", "m", x.placement[0, :3, 3]),
         ("velocity", "m/s", x.velocity[0, :3]),
@@ -219,7 +214,7 @@ def numbers(x: FrameMotion) -> str:
 
 
 def check_line(x: FrameMotion) -> str:
-    """What Pinocchio says of the numbers shown."""
+    """Return a line with the result of Pinocchio's check."""
     if x.not_verified is not None:
         return f"**! not verified** by Pinocchio {version()}: {markdown_text(x.not_verified)}"
     figures = ", ".join(f"{quantity} {check.units[0]:.2g}" for quantity, check in x.checks.items())
@@ -228,7 +223,7 @@ def check_line(x: FrameMotion) -> str:
 
 
 def legend() -> str:
-    """Which colour each part of the acceleration has."""
+    """Return the legend of the acceleration's parts, with their colours."""
     return " ".join(
         f'<span style="color: rgb{colour}">■</span> {name}' for name, colour in PART_COLOURS.items()
     )
@@ -246,14 +241,14 @@ class Viewer:
     """A robot in a browser tab.
 
     Args:
-        server: Of `urdfkin.view.server.new_server`.
-        robot: What to show.
-        q: (nq,) where it begins; None: the neutral configuration, moved to within the limits.
+        server: The server from `urdfkin.view.server.new_server`.
+        robot: The robot to show.
+        q: (nq,) start configuration; None: the neutral configuration, moved to within the limits.
 
     Attributes:
-        q: (nq,) what the sliders say.
-        v: (nv,) its rate.
-        a: (nv,) the rate's rate.
+        q: (nq,) configuration of the sliders, rad and m.
+        v: (nv,) joint velocities.
+        a: (nv,) joint accelerations.
         motion: The chosen frame's motion in the chosen reference, checked.
     """
 
@@ -267,7 +262,7 @@ class Viewer:
         self._table: DHTable | None = None
         self._lock = threading.RLock()
         self._build()
-        self._say_q()
+        self._write_q()
         self.update()
 
     # -- controls ------------------------------------------------------------------------------------
@@ -282,7 +277,7 @@ class Viewer:
         self.sliders.build(self.q, degrees=False)
         with joints:
             self.words_of_q = gui.add_text(
-                "q, to copy or type", "", hint="As --q takes it: 0.5, 30deg, ready, ready,elbow=30deg."
+                "q, to copy or type", "", hint="The forms of --q: 0.5, 30deg, ready, ready,elbow=30deg."
             )
             self.wrong = gui.add_markdown("")
             neutral, random = gui.add_button("neutral, within the limits"), gui.add_button("random")
@@ -296,7 +291,7 @@ class Viewer:
             self.axes = gui.add_checkbox("link frames", initial_value=False)
             self.names = gui.add_dropdown("names", NAMES)
             self.columns = gui.add_dropdown("Jacobian's columns", ("none", "linear", "angular"))
-            self.ellipsoid = gui.add_dropdown("ellipsoid of velocity", ("none", "linear", "angular"))
+            self.ellipsoid = gui.add_dropdown("velocity ellipsoid", ("none", "linear", "angular"))
             self.parts = gui.add_checkbox("acceleration's parts", initial_value=False)
             gui.add_markdown(legend())
             self.dh = gui.add_dropdown("DH frames", ("none", "standard", "modified"))
@@ -305,7 +300,9 @@ class Viewer:
         self._build_rates()
         if self.stage.missing:
             count = len(self.stage.missing)
-            gui.add_markdown(f"{count} mesh{'es' if count > 1 else ''} could not be shown; the skeleton is.")
+            gui.add_markdown(
+                f"{count} mesh{'es' if count > 1 else ''} cannot be shown; the skeleton is shown."
+            )
         for handle in (self.frame, self.reference):
             handle.on_update(lambda _: self._choose())
         self.dh.on_update(lambda _: self._choose_convention())
@@ -321,10 +318,10 @@ class Viewer:
 
     def _build_rates(self) -> None:
         gui, robot = self.server.gui, self.robot
-        with gui.add_folder("Rates", expand_by_default=False):
-            rest, random = gui.add_button("at rest"), gui.add_button("random rates")
-            first = gui.add_folder("v, the rate of q", expand_by_default=True)
-            second = gui.add_folder("a, the rate of v", expand_by_default=False)
+        with gui.add_folder("Joint velocities, accelerations", expand_by_default=False):
+            rest, random = gui.add_button("at rest"), gui.add_button("random")
+            first = gui.add_folder("v, joint velocities", expand_by_default=True)
+            second = gui.add_folder("a, joint accelerations", expand_by_default=False)
         self.rates = Sliders(gui, first, rate_rows(robot, second=False), "/s", self._rate)
         self.second_rates = Sliders(gui, second, rate_rows(robot, second=True), "/s²", self._second_rate)
         for sliders, values in ((self.rates, self.v), (self.second_rates, self.a)):
@@ -340,7 +337,7 @@ class Viewer:
         with self._lock:
             self.q = self.q.copy()
             self.q[at] = value
-            self._say_q()
+            self._write_q()
             self.update()
 
     def _rate(self, at: int, value: float) -> None:
@@ -356,31 +353,31 @@ class Viewer:
             self.update()
 
     def set_q(self, q: Given) -> None:
-        """Put the robot into a configuration and every slider with it.
+        """Move the robot and all sliders to a configuration.
 
         Raises:
-            InputError: as every function that takes a `q`.
+            InputError: `q` is invalid, as in every function with a `q`.
         """
         with self._lock:
             self.q = checked(self.robot.tree, q, "q").copy()
             self.sliders.show(self.q)
-            self._say_q()
+            self._write_q()
             self.update()
 
     def set_rates(self, v: FloatArray, a: FloatArray) -> None:
-        """Give the joints rates and their rates, and the sliders with them."""
+        """Set the joint velocities and accelerations, and their sliders."""
         with self._lock:
             self.v, self.a = v, a
             self.rates.show(v)
             self.second_rates.show(a)
             self.update()
 
-    def _say_q(self) -> None:
+    def _write_q(self) -> None:
         self.words_of_q.value = written(self.q)
         self.wrong.content = ""
 
     def _typed(self, event: Any) -> None:
-        """Somebody types other numbers in place of those to be copied; they stay as they are typed."""
+        """Read a configuration that the user typed; its text stays unchanged."""
         if event.client is None:
             return
         with self._lock:
@@ -401,7 +398,7 @@ class Viewer:
             self.second_rates.build(self.a, degrees=degrees)
 
     def _choose_convention(self) -> None:
-        """A table's frames lie inside the shapes: let them be seen through these."""
+        """Make the shapes transparent while a table is shown, because its frames lie inside them."""
         with self._lock:
             shown = self.dh.value != "none"
             if self.shapes.value == (SOLID if shown else SEE_THROUGH):
@@ -409,7 +406,7 @@ class Viewer:
             self._choose()
 
     def _choose(self) -> None:
-        """Another frame, reference or convention: the table is derived and checked once."""
+        """Apply a new frame, reference or convention: derive and check the table once, then update."""
         with self._lock:
             self._table = None
             self.dh_words.content = ""
@@ -417,16 +414,16 @@ class Viewer:
                 try:
                     self._table = self.robot.dh(self.frame.value, convention=self.dh.value)
                     table = self._table
-                    # Not as code: viser looks for images there, too, and reads their files.
+                    # Not as code: in code, too, viser searches for images and reads their files.
                     self.dh_words.content = markdown_text(f"{table.base_frame} to {table.tip_frame}")
                 except UrdfkinError as error:
                     self.dh_words.content = markdown_text(str(error))
             self.update()
 
-    # -- what is seen --------------------------------------------------------------------------------
+    # -- drawing -------------------------------------------------------------------------------------
 
     def update(self) -> None:
-        """Compute, check and draw."""
+        """Compute, check and draw everything."""
         with self._lock:
             self.motion = self._motion(Reference.of(self.reference.value))
             aligned = Reference.LOCAL_WORLD_ALIGNED

@@ -1,7 +1,7 @@
-"""Found on PYTHONPATH by every process of a mutant's test: one module of the package is read with its slip.
+"""Import one module of the package with a mutant; each process of a mutant's test loads this from PYTHONPATH.
 
-`URDFKIN_MUTANT` is the module's name and the slip's number, `urdfkin.validation.error_stats:17`; or the name
-alone, where `URDFKIN_MUTANT_TEXTS` is the slip: the text as it stands and the text instead, as JSON.
+`URDFKIN_MUTANT` is the module's name and the mutant's number, `urdfkin.validation.error_stats:17`. It can
+also be the name alone; then `URDFKIN_MUTANT_TEXTS` has the text and its replacement, as JSON.
 """
 
 import importlib.abc

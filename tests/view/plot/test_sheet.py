@@ -40,7 +40,7 @@ def test_the_lines_are_the_numbers(case: Case) -> None:
     for k, drawn in enumerate(velocity.lines):
         np.testing.assert_array_equal(drawn.get_ydata(), x.velocity[:, k])
         np.testing.assert_array_equal(drawn.get_xdata(), trajectory.t)
-    together = next(drawn for drawn in parts.lines if drawn.get_label() == "all together")
+    together = next(drawn for drawn in parts.lines if drawn.get_label() == "sum")
     np.testing.assert_array_equal(together.get_ydata(), np.linalg.norm(x.acceleration[:, :3], axis=1))
 
 
@@ -162,7 +162,7 @@ def test_the_ending_says_the_format_and_the_same_motion_gives_the_same_file(
 
 
 def test_unknown_endings_and_panels_are_refused_by_name(case: Case, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="unknown kind of picture"):
+    with pytest.raises(InputError, match="unknown picture format"):
         save(sheet(*case, ["position"]), tmp_path / "a.bmp")
     with pytest.raises(UnknownNameError, match="velocity"):
         sheet(*case, ["velocty"])
