@@ -9,7 +9,7 @@ from itertools import count
 
 import numpy as np
 
-from urdfkin.kinematics.number_kinds import bound
+from urdfkin.kinematics.arithmetic import bound
 from urdfkin.model.tree import FloatArray
 
 _NEW = count()

@@ -15,7 +15,7 @@ import numpy as np
 from urdfkin.compiled import axes, outputs, recursion
 from urdfkin.compiled.plan import CompiledTree
 from urdfkin.compiled.program import KEPT_ROWS, WIDTH, Head, Op, program_of
-from urdfkin.kinematics.number_kinds import bound
+from urdfkin.kinematics.arithmetic import bound
 
 #: Reduction 10, z and 1 - z/2 with their rounding errors 8, two polynomials 20, last steps 13
 #: (`compiled.sine`).

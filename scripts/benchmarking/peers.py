@@ -19,7 +19,7 @@ from scripts.benchmarking.calls import Calls
 from scripts.benchmarking.subject import Subject, bare_urdf
 from scripts.benchmarking.timing import Work
 from urdfkin.compiled.plan import Step
-from urdfkin.kinematics.number_kinds import bound
+from urdfkin.kinematics.arithmetic import bound
 from urdfkin.model.tree import FloatArray
 
 #: Row order that converts [angular; linear] to [linear; angular].

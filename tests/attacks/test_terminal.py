@@ -297,7 +297,7 @@ def test_what_is_printed_goes_through_the_door() -> None:
         "check.py": ("click.echo(as_json(", "click.echo(as_sarif("),
         "report.py": ("click.echo(asset(",), "compare.py": ("click.echo(json.dumps(",),
         "same.py": ("click.echo(schema_text()",),
-        "dh.py": ("click.echo(text, nl=False)",),
+        "dh_tables.py": ("click.echo(text, nl=False)",),
         "__init__.py": ('click.echo(f"urdfkin {own_version()}, Pinocchio {version()',),
         "exit.py": ('click.echo("urdfkin: interrupted', 'click.echo("".join(traceback.', "click.echo("),
     }  # fmt: skip

@@ -71,7 +71,8 @@ def test_a_command_that_needs_more_says_so() -> None:
     done = bare("placement", ROBOT)
     assert done.returncode == 2
     found = re.fullmatch(
-        r"urdfkin: error: (\w+) is not installed; install urdfkin with its dependencies: pip install urdfkin\n",
+        r"urdfkin: error: (\w+) is not installed; "
+        r"install urdfkin with its dependencies: pip install urdfkin\n",
         done.stderr,
     )
     assert found is not None

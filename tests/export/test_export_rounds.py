@@ -39,7 +39,7 @@ _OPERATIONS: dict[str, Callable[..., Counted]] = {
 
 def of_constant(R: Matrix, S: FloatArray) -> Matrix:
     """R S by the expressions that are written; what is left out of S is as large as it may be."""
-    graph, kept = Graph(), [recursion._structure(row) for row in S.tolist()]
+    graph, kept = Graph(), [recursion._without_rounding(row) for row in S.tolist()]
     letters = [[graph.input("q", 3 * r + c) for c in range(3)] for r in range(3)]
     results = graph.chapter.product(letters, kept)
     value: dict[Node, Counted] = {}
@@ -134,7 +134,7 @@ def test_no_more_is_left_out_of_a_constant_than_half_an_eps_of_its_largest_numbe
     for largest in (1.0, 0.3, 7e5, 5e-324):
         for share in (0.0, 0.49, 0.51, 1e3):
             row = largest, -share * EPS * largest, 0.0
-            kept = recursion._structure(row)
+            kept = recursion._without_rounding(row)
             assert kept[0] == largest
             assert abs(kept[1] - row[1]) <= 0.5 * EPS * largest
             assert kept[1] == row[1] or share < 0.5

@@ -13,8 +13,9 @@ from tests.strategies import rotations, trees
 from urdfkin.compiled.evaluate import accelerations, placements, velocities
 from urdfkin.compiled.plan import compile_tree
 from urdfkin.kinematics import equations
-from urdfkin.kinematics.number_kinds import VECTORS, counted, norm, product
+from urdfkin.kinematics.arithmetic import VECTORS
 from urdfkin.kinematics.number_kinds import array_equations as on_vectors
+from urdfkin.kinematics.number_kinds import counted, norm, product
 from urdfkin.kinematics.number_kinds import length_equations as on_lengths
 from urdfkin.kinematics.roundings import EPS, SMALLEST
 from urdfkin.model.base_motion import STILL_STATE

@@ -14,7 +14,7 @@ from tests.laws.subjects import robot_of
 from tests.reading import tree_of
 from urdfkin.compiled.plan import compile_tree
 from urdfkin.kinematics import equations
-from urdfkin.kinematics.number_kinds import VECTORS
+from urdfkin.kinematics.arithmetic import VECTORS
 from urdfkin.robot import Robot
 from urdfkin.urdf.sources import Origin
 from urdfkin.validation.accuracy import judge
@@ -88,7 +88,7 @@ def test_the_equations_as_they_are_agree_with_pinocchio(robots: list[Robot]) -> 
 def test_a_term_of_an_equation_that_is_off_by_1e_10_is_caught(
     robots: list[Robot], equation: str, term: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(recursion._WALK, "eq", with_a_slip(equation, term))
+    monkeypatch.setattr(recursion._RECURSION, "eq", with_a_slip(equation, term))
     assert any(farthest(robot) > WIDEST for robot in robots)
 
 

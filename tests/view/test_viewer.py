@@ -117,8 +117,8 @@ def test_tables_frames_are_seen_through_the_shapes(viewer: Viewer) -> None:
     viewer.dh.value = "modified"
     assert viewer.shapes.value == "see-through"
     assert all(not handle.visible for _, handle in viewer.stage._shapes)
-    assert len(viewer.stage._ghosts) == len(viewer.stage._shapes) > 0
-    assert all(handle.visible and handle.opacity < 0.5 for handle in viewer.stage._ghosts)
+    assert len(viewer.stage._transparent) == len(viewer.stage._shapes) > 0
+    assert all(handle.visible and handle.opacity < 0.5 for handle in viewer.stage._transparent)
     viewer.dh.value = "none"
     assert viewer.shapes.value == "solid"
     assert all(handle.visible for _, handle in viewer.stage._shapes)

@@ -10,7 +10,7 @@ from urdfkin.cli.output import check_line, console, hand_out, npy
 from urdfkin.cli.streams import say
 from urdfkin.errors.display import NOISE, six_digits
 from urdfkin.errors.escape import csv_cell, csv_text, json_text
-from urdfkin.report.pages import print_named
+from urdfkin.report.listing import print_named
 from urdfkin.verify.quantities import SIX
 
 if TYPE_CHECKING:

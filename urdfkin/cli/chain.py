@@ -42,7 +42,7 @@ def command(robot: Robot, base: str | None, tip: str | None, q: str, seed: int, 
     joints = list(zip(path.joints, axes, origins, ways, strict=False))
 
     def show() -> None:
-        from urdfkin.report.pages import print_named  # noqa: PLC0415
+        from urdfkin.report.listing import print_named  # noqa: PLC0415
 
         out = console()
         names = ", ".join(path.joint_names) or "none: nothing moves"

@@ -55,7 +55,7 @@ def _print(robot: Robot) -> None:
 
 def _print_table(out: Console, table: Table) -> None:
     from urdfkin.model.summary import WORDS  # noqa: PLC0415
-    from urdfkin.report.pages import fits, make_table, print_named  # noqa: PLC0415
+    from urdfkin.report.listing import fits, make_table, print_named  # noqa: PLC0415
 
     rows = [[str(cell) for cell in row] for row in table.rows]
     if out.options.ascii_only:

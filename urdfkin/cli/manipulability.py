@@ -23,7 +23,7 @@ from urdfkin.cli.options import format_from_suffix
 from urdfkin.cli.output import check_line, compiling, console, exit_code, hand_out, output_option
 from urdfkin.cli.streams import say
 from urdfkin.errors.escape import csv_cell, csv_text, json_text
-from urdfkin.report.pages import print_named
+from urdfkin.report.listing import print_named
 
 if TYPE_CHECKING:
     from rich.console import Console

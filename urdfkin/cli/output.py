@@ -20,7 +20,7 @@ from urdfkin.cli.streams import say
 from urdfkin.errors.display import NOISE
 from urdfkin.errors.escape import csv_cell, csv_text, json_text
 from urdfkin.errors.numbers import parse_int
-from urdfkin.report.pages import make_table, print_named
+from urdfkin.report.listing import make_table, print_named
 from urdfkin.system.files import write_file
 
 __all__ = ["write_file"]

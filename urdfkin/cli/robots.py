@@ -31,7 +31,7 @@ def command(family: str | None, format_: str) -> None:
         click.echo()
         return
     from urdfkin.cli.output import console  # noqa: PLC0415  json needs no tables
-    from urdfkin.report.pages import print_named  # noqa: PLC0415
+    from urdfkin.report.listing import print_named  # noqa: PLC0415
 
     rows = ((entry.name, entry.family, entry.base or "", entry.tip or "") for entry in entries)
     out = console()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from urdfkin.compiled.compiling import compiled
-from urdfkin.kinematics.number_kinds import bound
+from urdfkin.kinematics.arithmetic import bound
 
 globals().update(vars(bound(made=compiled)))
 

@@ -19,7 +19,7 @@ from collections.abc import Callable, Sequence
 from functools import wraps
 from typing import Any
 
-from urdfkin.kinematics.number_kinds import bound
+from urdfkin.kinematics.arithmetic import bound
 
 #: A number of an equation on the graph: a constant or an expression.
 Number = Any

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from urdfkin.kinematics import equations
-from urdfkin.kinematics.number_kinds import bound
+from urdfkin.kinematics.arithmetic import bound
 
 #: Parameter name -> its symbol in the textbook.
 _SYMBOLS = {

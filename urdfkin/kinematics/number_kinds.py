@@ -1,7 +1,4 @@
-"""The equations for other kinds of numbers: NumPy arrays, lengths, or LaTeX expressions.
-
-`urdfkin.kinematics.equations` computes with triples of numbers. `bound` makes copies of its functions that
-use other basic operations than `plus`, `cross` and so on.
+"""The equations for NumPy arrays and for lengths (`urdfkin.kinematics.arithmetic.bound`).
 
 `array_equations` computes with NumPy arrays: the last axis contains the three components of a vector, so
 whole batches are computed at once.
@@ -19,46 +16,12 @@ numbers may also underflow to zero and later be multiplied by a large number.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from types import FunctionType, SimpleNamespace
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-from urdfkin.kinematics import equations
+from urdfkin.kinematics.arithmetic import bound
 from urdfkin.kinematics.roundings import SMALLEST
 
-#: The basic operations on vectors. All other functions are composed of them.
-VECTORS = ("plus", "minus", "times", "dot", "cross", "rotate", "transposed", "product")
-
-
-def bound(
-    *, made: Callable[[Callable[..., Any]], Any] = lambda function: function, **vectors: Any
-) -> SimpleNamespace:
-    """Return a namespace with a copy of every function of `equations` that uses other basic operations.
-
-    Args:
-        made: A decorator for each copied function, for example a compiler's.
-        vectors: Basic operations to use instead of those of `equations`.
-
-    >>> lengths = bound(plus=lambda x, y: x + y, cross=lambda x, y: x * y)
-    >>> lengths.point_velocity(1.0, 2.0, 3.0)
-    7.0
-    """
-    names: dict[str, Any] = {}
-    for name, function in _functions():
-        copy = FunctionType(function.__code__, names, name, function.__defaults__)
-        copy.__doc__, copy.__module__ = function.__doc__, function.__module__
-        names[name] = vectors.get(name) or made(copy)
-    return SimpleNamespace(**names)
-
-
-def _functions() -> list[tuple[str, FunctionType]]:
-    return [(name, value) for name, value in vars(equations).items() if isinstance(value, FunctionType)]
-
-
-#: The equations on NumPy arrays: a number is (...), a vector (..., 3) and a rotation (..., 3, 3).
 array_equations = bound(
     plus=np.add,
     minus=np.subtract,

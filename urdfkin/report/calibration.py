@@ -12,7 +12,7 @@ from urdfkin.calibration.write_back import Rewritten
 from urdfkin.comparison.result import angle, length
 from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.tree import FloatArray
-from urdfkin.report.pages import print_named
+from urdfkin.report.listing import print_named
 from urdfkin.report.words import counted
 
 if TYPE_CHECKING:

@@ -30,8 +30,8 @@ from urdfkin.errors.escape import markdown_text as text
 from urdfkin.model.mechanisms.mechanism import Tolerance
 from urdfkin.model.summary import axis_words, rule_words
 from urdfkin.report.document import Check, Document, Joint, Model, Robot, Units, outcome_of
+from urdfkin.report.listing import print_named
 from urdfkin.report.markdown import LIMIT, shortened
-from urdfkin.report.pages import print_named
 from urdfkin.report.words import VERDICTS, check_name, counted, percent, quantity_name, summary, units, worst
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from urdfkin.errors.escape import printable
 from urdfkin.report.document import Check, Document, Judgement, Robot, outcome_of
-from urdfkin.report.pages import print_named
+from urdfkin.report.listing import print_named
 from urdfkin.report.words import (
     SIDES,
     check_name,

@@ -160,7 +160,7 @@ def test_what_an_equation_gives_that_is_slightly_wrong_leaves_the_interval(
 ) -> None:
     robot = robot_of("panda")
     x, frame = sample(robot), robot.tip_frame
-    monkeypatch.setattr(recursion._WALK, "eq", with_a_slip(equation, term))
+    monkeypatch.setattr(recursion._RECURSION, "eq", with_a_slip(equation, term))
     for one in quantities(robot.enclose(*x, frame, digits=15)):
         assert one.pinocchio is not None
         if one.quantity == quantity:
