@@ -170,18 +170,10 @@ def leads_somewhere(name: str) -> bool:
     return True
 
 
-@pytest.mark.parametrize("page", [*DOCS, "README.md", "CONTRIBUTING.md"])
+@pytest.mark.parametrize("page", [*DOCS, "README.md", "CHANGELOG.md", "CONTRIBUTING.md"])
 def test_every_name_and_file_of_ours_is_there(page: str) -> None:
     text = (ROOT / page).read_text("utf-8")
     names = set(re.findall(r"`(urdfkin(?:\.\w+)+)", text))
     assert {name for name in names if not leads_somewhere(name)} == set()
     files = set(re.findall(r"`((?:urdfkin|tests|scripts|docs)/[\w./-]*\w)", text)) - {"urdfkin/robots/dh"}
-    assert {file for file in files if not (ROOT / file).exists()} == set()
-
-
-def test_every_file_of_ours_in_the_changelog_is_there() -> None:
-    files = set(
-        re.findall(r"`((?:urdfkin|tests|scripts|docs)/[\w./-]*\w)", (ROOT / "CHANGELOG.md").read_text())
-    )
-    assert len(files) > 5
     assert {file for file in files if not (ROOT / file).exists()} == set()

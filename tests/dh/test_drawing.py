@@ -39,5 +39,5 @@ def test_the_same_table_gives_the_same_file() -> None:
 
 def test_a_chain_without_motion_can_be_drawn_and_a_batch_cannot() -> None:
     assert "<svg" in drawing(dh_table(arm(tip=LINK), "tip"))
-    with pytest.raises(InputError, match="shows one configuration"):
+    with pytest.raises(InputError, match="needs exactly one configuration"):
         drawing(dh_table(arm(LINK), "tip"), np.zeros((2, 1)))

@@ -145,7 +145,7 @@ def test_a_quaternion_that_yourdfpy_dropped_is_no_secret(tmp_path: Path) -> None
     findings, reading = said['quat_xyzw="0 0 1 0"']
     assert len(findings) == 1
     assert "<yourdfpy>:1:1: URDF512 note: yourdfpy ignores quat_xyzw: if the file has one" in findings[0]
-    assert "drops quat_xyzw: its file was not seen" in reading
+    assert "drops quat_xyzw; the file was not read" in reading
 
 
 def test_a_yourdfpy_robot_in_two_pieces_is_refused() -> None:
