@@ -192,7 +192,7 @@ class Inputs:
     said: Mapping[str, Any] = field(default_factory=dict)
 
     def saying(self, **more: Any) -> Inputs:
-        """Return a copy with more settings that the result depends on, for titles and JSON."""
+        """Return a copy with additional settings, which titles and JSON output list."""
         return replace(self, said={**self.said, **more})
 
 

@@ -74,7 +74,7 @@ def motion_words(frame: Interval, moves: str = "move", turns: str = "turn") -> s
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """The frame that the changes of one joint alone move most, and the interval of its distance."""
+    """The frame that one joint's changes move most, and how far they move it."""
 
     element: str
     interval: Interval

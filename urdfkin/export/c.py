@@ -27,7 +27,7 @@ def write(code: Code, to: str = "c") -> str:
 
 
 def unit(code: Code, head: str = "", main: str = "") -> str:
-    """Return the functions, with a head before them and a program after them."""
+    """Return the C file: its header comment, the functions, and the check program."""
     return framed(
         "file.c",
         head=head,

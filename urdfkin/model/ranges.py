@@ -98,7 +98,7 @@ def kept_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tuple[f
         own = rule.multiplier * leader + rule.offset
         return bool(np.nextafter(limit.lower, -np.inf) <= own <= np.nextafter(limit.upper, np.inf))
 
-    if keeps(lower) and keeps(upper):  # then so does every value between: the range stays bit for bit
+    if keeps(lower) and keeps(upper):  # every value between keeps them too
         return lower, upper
     if rule.multiplier == 0.0:
         return math.inf, -math.inf

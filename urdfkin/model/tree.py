@@ -367,7 +367,7 @@ class KinematicTree:
 
 
 def with_root_joint(tree: KinematicTree, kind: JointKind) -> KinematicTree:
-    """Return the tree with a root joint: a new link `universe` carries it by a joint `root_joint`.
+    """Return the tree with a new root link `universe` and a joint `root_joint` to the old root link.
 
     Both names are Pinocchio's.
 

@@ -26,7 +26,7 @@ CELLS = ("theta", "d", "a", "alpha", "beta")
 LONGEST_STEP = 0.5
 #: Largest number of steps; smallest relative improvement; mean error that counts as zero.
 _ROUNDS, _BETTER, _SOLVED = 40, 1e-9, 1e-14
-#: Relative size of singular values that count as zero: of free parameters, and of cells.
+#: Relative sizes below which a singular value counts as zero: for free parameters, for cells.
 _FREE, _CELLS = 1e-8, 1e-9
 #: Iterations of the sparse solution, and its smallest weight relative to the reach.
 _SPARSER, _STAYS = 25, 1e-9

@@ -29,7 +29,7 @@ _EASING, _HARDER = 0.03, 10.0
 _SLOW, _PATIENCE = 0.99, 4
 #: Mean error at which a fit ends, relative to the reach.
 _ROUNDING = 1e-13
-#: Numbers of sign patterns in a fast fit: fitted, and kept at each joint.
+#: A fast fit fits this many sign patterns, and keeps this many at each joint.
 HASTY = (3, 16)
 #: Tip error that counts as rounding, relative to the reach; the search ends there.
 _AT_ROUNDING = 1e-12

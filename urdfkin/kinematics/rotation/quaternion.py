@@ -261,7 +261,7 @@ def _step(
 
 
 def _rates(quat: FloatArray, w: FloatArray, frame: ExpressedIn) -> FloatArray:
-    """Return the rates of a quaternion of any length; 7.57 is linear in the quaternion."""
+    """Return the rates of a quaternion of any length; equation 7.57 is linear in the quaternion."""
     length = np.sqrt((quat * quat).sum(axis=-1, keepdims=True))
     rates: FloatArray = length * quaternion_rates(quat / length, w, frame)
     return rates
