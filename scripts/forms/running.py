@@ -10,6 +10,7 @@ import json
 import re
 import shutil
 import subprocess
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,6 +21,7 @@ from scripts.forms import poses
 from urdfkin.dh import DHTable, export, read_table, to_urdf
 from urdfkin.dh.convert import link_names
 from urdfkin.dh.export.numeric_code import plain
+from urdfkin.lint import UrdfWarning
 from urdfkin.loading import load
 from urdfkin.model.tree import FloatArray
 
@@ -165,7 +167,9 @@ def as_urdf(jobs: Sequence[Job], folder: Path) -> Poses:
     found = Poses()
     for job in jobs:
         base, *_, tip = link_names(job.table)
-        path = load(to_urdf(job.table), verify=False).chain(tip, base)
+        with warnings.catch_warnings():  # findings about the robot's own limits and axes
+            warnings.simplefilter("ignore", UrdfWarning)
+            path = load(to_urdf(job.table), verify=False).chain(tip, base)
         order = [job.table.joint_names.index(name) for name in path.joint_names]
         found.append(path.placement(job.q[:, order]))
     return found

@@ -50,7 +50,7 @@ def test_a_wrong_d1_that_the_base_takes_up_is_told_with_its_millimetres() -> Non
     text = comparison_text(found, units_of("radians", "millimetres"))
     assert "very cell" not in text
     assert "after a fit of base, tool and joint offsets" in text
-    assert "the base 10 mm" in text
+    assert "changed the base by 10 mm" in text
     assert "can replace them: d1" in text
     assert [(one.row, one.cell) for one in found.instead] == [(0, "d")]
     assert found.instead[0].difference == pytest.approx(-0.01, rel=1e-6)
@@ -105,8 +105,8 @@ def test_cells_that_explain_nothing_are_not_blamed() -> None:
     assert not found.agrees
     assert found.differences == ()
     text = comparison_text(found, units_of())
-    assert "No change of cells explains the URDF" in text
-    assert "without --no-fit" in text
+    assert "No change of cells explains the difference" in text
+    assert "Omit --no-fit" in text
 
 
 # -- calibrated robots ----------------------------------------------------------------------------------

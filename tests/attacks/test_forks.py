@@ -84,7 +84,7 @@ CASES = {
         """,
     "a deep robot, while another thread builds one": """
         from urdfkin.system import processes
-        held(processes._one_at_a_time)
+        held(processes._stack_size_lock)
         fork(lambda: processes.with_stack(2**24, lambda: None))
         """,
     "verified results, after the parent had some": """
@@ -131,7 +131,7 @@ def test_every_lock_and_pool_of_the_package_is_made_for_forks() -> None:
         if name in path.read_text(encoding="utf-8") and path.parent.name != "validation"
     }
     assert found == {
-        "system/processes.py: threading.RLock",
+        "system/locks.py: threading.RLock",
         "compiled/batch.py: ThreadPoolExecutor",  # forgotten in the child
         "view/viewer.py: threading.RLock",  # a server that does not fork
     }

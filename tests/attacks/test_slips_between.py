@@ -54,7 +54,7 @@ FRAGMENTS = [
      "return sorted(joints, key=lambda pair: pair[0].name)"),
     ("urdf.reader", "= rule.multiplier * end.offset + rule.offset", "= end.offset + rule.offset"),
     ("urdf.reader", "rule.multiplier * end.multiplier, offset)", "rule.multiplier, offset)"),
-    ("urdf.reader", "resolved[follower] = Mimic(end.leader,", "resolved[follower] = Mimic('b',"),
+    ("urdf.reader", "resolved[name] = Mimic(end.leader,", "resolved[name] = Mimic('b',"),
     ("verify.pinocchio_inputs", "offset = rule.multiplier * end.offset + rule.offset",
      "offset = end.offset + rule.offset"),
     ("verify.pinocchio_inputs", "rule.multiplier * end.multiplier, offset)", "rule.multiplier, offset)"),

@@ -153,7 +153,7 @@ def test_what_a_robot_needs_grows_with_the_cube_of_its_rates_and_with_its_links(
     assert memory.needed(wide, 28) > needs[0] + 1000 * 16_000
     memory.demand(trees[0], 28, needs[0])
     memory.demand(trees[0], 28, None)
-    with pytest.raises(OracleError, match="more memory"):
+    with pytest.raises(OracleError, match="not enough memory"):
         memory.demand(trees[0], 28, needs[0] - 1)
 
 

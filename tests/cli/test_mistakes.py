@@ -164,7 +164,7 @@ def test_a_robot_pinocchio_cannot_check_says_so_once_with_exit_3() -> None:
     )  # fmt: skip
     assert done.code == 3
     assert done.data["verified"] is False
-    assert "memory grows with the cube" in done.data["check"]
+    assert "memory grows with nv^3" in done.data["check"]
     assert "Warning" not in done.err
 
 

@@ -423,7 +423,7 @@ def test_a_full_disc_is_said_and_what_was_kept_is_gone_on_with(undisturbed: str,
 
     full = _run(tmp_path / "s", preexec_fn=limit)
     assert full.returncode == 3, full.stderr
-    assert "the store cannot be written: found File too large; what it holds stays; make room" in " ".join(
+    assert "the store cannot be written: found File too large; free some disk space" in " ".join(
         full.stdout.split()
     )
     assert numbers(validate(ROBOTS, samples=SAMPLES, store=tmp_path / "s")) == undisturbed

@@ -13,8 +13,8 @@ from urdfkin.cli.arguments import Inputs, frame_name
 from urdfkin.cli.options import reject_unused_options
 from urdfkin.cli.output import compiling
 from urdfkin.cli.quantity import Computing, computing_options
-from urdfkin.verify.certificate import replay_line
 from urdfkin.verify.quantities import PLACEMENT
+from urdfkin.verify.replay import replay_line
 
 if TYPE_CHECKING:
     from urdfkin.model.tree import FloatArray

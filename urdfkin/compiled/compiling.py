@@ -42,7 +42,7 @@ from numba.core.serialize import dumps
 from urdfkin.kinematics import equations
 from urdfkin.system.cache import get, kept_folder, put, report_damaged
 from urdfkin.system.files import read_bytes
-from urdfkin.system.processes import lock_over_forks
+from urdfkin.system.locks import lock_over_forks
 
 #: Called with a kernel's name and None when its compilation begins, and with the seconds when it is ready.
 Listener = Callable[[str, float | None], None]

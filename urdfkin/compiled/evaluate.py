@@ -22,7 +22,7 @@ from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.model.base_motion import STILL_STATE, against_gravity
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.system.processes import importing
+from urdfkin.system.locks import importing
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _PLACES = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A

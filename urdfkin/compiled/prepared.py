@@ -18,7 +18,7 @@ from urdfkin.compiled.plan import CompiledTree
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.system.processes import importing
+from urdfkin.system.locks import importing
 
 #: Takes q, or q and v, or q, v and a, then the output array or None; returns the result. It returns None for
 #: arguments that it does not support; `Robot` then computes the result or raises the error.

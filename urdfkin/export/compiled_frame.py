@@ -36,7 +36,7 @@ from urdfkin.model.configuration_like import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.cache import get, kept_folder, put
-from urdfkin.system.processes import importing, lock_over_forks
+from urdfkin.system.locks import importing, lock_over_forks
 from urdfkin.verify.call import Call
 from urdfkin.verify.quantities import QUANTITIES, Quantity
 from urdfkin.verify.sampling import draw

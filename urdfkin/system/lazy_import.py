@@ -13,7 +13,7 @@ from importlib import import_module, metadata
 from operator import attrgetter
 from typing import Any
 
-from urdfkin.system.processes import importing
+from urdfkin.system.locks import importing
 
 
 def lazy_import(home: str) -> Callable[..., Any]:

@@ -24,6 +24,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TypeVar
 
+from urdfkin.system.locks import lock_over_forks
+
 #: Environment variables that a Python interpreter may need to start.
 _NEEDED = ("LD_LIBRARY_PATH",)
 #: One thread for linear algebra: more threads need address space, which is limited in a confined process.
@@ -112,21 +114,6 @@ def not_reading(settings: str) -> Iterator[None]:
     finally:
         os.fchdir(here)
         os.close(here)
-
-
-def lock_over_forks() -> threading.RLock:
-    """Return a lock that a fork waits for, and that is unlocked in parent and child after the fork.
-
-    Use it for modules only, not for objects: the lock stays registered until the process ends.
-    """
-    lock = threading.RLock()
-    os.register_at_fork(before=lock.acquire, after_in_parent=lock.release, after_in_child=lock.release)
-    return lock
-
-
-#: Held during lazy imports. Without it, a child that another thread forks during an import would wait for
-#: ever for the end of that import.
-importing = lock_over_forks()
 
 
 _T = TypeVar("_T")

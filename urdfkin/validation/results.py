@@ -26,10 +26,10 @@ from urdfkin.validation.error_stats import HISTOGRAM_EDGES, Key, Tally, WorstCas
 from urdfkin.validation.outcome import Outcome, Verdict, outcome
 from urdfkin.validation.robot_summary import NO_PORTRAIT, RobotSummary
 from urdfkin.validation.timings import Clock
-from urdfkin.verify.certificate import replay_line
 from urdfkin.verify.oracles import WITNESSES
 from urdfkin.verify.pinocchio_module import version as pinocchio_version
 from urdfkin.verify.quantities import QUANTITIES
+from urdfkin.verify.replay import replay_line
 
 if TYPE_CHECKING:
     from urdfkin.validation.accuracy import Judgement

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import math
 import os
-import shlex
-from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -20,35 +18,10 @@ from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.errors.escape import json_text, log_line
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.files import at_home, write_file
-from urdfkin.system.processes import lock_over_forks
-from urdfkin.urdf.sources import Origin
+from urdfkin.system.locks import lock_over_forks
 from urdfkin.verify.bounds import Bound, result_k
 from urdfkin.verify.comparison import worst_of_each
 from urdfkin.verify.quantities import QUANTITIES
-
-
-def replay_line(
-    origin: Origin, command: str, frame: str, reference: str | None, values: Mapping[str, Sequence[float]]
-) -> str:
-    """Return the command that computes one case again; its numbers read back exactly.
-
-    Args:
-        origin: Source of the robot. A robot given as text must be passed on standard input.
-        command: Command of the quantity.
-        frame: Name of a link or joint.
-        reference: Reference frame; None for a placement.
-        values: The numbers of q, v and a that the command takes.
-
-    >>> replay_line(Origin("ur5"), "velocity", "tool 0", "local", {"q": [0.5, 0.1], "v": []})
-    "urdfkin velocity ur5 --frame 'tool 0' --reference local --q 0.5,0.1 --v neutral"
-    """
-    words = ["urdfkin", command, origin.words, "--frame", shlex.quote(frame)]
-    if reference:
-        words += ["--reference", reference]
-    for letter, numbers in values.items():
-        words += [f"--{letter}", ",".join(repr(float(x)) for x in numbers) or "neutral"]
-    return " ".join(words)
-
 
 #: Reason in certificates for results of calls with verify=False.
 NOT_ASKED_FOR = "verify=False was asked for"

@@ -25,19 +25,13 @@ from urdfkin.urdf.sources import Origin
 from urdfkin.verify import bounds
 from urdfkin.verify.bounds import Bound, magnitudes
 from urdfkin.verify.call import Call, Part
-from urdfkin.verify.certificate import (
-    Certificate,
-    Comparison,
-    Ledger,
-    VerificationError,
-    compare,
-    replay_line,
-)
+from urdfkin.verify.certificate import Certificate, Comparison, Ledger, VerificationError, compare
 from urdfkin.verify.oracle_query import QueryBatch
 from urdfkin.verify.oracles import PINOCCHIO, Witness, WitnessName, witness_of
 from urdfkin.verify.pinocchio import Oracle, OracleError, build_model
 from urdfkin.verify.pinocchio_module import pinocchio, version
 from urdfkin.verify.quantities import Quantity
+from urdfkin.verify.replay import replay_line
 from urdfkin.verify.sampling import SAMPLE, Verify, checked_choice, draw, parts
 from urdfkin.verify.tables import TableCheck, TableError, check_table
 

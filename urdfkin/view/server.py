@@ -46,7 +46,7 @@ from pathlib import Path
 from typing import Any
 
 from urdfkin.errors import InputError, UrdfkinError
-from urdfkin.system.processes import lock_over_forks
+from urdfkin.system.locks import lock_over_forks
 
 
 def has_screen() -> bool:
