@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from importlib import import_module, metadata
+from importlib import import_module
 from operator import attrgetter
 from typing import Any
 
@@ -31,6 +31,8 @@ def lazy_import(home: str) -> Callable[..., Any]:
 @cache
 def installed_version(package: str) -> str | None:
     """Return the installed version of a package, or None. It is cached: a lookup takes milliseconds."""
+    from importlib import metadata  # noqa: PLC0415  it imports modules that a folder may replace
+
     try:
         return metadata.version(package)
     except metadata.PackageNotFoundError:
