@@ -353,6 +353,8 @@ def _peak(chunks_: int) -> int:
     for index in itertools.chain.from_iterable(pairs):
         task = Task(0, cut.chunk(robot, 0, index))
         gathering.enter(task, replace(found, samples=task.chunk.configurations))
+        if index % 1000 == 0:  # else the peak depends on when the collector runs
+            gc.collect()
     (report,) = gathering.reports()
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
