@@ -1,8 +1,8 @@
 """The script that makes slips makes each of them, the same ones each time, where the program really runs."""
 
 import ast
+import hashlib
 import os
-import random
 import re
 import sys
 from pathlib import Path
@@ -98,10 +98,17 @@ PARTS = ["validation/outcome", "validation/error_stats", "verify/certificate", "
 SEED = int(os.environ.get("URDFKIN_MUTATION_SEED", "1"))
 
 
+def drawn(count: int) -> list[Mutant]:
+    """Return the mutants with the smallest hashes: a change elsewhere in a file draws no others."""
+
+    def rank(mutant: Mutant) -> str:
+        return hashlib.sha256(f"{SEED} {mutant.place} {mutant.what}".encode()).hexdigest()
+
+    return sorted(mutants(PARTS), key=rank)[:count]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "mutant", random.Random(SEED).sample(mutants(PARTS), 6), ids=lambda mutant: str(mutant.name)
-)
+@pytest.mark.parametrize("mutant", drawn(6), ids=lambda mutant: str(mutant.name))
 def test_a_slip_drawn_by_a_seed_is_noticed_or_argued(mutant: Mutant) -> None:
     if (mutant.place, mutant.what) not in argued():
         outcome = judge(mutant, timeout=300.0, slow=True)

@@ -220,3 +220,14 @@ def test_a_base_with_an_infinite_number_is_refused(number: str) -> None:
     sheet = f"standard\na  alpha  d  theta\n0  pi/2  0.3  q1\n\nbase (metres):\n{rows}"
     with pytest.raises(InputError, match="the base must be a matrix of finite numbers"):
         table_from_text(sheet, ".txt")
+
+
+@pytest.mark.parametrize("form", ["to_markdown", "to_latex", "to_html"])
+def test_a_table_in_a_form_has_radians_metres_and_ten_digits_unless_asked(form: str) -> None:
+    table = table_from_rows(
+        [{"a": math.sqrt(2.0), "alpha": 0.1, "d": math.sqrt(0.5), "theta": 0.0}], "standard"
+    )
+    write = getattr(table, form)
+    assert write() == write("radians", "metres", 10)
+    assert "1.4142135624" not in write()
+    assert "1.4142135624" in write(digits=11)

@@ -173,8 +173,8 @@ def as_step(T: FloatArray) -> tuple[float, float] | None:
         >>> as_step(between_axes(0.5, math.pi))
         (0.5, 3.141592653589793)
     """
-    crossed = (T[0, 1], T[0, 2], T[1, 0], T[2, 0])
-    if max(map(abs, crossed)) > ANGLE * EPS or T[0, 0] < 0.0 or T[1, 3] or T[2, 3]:
+    tilt = max(abs(T[0, 1]), abs(T[0, 2]))  # of the x axis; the first column has the same size
+    if tilt > ANGLE * EPS or T[0, 0] < 0.0 or T[1, 3] or T[2, 3]:
         return None
     alpha = math.atan2(T[2, 1], T[2, 2])
     twelfth = nearest_twelfth(alpha)
