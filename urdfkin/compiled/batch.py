@@ -33,7 +33,9 @@ def default_threads(n: int) -> int:
 
 def _processors() -> int:
     """Return the number of processors that this process may use."""
-    return len(os.sched_getaffinity(0))
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1  # macOS
 
 
 def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, threads: int | None) -> int:

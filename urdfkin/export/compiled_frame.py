@@ -131,6 +131,11 @@ def _compile(text: str, command: list[str]) -> bytes:
 
 
 def _load(data: bytes) -> ctypes.CDLL:
+    if not hasattr(os, "memfd_create"):  # macOS: a file in a private folder, removed once it is loaded
+        with tempfile.TemporaryDirectory() as folder:
+            library = Path(folder, f"robot{next(_names)}.so")
+            library.write_bytes(data)
+            return ctypes.CDLL(str(library))
     descriptor = os.memfd_create("urdfkin", os.MFD_CLOEXEC)
     with os.fdopen(descriptor, "wb") as file:
         file.write(data)

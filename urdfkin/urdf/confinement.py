@@ -102,6 +102,8 @@ def limit(seconds: int) -> None:
         resource.RLIMIT_NOFILE: 64,
         resource.RLIMIT_CORE: 0,
     }
+    if sys.platform == "darwin":  # refuses a limit of the address space
+        del bounds[resource.RLIMIT_AS]
     for kind, most in bounds.items():
         hard = resource.getrlimit(kind)[1]
         least = most if hard == resource.RLIM_INFINITY else min(most, hard)
