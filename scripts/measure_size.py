@@ -1,36 +1,58 @@
-"""Measure the size of an installation of urdfkin in a new environment, and write it into docs/index.md.
+"""Measure the size of an installation of urdfkin, and write it into docs/install.md.
 
-    python scripts/measure_size.py
+    python scripts/measure_size.py           print the sizes, and write the page
+    python scripts/measure_size.py --print   only print them
 
-The script also prints the largest packages and the sums. Python, pip and bytecode are not counted.
+The environment that scripts/try.sh makes is enough to print. To write the page, all extras must be
+installed, as scripts/test.sh does. Python, pip and bytecode are not counted.
 """
 
 from __future__ import annotations
 
+import argparse
 import importlib.metadata
 import re
+import sys
+from collections.abc import Iterable
 from pathlib import Path
 
-from packaging.requirements import Requirement
+try:
+    from packaging.requirements import Requirement
+except ModuleNotFoundError:  # an environment without extras has only pip's copy
+    from pip._vendor.packaging.requirements import Requirement  # type: ignore[assignment,unused-ignore]
 
 ROOT = Path(__file__).parents[1]
-PAGE = ROOT / "docs" / "index.md"
+PAGE = ROOT / "docs" / "install.md"
+EXTRAS = ("plots", "view", "xacro", "mujoco", "descriptions", "cluster")
 _PLACE = re.compile(r"(<!-- size -->\n).*?(\n<!-- end -->)", re.DOTALL)
 
 
-def closure(name: str) -> dict[str, int]:
-    """Return the sizes in bytes of a package and its dependencies without extras."""
+def closure(name: str, extras: Iterable[str] = (), without: str = "") -> dict[str, int]:
+    """Return the sizes in bytes of a package and of the packages that it needs.
+
+    Args:
+        name: A package.
+        extras: Extras of the package that are included.
+        without: A package that is left out, with the packages that only it needs.
+
+    Raises:
+        PackageNotFoundError: a package is not installed.
+    """
     found: dict[str, int] = {}
-    waiting = [name]
+    seen: set[tuple[str, frozenset[str]]] = set()
+    waiting = [(name, frozenset(extras))]
     while waiting:
-        name = waiting.pop().lower().replace("_", "-")
-        if name in found:
+        name, wanted = waiting.pop()
+        name = name.lower().replace("_", "-")
+        if (name, wanted) in seen or name == without:
             continue
+        seen.add((name, wanted))
         distribution = importlib.metadata.distribution(name)
-        files = [Path(path.locate()) for path in distribution.files or ()]
+        files = [Path(str(path.locate())) for path in distribution.files or ()]
         found[name] = sum(file.stat().st_size for file in files if file.is_file())
-        needs = map(Requirement, distribution.requires or ())
-        waiting += [need.name for need in needs if need.marker is None or need.marker.evaluate({"extra": ""})]
+        for need in map(Requirement, distribution.requires or ()):
+            if need.marker is None or any(need.marker.evaluate({"extra": extra}) for extra in {"", *wanted}):
+                waiting.append((need.name, frozenset(need.extras)))
     return found
 
 
@@ -41,36 +63,65 @@ def own() -> int:
     return sum(file.stat().st_size for file in files if file.is_file() and file.suffix != ".pyc")
 
 
-def sentence(all_: int, robots: int, pinocchio: int, checking: int) -> str:
-    """Return the sentence of the page from sizes in bytes."""
-    return (
-        f"An installation takes {all_ / 1e9:.1f} GB: {robots / 1e9:.2f} GB for the robots of"
-        f" example-robot-data, {pinocchio / 1e9:.2f} GB for Pinocchio and its\nlibraries, and the rest mostly"
-        f" for NumPy, Numba and its compiler. A job that only [checks files](ci.md)\nneeds urdfkin and click,"
-        f" {checking / 1e6:.0f} MB."
+def installed_extras(core: dict[str, int]) -> dict[str, tuple[int, int]]:
+    """Return for each installed extra the number and the bytes of the packages that it adds."""
+    sizes = {}
+    for extra in EXTRAS:
+        try:
+            added = {name: size for name, size in closure("urdfkin", [extra]).items() if name not in core}
+        except importlib.metadata.PackageNotFoundError:
+            continue
+        sizes[extra] = (len(added), sum(added.values()))
+    return sizes
+
+
+def sentences(core: dict[str, int], lean: dict[str, int], extras: dict[str, tuple[int, int]]) -> str:
+    """Return the text of the page: the core with and without yourdfpy, `check` alone, the extras."""
+    total, meshes = sum(core.values()), sum(core.values()) - sum(lean.values())
+    robots, pinocchio = core["example-robot-data"], sum(closure("pin").values())
+    text = (
+        f"An installation has {len(core)} packages and takes {total / 1e9:.1f} GB:"
+        f" {robots / 1e9:.2f} GB for the robots of\nexample-robot-data, {pinocchio / 1e9:.2f} GB for"
+        " Pinocchio and its libraries, and the rest mostly for NumPy, Numba and its\ncompiler."
+        f" {len(core) - len(lean)} packages ({meshes / 1e6:.0f} MB) come only with yourdfpy, which needs"
+        " `trimesh[easy]`. A job that only\n[checks files](ci.md) needs urdfkin and click,"
+        f" {(own() + core['click']) / 1e6:.0f} MB.\n\n| extra | additional packages | size |\n|---|---|---|\n"
     )
+    rows = (f"| `[{name}]` | {count} | {size / 1e6:.0f} MB |" for name, (count, size) in extras.items())
+    return text + "\n".join(rows)
 
 
-def page(text: str, said: str) -> str:
-    """Return the page with the sentence inserted."""
-    found, count = _PLACE.subn(lambda place: place[1] + said + place[2], text)
+def page(text: str, inserted: str) -> str:
+    """Return the page with the text inserted."""
+    found, count = _PLACE.subn(lambda place: place[1] + inserted + place[2], text)
     if count != 1:
         raise ValueError(f"the page has {count} places for the size")
     return found
 
 
 def main() -> None:
-    """Print the largest packages and the sums, and write the page."""
-    sizes = closure("urdfkin") | {"urdfkin": own()}
-    for name, size in sorted(sizes.items(), key=lambda item: -item[1])[:10]:
+    """Print the largest packages, the sums and the extras, and write the page."""
+    parser = argparse.ArgumentParser(description="Measure the size of an installation.")
+    parser.add_argument("--print", action="store_true", dest="only_print", help="do not write the page")
+    options = parser.parse_args()
+    core = closure("urdfkin") | {"urdfkin": own()}
+    lean = closure("urdfkin", without="yourdfpy") | {"urdfkin": own()}
+    extras = installed_extras(core)
+    for name, size in sorted(core.items(), key=lambda item: -item[1])[:10]:
         print(f"{size / 1e6:7.0f} MB  {name}")
-    everything, pinocchio = sum(sizes.values()), sum(closure("pin").values())
-    checking = own() + sizes["click"]
-    print(f"{everything / 1e6:7.0f} MB  urdfkin and the {len(sizes) - 1} packages that it needs")
-    print(f"{pinocchio / 1e6:7.0f} MB  of these for pin, which is Pinocchio")
-    print(f"{checking / 1e6:7.0f} MB  urdfkin and click, which `urdfkin check` needs")
-    said = sentence(everything, sizes["example-robot-data"], pinocchio, checking)
-    PAGE.write_text(page(PAGE.read_text("utf-8"), said), "utf-8")
+    print(f"{sum(core.values()) / 1e6:7.0f} MB  urdfkin and the {len(core) - 1} packages that it needs")
+    print(f"{sum(lean.values()) / 1e6:7.0f} MB  the same {len(lean)} packages without yourdfpy's")
+    print(f"{sum(closure('pin').values()) / 1e6:7.0f} MB  of these for pin, which is Pinocchio")
+    print(f"{(own() + core['click']) / 1e6:7.0f} MB  urdfkin and click, which `urdfkin check` needs")
+    for name, (count, size) in extras.items():
+        print(f"{size / 1e6:7.0f} MB  [{name}], {count} packages more")
+    print(f"only yourdfpy needs: {', '.join(sorted(core.keys() - lean.keys()))}")
+    if options.only_print:
+        return
+    if len(extras) < len(EXTRAS):
+        missing = ", ".join(set(EXTRAS) - extras.keys())
+        sys.exit(f"the page is not written: install these extras first: {missing}")
+    PAGE.write_text(page(PAGE.read_text("utf-8"), sentences(core, lean, extras)), "utf-8")
     print(PAGE)
 
 

@@ -47,9 +47,3 @@ def test_every_hook_runs_a_command_of_the_environment_and_needs_no_network() -> 
 @pytest.mark.parametrize("path", sorted((ROOT / "robots").glob("*.urdf")), ids=lambda path: path.stem)
 def test_nothing_can_be_said_against_our_own_robots(path: Path) -> None:
     assert urdfkin.check(path) == []
-
-
-def test_the_citation_names_this_version() -> None:
-    version = re.search(r'^version = "(.+)"', (ROOT / "pyproject.toml").read_text("utf-8"), re.MULTILINE)
-    assert version is not None
-    assert f"\nversion: {version[1]}\n" in (ROOT / "CITATION.cff").read_text("utf-8")

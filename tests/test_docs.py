@@ -102,10 +102,13 @@ def test_the_size_of_an_installation_is_written_by_its_script() -> None:
     text = measure_size.PAGE.read_text("utf-8")
     (checking,) = re.findall(r"needs urdfkin and click, (\d+) MB\.", text)
     assert abs(int(checking) - (measure_size.own() + measure_size.closure("click")["click"]) / 1e6) < 1.0
-    said = measure_size.sentence(2_000_000_000, 10**9, 5 * 10**8, 7_000_000)
-    assert "takes 2.0 GB: 1.00 GB for" in measure_size.page(text, said)
+    core = {"example-robot-data": 10**9, "click": 10**6, "trimesh": 10**9}
+    written = measure_size.sentences(core, {"click": 10**6}, {"view": (8, 40_000_000)})
+    assert "takes 2.0 GB: 1.00 GB for" in measure_size.page(text, written)
+    assert "2 packages (2000 MB) come only" in written
+    assert "| `[view]` | 8 | 40 MB |" in written
     with pytest.raises(ValueError, match="0 places"):
-        measure_size.page("", said)
+        measure_size.page("", written)
 
 
 @pytest.mark.slow

@@ -63,6 +63,8 @@ def test_no_page_names_a_tag_that_may_not_exist() -> None:
 #: GitHub's schema, and what is written for it.
 WRITTEN = {
     "action.yml": "github-actions",
+    ".github/workflows/ci.yml": "github-workflows",
+    ".github/workflows/release.yml": "github-workflows",
     ".github/workflows/site.yml": "github-workflows",
     "docs/examples/robots.yml": "github-workflows",
 }
