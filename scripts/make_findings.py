@@ -10,11 +10,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from urdfkin.lint import DEFAULT_LIMITS, Finding, Severity, check
-from urdfkin.lint.finding import shortened
 from urdfkin.lint.pages import RULES
 from urdfkin.lint.pages import page as page_of
-from urdfkin.lint.reporter import WRITTEN_OUT
 from urdfkin.urdf.catalogue import catalogue
+from urdfkin.urdf.findings import WRITTEN_OUT, shortened
 
 PAGE = Path(__file__).parents[1] / "docs" / "findings.md"
 

@@ -18,11 +18,11 @@ from tests.attacks.hostile import NAMES, urdf
 from urdfkin.dh.export import export
 from urdfkin.dh.units import units_of
 from urdfkin.errors.display import Table, TextDocument
-from urdfkin.lint.finding import Findings
 from urdfkin.report.document import Document
 from urdfkin.report.html import as_html
 from urdfkin.report.markdown import as_markdown
 from urdfkin.robot import Robot
+from urdfkin.urdf.findings import Findings
 
 FORMS = ("__str__", "_repr_html_", "_repr_markdown_", "_repr_latex_")
 

@@ -16,23 +16,19 @@ from urdfkin.dh.parse_table import is_table_file, read_table_or_screws
 from urdfkin.dh.screws import ProductOfExponentials
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
-from urdfkin.lint.finding import Finding, PinocchioReading, Severity, UrdfError, UrdfWarning
-from urdfkin.lint.reporter import Reporter
-from urdfkin.lint.rules.axes import tilts
-from urdfkin.lint.rules.dialect import NEWER_VERSION
-from urdfkin.lint.rules.joints import lost_quaternions
+from urdfkin.lint.rules.joints import MIMIC_CONTINUOUS, tilts
 from urdfkin.lint.rules.left_out import left_out
-from urdfkin.lint.rules.mimic import MIMIC_CONTINUOUS
 from urdfkin.lint.runner import read_urdf
 from urdfkin.model.tree import with_poses, with_tilts
 from urdfkin.robot import Robot
 from urdfkin.system.files import at_home, read_bytes
+from urdfkin.urdf.findings import Finding, PinocchioReading, Reporter, Severity, UrdfError, UrdfWarning
+from urdfkin.urdf.foreign import XmlElement, XmlTree, is_model, lost_quaternions, text_of, tree_of_model
 from urdfkin.urdf.mjcf import is_mjcf, is_text, name_of
 from urdfkin.urdf.packages import described
-from urdfkin.urdf.pinocchio_model import is_model, tree_of_model
+from urdfkin.urdf.parser import NEWER_VERSION
 from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.sources import Origin, Source, Text, as_word, read_source
-from urdfkin.urdf.trees import XmlElement, XmlTree, text_of, without_rotation
 from urdfkin.urdf.writer import to_urdf as write_urdf
 from urdfkin.verify.chain_checks import check_screws
 from urdfkin.verify.mjcf_check import check_mjcf_source, read_mjcf
@@ -119,7 +115,7 @@ def load(
         return _load_model(source, xacro_args, **how)
     if (written := text_of(source)) is not None:
         _refuse_arguments(xacro_args, written[1])
-        lost = lost_quaternions(without_rotation(source), written[1])
+        lost = lost_quaternions(source, written[1])
         robot = robot_of(Text(written[0].encode(), written[1], written[1]), **how, listed=lost)
         if lost:
             robot.verifier.reading = "from a yourdfpy object, which drops quat_xyzw; the file was not read"

@@ -39,7 +39,6 @@ from urdfkin.kinematics.bodies import QUATERNION, seen_from
 from urdfkin.kinematics.inputs import scalars, vectors
 from urdfkin.kinematics.rotation.euler import NEAREST
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.lint.finding import Finding, Findings
 from urdfkin.model import configuration, integration
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.chain import FrameChain, chain
@@ -50,7 +49,8 @@ from urdfkin.model.summary import described
 from urdfkin.model.tree import FloatArray, Joint, KinematicTree
 from urdfkin.system.lazy_import import hook
 from urdfkin.urdf.catalogue import catalogue
-from urdfkin.urdf.joint_order import order_words
+from urdfkin.urdf.findings import Finding, Findings
+from urdfkin.urdf.plain_xml import order_words
 from urdfkin.urdf.sources import Origin
 from urdfkin.verify.bounds import magnitudes, movable, nearest_singularity
 from urdfkin.verify.call import Call

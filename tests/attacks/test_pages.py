@@ -39,7 +39,7 @@ from urdfkin.report.markdown import as_markdown
 from urdfkin.validation.campaign import validate
 from urdfkin.view.dh_drawing import drawing
 
-pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.lint.finding.UrdfWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.urdf.findings.UrdfWarning")
 
 Skeleton = list[tuple[str, tuple[str, ...]]]
 

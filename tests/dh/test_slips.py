@@ -18,9 +18,9 @@ from urdfkin.dh.hypotheses import as_said, doubts, other_readings
 from urdfkin.dh.references import reference_path
 from urdfkin.dh.rows import ORDER
 from urdfkin.errors import InputError
-from urdfkin.lint.finding import UrdfWarning
 from urdfkin.loading import load
 from urdfkin.model.chain import chain
+from urdfkin.urdf.findings import UrdfWarning
 
 SWAPPED_A_D = ("d", "alpha", "a", "theta")
 SWAPPED_ANGLES = ("a", "theta", "d", "alpha")

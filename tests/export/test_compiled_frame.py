@@ -25,7 +25,7 @@ needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C com
 
 @pytest.mark.slow
 @needs_compiler
-@pytest.mark.filterwarnings("ignore::urdfkin.lint.finding.UrdfWarning")
+@pytest.mark.filterwarnings("ignore::urdfkin.urdf.findings.UrdfWarning")
 @pytest.mark.parametrize("name", ["panda", "planar_and_floating_in_the_middle"])
 @pytest.mark.parametrize("reference", ["local_world_aligned"])
 def test_what_it_computes_is_pinocchios_and_one_alone_is_as_in_a_batch(name: str, reference: str) -> None:

@@ -11,9 +11,8 @@ from tests.lint.examples import document
 from tests.lint.others import ask
 from urdfkin.errors import UnknownNameError
 from urdfkin.lint import DEFAULT_LIMITS, Limits, check, rules
-from urdfkin.lint.explain import explain
-from urdfkin.lint.pages import RULES, TOPICS, Page, find_rule, page, topic_pages
-from urdfkin.lint.rule import Rule
+from urdfkin.lint.pages import RULES, TOPICS, Page, explain, find_rule, page, page_files, topic_pages
+from urdfkin.urdf.findings import Rule
 
 HERE = Path(rules.__file__).parent
 EVERY_RULE = pytest.mark.parametrize("rule", RULES.values(), ids=lambda rule: rule.id)
@@ -84,7 +83,7 @@ def test_the_pages_of_a_topic_are_those_of_its_rules_in_their_order(topic: str) 
 
 @pytest.mark.parametrize("topic", TOPICS)
 def test_a_file_of_pages_holds_nothing_that_is_not_read(topic: str) -> None:
-    data = tomllib.loads((HERE / f"{topic}.toml").read_text("utf-8"))
+    data = tomllib.loads(page_files()[topic].read_text("utf-8"))
     known = {field.name for field in fields(Page)} | {"parts"}
     assert data.keys() - {rule.id for rule in TOPICS[topic]} <= {"cure", "others", "parts", "question"}
     assert all(data[rule.id].keys() <= known for rule in TOPICS[topic])
@@ -92,8 +91,10 @@ def test_a_file_of_pages_holds_nothing_that_is_not_read(topic: str) -> None:
 
 def test_every_module_of_rules_is_a_topic() -> None:
     topics = {*TOPICS, "left_out"}  # which is of MJCF: `load` says it, not `check`
-    assert {path.stem for path in HERE.glob("*.py")} - {"__init__"} == topics
-    assert {path.stem for path in HERE.glob("*.toml")} == topics
+    assert {path.stem for path in HERE.glob("*.py")} - {"__init__"} == topics - {"parser"}
+    assert {path.stem for path in HERE.glob("*.toml")} == topics - {"parser"}
+    assert all(file.is_file() for file in page_files().values())
+    assert page_files().keys() == topics
     assert sum(map(len, TOPICS.values())) == len(RULES)
 
 

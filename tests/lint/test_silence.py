@@ -9,7 +9,7 @@ import pytest
 import urdfkin
 from tests.lint.cases.arm import arm
 from urdfkin.lint import check
-from urdfkin.lint.reporter import WRITTEN_OUT
+from urdfkin.urdf.findings import WRITTEN_OUT
 
 COMMENT = "<!-- urdfkin: ignore[{}] as drawn -->\n"
 

@@ -198,8 +198,8 @@ class Inputs:
 
 def load_robot(source: str, *, verify: bool = True, oracle: WitnessName = "pinocchio", **how: Any) -> Robot:
     """Load a command's robot with the command's options or `how`; write each warning to stderr as a line."""
-    from urdfkin.lint.finding import UrdfWarning  # noqa: PLC0415
     from urdfkin.loading import load  # noqa: PLC0415  keeps --help fast
+    from urdfkin.urdf.findings import UrdfWarning  # noqa: PLC0415
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

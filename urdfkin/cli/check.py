@@ -19,18 +19,25 @@ from urdfkin.cli.options import Whole, reject_unused_options
 from urdfkin.cli.streams import command_lines, harmless, say, say_file, say_styled
 from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
 from urdfkin.lint import Finding, Limits, Severity
-from urdfkin.lint.autofix import mend
+from urdfkin.lint.autofix import mend, patch
 from urdfkin.lint.baseline import baseline_text, read_baseline
-from urdfkin.lint.discovery import collected
-from urdfkin.lint.finding import Excerpts
 from urdfkin.lint.formats import as_github, as_json, as_sarif, statistics, summary
 from urdfkin.lint.pages import RULES, page
-from urdfkin.lint.patch import patch
 from urdfkin.lint.runner import Examined, examine, file_of
-from urdfkin.lint.settings import INCLUDE, Choice, Settings, codes, find_settings, known_before, read_settings
+from urdfkin.lint.settings import (
+    INCLUDE,
+    Choice,
+    Settings,
+    codes,
+    collected,
+    find_settings,
+    known_before,
+    read_settings,
+)
 from urdfkin.system.files import demand_regular, write_file
 from urdfkin.system.git import Version, version_before
 from urdfkin.system.lazy_import import installed_version
+from urdfkin.urdf.findings import Excerpts
 from urdfkin.urdf.sources import Text, is_xacro, read_source
 from urdfkin.urdf.xacro import XacroError
 

@@ -78,8 +78,8 @@ def _offered(names: Iterable[str], incomplete: str) -> Items:
 
 def _frames(word: str) -> Iterator[str]:
     """Yield the frame names in a robot's file, without expanding or computing anything."""
-    from urdfkin.lint.reporter import Reporter  # noqa: PLC0415
-    from urdfkin.lint.rules.document import read_document  # noqa: PLC0415
+    from urdfkin.urdf.findings import Reporter  # noqa: PLC0415
+    from urdfkin.urdf.parser import read_document  # noqa: PLC0415
     from urdfkin.urdf.sources import is_xacro, read_source  # noqa: PLC0415
 
     if is_xacro(word) or not (word in catalogue() or Path(word).expanduser().is_file()):

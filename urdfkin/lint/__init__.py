@@ -1,8 +1,8 @@
 """Check a URDF: each finding has a code and a position. Every URDF is checked before it is used."""
 
-from urdfkin.lint.finding import Finding, PinocchioReading, Severity, UrdfError, UrdfWarning
-from urdfkin.lint.limits import DEFAULT_LIMITS, Limits
 from urdfkin.lint.runner import check, check_text
+from urdfkin.urdf.findings import Finding, PinocchioReading, Severity, UrdfError, UrdfWarning
+from urdfkin.urdf.records import DEFAULT_LIMITS, Limits
 
 __all__ = [
     "DEFAULT_LIMITS",

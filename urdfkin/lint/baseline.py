@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from urdfkin.errors import InputError
-from urdfkin.lint.finding import Finding
 from urdfkin.system.files import read_text
+from urdfkin.urdf.findings import Finding
 
 #: Version of the file format; it changes when a field changes its meaning or is removed.
 VERSION = 1

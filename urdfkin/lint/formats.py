@@ -15,9 +15,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from urdfkin.lint.finding import Finding, Fix, Severity
 from urdfkin.lint.pages import RULES, page
-from urdfkin.lint.rule import Rule
+from urdfkin.urdf.findings import Finding, Fix, Rule, Severity
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 

@@ -1,6 +1,7 @@
-"""The rules by code, and the page of each rule.
+"""The rules by code, and the page of each rule, as data and as text.
 
-A topic is a module of `lint.rules`; its pages are in the TOML file of the same name, which is read on demand.
+A topic is a module with rules: the parser, or one of `lint.rules`. Its pages are in the TOML file beside it,
+which has the same name and is read on demand.
 At its top, `cure`, `others` and `question` are defaults for all pages of the file. `parts` defines `{name}`
 for examples: a text, or [text, times] for a repeated text, in which `{i}` is the index. Line breaks in prose
 have no meaning.
@@ -8,44 +9,26 @@ have no meaning.
 
 from __future__ import annotations
 
+import textwrap
 import tomllib
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
+from importlib.resources.abc import Traversable
 from typing import Any
 
 from urdfkin.errors import Question, UnknownNameError
-from urdfkin.lint import rules
-from urdfkin.lint.rule import Rule
-from urdfkin.lint.rules import (
-    axes,
-    comments,
-    dialect,
-    document,
-    encoding,
-    inertials,
-    joints,
-    left_out,
-    materials,
-    meshes,
-    mimic,
-    names,
-    numbers,
-    prefixes,
-    ranges,
-    shapes,
-    structure,
-    suspicious,
-    vocabulary,
-)
+from urdfkin.errors.escape import printable
+from urdfkin.lint.rules import bodies, dialect, joints, left_out, suspicious
+from urdfkin.urdf import parser
+from urdfkin.urdf.findings import Rule
+
+_MODULES = (parser, dialect, joints, suspicious, bodies)
 
 #: Topic -> rules.
 TOPICS: dict[str, tuple[Rule, ...]] = {
     module.__name__.rpartition(".")[2]: tuple(x for x in vars(module).values() if isinstance(x, Rule))
-    for module in (
-        *(encoding, document, comments, dialect, prefixes, vocabulary, numbers, names, structure),
-        *(joints, axes, ranges, mimic, suspicious, inertials, shapes, meshes, materials),
-    )
+    for module in _MODULES
 }
 
 #: Code -> rule, in the order of the codes.
@@ -88,10 +71,16 @@ def page(code: str) -> Page:
     return topic_pages(_TOPIC[code])[code]
 
 
+def page_files() -> dict[str, Traversable]:
+    """Return the file with the pages of each topic."""
+    packages = {module.__name__.rpartition(".")[2]: module.__package__ for module in (*_MODULES, left_out)}
+    return {topic: resources.files(str(package)) / f"{topic}.toml" for topic, package in packages.items()}
+
+
 @cache
 def topic_pages(topic: str) -> dict[str, Page]:
     """Return the pages of a topic."""
-    data = tomllib.loads((resources.files(rules) / f"{topic}.toml").read_text(encoding="utf-8"))
+    data = tomllib.loads(page_files()[topic].read_text(encoding="utf-8"))
     defaults = {key: value for key, value in data.items() if isinstance(value, str)}
     return {
         code: _page({**data, **defaults, **data[code]}) for code in data if code.startswith(("URDF", "MJCF"))
@@ -140,3 +129,38 @@ def find_rules(word: str) -> tuple[Rule, ...]:
     if prefix == "ALL":
         return tuple(RULES.values())
     return family if family and prefix[4:] else (find_rule(word),)
+
+
+#: Characters of an example's line; a longer one is cut.
+_WIDEST = 100
+#: Width of prose on a terminal, in characters.
+WIDTH = 88
+
+
+def explain(rule: Rule) -> str:
+    """Return the page of a rule as plain text."""
+    content = page(rule.id)
+    paragraphs = [
+        f"{rule.id} {rule.slug} ({rule.severity.value})",
+        textwrap.fill(content.title[0].upper() + content.title[1:] + ".", WIDTH),
+        textwrap.fill(content.why, WIDTH),
+        "Found in:\n\n" + _example(content.example),
+        "Better:\n\n" + _example(content.cure),
+        textwrap.fill(content.others, WIDTH),
+    ]
+    if rule.oracle is not None:
+        paragraphs.append(
+            textwrap.fill(
+                "Because of this, urdfkin computes the robot and reports every result as not verified.", WIDTH
+            )
+        )
+    if content.question is not None:
+        paragraphs.append(f"{content.question}.")
+    return "\n\n".join(paragraphs)
+
+
+def _example(text: str) -> str:
+    """Indent an example, escape unprintable characters and cut long lines."""
+    lines = [printable(line) for line in text.strip("\n").split("\n")]
+    cut = [line if len(line) <= _WIDEST else line[: _WIDEST - 4] + " ..." for line in lines]
+    return textwrap.indent("\n".join(cut), "    ", lambda line: True).rstrip()

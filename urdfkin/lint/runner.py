@@ -10,27 +10,21 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from urdfkin.errors.validators import as_bool, as_str
-from urdfkin.lint.finding import Finding, Findings
-from urdfkin.lint.limits import DEFAULT_LIMITS, Limits
 from urdfkin.lint.pages import CODES
-from urdfkin.lint.reporter import Reporter
-from urdfkin.lint.rules.axes import check_axes
-from urdfkin.lint.rules.comments import check_unused, read_comments
-from urdfkin.lint.rules.dialect import check_dialect
-from urdfkin.lint.rules.document import read_document
-from urdfkin.lint.rules.inertials import check_inertials
-from urdfkin.lint.rules.joints import read_robot
-from urdfkin.lint.rules.materials import check_materials
-from urdfkin.lint.rules.meshes import check_meshes
-from urdfkin.lint.rules.mimic import check_mimic
-from urdfkin.lint.rules.names import check_names
-from urdfkin.lint.rules.prefixes import check_prefixes
-from urdfkin.lint.rules.ranges import check_ranges
-from urdfkin.lint.rules.shapes import check_shapes
-from urdfkin.lint.rules.structure import check_structure
+from urdfkin.lint.rules.bodies import check_inertials, check_materials, check_meshes, check_shapes
+from urdfkin.lint.rules.dialect import (
+    check_dialect,
+    check_names,
+    check_prefixes,
+    check_unused,
+    check_vocabulary,
+    read_comments,
+)
+from urdfkin.lint.rules.joints import check_axes, check_mimic, check_ranges, check_structure
 from urdfkin.lint.rules.suspicious import check_suspicious
-from urdfkin.lint.rules.vocabulary import check_vocabulary
-from urdfkin.urdf.records import RobotRecord
+from urdfkin.urdf.findings import Finding, Findings, Reporter
+from urdfkin.urdf.parser import read_document, read_robot
+from urdfkin.urdf.records import DEFAULT_LIMITS, Limits, RobotRecord
 from urdfkin.urdf.sources import Source, Text, read_source
 
 
@@ -170,12 +164,12 @@ def read_urdf(report: Reporter, *, mimic: bool = True, root_joint: str | None = 
     """
     root = read_document(report)
     read_comments(report, CODES)
-    version = None if root is None else check_dialect(report, root)
-    if root is None or version is None:
+    robot = None if root is None else read_robot(report, root)
+    if root is None or robot is None:
         return None
+    check_dialect(report, root)
     check_prefixes(report, root)
     check_vocabulary(report, root)
-    robot = read_robot(report, root, version)
     check_names(report, robot, root_joint)
     sound = check_structure(report, robot)
     check_axes(report, robot)

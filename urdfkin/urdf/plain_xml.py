@@ -1,13 +1,19 @@
 """Parse XML like urdfdom: names as written, with undeclared namespace prefixes allowed.
 
 ElementTree's own parser refuses an undeclared prefix, which urdfdom accepts. This second parser is
-independent of `urdfkin.lint.rules.document` and serves to check its results.
+independent of `urdfkin.urdf.parser` and serves to check its results.
+
+
+Compare the order of the moving joints in a URDF with their order in q.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
+
+from urdfkin.errors import Question
 
 
 def plain_xml(text: str) -> Element:
@@ -27,3 +33,21 @@ def plain_xml(text: str) -> Element:
     parser.CharacterDataHandler = builder.data
     parser.Parse(text.encode(), True)
     return builder.close()
+
+
+def order_words(urdf: str, joints: Sequence[str]) -> str:
+    """Return a sentence that compares the joint order of a file with the order of q.
+
+    Args:
+        urdf: The text of the URDF.
+        joints: Names of the moving joints, in the order of q.
+    """
+    known = set(joints)
+    written = [e.get("name", "") for e in plain_xml(urdf) if e.tag == "joint" and e.get("name") in known]
+    ours = [name for name in joints if name in set(written)]
+    ours_is = "order of joints: Pinocchio's (depth first, siblings by name), for q, v and columns"
+    first = next((k for k, pair in enumerate(zip(written, ours, strict=False)) if pair[0] != pair[1]), None)
+    if first is None:
+        return f"{ours_is}; the file has the same"
+    differs = f"{written[first]} is number {first + 1} there, {ours[first]} here"
+    return f"{ours_is}; the file's differs: {differs}; {Question.JOINT_ORDER}"

@@ -1,19 +1,17 @@
-"""Build a `KinematicTree` from the records of a URDF, or from a robot of yourdfpy.
+"""Build a `KinematicTree` from the records of a URDF.
 
-`urdfkin.lint` reads the records, once and strictly. This module normalises the axes, resolves chains of mimic
-joints, and sorts the joints in Pinocchio's order.
+`urdfkin.urdf.parser` reads the records, and `urdfkin.lint` checks them. This module normalises the axes,
+resolves chains of mimic joints, and sorts the joints in Pinocchio's order.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from urdfkin.errors import InputError, UnknownNameError, UrdfkinError
+from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.rotation.euler import rotation_from_rpy, rpy_of
 from urdfkin.kinematics.rotation.quaternion import rotation_of
 from urdfkin.model.pose import pose
@@ -27,14 +25,7 @@ from urdfkin.model.tree import (
     build_tree,
     with_root_joint,
 )
-from urdfkin.urdf.element import Element
 from urdfkin.urdf.records import JointRecord, LimitRecord, MimicRecord, RobotRecord
-from urdfkin.urdf.writer import to_urdf
-
-if TYPE_CHECKING:
-    from yourdfpy import urdf as yourdf
-
-_NOWHERE = Element("", {}, None, 0, 0, 0)
 
 
 def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None = None) -> KinematicTree:
@@ -50,55 +41,27 @@ def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None =
         UnknownNameError: the mimicked joint of a mimic joint does not exist.
     """
     name = urdf.element.attributes.get("name", "")
-    tree = build_tree(name, _root(name, urdf.links, urdf.joints), _rows(urdf.joints, mimic=mimic))
+    tree = build_tree(name, root_link(name, urdf.links, urdf.joints), joint_rows(urdf.joints, mimic=mimic))
     return tree if root_joint is None else with_root_joint(tree, _root_kind(root_joint))
 
 
-def urdf_of(robot: yourdf.Robot) -> str:
-    """Return the URDF of a yourdfpy robot. The writer of yourdfpy (0.0.60) omits mimic rules.
-
-    The axes are not normalised, so that the checks can report their lengths.
+def joint_rows(joints: Sequence[JointRecord], *, mimic: bool = True) -> list[tuple[Joint, str, str]]:
+    """Return each joint with its mimic rule, its parent link and its child link.
 
     Raises:
-        InputError: the joints form no tree, mimic joints form a circle, required limits are missing, or a
-            name or number has a wrong type.
+        InputError: mimic joints form a circle.
         UnknownNameError: the mimicked joint of a mimic joint does not exist.
     """
-    try:
-        records = [_record(joint) for joint in robot.joints]
-        axes = {record.name: np.array(record.axis) for record in records}
-        rows = [
-            (replace(joint, axis=axes[joint.name]), parent, child) for joint, parent, child in _rows(records)
-        ]
-        return to_urdf(
-            build_tree(robot.name, _root(robot.name, [link.name for link in robot.links], records), rows)
-        )
-    except UrdfkinError:
-        raise
-    except (TypeError, ValueError, AttributeError, IndexError) as error:
-        raise InputError("yourdfpy's robot cannot be written as a URDF", found=str(error)) from error
-
-
-def _record(joint: yourdf.Joint) -> JointRecord:
-    """Convert a joint of yourdfpy to a record."""
-    T = np.eye(4) if joint.origin is None else np.asarray(joint.origin, dtype=np.float64)
-    axis = (1.0, 0.0, 0.0) if joint.axis is None else tuple(map(float, joint.axis))
-    limit, rule = joint.limit, joint.mimic
-    xyz, rpy = tuple(T[:3, 3]), tuple(rpy_of(T[:3, :3]))
-    return JointRecord(
-        _NOWHERE, joint.name, joint.type, joint.parent, joint.child, xyz, rpy,
-        axis=axis,
-        limit=limit and LimitRecord(_NOWHERE, limit.lower, limit.upper, limit.effort, limit.velocity),
-        mimic=rule and MimicRecord(_NOWHERE, rule.joint, rule.multiplier, rule.offset),
-    )  # fmt: skip
-
-
-def _rows(joints: Sequence[JointRecord], *, mimic: bool = True) -> list[tuple[Joint, str, str]]:
     rules = _rules(joints) if mimic else {}
     return [(_joint(one, rules.get(one.name)), str(one.parent), str(one.child)) for one in joints]
 
 
-def _root(name: str, links: Iterable[str], joints: Sequence[JointRecord]) -> str:
+def root_link(name: str, links: Iterable[str], joints: Sequence[JointRecord]) -> str:
+    """Return the link without a parent.
+
+    Raises:
+        InputError: there is none, or more than one.
+    """
     roots = set(links) - {joint.child for joint in joints}
     if len(roots) != 1:
         raise InputError(

@@ -1,14 +1,115 @@
-"""Links and joints of a URDF as plain data. `lint.rules.joints` fills these records, once and strictly.
+"""Elements, links and joints of a URDF as plain data, and the limits on their size. `urdf.parser` fills them.
 
-None marks a value that could not be read; a finding reports it. A value that the file does not write has the
-default of the specification.
+In the records of links and joints, None marks a value that could not be read; a finding reports it. A value
+that the file does not write has the default of the specification.
 """
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from urdfkin.urdf.element import Element
+#: Deepest nesting that Pinocchio accepts. Its XML parser, tinyxml2, has a limit of 500, in which it counts
+#: the document and the refused level.
+ORACLE_DEPTH = 498
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """The limits of one check.
+
+    Attributes:
+        bytes: Size of the file.
+        depth: Levels of nested elements; urdfdom's parser refuses more.
+        elements: Number of elements.
+        attributes: Number of attributes of one element.
+        name: Characters in the name of an element, an attribute, a link or a joint.
+        number: Characters in one number.
+        markup: Bytes of one tag, comment or processing instruction, within 10 %; libxml2 has the same limit.
+    """
+
+    bytes: int = 100_000_000
+    depth: int = ORACLE_DEPTH
+    elements: int = 1_000_000
+    attributes: int = 200
+    name: int = 10_000
+    number: int = 2_000
+    markup: int = 10_000_000
+
+
+DEFAULT_LIMITS = Limits()
+
+
+#: A start tag, matched from an element's offset. A quoted value may contain '>'.
+START_TAG = re.compile(rb"""<(?:[^<>"']++|"[^"]*+"|'[^']*+')*+>""")
+ATTRIBUTE = re.compile(rb"""([^\s=<>/"']++)\s*+=\s*+("[^"]*+"|'[^']*+')""")
+
+
+@dataclass(slots=True, eq=False)
+class Element:
+    """An element of a URDF.
+
+    Attributes:
+        tag: The tag as written.
+        attributes: The attributes as written.
+        parent: The parent element; None for the root.
+        line: The line of the start tag, from 1.
+        column: The column of the start tag.
+        offset: The position of the start tag in bytes.
+        above: The child of `<robot>` that contains this element; None for the children of `<robot>`.
+        children: The child elements, in file order.
+        text: The beginning of the element's text.
+    """
+
+    tag: str
+    attributes: dict[str, str]
+    parent: Element | None
+    line: int
+    column: int
+    offset: int
+    above: Element | None = None
+    children: Sequence[Element] = ()
+    text: str = ""
+
+    def append(self, child: Element) -> None:
+        """Add a child. An element without children has no list, which halves its size."""
+        if isinstance(self.children, list):
+            self.children.append(child)
+        else:
+            self.children = [child]
+
+    def all(self, tag: str) -> list[Element]:
+        """Return the children with a tag."""
+        return [child for child in self.children if child.tag == tag]
+
+    def first(self, tag: str) -> Element | None:
+        """Return the first child with a tag, or None. Every URDF reader uses the first."""
+        return next((child for child in self.children if child.tag == tag), None)
+
+    def walk(self) -> Iterator[Element]:
+        """Yield this element and all elements below it, in file order, without recursion."""
+        stack = [self]
+        while stack:
+            element = stack.pop()
+            yield element
+            stack += reversed(element.children)
+
+    @property
+    def holder(self) -> Element:
+        """The child of `<robot>` that contains this element, or the element itself."""
+        return self.above or self
+
+    @property
+    def owner(self) -> str:
+        """The tag of the holder: `joint` for every element inside a joint."""
+        return self.holder.tag
+
+    @property
+    def label(self) -> str | None:
+        """The name of the link or joint that contains this element."""
+        return self.holder.attributes.get("name") if self.parent is not None else None
+
 
 Vector = tuple[float, ...]
 

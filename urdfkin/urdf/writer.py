@@ -17,7 +17,7 @@ from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation.euler import rpy_of
 from urdfkin.model.tree import Joint, JointKind, KinematicTree, Limit
 from urdfkin.system.files import Edit
-from urdfkin.urdf.element import ATTRIBUTE, START_TAG, Element
+from urdfkin.urdf.records import ATTRIBUTE, START_TAG, Element
 
 #: Joint kinds that need position limits in a URDF.
 _BOUNDED = (JointKind.REVOLUTE, JointKind.PRISMATIC)

@@ -12,7 +12,7 @@ from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.configuration import neutral
 from urdfkin.model.frame_names import LinkFrame
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree
-from urdfkin.urdf.pinocchio_model import Modelled
+from urdfkin.urdf.foreign import Modelled
 from urdfkin.verify.bounds import Bound, magnitudes
 from urdfkin.verify.certificate import compare
 from urdfkin.verify.pinocchio import MOST_RATES

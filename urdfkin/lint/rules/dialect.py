@@ -1,59 +1,50 @@
-"""Check that a document is a URDF: root element, version, and no unexpanded xacro."""
+"""Check elements, attributes, names and comments: the dialect of a file."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+import unicodedata
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from typing import TypeVar
 
-from urdfkin.lint.finding import Severity, quoted, shortened
-from urdfkin.lint.reporter import Reporter
-from urdfkin.lint.rule import ERROR, WARNING, Rule
-from urdfkin.lint.rules import names
-from urdfkin.lint.rules.vocabulary import outside_extensions
-from urdfkin.urdf.element import Element
+from urdfkin.urdf import parser
+from urdfkin.urdf.findings import (
+    DIFFERS,
+    ERROR,
+    NOTE,
+    WARNING,
+    Comment,
+    Reporter,
+    Rule,
+    Severity,
+    Silence,
+    Silences,
+    quoted,
+    shortened,
+)
+from urdfkin.urdf.parser import JOINT_TYPES, nearest_tag
+from urdfkin.urdf.records import Element, RobotRecord
 
 INCLUDE = Rule("URDF112", "include", ERROR)
-NOT_URDF = Rule("URDF201", "not-a-urdf", ERROR)
 XACRO = Rule("URDF202", "unexpanded-xacro", ERROR)
-VERSION = Rule("URDF203", "urdf-version", ERROR)
-NEWER_VERSION = Rule("URDF204", "newer-urdf-version", WARNING)
 NO_LINKS = Rule("URDF205", "no-links", ERROR)
 NAMESPACE = Rule("URDF213", "default-namespace", WARNING)
 
 _T = TypeVar("_T")
 
-#: Root element of another format -> remedy.
-_FORMATS = {
-    "sdf": "this is an SDF file; convert it to a URDF first",
-    "mujoco": "this is MJCF, which `load` and all other commands read; a file of it ends in .xml or .mjcf",
-    "mujocoinclude": "this is a part of an MJCF file; load the file that includes it",
-    "model": "this is a part of an SDF file; convert it to a URDF first",
-    "world": "this is a part of an SDF file; convert it to a URDF first",
-    "collada": "this is a COLLADA file",
-    "html": "this is a web page, not the file it shows",
-    "launch": "this is a launch file; the URDF is what it loads",
-    "package": "this is a package manifest; the URDF is another file",
-    "drake": "this is a Drake file; convert it to a URDF first",
-}
-
 #: Elements of an SRDF, which accompanies a URDF.
 _SRDF = {"group", "group_state", "end_effector", "virtual_joint", "disable_collisions", "passive_joint"}
 
-_VERSION = re.compile(r"\s*\+?([0-9]+)\.\+?([0-9]+)")
 _XACRO_NAMESPACE = re.compile(r"https?://(www\.)?(ros|wiki\.ros)\.org/(wiki/)?xacro")
 _COMMAND = re.compile(r"\$\((find|arg|env|optenv|eval|anon|dirname)\b")
 _XINCLUDE = "http://www.w3.org/2001/XInclude"
 
-#: Newest URDF version that urdfdom 6 supports.
-NEWEST = (1, 2)
 
-
-def check_dialect(report: Reporter, root: Element) -> tuple[int, int] | None:
-    """Return the version of a URDF, or None if the document is not a URDF."""
-    if root.tag != "robot":
-        _other_format(report, root)
-        return None
+def check_dialect(report: Reporter, root: Element) -> None:
+    """Report a missing name, no links, unexpanded xacro, includes and a default namespace."""
     prefixes = _prefixes(root)
     _check_namespaces(report, root, prefixes)
     _check_name(report, root)
@@ -63,18 +54,6 @@ def check_dialect(report: Reporter, root: Element) -> tuple[int, int] | None:
             "this is an SRDF; pass the URDF of the same robot" if srdf else "a robot has at least one <link>"
         )
         report.add(NO_LINKS, "the robot has no link", root, remedy=remedy)
-    return _version(report, root)
-
-
-def _other_format(report: Reporter, root: Element) -> None:
-    prefix, _, local = root.tag.rpartition(":")
-    if local == "robot" and prefix:
-        remedy = f"write <robot> without the prefix {prefix!r}"
-    elif local.lower() == "robot":
-        remedy = "write it in lower case"
-    else:
-        remedy = _FORMATS.get(local.lower(), "a URDF begins with <robot name=...>")
-    report.add(NOT_URDF, "the root element is not <robot>", root, found=f"<{root.tag}>", remedy=remedy)
 
 
 def _prefixes(root: Element) -> dict[str, str]:
@@ -190,31 +169,442 @@ def is_expression(value: str) -> bool:
 def _check_name(report: Reporter, root: Element) -> None:
     name = root.attributes.get("name")
     if name is None:
-        report.add(names.MISSING_NAME, "the robot has no name", root, remedy='write <robot name="...">')
+        report.add(parser.MISSING_NAME, "the robot has no name", root, remedy='write <robot name="...">')
     elif not name.strip():
+        report.add(ODD_NAME, "the robot's name is empty", root, attribute="name", remedy="give it a name")
+
+
+MISPLACED = Rule("URDF206", "misplaced-element", ERROR)
+UNKNOWN_ELEMENT = Rule("URDF207", "unknown-element", WARNING)
+UNKNOWN_ATTRIBUTE = Rule("URDF208", "unknown-attribute", WARNING)
+DUPLICATE_ELEMENT = Rule("URDF209", "duplicate-element", WARNING)
+STRAY_TEXT = Rule("URDF212", "stray-text", WARNING)
+
+#: Extension elements with any content, even `<joint>` and `<link>`.
+OPAQUE = frozenset({"gazebo", "transmission", "ros2_control", "sensor", "plugin", "mujoco", "sdf", "verbose"})
+
+#: Elements and attributes that simulators and vendors add in widely used robots.
+_ADDED = (
+    "contact collision_checking self_filter surface gravity kinematic drake group dont_collapse D K"
+    " mu_coulomb mu_viscous current command_effort gear_velocity"
+)
+EXTENSIONS = frozenset(_ADDED.split())
+
+#: Element: attributes > child elements. Without a colon, the attributes are not checked. An element without
+#: a line is not checked.
+_TABLE = """
+robot: name version > link joint material
+link: name type > inertial visual collision
+joint: name type > origin parent child axis limit mimic dynamics safety_controller calibration
+inertial > origin mass inertia
+visual > origin geometry material
+collision > origin geometry material
+geometry > box cylinder sphere mesh capsule
+material > color texture
+origin: xyz rpy quat_xyzw >
+parent: link >
+child: link >
+axis: xyz >
+limit: lower upper effort velocity acceleration deceleration jerk >
+mimic: joint multiplier offset >
+dynamics: damping friction >
+safety_controller: k_velocity k_position soft_lower_limit soft_upper_limit >
+"""
+_LINES = [line.partition(">") for line in _TABLE.strip().splitlines()]
+CHILDREN = {head.split()[0].rstrip(":"): frozenset(inside.split()) for head, _, inside in _LINES}
+ATTRIBUTES = {
+    tag: frozenset(names.split())
+    for tag, colon, names in (head.partition(":") for head, *_ in _LINES)
+    if colon
+}
+
+#: Elements and attributes of other formats for poses, which URDF readers skip.
+_FOREIGN = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
+
+#: Attributes with a meaning elsewhere: `--fix` does not remove them.
+_MEANT = frozenset().union(*ATTRIBUTES.values()) | _FOREIGN | EXTENSIONS
+
+#: Children that may occur only once.
+_ONCE = {
+    **{tag: CHILDREN[tag] for tag in ("joint", "inertial", "visual", "collision", "geometry")},
+    "link": frozenset({"inertial"}),
+}
+
+#: Elements whose value belongs into attributes; text between their tags is lost.
+_VALUES = {"origin", "axis", "limit", "mimic", "parent", "child"}
+
+#: Elements whose text can only be a misplaced value.
+_VECTORS = ("origin", "axis")
+
+
+def check_vocabulary(report: Reporter, root: Element) -> None:
+    """Report unknown, misplaced and repeated elements, unknown attributes, and text between tags."""
+    stack = [root]
+    while stack:
+        element = stack.pop()
+        known = CHILDREN.get(element.tag)
+        if known is None:
+            continue
+        _check_attributes(report, element)
+        _check_text(report, element)
+        _check_repeats(report, element)
+        for child in element.children:
+            if child.tag not in known and child.tag not in OPAQUE and ":" not in child.tag:
+                _check_unknown(report, child, known)
+        stack += [child for child in reversed(element.children) if child.tag in known]
+
+
+def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) -> None:
+    parts = [part for part in outside_extensions(element) if _is_part(part)]
+    for part in parts:
+        inside = part.parent.tag if part.parent else ""
+        meant = nearest_tag(part.tag, _PARTS)
+        what = f"a {meant} inside <{inside}>" if part.tag == meant else f"<{part.tag}>"
         report.add(
-            names.ODD_NAME, "the robot's name is empty", root, attribute="name", remedy="give it a name"
+            MISPLACED,
+            f"{what} is skipped, so it is missing from the robot",
+            part,
+            remedy=f"write <{meant}> as a child of <robot>",
+            owner=part.tag,
+        )
+    if parts:
+        return
+    close = None if report.is_full(UNKNOWN_ELEMENT) else nearest_tag(element.tag, known)
+    parent = element.parent
+    if parent is not None and parent.tag in _VECTORS and element.text and not parent.attributes:
+        report.add(
+            STRAY_TEXT,
+            f"the value inside <{element.tag}> is skipped",
+            element,
+            found=quoted(element.text),
+            remedy=f"write it as an attribute, as in {_EXAMPLES[parent.tag]}",
+            severity=Severity.ERROR,
+        )
+        return
+    foreign = element.tag in _FOREIGN
+    remedy = (
+        f"write {_EXAMPLES['origin']}" if foreign else f"did you mean <{close}>?" if close else "remove it"
+    )
+    report.add(
+        UNKNOWN_ELEMENT,
+        f"URDF has no <{element.tag}> in <{parent.tag if parent else ''}>; it is skipped",
+        element,
+        remedy=remedy,
+        severity=Severity.NOTE if element.tag in EXTENSIONS else None,
+    )
+
+
+def outside_extensions(element: Element) -> Iterator[Element]:
+    """Yield an element and all elements below it, except those in extensions."""
+    stack = [element]
+    while stack:
+        element = stack.pop()
+        yield element
+        stack += [child for child in reversed(element.children) if child.tag not in OPAQUE]
+
+
+def _is_part(element: Element) -> bool:
+    """Return whether an element is a link or joint, by its tag and its content."""
+    tag = nearest_tag(element.tag, _PARTS) if len(element.tag) < _LONGEST_PART else None
+    if tag == "link":
+        return "name" in element.attributes
+    return tag == "joint" and (
+        element.attributes.get("type", "").lower() in JOINT_TYPES or element.first("parent") is not None
+    )
+
+
+_PARTS = frozenset({"link", "joint"})
+
+#: Longer tags are similar to neither: difflib's ratio with five common letters of eight is no match.
+_LONGEST_PART = 8
+
+
+def _check_attributes(report: Reporter, element: Element) -> None:
+    known = ATTRIBUTES.get(element.tag)
+    if known is None:
+        return
+    for attribute in element.attributes:
+        if attribute in known or ":" in attribute or attribute == "xmlns":
+            continue
+        close = None if report.is_full(UNKNOWN_ATTRIBUTE) else nearest_tag(attribute, known)
+        report.add(
+            UNKNOWN_ATTRIBUTE,
+            f"<{element.tag}> has no attribute of this name; it is skipped",
+            element,
+            attribute=attribute,
+            found=f"{attribute}={quoted(element.attributes[attribute])}",
+            remedy=f"did you mean {close}?" if close else f"its attributes are {', '.join(sorted(known))}",
+            severity=Severity.NOTE if attribute in EXTENSIONS else None,
+            fix=None if close or attribute in _MEANT else partial(report.without, element, attribute),
         )
 
 
-def _version(report: Reporter, root: Element) -> tuple[int, int]:
-    written = root.attributes.get("version")
-    if written is None:
-        return (1, 0)
-    match = _VERSION.fullmatch(written)
-    version = (int(match[1]), int(match[2])) if match and len(written) < 20 else None
-    rule, remedy = VERSION, 'write version="1.0" if the file follows it, or remove the attribute'
-    if version is None:
-        message = "a URDF version has the form 1.0"
-    elif version > NEWEST:
-        message = "the URDF version is later than 1.2, the last that urdfdom and Pinocchio read"
-        remedy = "write the version that the file follows, 1.0 to 1.2"
-    elif version < (1, 0):
-        message = "this URDF version does not exist"
-    elif version == (1, 0):
-        return version
+def _check_text(report: Reporter, element: Element) -> None:
+    if not element.text or element.tag not in _VALUES | {"robot", "joint", "link"}:
+        return
+    if element.tag in ("parent", "child") and "link" not in element.attributes:
+        return  # the finding about the missing attribute quotes this text
+    lost = element.tag in _VECTORS and not element.attributes
+    example = _EXAMPLES.get(element.tag)
+    report.add(
+        STRAY_TEXT,
+        f"text inside <{element.tag}> is skipped",
+        element,
+        found=quoted(element.text),
+        remedy=f"write it as an attribute, as in {example}" if example else "remove it",
+        severity=Severity.ERROR if lost else None,
+    )
+
+
+_EXAMPLES = {
+    "origin": '<origin xyz="0 0 1" rpy="0 0 0"/>',
+    "axis": '<axis xyz="0 0 1"/>',
+    "limit": '<limit lower="-1" upper="1" effort="10" velocity="1"/>',
+    "mimic": '<mimic joint="leader" multiplier="1" offset="0"/>',
+    "parent": '<parent link="base"/>',
+    "child": '<child link="arm"/>',
+}
+
+
+def _check_repeats(report: Reporter, element: Element) -> None:
+    once = _ONCE.get(element.tag)
+    if once is None:
+        return
+    seen: dict[str, Element] = {}
+    for child in element.children:
+        if child.tag in seen and child.tag in once:
+            report.add(
+                DUPLICATE_ELEMENT,
+                f"a second <{child.tag}> is skipped; the first, on line {seen[child.tag].line}, is used",
+                child,
+                remedy="remove one of the two",
+            )
+        seen.setdefault(child.tag, child)
+
+
+UNDECLARED_PREFIX = Rule("URDF214", "undeclared-prefix", WARNING)
+
+#: Prefixes that XML declares itself.
+_PREDECLARED = ("xml", "xmlns")
+
+#: Prefixes with findings of their own (URDF202, URDF112).
+_REPORTED = ("xacro:", "xi:include")
+
+
+@dataclass(slots=True)
+class _Use:
+    """The first use of a prefix, and the number of uses."""
+
+    element: Element
+    attribute: str | None
+    times: int = 0
+
+
+def check_prefixes(report: Reporter, root: Element) -> None:
+    """Report each undeclared prefix once."""
+    for prefix, use in _undeclared_prefixes(root).items():
+        more = f" and {use.times - 1} more" if use.times > 1 else ""
+        report.add(
+            UNDECLARED_PREFIX,
+            f"the prefix {quoted(prefix)} is not declared; most XML readers refuse the file",
+            use.element,
+            attribute=use.attribute,
+            found=quoted(use.attribute or f"<{use.element.tag}>") + more,
+            remedy=f'write xmlns:{shortened(prefix)}="..." in <robot>, or remove the names with this prefix',
+        )
+
+
+def _undeclared_prefixes(root: Element) -> dict[str, _Use]:
+    """Return the undeclared prefixes with their uses."""
+    found: dict[str, _Use] = {}
+    declared = Counter(_PREDECLARED)
+    stack = [(root, False)]
+    while stack:
+        element, leaving = stack.pop()
+        own = [key.removeprefix("xmlns:") for key in element.attributes if key.startswith("xmlns:")]
+        if leaving:
+            declared.subtract(own)
+            continue
+        declared.update(own)
+        if own:
+            stack.append((element, True))
+        stack += [(child, False) for child in reversed(element.children)]
+        for prefix, attribute in _prefixes_of(element):
+            if declared[prefix] < 1:
+                found.setdefault(prefix, _Use(element, attribute)).times += 1
+    return found
+
+
+def _prefixes_of(element: Element) -> Iterator[tuple[str, str | None]]:
+    """Yield the prefixes of an element's tag (attribute None) and of its attributes."""
+    if ":" in element.tag and not element.tag.startswith(_REPORTED):
+        yield element.tag.partition(":")[0], None
+    for key in element.attributes:
+        if ":" in key:
+            yield key.partition(":")[0], key
+
+
+RESERVED_NAME = Rule("URDF403", "reserved-name", WARNING)
+UNIVERSE = Rule("URDF404", "name-universe", WARNING, DIFFERS)
+ODD_NAME = Rule("URDF405", "odd-name", WARNING)
+NAME_BLANKS = Rule("URDF406", "line-break-in-name", WARNING, DIFFERS)
+LOOKALIKE = Rule("URDF407", "lookalike-names", WARNING)
+
+#: Longer names break tables and file paths.
+LONGEST = 200
+
+
+def check_names(report: Reporter, robot: RobotRecord, root_joint: str | None) -> None:
+    """Report names that are reserved, easily confused, or troublesome for other programs.
+
+    Args:
+        report: The reporter, which receives the findings.
+        robot: The records of the robot.
+        root_joint: Set if the robot gets a joint `root_joint` below a link `universe`.
+    """
+    links = list(robot.links.items())
+    joints = [(joint.name, joint.element) for joint in robot.joints if joint.name]
+    for name, element in (*links, *joints):
+        _check_odd(report, name, element)
+        _check_blanks(report, element)
+        _check_reserved(report, name, element, root_joint)
+    for kind in (links, joints):
+        _check_lookalikes(report, kind)
+
+
+def _check_odd(report: Reporter, name: str, element: Element) -> None:
+    reason = None
+    if not name.isprintable():
+        reason = "the name contains characters that cannot be printed"
+    elif name != name.strip():
+        reason = "the name begins or ends with a space"
+    elif "/" in name or "\\" in name:
+        reason = "the name contains a slash, like a path"
+    elif name[0] in "=+-@":
+        reason = "the name begins like a spreadsheet formula"
+    elif len(name) > LONGEST:
+        reason = f"the name has {len(name)} characters"
+    elif any(c in "\"'<>&|;`$" for c in name):
+        reason = "the name contains a special character of shells or XML"
+    if reason:
+        report.add(
+            ODD_NAME,
+            reason,
+            element,
+            attribute="name",
+            found=quoted(name),
+            remedy="use letters, digits, - and _",
+        )
+
+
+def _check_blanks(report: Reporter, element: Element) -> None:
+    raw = report.raw(element, "name") if report.has_raw_blanks else None
+    if raw is not None and any(c in raw for c in "\t\r\n"):
+        report.add(
+            NAME_BLANKS,
+            "the name contains a tab or a line end",
+            element,
+            attribute="name",
+            found=quoted(raw),
+            remedy="write the name on one line, without tabs",
+        )
+
+
+def _check_reserved(report: Reporter, name: str, element: Element, root_joint: str | None) -> None:
+    if name == "universe" and element.tag == "joint":
+        report.add(
+            UNIVERSE,
+            "Pinocchio uses this name for the world and does not find the joint",
+            element,
+            attribute="name",
+            remedy="rename it",
+        )
+    elif (element.tag, name) in (("link", "universe"), ("joint", "root_joint")):
+        what = "the world" if name == "universe" else "the joint of a free or planar base"
+        report.add(
+            RESERVED_NAME,
+            f"the name is reserved for {what}",
+            element,
+            attribute="name",
+            remedy="rename it" if root_joint else "rename it, or load without root_joint",
+            severity=Severity.ERROR if root_joint else None,
+        )
+
+
+def _check_lookalikes(report: Reporter, named: list[tuple[str, Element]]) -> None:
+    seen: dict[str, str] = {}
+    for name, element in named:
+        if name.isascii() or len(name) > LONGEST:
+            continue  # a longer name is reported anyway; normalising its marks takes quadratic time
+        key = unicodedata.normalize("NFKC", name)
+        first = seen.setdefault(key, name)
+        if first != name:
+            report.add(
+                LOOKALIKE,
+                "another name looks the same, but has different characters",
+                element,
+                attribute="name",
+                found=ascii(name) + " and " + ascii(first),
+                remedy="use one of the two",
+            )
+
+
+BAD_COMMENT = Rule("URDF120", "bad-comment", WARNING)
+UNUSED_COMMENT = Rule("URDF121", "unused-comment", NOTE)
+
+_FORM = re.compile(r"\s*urdfkin:\s*ignore\s*\[([^\]]*)\]\s*(.*)", re.DOTALL)
+_BETWEEN = re.compile(r"[,\s]+")
+
+
+def read_comments(report: Reporter, codes: Mapping[str, str]) -> None:
+    """Apply the comments of a document, and report invalid ones.
+
+    Args:
+        report: The reporter of the file.
+        codes: Names of codes in lower case -> code.
+    """
+    silences = Silences()
+    for comment in report.comments:
+        if (silence := _read(report, comment, codes)) is not None:
+            silences.add(silence)
+    report.silence(silences)
+
+
+def _read(report: Reporter, comment: Comment, codes: Mapping[str, str]) -> Silence | None:
+    match = _FORM.fullmatch(comment.text)
+    words = [word for word in _BETWEEN.split(match[1]) if word] if match else []
+    unknown = next((word for word in words if word.lower() not in codes), None)
+    reason = " ".join(match[2].split()) if match else ""
+    remedy: str | None
+    if words and unknown is None and reason:
+        return Silence(comment, tuple(dict.fromkeys(codes[word.lower()] for word in words)), reason)
+    if not words:
+        what, remedy = "no code in brackets", "write <!-- urdfkin: ignore[URDF503] the reason -->"
+    elif unknown is not None:
+        close = report.nearest(unknown.lower(), codes)
+        what = f"unknown code {quoted(unknown)}"
+        remedy = f"did you mean {', '.join(dict.fromkeys(codes[word] for word in close))}?" if close else None
     else:
-        rule, message = NEWER_VERSION, "most readers support only URDF 1.0"
-        remedy = "remove the attribute unless the file uses features of the version"
-    report.add(rule, message, root, attribute="version", found=quoted(written), remedy=remedy)
-    return version if version is not None and rule is NEWER_VERSION else (1, 0)
+        what, remedy = "no reason is given", "write the reason after the bracket"
+    report.add(
+        BAD_COMMENT,
+        f"{what}, so the comment silences nothing",
+        found=quoted(f"<!--{comment.text}-->"),
+        remedy=remedy,
+        position=(comment.line, comment.column),
+    )
+    return None
+
+
+def check_unused(report: Reporter) -> None:
+    """Report the codes of comments that silence no finding, after all rules."""
+    for silence in report.silences.all:
+        for code in silence.codes:
+            if code not in silence.used:
+                report.add(
+                    UNUSED_COMMENT,
+                    f"{code} is silenced, but there is no such warning or note here",
+                    found=quoted(f"<!--{silence.comment.text}-->"),
+                    remedy="remove it; an error cannot be silenced",
+                    position=(silence.comment.line, silence.comment.column),
+                )

@@ -1,245 +1,551 @@
-"""Read links and joints into records, once and strictly. The other rules and the reader use the records."""
+"""Check joints: they connect the links to one tree, and have usable axes, limits and mimic rules.
+
+All functions are iterative, because a chain of 50,000 links would exceed the recursion limit.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
+from decimal import Decimal, localcontext
+from typing import TYPE_CHECKING
 
-from urdfkin.lint.finding import Finding, Severity, quoted
-from urdfkin.lint.reporter import Reporter
-from urdfkin.lint.rule import ERROR, WARNING, Rule
-from urdfkin.lint.rules.axes import LONGEST, SHORTEST
-from urdfkin.lint.rules.names import named, report_duplicate
-from urdfkin.lint.rules.numbers import NumberReader
-from urdfkin.lint.rules.vocabulary import JOINT_TYPES, nearest
-from urdfkin.urdf.element import Element
-from urdfkin.urdf.records import FURTHER_LIMITS, JointRecord, LimitRecord, MimicRecord, RobotRecord
+from urdfkin.urdf import parser
+from urdfkin.urdf.findings import ERROR, NOTE, REFUSES, WARNING, Fix, Reporter, Rule, Severity, quoted
+from urdfkin.urdf.parser import LONGEST, SHORTEST
+from urdfkin.urdf.records import (
+    AXIAL,
+    FURTHER_LIMITS,
+    Element,
+    JointRecord,
+    LimitRecord,
+    MimicRecord,
+    RobotRecord,
+)
 
-MISSING_ELEMENT = Rule("URDF210", "missing-element", ERROR)
-MISSING_ATTRIBUTE = Rule("URDF211", "missing-attribute", ERROR)
-UNKNOWN_TYPE = Rule("URDF501", "unknown-joint-type", ERROR)
-EMPTY_AXIS = Rule("URDF504", "axis-without-xyz", ERROR)
-MISSING_LIMIT = Rule("URDF506", "missing-limit", ERROR)
-IGNORED = Rule("URDF510", "ignored-value", WARNING)
-QUATERNION_IGNORED = Rule("URDF511", "quat-xyzw-ignored", WARNING)
-QUATERNION = Rule("URDF512", "quat-xyzw", WARNING)
-BAD_QUATERNION = Rule("URDF513", "bad-quaternion", ERROR)
-#: Largest number of names in one finding.
-_NAMED = 5
+if TYPE_CHECKING:
+    from urdfkin.model.tree import Mimic
 
 
-def read_robot(report: Reporter, root: Element, version: tuple[int, int]) -> RobotRecord:
-    """Read the links and joints of a document; add findings for everything that cannot be read."""
-    robot = RobotRecord(root, version)
-    for element in root.all("link"):
-        name = named(report, element)
-        if name and name in robot.links:
-            report_duplicate(report, element, robot.links[name])
-        elif name:
-            robot.links[name] = element
-    reader = JointReader(report, version)
-    seen: dict[str, Element] = {}
-    for element in root.all("joint"):
-        joint = reader.read(element)
-        if joint.name and joint.name in seen:
-            report_duplicate(report, element, seen[joint.name])
-        seen.setdefault(joint.name, element)
-        robot.joints.append(joint)
-    return robot
+UNKNOWN_LINK = Rule("URDF408", "unknown-link", ERROR)
+SELF_PARENT = Rule("URDF409", "self-parent", ERROR)
+SEVERAL_PARENTS = Rule("URDF410", "several-parents", ERROR)
+SEVERAL_ROOTS = Rule("URDF411", "several-roots", ERROR)
+CYCLE = Rule("URDF412", "cycle", ERROR)
 
 
-def lost_quaternions(joints: Sequence[str], file: str) -> tuple[Finding, ...]:
-    """Return a finding for a yourdfpy robot whose rotations may be lost: yourdfpy ignores quat_xyzw.
-
-    Args:
-        joints: The joints whose origin has no rotation.
-        file: The name of the robot in messages.
-    """
-    if not joints:
-        return ()
-    more = f" and {len(joints) - _NAMED} more" if len(joints) > _NAMED else ""
-    message = (
-        f"yourdfpy ignores quat_xyzw: if the file has one at {', '.join(joints[:_NAMED])}{more}, its rotation"
-        " is missing here"
-    )
-    remedy = "load the file itself if it contains quat_xyzw"
-    return (Finding(QUATERNION.id, Severity.NOTE, message, remedy=remedy, file=file),)
+def check_structure(report: Reporter, robot: RobotRecord) -> bool:
+    """Report the reasons why the joints form no tree; return whether they form one."""
+    edges = [joint for joint in robot.joints if _ends_exist(report, robot, joint)]
+    sound = len(edges) == len(robot.joints) and _no_loops_or_diamonds(report, robot, edges)
+    return _one_root(report, robot) and sound and bool(robot.links)
 
 
-class JointReader:
-    """Reader of the `<joint>` elements of a file.
-
-    Args:
-        report: The reporter of the file.
-        version: The URDF version of the file.
-    """
-
-    def __init__(self, report: Reporter, version: tuple[int, int]) -> None:
-        self.report, self.version = report, version
-        self.numbers = NumberReader(report)
-
-    def read(self, element: Element) -> JointRecord:
-        """Read one joint; a value that cannot be read is reported and has its default in the record."""
-        joint = JointRecord(element, named(self.report, element))
-        joint.kind = self._kind(element)
-        joint.parent, joint.child = self._end(element, "parent"), self._end(element, "child")
-        self._origin(joint)
-        self._axis(joint)
-        self._limit(joint)
-        self._mimic(joint)
-        self._others(joint)
-        return joint
-
-    def required(self, element: Element, attribute: str, example: str, *, number: bool = False) -> str | None:
-        """Return a required attribute, or None after a finding that it is missing or empty.
-
-        Args:
-            element: The element.
-            attribute: The name of the attribute.
-            example: An example for the remedy.
-            number: Whether the attribute is a number. `NumberReader` reports an empty number.
-        """
-        value = element.attributes.get(attribute)
-        if value is None or not (value or number):
-            self.report.add(
-                MISSING_ATTRIBUTE,
-                f"<{element.tag}> needs {attribute}" + ("" if value is None else ", and it is empty"),
-                element,
-                attribute=attribute,
-                found=quoted(element.text) if element.text else None,
-                remedy=f"write {example}",
+def _ends_exist(report: Reporter, robot: RobotRecord, joint: JointRecord) -> bool:
+    """Return whether a joint has two different links that exist; report them otherwise."""
+    for tag, link in (("parent", joint.parent), ("child", joint.child)):
+        if link is not None and link not in robot.links:
+            nearest = report.nearest(link, robot.links)
+            report.add(
+                UNKNOWN_LINK,
+                f"the {tag} link does not exist",
+                joint.element.first(tag),
+                attribute="link",
+                found=quoted(link),
+                remedy=f"did you mean {', '.join(nearest)}?"
+                if nearest
+                else f"add <link name={quoted(link)}/>",
             )
-        return value or None
+    if joint.parent is not None and joint.parent == joint.child:
+        report.add(
+            SELF_PARENT,
+            "the joint connects a link with itself",
+            joint.element.first("child"),
+            attribute="link",
+            found=quoted(joint.parent),
+            remedy="name another parent or child",
+        )
+        return False
+    return joint.parent in robot.links and joint.child in robot.links
 
-    def _kind(self, element: Element) -> str | None:
-        written = self.required(element, "type", '<joint name="..." type="revolute">')
-        if written is None or written in JOINT_TYPES:
-            return written
-        close = nearest(written, frozenset(JOINT_TYPES))
-        self.report.add(
-            UNKNOWN_TYPE,
-            "unknown joint type",
+
+def _no_loops_or_diamonds(report: Reporter, robot: RobotRecord, edges: list[JointRecord]) -> bool:
+    """Search depth first for links with several parents.
+
+    A joint to a link on the current path closes a loop. A joint to another visited link gives this link a
+    second parent.
+    """
+    below: dict[str, list[JointRecord]] = {}
+    children = set()
+    for joint in edges:
+        below.setdefault(joint.parent or "", []).append(joint)
+        children.add(joint.child)
+    first: dict[str, JointRecord] = {}
+    repeated: list[tuple[JointRecord, bool]] = []
+    visited: set[str] = set()
+    for start in [link for link in robot.links if link not in children] + list(robot.links):
+        if start in visited:
+            continue
+        path: set[str] = {start}
+        stack: list[tuple[str, list[JointRecord]]] = [(start, list(reversed(below.get(start, []))))]
+        visited.add(start)
+        while stack:
+            link, pending = stack[-1]
+            if not pending:
+                stack.pop()
+                path.discard(link)
+                continue
+            joint = pending.pop()
+            child = joint.child or ""
+            if child in visited:
+                repeated.append((joint, child in path))
+                continue
+            visited.add(child)
+            first[child] = joint
+            path.add(child)
+            stack.append((child, list(reversed(below.get(child, [])))))
+    for joint, loop in repeated:
+        _report_repeat(report, joint, first.get(joint.child or ""), loop=loop)
+    return not repeated
+
+
+def _report_repeat(report: Reporter, joint: JointRecord, first: JointRecord | None, *, loop: bool) -> None:
+    if loop:
+        rule, remedy = CYCLE, "remove a joint of the loop; a URDF is a tree"
+        message = (
+            f"the joint closes a loop: its child is an ancestor of its parent {quoted(joint.parent or '')}"
+        )
+    else:
+        other = f"joint {quoted(first.name)} on line {first.element.line}" if first else "another joint"
+        rule, remedy = SEVERAL_PARENTS, "a link has one parent; remove one of the joints"
+        message = f"the child link is already the child of {other}"
+    at, found = joint.element.first("child"), quoted(joint.child or "")
+    report.add(rule, message, at, attribute="link", found=found, remedy=remedy)
+
+
+def _one_root(report: Reporter, robot: RobotRecord) -> bool:
+    """Return whether exactly one link has no parent; report the others.
+
+    A link is not reported if a joint with an error may be its parent joint.
+    """
+    children = {joint.child for joint in robot.joints}
+    roots = [link for link in robot.links if link not in children]
+    if not roots and robot.links and not report.failed:
+        report.add(CYCLE, "no link is a root: every link is the child of a joint", robot.element)
+    if len(roots) < 2:
+        return len(roots) == 1
+    if not children <= robot.links.keys():
+        return False  # already reported: a joint with a missing or wrong child
+    parents = {joint.parent for joint in robot.joints}
+    # The first root with children is the robot; the others are disconnected.
+    main = next((root for root in roots if root in parents), roots[0])
+    for root in roots:
+        if root != main:
+            report.add(
+                SEVERAL_ROOTS,
+                f"the link has no parent, and neither has {quoted(main)}",
+                robot.links[root],
+                attribute="name",
+                remedy="connect it with a joint, or remove it",
+            )
+    return False
+
+
+NO_DIRECTION = Rule("URDF502", "axis-without-direction", ERROR)
+AXIS_LENGTH = Rule("URDF503", "axis-not-unit", WARNING)
+PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
+NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
+
+#: A smaller difference of the length from one is rounding of the last digits: a note.
+ROUNDING = 2e-4
+
+#: Tolerance of a unit vector's length, the same as in `kinematics.inputs`.
+_ONE = 1e-12
+
+#: Relative tolerance within which the axis of a planar joint is z.
+_LEAN = 1e-9
+
+#: Tolerance within which Pinocchio replaces an axis by a coordinate axis; Eigen's isApprox compares squares.
+_SNAPPED = 1e-12
+
+#: A smaller tilt (rad) is within the rounding that `verify.bounds` allows for an axis of Pinocchio.
+_TILT = 2.0**-52
+
+
+def check_axes(report: Reporter, robot: RobotRecord) -> None:
+    """Report axes without a direction, axes that are not unit vectors, and axes that are not used."""
+    for joint in robot.joints:
+        if joint.kind in AXIAL:
+            _check_axis(report, joint)
+        elif joint.kind == "planar":
+            _check_planar(report, joint)
+
+
+def _written(joint: JointRecord) -> str:
+    axis = joint.axis_element
+    return f"xyz={quoted(axis.attributes.get('xyz', ''))}" if axis is not None else 'the default "1 0 0"'
+
+
+def _check_axis(report: Reporter, joint: JointRecord) -> None:
+    if joint.axis is None or joint.axis_element is None:
+        return
+    length = math.hypot(*joint.axis)
+    if not SHORTEST < length < LONGEST:
+        what = "is zero" if length == 0.0 else f"has no usable length ({length:.3g})"
+        report.add(
+            NO_DIRECTION,
+            f"the axis {what}",
+            joint.axis_element,
+            attribute="xyz",
+            found=_written(joint),
+            remedy='write a unit vector, such as xyz="0 0 1"',
+        )
+    elif abs(length - 1.0) > _ONE:
+        unit = unit_vector(joint.axis)
+        written = " ".join(repr(x).removesuffix(".0") for x in unit)
+        element = joint.axis_element
+        report.add(
+            AXIS_LENGTH,
+            f"the axis has length {length:.9g} and is normalised",
             element,
-            attribute="type",
-            found=quoted(written),
-            remedy=f"did you mean {close}?" if close else f"the types are {', '.join(JOINT_TYPES)}",
+            attribute="xyz",
+            found=_written(joint),
+            remedy=f'write xyz="{written}"',
+            fix=lambda: None if _snap(unit) else report.rewritten(element, "xyz", written),
+            severity=Severity.NOTE if abs(length - 1.0) < ROUNDING else None,
+            weight=abs(length - 1.0),
         )
+    _check_snapped(report, joint, joint.axis, joint.axis_element)
+
+
+def unit_vector(vector: Sequence[float]) -> tuple[float, ...]:
+    """Divide a vector by its length, with one rounding per number (at most 2**-53 rad of direction).
+
+    >>> unit_vector((0.0, -3.0, 4.0))
+    (0.0, -0.6, 0.8)
+    """
+    with localcontext(prec=60):
+        numbers = [Decimal(x) for x in vector]
+        length = sum((x * x for x in numbers), Decimal(0)).sqrt()
+        return tuple(float(x / length) + 0.0 for x in numbers)  # + 0.0: no minus before zero
+
+
+def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], element: Element) -> None:
+    if snapped := _snap(axis):
+        unit, tilt = snapped
+        written = " ".join(f"{x:g}" for x in unit)
+        report.add(
+            NEARLY_COORDINATE_AXIS,
+            f"the axis differs from {written} by {tilt:.2g} rad, and Pinocchio uses {written}",
+            element,
+            attribute="xyz",
+            found=_written(joint),
+            remedy=f'write xyz="{written}"; if you mean the tilt, write the vector twice as long',
+            weight=tilt,
+        )
+
+
+def tilts(robot: RobotRecord) -> dict[str, float]:
+    """Return the angle (rad) between the axis in Pinocchio and in the file, for joints with URDF514."""
+    snapped = ((joint.name, _snap(joint.axis)) for joint in robot.joints if joint.kind in AXIAL)
+    return {name: result[1] for name, result in snapped if result is not None}
+
+
+def _snap(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
+    """Return the coordinate axis that Pinocchio uses instead of an axis, and their angle (rad), or None."""
+    if axis is None:
         return None
+    for i in range(3):
+        unit = tuple(float(i == k) for k in range(3))
+        tilt = math.hypot(*(x for k, x in enumerate(axis) if k != i))
+        if tilt > _TILT and _is_approx(axis, unit):
+            return unit, tilt
+    return None
 
-    def _end(self, element: Element, tag: str) -> str | None:
-        """Return the link that a joint's `<parent>` or `<child>` names."""
-        end = element.first(tag)
-        if end is None:
-            self.report.add(
-                MISSING_ELEMENT, f"the joint has no <{tag}>", element, remedy=f'write <{tag} link="..."/>'
+
+def _is_approx(axis: Sequence[float], unit: Sequence[float]) -> bool:
+    """Compute Eigen's `axis.isApprox(unit)`, with the same order of operations."""
+    difference = sum((x - e) * (x - e) for x, e in zip(axis, unit, strict=True))
+    return difference <= _SNAPPED * _SNAPPED * min(sum(x * x for x in axis), 1.0)
+
+
+def _check_planar(report: Reporter, joint: JointRecord) -> None:
+    x, y, z = joint.axis or (0.0, 0.0, 0.0)
+    if z > 0.0 and math.hypot(x, y) <= _LEAN * z:
+        return
+    at = joint.axis_element or joint.element
+    report.add(
+        PLANAR_AXIS,
+        "a planar joint moves in the XY plane of its frame, whatever its axis says",
+        at,
+        attribute="xyz",
+        found=_written(joint),
+        remedy='rotate the origin so that the normal is z, and write <axis xyz="0 0 1"/>',
+    )
+
+
+INVERTED_LIMIT = Rule("URDF507", "inverted-limit", ERROR)
+EMPTY_RANGE = Rule("URDF508", "empty-range", WARNING)
+NEGATIVE_LIMIT = Rule("URDF509", "negative-limit", WARNING, REFUSES)
+
+
+def check_ranges(report: Reporter, robot: RobotRecord) -> None:
+    """Check the `<limit>` of each joint."""
+    for joint in robot.joints:
+        if joint.limit is not None:
+            _check_limit(report, joint, joint.limit, robot.version)
+
+
+def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, version: tuple[int, int]) -> None:
+    strict = version >= (1, 2)  # from 1.2 on urdfdom has the same rules for all joint types
+    for attribute in ("effort", "velocity", *FURTHER_LIMITS):
+        value = getattr(limit, attribute)
+        if value is not None and value < 0.0:
+            refused = strict or joint.kind in AXIAL
+            report.add(
+                NEGATIVE_LIMIT if refused else parser.IGNORED,
+                f"the limit of {attribute} is negative; Pinocchio {'refuses' if refused else 'ignores'} it",
+                limit.element,
+                attribute=attribute,
+                found=quoted(limit.element.attributes[attribute]),
+                remedy="write its magnitude",
             )
-            return None
-        return self.required(end, "link", f'<{tag} link="..."/>')
-
-    def _origin(self, joint: JointRecord) -> None:
-        origin = joint.origin_element = joint.element.first("origin")
-        if origin is None:
-            return
-        joint.xyz = self.numbers.vector(origin, "xyz") or joint.xyz
-        joint.rpy = self.numbers.vector(origin, "rpy") or joint.rpy
-        if "quat_xyzw" in origin.attributes:
-            self._quaternion(joint, origin)
-
-    def _quaternion(self, joint: JointRecord, origin: Element) -> None:
-        found = f"quat_xyzw={quoted(origin.attributes['quat_xyzw'])}"
-
-        def add(rule: Rule, message: str, remedy: str) -> None:
-            self.report.add(rule, message, origin, attribute="quat_xyzw", found=found, remedy=remedy)
-
-        if self.version < (1, 1):
-            message = 'quat_xyzw needs version="1.1" and is ignored'
-            add(QUATERNION_IGNORED, message, "write the rotation as rpy")
-            return
-        quaternion = self.numbers.vector(origin, "quat_xyzw", 4)
-        if quaternion is None:
-            return
-        both, zero = "rpy" in origin.attributes, not SHORTEST < sum(map(abs, quaternion)) < LONGEST
-        if both:
-            add(BAD_QUATERNION, "rpy and quat_xyzw are both given", "remove one of the two")
-        elif zero:
-            add(BAD_QUATERNION, "the quaternion has no direction", 'the identity is "0 0 0 1"')
-        else:
-            joint.quaternion = quaternion
-            message = "quat_xyzw is used, but most readers ignore it"
-            add(QUATERNION, message, "write the rotation as rpy for these readers")
-
-    def _axis(self, joint: JointRecord) -> None:
-        axis = joint.axis_element = joint.element.first("axis")
-        if axis is None:
-            return
-        if joint.kind in ("fixed", "floating"):
-            # No reader uses this axis, so a bad number in it is only URDF510.
-            numbers = NumberReader(self.report, IGNORED, IGNORED)
-            numbers.vector(axis, "xyz")
-            return
-        if "xyz" in axis.attributes:
-            joint.axis = self.numbers.vector(axis, "xyz")
-            return
-        if not axis.attributes and (axis.text or any(x.tag == "xyz" and x.text for x in axis.children)):
-            return  # an error already: the value is written as text (URDF212)
-        self.report.add(
-            EMPTY_AXIS,
-            "<axis> without xyz is 1 0 0 to some readers and 0 0 0 to urdfdom",
-            axis,
-            remedy='write the axis, for example <axis xyz="1 0 0"/>',
-            # A planar joint moves in the XY plane, whatever its axis (URDF505).
-            severity=Severity.WARNING if joint.kind == "planar" else None,
+    if joint.kind == "continuous":
+        _check_continuous(report, limit)
+    bounded = joint.kind in ("revolute", "prismatic")
+    written = {"lower", "upper"} & limit.element.attributes.keys()
+    if not bounded and not (strict and len(written) == 2):
+        return
+    if any(getattr(limit, name) is None for name in written):
+        return
+    lower, upper = limit.lower or 0.0, limit.upper or 0.0
+    found = f'lower="{lower:g}" upper="{upper:g}"' if written else "neither lower nor upper, so both are 0"
+    if lower > upper:
+        report.add(
+            INVERTED_LIMIT,
+            "the lower limit is above the upper limit",
+            limit.element,
+            attribute="lower",
+            found=found if len(written) == 2 else f"{found} (a missing bound is 0)",
+            remedy="swap the two" if len(written) == 2 else "write both limits",
+        )
+    elif lower == upper and bounded:
+        report.add(
+            EMPTY_RANGE,
+            "the joint cannot move: its limits are equal",
+            limit.element,
+            attribute="lower",
+            found=found,
+            remedy="write the range, or make the joint fixed",
         )
 
-    def _limit(self, joint: JointRecord) -> None:
-        limit = joint.element.first("limit")
-        bounded = joint.kind in ("revolute", "prismatic")
-        if limit is None:
-            if bounded:
-                self.report.add(
-                    MISSING_LIMIT,
-                    f"a {joint.kind} joint needs a <limit>",
-                    joint.element,
-                    remedy=f"write {_EXAMPLE_LIMIT}"
-                    if joint.kind == "prismatic"
-                    else f'write {_EXAMPLE_LIMIT}, or type="continuous" if it rotates without limits',
-                )
-            return
-        required = ("effort", "velocity") if self.version < (1, 2) else ("lower", "upper") if bounded else ()
-        for attribute in required:
-            self.required(limit, attribute, _EXAMPLE_LIMIT, number=True)
-        names = ("lower", "upper", "effort", "velocity", *(FURTHER_LIMITS if self.version >= (1, 2) else ()))
-        values = {name: self.numbers.scalar(limit, name) for name in names}
-        joint.limit = LimitRecord(limit, **values)
 
-    def _mimic(self, joint: JointRecord) -> None:
-        mimic = joint.element.first("mimic")
-        if mimic is None:
-            return
-        leader = self.required(mimic, "joint", '<mimic joint="..."/>')
-        multiplier = self.numbers.scalar(mimic, "multiplier", 1.0)
-        offset = self.numbers.scalar(mimic, "offset", 0.0)
-        if leader is not None and multiplier is not None and offset is not None:
-            joint.mimic = MimicRecord(mimic, leader, multiplier, offset)
+def _check_continuous(report: Reporter, limit: LimitRecord) -> None:
+    written = [name for name in ("lower", "upper") if name in limit.element.attributes]
+    if any(getattr(limit, name) for name in written):
+        report.add(
+            parser.IGNORED,
+            "a continuous joint has no position limits; they are ignored",
+            limit.element,
+            attribute=written[0],
+            found=" ".join(f"{name}={quoted(limit.element.attributes[name])}" for name in written),
+            remedy='remove them, or write type="revolute"',
+            fix=lambda: report.without(limit.element, *written),
+        )
 
-    def _others(self, joint: JointRecord) -> None:
-        """Check the elements that kinematics does not use, but for which urdfdom refuses a file."""
-        dynamics = joint.element.first("dynamics")
-        if dynamics is not None:
-            if not {"damping", "friction"} & dynamics.attributes.keys():
-                self.required(dynamics, "damping", '<dynamics damping="0"/>, or remove it')
-            for attribute in ("damping", "friction"):
-                self.numbers.scalar(dynamics, attribute)
-        safety = joint.element.first("safety_controller")
-        if safety is not None:
-            self.required(
-                safety, "k_velocity", '<safety_controller k_velocity="0"/>, or remove it', number=True
+
+MIMIC_UNKNOWN = Rule("URDF520", "mimic-unknown", ERROR)
+MIMIC_LOOP = Rule("URDF521", "mimic-loop", ERROR)
+MIMIC_LEADER = Rule("URDF522", "mimic-leader", ERROR)
+MIMIC_CONSTANT = Rule("URDF523", "mimic-constant", WARNING)
+MIMIC_CONTINUOUS = Rule("URDF524", "mimic-continuous", WARNING)
+MIMIC_CHAIN = Rule("URDF525", "mimic-chain", NOTE)
+MIMIC_SCALE = Rule("URDF526", "mimic-scale", WARNING)
+MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
+
+#: Larger multipliers and offsets (rad or m) are reported as mistakes.
+LARGEST = 1e6
+#: Share of a joint's range that limits of its mimic joint may leave out: limits are written with few digits.
+LEAST_LOST = 1e-3
+
+
+def check_mimic(report: Reporter, robot: RobotRecord, *, enabled: bool) -> None:
+    """Report problems of mimic joints.
+
+    Args:
+        report: The reporter, which receives the findings.
+        robot: The records of the robot.
+        enabled: Whether the mimic rules are used. If not, every finding is a note.
+    """
+    checker = _MimicChecker(report, robot.by_name, enabled)
+    for joint in robot.joints:
+        if joint.mimic is not None:
+            checker.check(joint, joint.mimic)
+
+
+class _MimicChecker:
+    """Check one mimic joint after another."""
+
+    def __init__(self, report: Reporter, joints: dict[str, JointRecord], enabled: bool) -> None:
+        self.report, self.joints, self.enabled = report, joints, enabled
+        self.in_loops = _joints_in_loops(joints)
+
+    def add(
+        self,
+        code: Rule,
+        message: str,
+        mimic: MimicRecord,
+        attribute: str,
+        remedy: str,
+        fix: Callable[[], Fix | None] | None = None,
+    ) -> None:
+        """Add a finding at an attribute of a `<mimic>`."""
+        written = mimic.element.attributes.get(attribute)
+        self.report.add(
+            code,
+            message,
+            mimic.element,
+            attribute=attribute,
+            found=None if written is None else f"{attribute}={quoted(written)}",
+            remedy=remedy,
+            severity=None if self.enabled else Severity.NOTE,
+            fix=fix,
+        )
+
+    def check(self, joint: JointRecord, mimic: MimicRecord) -> None:
+        """Check one mimic joint."""
+        if joint.kind == "fixed":
+            self.add(
+                parser.IGNORED,
+                "a fixed joint cannot mimic; its <mimic> is ignored",
+                mimic,
+                "joint",
+                "remove it",
+                lambda: self.report.without_element(mimic.element),
             )
-            for attribute in ("k_velocity", "k_position", "soft_lower_limit", "soft_upper_limit"):
-                self.numbers.scalar(safety, attribute)
-        calibration = joint.element.first("calibration")
-        if calibration is not None:
-            for attribute in ("rising", "falling"):
-                self.numbers.scalar(calibration, attribute)
+            return
+        if joint.kind in ("planar", "floating"):
+            message = f"a {joint.kind} joint cannot mimic another: it has several coordinates"
+            self.add(MIMIC_LEADER, message, mimic, "joint", "remove it")
+            return
+        leader = self.joints.get(mimic.leader)
+        if leader is None:
+            self.unknown(mimic)
+        elif joint.name in self.in_loops:
+            itself = leader is joint
+            message = "the joint mimics itself" if itself else "the joints mimic each other in a circle"
+            self.add(MIMIC_LOOP, message, mimic, "joint", "name a joint that is not a mimic joint")
+        elif leader.kind is not None and leader.kind not in AXIAL:
+            count = "no coordinate" if leader.kind == "fixed" else "several coordinates"
+            message = f"the mimicked joint is {leader.kind} and has {count}"
+            self.add(MIMIC_LEADER, message, mimic, "joint", "name a joint with one coordinate")
+        else:
+            self.check_sound(joint, mimic, leader)
+
+    def unknown(self, mimic: MimicRecord) -> None:
+        """Report that the mimicked joint does not exist."""
+        nearest = self.report.nearest(mimic.leader, self.joints)
+        remedy = f"did you mean {', '.join(nearest)}?" if nearest else "name a joint of the robot"
+        if self.enabled:
+            remedy += " (with mimic=False, --no-mimic, the joint moves freely)"
+        self.add(MIMIC_UNKNOWN, "the mimicked joint does not exist", mimic, "joint", remedy)
+
+    def check_sound(self, joint: JointRecord, mimic: MimicRecord, leader: JointRecord) -> None:
+        """Report probable mistakes in a valid mimic rule."""
+        if mimic.multiplier == 0.0:
+            self.add(
+                MIMIC_CONSTANT,
+                f"the multiplier is zero: the joint stays at {mimic.offset:g}",
+                mimic,
+                "multiplier",
+                "write the ratio, or make the joint fixed",
+            )
+        for attribute, value in (("multiplier", mimic.multiplier), ("offset", mimic.offset)):
+            if abs(value) > LARGEST:
+                message = f"the {attribute} is far too large"
+                self.add(MIMIC_SCALE, message, mimic, attribute, "check the exponent")
+        if joint.kind == "continuous":
+            self.add(
+                MIMIC_CONTINUOUS,
+                "a continuous joint mimics another: Pinocchio itself accepts this for a continuous mimicked"
+                " joint only",
+                mimic,
+                "joint",
+                'write type="revolute" for it',
+            )
+        if leader.mimic is not None:
+            self.add(
+                MIMIC_CHAIN,
+                f"the mimicked joint itself mimics {leader.mimic.leader!r}",
+                mimic,
+                "joint",
+                "name the last joint of the chain: some readers resolve one step only",
+            )
+        if joint.limit is not None and max(abs(mimic.multiplier), abs(mimic.offset)) <= LARGEST:
+            self.check_range(joint, mimic, joint.limit)
+
+    def check_range(self, joint: JointRecord, mimic: MimicRecord, limit: LimitRecord) -> None:
+        """Check that the limits of a mimic joint allow the full range of the mimicked joint."""
+        from urdfkin.model.ranges import kept_range, range_words  # noqa: PLC0415  most files need no numpy
+        from urdfkin.model.tree import Limit  # noqa: PLC0415
+
+        rule, leader = self.resolved(mimic)
+        limits, moving = _range_of(joint), None if leader is None else _range_of(leader)
+        if leader is None or moving is None or limits is None or joint.kind == "continuous":
+            return
+        low, high = kept_range(rule, Limit(*limits, math.inf, math.inf), *moving)
+        if rule.multiplier == 0.0 or high - low >= (1.0 - LEAST_LOST) * (moving[1] - moving[0]):
+            return
+        allowed = f"only from {range_words((low, high))}" if low < high else "nowhere"
+        message = f"the mimic joint leaves its limits: {leader.name!r} moves from {range_words(moving)}, "
+        ends = sorted(rule.multiplier * end + rule.offset for end in moving)
+        self.report.add(
+            MIMIC_RANGE,
+            f"{message}but may move {allowed}",
+            limit.element,
+            attribute="lower",
+            found=f'lower="{limits[0]:g}" upper="{limits[1]:g}"',
+            remedy=f'write lower="{ends[0]:.6g}" upper="{ends[1]:.6g}", the range of the rule',
+            severity=None if self.enabled else Severity.NOTE,
+        )
+
+    def resolved(self, mimic: MimicRecord) -> tuple[Mimic, JointRecord | None]:
+        """Return the combined rule of a chain of mimic joints, and the last joint; None if there is none."""
+        from urdfkin.model.tree import Mimic  # noqa: PLC0415
+
+        rule = Mimic(mimic.leader, mimic.multiplier, mimic.offset)
+        leader = self.joints.get(rule.leader)
+        while leader is not None and (next_ := leader.mimic) is not None:
+            if leader.name in self.in_loops:
+                return rule, None
+            offset = rule.multiplier * next_.offset + rule.offset
+            rule = Mimic(next_.leader, rule.multiplier * next_.multiplier, offset)
+            leader = self.joints.get(rule.leader)
+        return rule, leader
 
 
-_EXAMPLE_LIMIT = '<limit lower="-1" upper="1" effort="10" velocity="1"/>'
+def _range_of(joint: JointRecord) -> tuple[float, float] | None:
+    """Return the range of a joint: its limits, or one revolution; None without valid limits."""
+    if joint.kind == "continuous":
+        return -math.pi, math.pi
+    if joint.limit is None or joint.kind not in ("revolute", "prismatic"):
+        return None
+    low, high = (0.0 if end is None else end for end in (joint.limit.lower, joint.limit.upper))
+    return (low, high) if low < high else None
+
+
+def _joints_in_loops(joints: dict[str, JointRecord]) -> set[str]:
+    """Return the names of the joints in circles of mimic rules; each joint is visited once."""
+    in_loops: set[str] = set()
+    visited: set[str] = set()
+    for start in joints:
+        path: dict[str, int] = {}
+        name: str | None = start
+        while name is not None and name in joints and name not in visited:
+            visited.add(name)
+            path[name] = len(path)
+            rule = joints[name].mimic
+            name = None if rule is None else rule.leader
+        if name is not None and name in path:
+            in_loops |= {member for member, place in path.items() if place >= path[name]}
+    return in_loops

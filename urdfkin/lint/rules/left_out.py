@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from urdfkin.lint.finding import Finding
-from urdfkin.lint.rule import NOTE, WARNING, Rule
+from urdfkin.urdf.findings import NOTE, WARNING, Finding, Rule
 
 if TYPE_CHECKING:
     from urdfkin.urdf.mjcf import Listed

@@ -6,9 +6,7 @@ import math
 import re
 from fractions import Fraction
 
-from urdfkin.lint.finding import Severity, quoted
-from urdfkin.lint.reporter import Reporter
-from urdfkin.lint.rule import ERROR, NOTE, WARNING, Rule
+from urdfkin.urdf.findings import ERROR, NOTE, WARNING, Reporter, Rule, Severity, quoted
 from urdfkin.urdf.records import AXIAL, JointRecord, RobotRecord
 
 ROUNDED_PI = Rule("URDF601", "rounded-pi", NOTE)

@@ -1,8 +1,6 @@
-"""Convert a `pinocchio.Model` to a kinematic tree, without importing Pinocchio.
+"""Convert objects of other libraries to URDF: ElementTree, lxml, yourdfpy, and Pinocchio's Model.
 
-A model does not store its URDF, so the tree is built from its joints and frames. A body frame that coincides
-with a joint becomes the child link of this joint. Every other frame becomes a link on a fixed joint, so that
-each frame is available by its name.
+The library is recognized by the object's attributes and module name, so that no library is imported.
 """
 
 from __future__ import annotations
@@ -10,15 +8,149 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any, TypeGuard
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Protocol, TypeGuard
+from xml.etree import ElementTree
 
 import numpy as np
 
-from urdfkin.errors import InputError
+from urdfkin.errors import InputError, UrdfkinError
+from urdfkin.errors.validators import safe_repr
+from urdfkin.kinematics.rotation.euler import rpy_of
 from urdfkin.model.pose import inverse
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree
+from urdfkin.urdf.findings import Finding, Severity
 from urdfkin.urdf.mjcf import UNBOUNDED
+from urdfkin.urdf.parser import QUATERNION
+from urdfkin.urdf.reader import joint_rows, root_link
+from urdfkin.urdf.records import Element, JointRecord, LimitRecord, MimicRecord
+from urdfkin.urdf.writer import to_urdf
+
+if TYPE_CHECKING:
+    from yourdfpy import urdf as yourdf
+
+#: Largest number of names in one finding.
+_NAMED = 5
+
+_NOWHERE = Element("", {}, None, 0, 0, 0)
+
+
+class XmlElement(Protocol):
+    """An element of Python's ElementTree or of lxml's."""
+
+    @property
+    def tag(self) -> Any:
+        """The name of the element."""
+
+    @property
+    def attrib(self) -> Any:
+        """The names and values of the attributes."""
+
+
+class XmlTree(Protocol):
+    """A tree of `XmlElement`."""
+
+    def getroot(self) -> Any:
+        """Return the root element."""
+
+
+def text_of(source: Any) -> tuple[str, str] | None:
+    """Return the URDF text of an object and its name in messages; None for any other source.
+
+    Raises:
+        InputError: an element cannot be written as XML, or a yourdfpy robot is not a tree.
+    """
+    if any(kind.__module__.partition(".")[0] == "yourdfpy" for kind in type(source).__mro__):
+        return urdf_of(getattr(source, "robot", source)), "<yourdfpy>"
+    root = source.getroot() if hasattr(source, "getroot") else source
+    if hasattr(root, "tag") and hasattr(root, "attrib") and hasattr(root, "iter"):
+        return _text(root), "<ElementTree>"
+    return None
+
+
+def lost_quaternions(source: Any, file: str) -> tuple[Finding, ...]:
+    """Return a finding for a yourdfpy robot whose rotations may be lost; none for any other source.
+
+    yourdfpy (0.0.60) ignores the attribute quat_xyzw and does not store the text. A rotation that the file
+    writes as quat_xyzw is therefore lost without a trace.
+
+    Args:
+        source: The object.
+        file: The name of the robot in messages.
+    """
+    robot = getattr(source, "robot", source)
+    if not type(robot).__module__.startswith("yourdfpy"):
+        return ()
+    joints = [
+        str(joint.name)
+        for joint in robot.joints
+        if joint.origin is not None and (joint.origin[:3, :3] == np.eye(3)).all()
+    ]
+    if not joints:
+        return ()
+    more = f" and {len(joints) - _NAMED} more" if len(joints) > _NAMED else ""
+    message = (
+        f"yourdfpy ignores quat_xyzw: if the file has one at {', '.join(joints[:_NAMED])}{more}, its rotation"
+        " is missing here"
+    )
+    remedy = "load the file itself if it contains quat_xyzw"
+    return (Finding(QUATERNION.id, Severity.NOTE, message, remedy=remedy, file=file),)
+
+
+def urdf_of(robot: yourdf.Robot) -> str:
+    """Return the URDF of a yourdfpy robot. The writer of yourdfpy (0.0.60) omits mimic rules.
+
+    The axes are not normalised, so that the checks can report their lengths.
+
+    Raises:
+        InputError: the joints form no tree, mimic joints form a circle, required limits are missing, or a
+            name or number has a wrong type.
+        UnknownNameError: the mimicked joint of a mimic joint does not exist.
+    """
+    try:
+        records = [_record(joint) for joint in robot.joints]
+        axes = {record.name: np.array(record.axis) for record in records}
+        rows = [(replace(one, axis=axes[one.name]), up, down) for one, up, down in joint_rows(records)]
+        return to_urdf(
+            build_tree(robot.name, root_link(robot.name, [link.name for link in robot.links], records), rows)
+        )
+    except UrdfkinError:
+        raise
+    except (TypeError, ValueError, AttributeError, IndexError) as error:
+        raise InputError("yourdfpy's robot cannot be written as a URDF", found=str(error)) from error
+
+
+def _record(joint: yourdf.Joint) -> JointRecord:
+    """Convert a joint of yourdfpy to a record."""
+    T = np.eye(4) if joint.origin is None else np.asarray(joint.origin, dtype=np.float64)
+    axis = (1.0, 0.0, 0.0) if joint.axis is None else tuple(map(float, joint.axis))
+    limit, rule = joint.limit, joint.mimic
+    xyz, rpy = tuple(T[:3, 3]), tuple(rpy_of(T[:3, :3]))
+    return JointRecord(
+        _NOWHERE, joint.name, joint.type, joint.parent, joint.child, xyz, rpy,
+        axis=axis,
+        limit=limit and LimitRecord(_NOWHERE, limit.lower, limit.upper, limit.effort, limit.velocity),
+        mimic=rule and MimicRecord(_NOWHERE, rule.joint, rule.multiplier, rule.offset),
+    )  # fmt: skip
+
+
+def _text(root: Any) -> str:
+    """Write elements, attributes and text; skip comments, whose tag is not a string."""
+    if not isinstance(root.tag, str):
+        raise InputError("the root of this ElementTree is not an element", found=safe_repr(root.tag))
+    try:
+        copy = ElementTree.Element(root.tag, dict(root.attrib))
+        open_ = [(root, copy)]
+        while open_:
+            element, duplicate = open_.pop()
+            duplicate.text = element.text
+            for child in element:
+                if isinstance(child.tag, str):
+                    open_.append((child, ElementTree.SubElement(duplicate, child.tag, dict(child.attrib))))
+        return ElementTree.tostring(copy, encoding="unicode")
+    except (TypeError, AttributeError, RecursionError) as error:
+        raise InputError("this ElementTree cannot be written as XML", found=str(error)) from None
+
 
 _ROOT = "universe"
 #: Joints about (R, RUB: unbounded) or along (P) an axis of their frame. The others are in `_KINDS`.

@@ -1,0 +1,371 @@
+"""Check inertials, shapes, materials and meshes. Kinematics does not use them, so no finding is an error."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from urdfkin.urdf.findings import ERROR, WARNING, Reporter, Rule, quoted
+from urdfkin.urdf.packages import find_package, split_uri
+from urdfkin.urdf.parser import NumberReader
+from urdfkin.urdf.records import Element, RobotRecord
+
+INERTIAL_INCOMPLETE = Rule("URDF701", "inertial-incomplete", WARNING)
+INERTIAL_IMPOSSIBLE = Rule("URDF702", "inertial-impossible", WARNING)
+INERTIAL_SCALE = Rule("URDF703", "inertial-scale", WARNING)
+
+#: Larger masses (kg) and distances of the centre of mass (m) are reported as mistakes.
+HEAVIEST, FARTHEST = 1e9, 1e6
+
+#: Bodies below this mass (kg) are placeholders; their moments are not checked.
+NEGLIGIBLE = 1e-3
+
+#: Moments of inertia per kg (m^2) that are rounding errors: those of a body of 0.03 mm.
+ROUNDING = 1e-9
+
+#: Relative rounding error of moments, from the number of digits that exporters write.
+_WRITTEN = 1e-6
+
+_MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+
+def check_inertials(report: Reporter, robot: RobotRecord) -> None:
+    """Check the inertial of each link."""
+    numbers = NumberReader(report, UNREADABLE, UNREADABLE)
+    for link in robot.links.values():
+        inertial = link.first("inertial")
+        if inertial is not None:
+            _check_inertial(report, inertial, numbers)
+
+
+def _check_inertial(report: Reporter, inertial: Element, numbers: NumberReader) -> None:
+    origin, mass_element, tensor = (inertial.first(tag) for tag in ("origin", "mass", "inertia"))
+    missing = [f"<{tag}>" for tag in ("mass", "inertia") if inertial.first(tag) is None]
+    if mass_element is not None and "value" not in mass_element.attributes:
+        missing.append("value of <mass>")
+    if tensor is not None:
+        missing += [name for name in _MOMENTS if name not in tensor.attributes]
+    if missing:
+        report.add(
+            INERTIAL_INCOMPLETE,
+            "the inertial is incomplete",
+            inertial,
+            found=f"no {', '.join(missing)}",
+            remedy="write mass and all six moments, or no inertial",
+        )
+    lever = None
+    if origin is not None:
+        lever = numbers.vector(origin, "xyz")
+        numbers.vector(origin, "rpy")
+    mass = None if mass_element is None else numbers.scalar(mass_element, "value")
+    _check_mass(report, inertial, mass, lever)
+    if tensor is not None:
+        moments = [numbers.scalar(tensor, name) for name in _MOMENTS]
+        if all(moment is not None for moment in moments):
+            _check_moments(report, tensor, [moment for moment in moments if moment is not None], mass)
+
+
+def _check_mass(
+    report: Reporter, inertial: Element, mass: float | None, lever: tuple[float, ...] | None
+) -> None:
+    if mass is not None and mass < 0.0:
+        report.add(
+            INERTIAL_IMPOSSIBLE,
+            "the mass is negative",
+            inertial.first("mass"),
+            attribute="value",
+            found=f"{mass:g}",
+            remedy="write kilograms",
+            weight=1.0,
+        )
+    heavy = mass is not None and abs(mass) > HEAVIEST
+    if heavy or (lever is not None and max(abs(x) for x in lever) > FARTHEST):
+        what = f"mass {mass:g} kg" if heavy else f"centre of mass {max(abs(x) for x in lever or ()):g} m away"
+        report.add(
+            INERTIAL_SCALE,
+            "the inertial is far too large",
+            inertial,
+            found=what,
+            remedy="write kilograms and metres",
+        )
+
+
+def _check_moments(report: Reporter, tensor: Element, moments: list[float], mass: float | None) -> None:
+    kilograms = 1.0 if mass is None else abs(mass)
+    if mass == 0.0 and any(moments):
+        report.add(
+            INERTIAL_IMPOSSIBLE,
+            "the body has moments of inertia, but no mass",
+            tensor,
+            remedy="write kilograms, or no moments",
+        )
+        return
+    if 0.0 < kilograms < NEGLIGIBLE:
+        return
+    small, middle, large = principal_moments(moments)
+    slack = _WRITTEN * max(abs(small), abs(large)) + ROUNDING * kilograms
+    if small < -slack:
+        what, found = "a principal moment of inertia is negative", f"{small:.3g}"
+    elif large > middle + small + slack:
+        what = "the largest principal moment exceeds the sum of the others"
+        found = f"{small:.3g}, {middle:.3g} and {large:.3g}"
+    else:
+        return
+    report.add(
+        INERTIAL_IMPOSSIBLE,
+        f"no body has this inertia: {what}",
+        tensor,
+        found=found,
+        remedy="check units and signs; kinematics does not use them",
+    )
+
+
+def principal_moments(moments: Sequence[float]) -> tuple[float, float, float]:
+    """Return the eigenvalues of an inertia tensor, smallest first, by the trigonometric cubic formula.
+
+    Args:
+        moments: ixx, ixy, ixz, iyy, iyz, izz.
+
+    >>> principal_moments([1.0, 0.0, 0.0, 2.0, 0.0, 3.0])
+    (1.0, 2.0, 3.0)
+    """
+    scale = max(map(abs, moments))
+    if scale == 0.0:
+        return (0.0, 0.0, 0.0)
+    xx, xy, xz, yy, yz, zz = (value / scale for value in moments)
+    off = xy * xy + xz * xz + yz * yz
+    if off == 0.0:
+        low, middle, high = sorted((moments[0], moments[3], moments[5]))
+        return low, middle, high
+    mean = (xx + yy + zz) / 3.0
+    p = math.sqrt(((xx - mean) ** 2 + (yy - mean) ** 2 + (zz - mean) ** 2 + 2.0 * off) / 6.0)
+    a, b, c, d, e, f = (xx - mean) / p, xy / p, xz / p, (yy - mean) / p, yz / p, (zz - mean) / p
+    half_determinant = (a * (d * f - e * e) - b * (b * f - e * c) + c * (b * e - d * c)) / 2.0
+    angle = math.acos(min(1.0, max(-1.0, half_determinant))) / 3.0
+    high = mean + 2.0 * p * math.cos(angle)
+    low = mean + 2.0 * p * math.cos(angle + 2.0 * math.pi / 3.0)
+    return low * scale, (3.0 * mean - high - low) * scale, high * scale
+
+
+UNREADABLE = Rule("URDF704", "unreadable-extra", WARNING)
+GEOMETRY = Rule("URDF705", "geometry-incomplete", WARNING)
+
+#: Shape -> its numbers: (attribute, count, required).
+_SHAPES: dict[str, tuple[tuple[str, int, bool], ...]] = {
+    "box": (("size", 3, True),),
+    "sphere": (("radius", 1, True),),
+    "cylinder": (("radius", 1, True), ("length", 1, True)),
+    "capsule": (("radius", 1, True), ("length", 1, True)),
+    "mesh": (("scale", 3, False),),
+}
+
+
+def check_shapes(report: Reporter, robot: RobotRecord) -> None:
+    """Report invalid and incomplete shapes."""
+    numbers = NumberReader(report, UNREADABLE, UNREADABLE)
+    for link in robot.links.values():
+        for shape in link.children:
+            if shape.tag in ("visual", "collision"):
+                _check_geometry(report, shape, numbers)
+                _check_capsule(report, shape, robot.version)
+
+
+def _check_geometry(report: Reporter, owner: Element, numbers: NumberReader) -> None:
+    origin, geometry = owner.first("origin"), owner.first("geometry")
+    if origin is not None:
+        numbers.vector(origin, "xyz")
+        numbers.vector(origin, "rpy")
+    shape = geometry.children[0] if geometry is not None and geometry.children else None
+    if shape is None or shape.tag not in _SHAPES:
+        lacks = "no <geometry>" if geometry is None else "an empty <geometry>"
+        report.add(
+            GEOMETRY,
+            f"the {owner.tag} has no shape of URDF",
+            geometry or owner,
+            found=lacks if shape is None else f"<{shape.tag}>",
+            remedy="the shapes are box, cylinder, sphere and mesh",
+        )
+        return
+    for attribute, count, required in _SHAPES[shape.tag]:
+        if attribute not in shape.attributes:
+            if required:
+                _missing(report, owner, shape, attribute)
+        elif count == 1:
+            numbers.scalar(shape, attribute)
+        else:
+            numbers.vector(shape, attribute, count)
+    if shape.tag == "mesh" and not shape.attributes.get("filename", "").strip():
+        _missing(report, owner, shape, "filename")
+    elif shape.tag == "mesh":
+        check_address(report, shape)
+
+
+def _check_capsule(report: Reporter, owner: Element, version: tuple[int, int]) -> None:
+    """Report a capsule in a file of version 1.0, where readers skip it."""
+    geometry = owner.first("geometry")
+    capsule = None if geometry is None else geometry.first("capsule")
+    if capsule is not None and version < (1, 1):
+        report.add(
+            GEOMETRY,
+            'a capsule needs version="1.1" and is ignored',
+            capsule,
+            remedy="use a cylinder and two spheres",
+        )
+
+
+def _missing(report: Reporter, owner: Element, shape: Element, attribute: str) -> None:
+    report.add(
+        GEOMETRY,
+        f"the {shape.tag} of a {owner.tag} has no {attribute}",
+        shape,
+        remedy=f'write <{shape.tag} {attribute}="..."/>',
+    )
+
+
+MATERIAL_UNKNOWN = Rule("URDF708", "material-unknown", WARNING)
+MATERIAL_TWICE = Rule("URDF709", "material-twice", ERROR)
+
+
+def check_materials(report: Reporter, robot: RobotRecord) -> None:
+    """Check the materials of the robot and of each visual."""
+    defined = _materials(report, robot)
+    for link in robot.links.values():
+        for visual in link.all("visual"):
+            _check_material(report, visual, defined)
+
+
+def _materials(report: Reporter, robot: RobotRecord) -> set[str]:
+    """Return the names of the defined materials, and report names with two definitions."""
+    defined: dict[str, Element] = {}
+    for material in robot.element.all("material"):
+        name = material.attributes.get("name", "")
+        if name in defined:
+            report.add(
+                MATERIAL_TWICE,
+                "another material of the robot has this name; urdfdom refuses the file",
+                material,
+                attribute="name",
+                found=quoted(name),
+                remedy=f"the first is on line {defined[name].line}; remove one",
+            )
+        defined.setdefault(name, material)
+    inside = {
+        material.attributes.get("name", "")
+        for link in robot.links.values()
+        for visual in link.all("visual")
+        for material in visual.all("material")
+        if material.first("color") is not None or material.first("texture") is not None
+    }
+    return set(defined) | inside
+
+
+def _check_material(report: Reporter, visual: Element, defined: set[str]) -> None:
+    material = visual.first("material")
+    if material is None:
+        return
+    name = material.attributes.get("name")
+    anonymous = name is None or (not name and (material.first("color") or material.first("texture")))
+    if name is None or (name not in defined and not anonymous):
+        report.add(
+            MATERIAL_UNKNOWN,
+            "the material has no name" if name is None else "the material is not defined",
+            material,
+            attribute="name",
+            found=None if name is None else quoted(name),
+            remedy='write <material name="..."> with a <color>',
+        )
+
+
+MESH_MISSING = Rule("URDF706", "mesh-missing", WARNING)
+MESH_REMOTE = Rule("URDF707", "mesh-remote", WARNING)
+
+
+def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
+    """Report each package that is not found once, and each missing file.
+
+    Args:
+        report: The reporter, which receives the findings.
+        root: The root element of the document.
+        beside: The file of the URDF; None if the URDF is text. Then only packages are searched, on the
+            search paths of the environment.
+    """
+    packages: dict[str, Path | None] = {}
+    missing: dict[str, list[Element]] = {}
+    for mesh in _meshes(root):
+        filename = mesh.attributes.get("filename", "").strip()
+        parts = split_uri(filename)
+        if parts is not None:
+            package, path = parts
+            if package not in packages:
+                packages[package] = find_package(package, beside)
+            folder = packages[package]
+            if folder is None:
+                missing.setdefault(package, []).append(mesh)
+            elif not _exists(folder / path):
+                _report_file(report, mesh, filename)
+        elif _is_missing_file(filename, beside):
+            _report_file(report, mesh, filename)
+    for package, meshes in missing.items():
+        report.add(
+            MESH_MISSING,
+            f"package {quoted(package)} of {_count(len(meshes))} is not found"
+            if package
+            else f"the address of {_count(len(meshes))} names no package",
+            meshes[0],
+            attribute="filename",
+            found=quoted(meshes[0].attributes["filename"]),
+            remedy="add the package's folder to ROS_PACKAGE_PATH; kinematics needs no mesh",
+        )
+
+
+def check_address(report: Reporter, mesh: Element) -> None:
+    """Report a mesh with an address on the network."""
+    filename = mesh.attributes["filename"]
+    if filename.lower().startswith(("http:", "https:", "ftp:")):
+        report.add(
+            MESH_REMOTE,
+            "the mesh is on the network; it was not downloaded",
+            mesh,
+            attribute="filename",
+            found=quoted(filename),
+            remedy="copy it into a package",
+        )
+
+
+def _meshes(root: Element) -> Iterator[Element]:
+    for link in root.all("link"):
+        for shape in link.children:
+            geometry = shape.first("geometry") if shape.tag in ("visual", "collision") else None
+            if geometry is not None:
+                yield from geometry.all("mesh")
+
+
+def _is_missing_file(filename: str, beside: Path | None) -> bool:
+    """Return whether the address is a path (relative to the URDF) that does not exist."""
+    local = filename and ("://" not in filename or filename.startswith("file://"))
+    if beside is None or not local:
+        return False
+    return not _exists(beside.absolute().parent / filename.removeprefix("file://"))
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def _report_file(report: Reporter, mesh: Element, filename: str) -> None:
+    report.add(
+        MESH_MISSING,
+        "the mesh is not found",
+        mesh,
+        attribute="filename",
+        found=quoted(filename),
+        remedy="kinematics needs no mesh",
+    )
+
+
+def _count(number: int) -> str:
+    return "a mesh" if number == 1 else f"{number} meshes"

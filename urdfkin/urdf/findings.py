@@ -1,0 +1,715 @@
+"""Findings: problems in a URDF, with a stable code, their position, the found text and a remedy.
+
+The parser and the rules of `urdfkin.lint` add findings to the `Reporter` of a file. It locates them in the
+bytes, and applies the comments that silence findings. A finding is plain data: it can be printed, compared,
+converted to JSON or SARIF and sent to another process. Positions count in the bytes after a byte order mark.
+
+A comment in a URDF names the codes that it silences, and gives a reason.
+
+    <!-- urdfkin: ignore[URDF601] the vendor's own digits -->
+
+| Position of the comment | It applies to |
+|---|---|
+| after other text on the same line | this line |
+| on its own line, before an element | this element and its content |
+| before the root element | the whole file |
+"""
+
+from __future__ import annotations
+
+import codecs
+import re
+import unicodedata
+from array import array
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import asdict, dataclass, field, replace
+from enum import Enum
+from itertools import islice
+from typing import Any
+
+from urdfkin.errors import UrdfkinError, nearest
+from urdfkin.errors.display import Displayable, Table, TextDocument
+from urdfkin.errors.escape import log_line, printable
+from urdfkin.system.files import Edit, edited
+from urdfkin.urdf.records import ATTRIBUTE, DEFAULT_LIMITS, START_TAG, Element, Limits
+
+#: Longest quotation from a file in a message, in characters.
+QUOTED = 60
+
+
+def shortened(text: str, limit: int = QUOTED) -> str:
+    """Return at most `limit` characters of a text, safe to print."""
+    return printable(text if len(text) <= limit else text[: limit - 3] + "...")
+
+
+def quoted(text: str, limit: int = QUOTED) -> str:
+    """Return a text in double quotes, at most `limit` characters of it, safe to print."""
+    return '"' + shortened(text, limit).replace('"', '\\"') + '"'
+
+
+#: Characters of a line in an excerpt, and how many of them are before the marked text.
+SHOWN, BEFORE = 100, 60
+
+_TAB = "    "
+
+
+class Excerpts:
+    """Excerpts of one file: the line of a finding, with carets below the marked text.
+
+    Args:
+        data: The bytes of the file after a byte order mark.
+    """
+
+    def __init__(self, data: bytes) -> None:
+        self.lines = data.splitlines()
+        self.number, self.text = 0, ""
+
+    def of(self, finding: Finding) -> str | None:
+        """Return two lines, the file's and one with carets; None for a finding about the whole file.
+
+        >>> from urdfkin.urdf.findings import Severity
+        >>> finding = Finding("URDF503", Severity.NOTE, "", column=7, width=11)
+        >>> print(Excerpts(b'<axis xyz="0 0 2"/>').of(finding))
+          1 | <axis xyz="0 0 2"/>
+            |       ^^^^^^^^^^^
+        """
+        if finding.width <= 0 or not 0 < finding.line <= len(self.lines):
+            return None
+        if self.number != finding.line:  # decode a line once: it may have megabytes
+            self.number = finding.line
+            self.text = self.lines[finding.line - 1].decode("utf-8", "replace")
+        start = finding.column - 1
+        first = max(start - BEFORE, 0) if len(self.text) > SHOWN else 0
+        last = first + SHOWN
+        end = min(start + finding.width, last)
+        before, marked, behind = map(
+            _printable, (self.text[first:start], self.text[start:end], self.text[end:last])
+        )
+        lead, tail = "..." if first else "", "..." if len(self.text) > last else ""
+        number = f"{finding.line:>3}"
+        caret = " " * (_cells(lead) + _cells(before)) + "^" * max(_cells(marked), 1)
+        return f"{number} | {lead}{before}{marked}{behind}{tail}\n{' ' * len(number)} | {caret}"
+
+
+def _printable(text: str) -> str:
+    return printable(text.replace("\t", _TAB))
+
+
+def _cells(text: str) -> int:
+    """Return the number of terminal columns of a text."""
+    return sum(
+        0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text
+    )
+
+
+#: Largest change (rad) of an angle of one revolution when it is rounded to a double.
+ROUNDING = 2.0**-50
+
+
+@dataclass(frozen=True, slots=True)
+class Fix:
+    """The automatic fix of a finding.
+
+    Attributes:
+        edits: The edits of the text, in file order, without overlap.
+        turns: Bound on the rotation (rad) of the joint frame by the fix; 0: the robot does not change.
+    """
+
+    edits: tuple[Edit, ...]
+    turns: float = 0.0
+
+    @property
+    def is_safe(self) -> bool:
+        """Whether the fix rotates no joint frame by more than the rounding of one number."""
+        return self.turns <= ROUNDING
+
+
+def apply(data: bytes, fixes: Iterable[Fix]) -> tuple[bytes, list[Fix]]:
+    """Apply the fixes that do not overlap; return the new bytes and the applied fixes.
+
+    >>> apply(b'<axis xyz="0 0 2"/>', [Fix((Edit(11, 16, "0 0 1"),))])[0]
+    b'<axis xyz="0 0 1"/>'
+    """
+    mark = codecs.BOM_UTF8 if data.startswith(codecs.BOM_UTF8) else b""
+    taken, end = list[Fix](), 0
+    for fix in sorted(fixes, key=lambda fix: fix.edits[0].start):
+        if fix.edits[0].start >= end:
+            taken.append(fix)
+            end = fix.edits[-1].end
+    return mark + edited(data.removeprefix(mark), [edit for fix in taken for edit in fix.edits]), taken
+
+
+class Severity(Enum):
+    """The severity of a finding.
+
+    An error makes the file unusable: it has no meaning, or two readers would read two different robots. A
+    warning is legal, but almost certainly a mistake, or read differently by some readers. A note is
+    information.
+    """
+
+    ERROR = "error"
+    WARNING = "warning"
+    NOTE = "note"
+
+    @property
+    def rank(self) -> int:
+        """0 for errors, 1 for warnings, 2 for notes."""
+        return list(Severity).index(self)
+
+
+class PinocchioReading(Enum):
+    """Pinocchio's behaviour for legal content, where it differs from the specification."""
+
+    REFUSES = "refuses"
+    DIFFERS = "differs"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A problem at one position of a file.
+
+    Attributes:
+        code: The stable code, for example `URDF502`.
+        severity: Error, warning or note.
+        message: The problem in one clause, without a full stop.
+        found: The text in the file that causes the finding, or None.
+        remedy: The remedy, or None.
+        file: The name of the file as given by the user, or `<text>`, `<stdin>`.
+        line: Line, from 1.
+        column: Column in characters, from 1.
+        element: The tag of the element (`joint`, `link`, `origin`, ...); None for the whole file.
+        name: The name of the link, joint or material, or None.
+        oracle: Set if Pinocchio refuses the file for this reason or reads it differently. Then no result
+            from the file can be verified with Pinocchio.
+        also: The lines of further findings of the same kind, combined into this one.
+        width: Number of marked characters from `column` on; 0: no position in the text.
+        fix: The automatic fix, or None.
+    """
+
+    code: str
+    severity: Severity
+    message: str
+    found: str | None = None
+    remedy: str | None = None
+    file: str = "<text>"
+    line: int = 1
+    column: int = 1
+    element: str | None = None
+    name: str | None = None
+    oracle: PinocchioReading | None = None
+    also: tuple[int, ...] = ()
+    width: int = 0
+    fix: Fix | None = None
+
+    @property
+    def subject(self) -> str:
+        """The element and its name, for example `joint 'elbow'`; an empty string for the whole file."""
+        if self.element is None:
+            return ""
+        tag = shortened(self.element)
+        return tag if self.name is None else f"{tag} '{shortened(self.name)}'"
+
+    @property
+    def count(self) -> int:
+        """The number of findings, those in `also` included."""
+        return 1 + len(self.also)
+
+    @property
+    def _others(self) -> str:
+        """The number of further findings and their lines."""
+        others = tuple(sorted(set(self.also) - {self.line}))
+        if len(others) == len(self.also):
+            return f"also on {_lines(others)}"
+        here = ("this line",) if self.line in self.also else ()
+        where = (*here, _lines(others)) if others else here
+        return f"{len(self.also)} more on {' and '.join(where)}"
+
+    @property
+    def sentence(self) -> str:
+        """The finding in one line, without its position and code."""
+        subject = f"{self.subject}: " if self.element and self.name is not None else ""
+        found = f": found {self.found}" if self.found else ""
+        also = f" ({self._others})" if self.also else ""
+        remedy = f"; {self.remedy}" if self.remedy else ""
+        return f"{subject}{self.message}{found}{also}{remedy}"
+
+    def __str__(self) -> str:
+        place = f"{printable(self.file)}:{self.line}:{self.column}"
+        return log_line(f"{place}: {self.code} {self.severity.value}: {self.sentence}")
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the finding for the JSON of a report: enums as strings, tuples as lists, without `fix`."""
+        data = asdict(self)
+        del data["width"], data["fix"]
+        data["severity"] = self.severity.value
+        data["oracle"] = self.oracle.value if self.oracle else None
+        data["also"] = list(self.also)
+        return data
+
+
+class Findings(list[Finding], Displayable):
+    """The findings of one file, by line: a list that displays as a table."""
+
+    def _sheet(self) -> TextDocument:
+        rows = [(f"{f.file}:{f.line}:{f.column}", f.code, f.severity.value, f.sentence) for f in self]
+        counts = {s: sum(f.count for f in self if f.severity is s) for s in Severity}
+        totals = [f"{n} {s.value}{'s' if n > 1 else ''}" for s, n in counts.items() if n]
+        table = [Table(("place", "code", "severity", "what"), rows, left=4)] if rows else []
+        return TextDocument(", ".join(totals) or "no findings", table)
+
+
+def _lines(lines: tuple[int, ...], shown: int = 4) -> str:
+    numbers = ", ".join(str(line) for line in lines[:shown])
+    rest = f" and {len(lines) - shown} more" if len(lines) > shown else ""
+    return f"line{'s' if len(lines) > 1 else ''} {numbers}{rest}"
+
+
+class UrdfError(UrdfkinError, ValueError):
+    """A URDF with errors; its message lists them like a linter.
+
+    Attributes:
+        findings: All findings of the file by line, warnings and notes included.
+    """
+
+    #: Number of errors in the message; further errors are counted.
+    SHOWN = 5
+
+    def __init__(self, findings: Iterable[Finding]) -> None:
+        self.findings = tuple(findings)
+        errors = self._errors = [one for one in self.findings if one.severity is Severity.ERROR]
+        file = self.findings[0].file if self.findings else "<text>"
+        total = sum(error.count for error in errors)
+        count = "an error" if total == 1 else f"{total} errors"
+        super().__init__(
+            f"the URDF has {count}",
+            where=file,
+            remedy=f"run 'urdfkin explain {errors[0].code}' for details" if errors else None,
+        )
+
+    def __str__(self) -> str:
+        lines = [super().__str__(), *(f"  {finding}" for finding in self._errors[: self.SHOWN])]
+        rest = sum(error.count for error in self._errors[self.SHOWN :])
+        if rest:
+            lines.append(f"  ... and {rest} more: see .findings or 'urdfkin check'")
+        return "\n".join(lines)
+
+
+class UrdfWarning(UserWarning):
+    """The Python warning for each warning in a loaded URDF."""
+
+
+ERROR, WARNING, NOTE = Severity.ERROR, Severity.WARNING, Severity.NOTE
+REFUSES, DIFFERS = PinocchioReading.REFUSES, PinocchioReading.DIFFERS
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """A kind of finding.
+
+    Attributes:
+        id: The code: `URDF` and three digits. A code is never reused. The first digit is the family:
+            1 text and XML, 2 dialect and elements, 3 numbers, 4 names and structure, 5 joints, 6 suspicious,
+            7 inertials, geometry and materials.
+        slug: The short name.
+        severity: The default severity of its findings.
+        oracle: Pinocchio's behaviour, if it differs from the specification.
+    """
+
+    id: str
+    slug: str
+    severity: Severity
+    oracle: PinocchioReading | None = None
+
+
+#: The beginning of a comment for urdfkin, after spaces.
+MARK = "urdfkin:"
+
+
+@dataclass(slots=True)
+class Comment:
+    """A comment for urdfkin.
+
+    Attributes:
+        text: The text between `<!--` and `-->`.
+        line: The line, from 1.
+        column: The column, from 1.
+        behind: Whether other text precedes it on its line.
+        element: The next element, or None.
+    """
+
+    text: str
+    line: int
+    column: int
+    behind: bool
+    element: Element | None = None
+
+
+@dataclass(slots=True, eq=False)
+class Silence:
+    """The codes that a comment silences.
+
+    Attributes:
+        comment: The comment.
+        codes: The codes.
+        reason: The reason.
+        used: The codes that silenced at least one finding.
+    """
+
+    comment: Comment
+    codes: tuple[str, ...]
+    reason: str
+    used: set[str] = field(default_factory=set)
+
+
+#: Code -> the first comment that silences it.
+Codes = dict[str, Silence]
+
+
+@dataclass(slots=True)
+class Silences:
+    """The silencing comments of a file.
+
+    Attributes:
+        everywhere: Comments for the whole file.
+        lines: Comments for a line, by line number.
+        elements: Comments for an element, by the element's `id()`.
+        all: All comments.
+    """
+
+    everywhere: Codes = field(default_factory=dict)
+    lines: dict[int, Codes] = field(default_factory=dict)
+    elements: dict[int, Codes] = field(default_factory=dict)
+    all: list[Silence] = field(default_factory=list)
+
+    def __bool__(self) -> bool:
+        return bool(self.all)
+
+    def add(self, silence: Silence) -> None:
+        """Add a comment."""
+        self.all.append(silence)
+        place = self._place(silence.comment)
+        for code in silence.codes:
+            place.setdefault(code, silence)
+
+    def _place(self, comment: Comment) -> Codes:
+        if comment.behind:
+            return self.lines.setdefault(comment.line, {})
+        if comment.element is None:
+            return {}
+        if comment.element.parent is None:
+            return self.everywhere
+        return self.elements.setdefault(id(comment.element), {})
+
+    def reason(self, code: str, line: int, at: Element | None) -> str | None:
+        """Return the reason of the nearest comment that silences a finding; None if there is none.
+
+        Args:
+            code: The code of the finding.
+            line: The line of the finding.
+            at: The element of the finding.
+        """
+        silence = self.lines.get(line, {}).get(code)
+        while silence is None and at is not None:
+            silence = self.elements.get(id(at), {}).get(code)
+            at = at.parent
+        silence = silence or self.everywhere.get(code)
+        if silence is None:
+            return None
+        silence.used.add(code)
+        return silence.reason
+
+
+#: Limits of the suggestions for misspelt names: names per file, candidates per name, work per comparison.
+SEARCHES, CANDIDATES, WORK = 20, 5_000, 250_000
+
+#: Number of warnings or notes of one kind from which they are combined into one. The second number is for
+#: URDF7xx, which kinematics does not use.
+FOLDED, FOLDED_EXTRAS = 4, 2
+
+#: Number of errors of one kind that are not combined.
+ERRORS_SHOWN = 100
+
+#: Number of complete findings of one kind; for further ones only the lines are stored.
+WRITTEN_OUT = 10_000
+
+
+@dataclass(slots=True)
+class _Kind:
+    """The findings of one code and severity.
+
+    Attributes:
+        severity: The severity.
+        found: The findings, each with its weight.
+        lines: The lines of the findings beyond the limit `WRITTEN_OUT`.
+    """
+
+    severity: Severity
+    found: list[tuple[Finding, float]] = field(default_factory=list)
+    lines: array[int] = field(default_factory=lambda: array("q"))
+
+
+@dataclass(slots=True)
+class Reporter:
+    """The findings of one file.
+
+    Attributes:
+        file: The name of the file, for the findings.
+        data: The bytes of the file, for the positions of attributes.
+        limits: Limits on the size of the file and its parts.
+        comments: The comments for urdfkin.
+        silenced: The findings that a comment silences, each with the reason.
+        silences: The parsed comments.
+    """
+
+    file: str
+    data: bytes = b""
+    limits: Limits = DEFAULT_LIMITS
+    comments: list[Comment] = field(default_factory=list)
+    silenced: list[tuple[Finding, str]] = field(default_factory=list)
+    silences: Silences = field(default_factory=Silences)
+    _searches: int = 0
+    _raw_blanks: bool | None = None
+    _kinds: dict[tuple[str, Severity], _Kind] = field(default_factory=dict)
+    _element: Element | None = None
+    _attributes: dict[str, _AttributeSpan] = field(default_factory=dict)
+
+    def add(
+        self,
+        rule: Rule,
+        message: str,
+        at: Element | None = None,
+        *,
+        attribute: str | None = None,
+        found: str | None = None,
+        remedy: str | None = None,
+        owner: str | None = None,
+        severity: Severity | None = None,
+        position: tuple[int, int] = (1, 1),
+        weight: float = 0.0,
+        fix: Callable[[], Fix | None] | None = None,
+    ) -> None:
+        """Add a finding.
+
+        Args:
+            rule: The rule.
+            message: The problem in one clause.
+            at: The element; without it, `position` is used.
+            attribute: The attribute of `at` to mark.
+            found: The text that causes the finding, quoted for printing.
+            remedy: The remedy.
+            owner: The tag for the message, if `at` is a link or joint in the wrong place. The default is the
+                tag of the link or joint that contains `at`.
+            severity: Severity instead of the rule's.
+            position: (line, column) if there is no element.
+            weight: If findings of one kind are combined, the one with the greatest weight is reported.
+            fix: A function that makes the automatic fix, called on demand; None: there is no automatic fix.
+        """
+        severity = rule.severity if severity is None else severity
+        # A comment cannot silence an error.
+        reason = (
+            None if severity is Severity.ERROR else self._silenced_by(rule.id, position[0], at, attribute)
+        )
+        kind = self._kinds.setdefault((rule.id, severity), _Kind(severity))
+        if len(kind.found if reason is None else self.silenced) >= WRITTEN_OUT:
+            if reason is None:
+                kind.lines.append(position[0] if at is None else at.line)
+            return
+        line, column, width = (*position, 0) if position == (1, 1) else (*position, 1)
+        name = None
+        if at is not None:
+            line, column, width = self._place(at, attribute)
+            name = at.label if owner is None else at.attributes.get("name")
+        finding = Finding(
+            rule.id,
+            severity,
+            message,
+            found,
+            remedy,
+            self.file,
+            line,
+            column,
+            owner if owner or at is None else at.owner,
+            name,
+            rule.oracle,
+            width=width,
+            fix=None if fix is None or reason is not None else fix(),
+        )
+        if reason is None:
+            kind.found.append((finding, weight))
+        else:
+            self.silenced.append((finding, reason))
+
+    def _silenced_by(self, code: str, line: int, at: Element | None, attribute: str | None) -> str | None:
+        if not self.silences:
+            return None
+        return self.silences.reason(code, line if at is None else self._place(at, attribute)[0], at)
+
+    def silence(self, silences: Silences) -> None:
+        """Apply the comments to later findings, and to those that parsing has already added."""
+        self.silences = silences
+        for (code, severity), kind in self._kinds.items():
+            if severity is not Severity.ERROR:
+                reasons = [(pair, silences.reason(code, pair[0].line, None)) for pair in kind.found]
+                self.silenced += [(finding, reason) for (finding, _), reason in reasons if reason is not None]
+                kind.found = [pair for pair, reason in reasons if reason is None]
+
+    def nearest(self, word: str, known: Iterable[str]) -> list[str]:
+        """Return up to three known names similar to `word`; none after `SEARCHES` calls, which are slow."""
+        self._searches += 1
+        if self._searches > SEARCHES:
+            return []
+        return nearest(word, islice(known, CANDIDATES), work=WORK)
+
+    def is_full(self, rule: Rule) -> bool:
+        """Return whether a rule has `WRITTEN_OUT` findings, so that no more are stored completely."""
+        kind = self._kinds.get((rule.id, rule.severity))
+        return kind is not None and len(kind.found) >= WRITTEN_OUT
+
+    @property
+    def failed(self) -> bool:
+        """Whether there is an error."""
+        return any(severity is Severity.ERROR for _, severity in self._kinds)
+
+    def findings(
+        self, *, fold: bool = True, wanted: Callable[[Finding], bool] | None = None
+    ) -> tuple[Finding, ...]:
+        """Return the findings by line.
+
+        Args:
+            fold: Whether to combine many warnings of one kind, and the errors of a kind from the hundredth
+                on.
+            wanted: A filter, called once for each finding, in file order; None: all findings.
+        """
+        kinds = [kind for kind in self._kinds.values() if kind.found]
+        if wanted is not None:
+            pairs = sorted(
+                (pair for kind in kinds for pair in kind.found), key=lambda p: _place_in_file(p[0])
+            )
+            selected = {id(pair) for pair in pairs if wanted(pair[0])}
+            kinds = [
+                _Kind(kind.severity, chosen, kind.lines)
+                for kind in kinds
+                if (chosen := [pair for pair in kind.found if id(pair) in selected])
+            ]
+        found = (finding for kind in kinds for finding in _combine(kind, fold=fold))
+        return tuple(sorted(found, key=_place_in_file))
+
+    @property
+    def has_raw_blanks(self) -> bool:
+        """Whether a value contains a tab, a line end or a reference, which an XML parser replaces."""
+        if self._raw_blanks is None:
+            self._raw_blanks = _RAW_BLANK.search(self.data) is not None
+        return self._raw_blanks
+
+    def raw(self, at: Element, attribute: str) -> str | None:
+        """Return the value of an attribute as written, before XML replaces white space and references."""
+        span = self._spans(at).get(attribute)
+        return None if span is None else self.data[slice(*span.value)].decode("utf-8", "replace")
+
+    def _spans(self, at: Element) -> dict[str, _AttributeSpan]:
+        """Return the positions of an element's attributes; those of the last element are cached."""
+        if self._element is not at:
+            self._element, self._attributes = at, dict(_attributes(self.data, at))
+        return self._attributes
+
+    def _place(self, at: Element, attribute: str | None) -> tuple[int, int, int]:
+        """Return line, column and width of an element's start tag, or of one of its attributes."""
+        span = None if attribute is None else self._spans(at).get(attribute)
+        if span is None:
+            return at.line, at.column, 1 + len(at.tag)
+        first = _NEWLINE.split(self.data[span.start : span.value[1] + 1], 1)[0]
+        return span.line, span.column, len(first.decode("utf-8", "replace"))
+
+    def rewritten(self, at: Element, attribute: str, value: str, turns: float = 0.0) -> Fix | None:
+        """Return the fix that changes the value of an attribute."""
+        span = self._spans(at).get(attribute)
+        return None if span is None else Fix((Edit(*span.value, value),), turns)
+
+    def without(self, at: Element, *attributes: str) -> Fix | None:
+        """Return the fix that removes attributes, each with the white space before it."""
+        existing = [span for name in attributes if (span := self._spans(at).get(name)) is not None]
+        spans = sorted((span.start, span.value[1] + 1) for span in existing)
+        return (
+            Fix(tuple(Edit(_blanks_before(self.data, start), end) for start, end in spans)) if spans else None
+        )
+
+    def without_element(self, at: Element) -> Fix | None:
+        """Return the fix that removes an empty element, and its line if it is alone on it."""
+        tag = START_TAG.match(self.data, at.offset)
+        if tag is None:
+            return None
+        end = tag.end()
+        if not tag[0].endswith(b"/>"):
+            closing = re.compile(rb"[ \t\r\n]*</" + re.escape(at.tag.encode()) + rb"[ \t\r\n]*>")
+            if (closed := closing.match(self.data, end)) is None:
+                return None
+            end = closed.end()
+        start = _blanks_before(self.data, at.offset, b" \t")
+        rest = _REST_OF_LINE.match(self.data, end)
+        alone = rest is not None and self.data[start - 1 : start] in (b"\n", b"\r")
+        return Fix((Edit(start, rest.end()) if rest is not None and alone else Edit(at.offset, end),))
+
+
+@dataclass(frozen=True, slots=True)
+class _AttributeSpan:
+    """The position of an attribute in the file.
+
+    Attributes:
+        line: Line, from 1.
+        column: Column in characters, from 1.
+        start: Index of its first byte.
+        value: Indices of the first byte between its quotes and of the closing quote.
+    """
+
+    line: int
+    column: int
+    start: int
+    value: tuple[int, int]
+
+
+#: A value with a tab, a line end or a reference, all of which XML replaces. Possessive matching: linear time.
+_RAW_BLANK = re.compile(rb"""=\s*+(?:"[^"<\t\r\n&]*+[\t\r\n&]|'[^'<\t\r\n&]*+[\t\r\n&])""")
+
+_NEWLINE = re.compile(rb"\r\n|\r|\n")
+_REST_OF_LINE = re.compile(rb"[ \t]*+(?:\r\n|\r|\n)")
+
+
+def _attributes(data: bytes, at: Element) -> Iterator[tuple[str, _AttributeSpan]]:
+    """Yield the attributes of an element's start tag with their positions, in one pass."""
+    tag = START_TAG.match(data, at.offset)
+    if tag is None:
+        return
+    line, column, cursor = at.line, at.column, at.offset
+    for match in ATTRIBUTE.finditer(data, at.offset + len(at.tag.encode()) + 1, tag.end()):
+        lines = _NEWLINE.split(data[cursor : match.start()])
+        column = len(lines[-1].decode("utf-8", "replace")) + (column if len(lines) == 1 else 1)
+        line, cursor = line + len(lines) - 1, match.start()
+        yield match[1].decode(), _AttributeSpan(line, column, cursor, (match.start(2) + 1, match.end(2) - 1))
+
+
+def _blanks_before(data: bytes, start: int, blanks: bytes = b" \t\r\n") -> int:
+    """Return the index of the first of the white-space characters that end at an index."""
+    while start > 0 and data[start - 1] in blanks:
+        start -= 1
+    return start
+
+
+def _place_in_file(finding: Finding) -> tuple[int, int, int, str, str]:
+    return finding.line, finding.column, finding.severity.rank, finding.code, finding.message
+
+
+def _combine(kind: _Kind, *, fold: bool) -> list[Finding]:
+    """Return the findings of a kind; the last one, or the one of greatest weight, lists the other lines."""
+    kind.found.sort(key=lambda pair: _place_in_file(pair[0]))
+    found = [finding for finding, _ in kind.found]
+    into_one = fold and kind.severity is not Severity.ERROR
+    if into_one and len(found) >= (FOLDED_EXTRAS if found[0].code.startswith("URDF7") else FOLDED):
+        best = max(range(len(found)), key=lambda i: kind.found[i][1])
+        complete, rest = [found.pop(best)], found
+    else:
+        most = ERRORS_SHOWN if fold else len(found)
+        complete, rest = found[:most], found[most:]
+    lines = sorted([*(finding.line for finding in rest), *kind.lines])
+    if lines:
+        complete[-1] = replace(complete[-1], also=tuple(lines))
+    return complete

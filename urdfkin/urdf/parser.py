@@ -1,0 +1,951 @@
+"""The parser of URDF: from bytes to elements, and from elements to the records of links and joints.
+
+`read_document` checks that the bytes are UTF-8 and parses the XML to elements with positions. The
+XML parser is expat. It does not change names (`xacro:macro`), reports the position of every start tag, needs
+no stack for deep nesting, and opens no file. A document type definition with content stops it before it
+expands an entity.
+
+`read_robot` reads links and joints into records, once and strictly. Numbers are ASCII, finite, and of the
+right count: the grammar is `xs:double` without its special values, as in urdfdom. Nothing is guessed or
+repaired; every problem is a finding. `urdfkin.lint` checks the records further.
+"""
+
+from __future__ import annotations
+
+import codecs
+import difflib
+import html
+import math
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+from xml.parsers import expat
+
+from urdfkin.errors.numbers import DECIMAL
+from urdfkin.system.files import Edit
+from urdfkin.urdf.findings import (
+    ERROR,
+    MARK,
+    NOTE,
+    QUOTED,
+    REFUSES,
+    WARNING,
+    Comment,
+    Fix,
+    Reporter,
+    Rule,
+    Severity,
+    quoted,
+    shortened,
+)
+from urdfkin.urdf.records import (
+    FURTHER_LIMITS,
+    ORACLE_DEPTH,
+    Element,
+    JointRecord,
+    LimitRecord,
+    MimicRecord,
+    RobotRecord,
+)
+
+EMPTY = Rule("URDF101", "empty-file", ERROR)
+ENCODING = Rule("URDF102", "not-utf8", ERROR)
+DECLARED = Rule("URDF103", "declared-encoding", ERROR)
+DECLARED_ASCII = Rule("URDF104", "declared-encoding-unused", WARNING)
+XML_VERSION = Rule("URDF111", "xml-version", WARNING)
+BYTE_ORDER_MARK = Rule("URDF113", "byte-order-mark", NOTE)
+
+#: Byte order marks of encodings other than UTF-8; the longer ones first.
+_MARKS = (
+    (codecs.BOM_UTF32_LE, "UTF-32"),
+    (codecs.BOM_UTF32_BE, "UTF-32"),
+    (codecs.BOM_UTF16_LE, "UTF-16"),
+    (codecs.BOM_UTF16_BE, "UTF-16"),
+)
+
+#: First bytes of '<' in wide encodings without a byte order mark.
+_WIDE = ((b"<\0\0\0", "UTF-32"), (b"\0\0\0<", "UTF-32"), (b"<\0", "UTF-16"), (b"\0<", "UTF-16"))
+
+_DECLARATION = re.compile(rb"""<\?xml(?=\s)[^>]*?\?>""")
+_ENCODING = re.compile(rb"""\sencoding\s*=\s*["']([^"']*)["']""")
+_XML_VERSION = re.compile(rb"""\sversion\s*=\s*["']([^"']*)["']""")
+
+#: Encodings that contain ASCII: a text of ASCII characters is the same in each.
+_ASCII_SUPERSETS = re.compile(r"(iso8859|windows125|cp125|latin|koi8|mac)")
+
+
+def utf8_bytes(report: Reporter, data: bytes) -> bytes | None:
+    """Return the bytes without a byte order mark if they are UTF-8; None after an error.
+
+    Args:
+        report: The reporter, which receives the findings.
+        data: The bytes of the file.
+    """
+    if not data.strip():
+        what = "the file is empty" if not data else "the file contains only white space"
+        report.add(EMPTY, what, remedy="check the program that wrote it")
+        return None
+    wide = next((name for mark, name in (*_MARKS, *_WIDE) if data.startswith(mark)), None)
+    if wide is not None:
+        report.add(ENCODING, "the file is not UTF-8 text", found=wide, remedy="save the file as UTF-8")
+        return None
+    marked = data.startswith(codecs.BOM_UTF8)
+    text = data.removeprefix(codecs.BOM_UTF8)
+    declared = _declared_encoding(text)
+    if not (_is_utf8(report, text, declared) and _agrees(report, text, declared)):
+        return None
+    if marked:
+        report.add(BYTE_ORDER_MARK, "the text begins with a byte order mark", remedy="remove it if you can")
+    return text
+
+
+def _declared_encoding(text: bytes) -> str | None:
+    """Return the encoding in the XML declaration, as written."""
+    declaration = _DECLARATION.match(text.lstrip())
+    match = _ENCODING.search(declaration[0]) if declaration else None
+    return match[1].decode("ascii", "replace") if match else None
+
+
+def _is_utf8(report: Reporter, text: bytes, declared: str | None) -> bool:
+    zero = text.find(b"\0")
+    if zero >= 0:
+        report.add(
+            ENCODING,
+            "the text contains a zero byte: some readers stop there, others continue",
+            remedy="check the file: it is not a text file, or it is damaged",
+            position=line_and_column(text, zero),
+        )
+        return False
+    try:
+        text.decode("utf-8")
+    except UnicodeDecodeError as error:
+        claim = f", although the file declares {declared}" if declared else ""
+        report.add(
+            ENCODING,
+            f"a byte is not UTF-8{claim}",
+            found=f"0x{text[error.start]:02x}",
+            remedy="save the file as UTF-8",
+            position=line_and_column(text, error.start),
+        )
+        return False
+    return True
+
+
+def _agrees(report: Reporter, text: bytes, declared: str | None) -> bool:
+    """Return whether the XML declaration is compatible with UTF-8."""
+    declaration = _DECLARATION.match(text)
+    version = _XML_VERSION.search(declaration[0]) if declaration else None
+    if version is not None and version[1] != b"1.0":
+        found = quoted(version[1].decode())
+        report.add(XML_VERSION, "the XML version is not 1.0", found=found, remedy='write version="1.0"')
+    if declared is None or _codec(declared) in ("utf-8", "ascii"):
+        return True
+    if text.isascii() and _ASCII_SUPERSETS.match(_codec(declared) or ""):
+        report.add(
+            DECLARED_ASCII,
+            "the declared encoding is not UTF-8, but every character is ASCII",
+            found=quoted(declared),
+            remedy='write encoding="UTF-8"',
+            fix=lambda: Fix((Edit(*match.span(1), "UTF-8"),)) if (match := _ENCODING.search(text)) else None,
+        )
+        return True
+    report.add(
+        DECLARED,
+        "the declared encoding is not UTF-8",
+        found=quoted(declared),
+        remedy='save the file as UTF-8 and write encoding="UTF-8"',
+    )
+    return False
+
+
+def _codec(name: str) -> str | None:
+    """Return Python's name of an encoding, in lower case; None if it is unknown."""
+    try:
+        return codecs.lookup(name).name.lower().replace("-", "").replace("utf8", "utf-8")
+    except LookupError:
+        return None
+
+
+def line_and_column(data: bytes, offset: int) -> tuple[int, int]:
+    """Return the line and the column of a byte, both from 1."""
+    before = data[: max(offset, 0)].decode("utf-8", "replace")
+    return before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
+
+
+SYNTAX = Rule("URDF105", "xml-syntax", ERROR)
+ENTITY = Rule("URDF106", "entity", ERROR)
+DOCTYPE = Rule("URDF107", "doctype", WARNING)
+TOO_LARGE = Rule("URDF108", "too-large", ERROR)
+DEEP_NESTING = Rule("URDF109", "deep-nesting", WARNING)
+TOO_DEEP_FOR_ORACLE = Rule("URDF110", "too-deep-for-pinocchio", WARNING, REFUSES)
+TOO_MANY_ELEMENTS = Rule("URDF114", "too-many-elements", ERROR)
+TOO_DEEP = Rule("URDF115", "too-deep", ERROR)
+TOO_MANY_ATTRIBUTES = Rule("URDF116", "too-many-attributes", ERROR)
+NAME_TOO_LONG = Rule("URDF117", "name-too-long", ERROR)
+INSTRUCTION = Rule("URDF118", "processing-instruction", WARNING, REFUSES)
+MARKUP_TOO_LONG = Rule("URDF119", "markup-too-long", ERROR)
+
+#: Older versions of libxml2, and the readers built on it, refuse deeper nesting.
+COMMON_DEPTH = 256
+_COMMON = ("older readers built on libxml2 refuse", COMMON_DEPTH)
+
+#: Bytes per call of the parser.
+_PIECE = 1_000_000
+
+#: Characters of an element's text that are stored: more than a message quotes.
+_STORED = 2 * QUOTED
+
+#: Attributes with names of links and joints.
+_NAMES = frozenset({"name", "link", "joint"})
+
+
+class _Stop(Exception):  # noqa: N818 - control flow, not an error
+    """Stop the parser after a finding that makes the rest of the file meaningless."""
+
+
+def read_document(report: Reporter) -> Element | None:
+    """Return the root element of the reporter's file, or None after a finding with the reason."""
+    data, most = report.data, report.limits.bytes
+    if len(data) > most:
+        report.add(
+            TOO_LARGE,
+            "the file is too large",
+            found=f"{len(data)} bytes, more than {most}",
+            remedy="if the file is correct, raise the limit with --max-bytes",
+        )
+        return None
+    text = utf8_bytes(report, data)
+    if text is None:
+        return None
+    report.data = text
+    return _parse(report)
+
+
+def _parse(report: Reporter) -> Element | None:
+    builder = _Builder(report)
+    try:
+        builder.read(report.data)
+    except _Stop:
+        return None
+    except expat.ExpatError as error:
+        builder.syntax_error(error)
+        return None
+    if builder.deepest > COMMON_DEPTH:
+        refused = builder.deepest > ORACLE_DEPTH
+        reader, most = ("urdfdom refuses", ORACLE_DEPTH) if refused else _COMMON
+        report.add(
+            TOO_DEEP_FOR_ORACLE if refused else DEEP_NESTING,
+            f"elements are nested {builder.deepest} deep",
+            builder.deepest_element,
+            remedy=f"{reader} more than {most}",
+        )
+    return builder.root
+
+
+class _Builder:
+    """The handlers of the parser, which build the tree and check the limits."""
+
+    def __init__(self, report: Reporter) -> None:
+        self.report, self.limits = report, report.limits
+        self.root: Element | None = None
+        self.open: list[Element] = []
+        self.begun = False
+        self.count = self.deepest = 0
+        self.deepest_element: Element | None = None
+        self.waiting: list[Comment] = []
+        self.marked = MARK.encode() in report.data
+        self.parser = parser = expat.ParserCreate("utf-8")
+        parser.buffer_text = True
+        parser.StartElementHandler = self.start
+        parser.EndElementHandler = self.end
+        parser.CharacterDataHandler = self.characters
+        parser.StartDoctypeDeclHandler = self.doctype
+        parser.CommentHandler = self.comment
+        parser.ProcessingInstructionHandler = self.instruction
+        parser.SkippedEntityHandler = self.skipped
+
+    def read(self, data: bytes) -> None:
+        """Feed the parser in pieces. expat reads incomplete markup again with the next piece."""
+        whole, size = memoryview(data), min(_PIECE, self.limits.markup)
+        for start in range(0, len(whole), size):
+            fed = min(start + size, len(whole))
+            self.parser.Parse(whole[start:fed], False)
+            if fed - max(self.parser.CurrentByteIndex, 0) > self.limits.markup:
+                found = f"more than {self.limits.markup} bytes without an end"
+                self.refuse(MARKUP_TOO_LONG, "markup", "a tag, comment or instruction is too long", found)
+        self.parser.Parse(b"", True)
+
+    def here(self) -> tuple[int, int]:
+        """Return the line and the column of the parser's position."""
+        return self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        line, column = self.here()
+        parent = self.open[-1] if self.open else None
+        element = Element(tag, attributes, parent, line, column, self.parser.CurrentByteIndex)
+        if parent is None:
+            self.root, self.begun = element, True
+            if not self.marked:
+                self.parser.CommentHandler = None
+        else:
+            element.above = None if parent is self.root else parent.holder
+            parent.append(element)
+        for comment in self.waiting:
+            comment.element = element
+        self.waiting.clear()
+        self.open.append(element)
+        self.count += 1
+        if len(self.open) > self.deepest:
+            self.deepest, self.deepest_element = len(self.open), element
+        self.check_limits(tag, attributes)
+
+    def check_limits(self, tag: str, attributes: dict[str, str]) -> None:
+        most = self.limits
+        if self.deepest > most.depth:
+            self.refuse(TOO_DEEP, "depth", "elements are nested too deep", f"more than {most.depth} levels")
+        if self.count > most.elements:
+            self.refuse(TOO_MANY_ELEMENTS, "elements", "too many elements", f"more than {most.elements}")
+        if len(attributes) > most.attributes:
+            found = f"{len(attributes)} in <{shortened(tag)}>, more than {most.attributes}"
+            self.refuse(TOO_MANY_ATTRIBUTES, "attributes", "an element has too many attributes", found)
+        if len(tag) > most.name:
+            self.refuse_name("an element", tag)
+        for key, value in attributes.items():
+            if len(key) > most.name:
+                self.refuse_name("an attribute", key)
+            if len(value) > most.name and key in _NAMES:
+                self.refuse_name("a link or joint", value)
+
+    def refuse_name(self, owner: str, name: str) -> None:
+        found = f"{quoted(name, 30)} of {len(name)} characters, more than {self.limits.name}"
+        self.refuse(NAME_TOO_LONG, "name", f"the name of {owner} is too long", found)
+
+    def refuse(self, code: Rule, limit: str, message: str, found: str) -> None:
+        remedy = f"if the file is correct, raise the limit with --max-{limit}"
+        self.report.add(code, message, found=found, remedy=remedy, position=self.here())
+        raise _Stop
+
+    def end(self, tag: str) -> None:
+        self.waiting.clear()
+        element = self.open.pop()
+        if element.text:
+            element.text = element.text.strip()
+
+    def characters(self, text: str) -> None:
+        element = self.open[-1]
+        if len(element.text) < _STORED and not text.isspace():
+            element.text += (text if element.text else text.lstrip())[:_STORED]
+
+    def comment(self, text: str) -> None:
+        self.begun = True
+        if text.lstrip().startswith(MARK):
+            comment = Comment(text, *self.here(), self._is_behind_something())
+            self.report.comments.append(comment)
+            self.waiting.append(comment)
+
+    def _is_behind_something(self) -> bool:
+        """Return whether the line has other text before the parser's position."""
+        data, start = self.report.data, self.parser.CurrentByteIndex
+        while start > 0 and data[start - 1] in b" \t":
+            start -= 1
+        return start > 0 and data[start - 1] not in b"\r\n"
+
+    def instruction(self, target: str, text: str) -> None:
+        """Report a processing instruction that is not at the beginning, where urdfdom allows it."""
+        if self.begun:
+            self.report.add(
+                INSTRUCTION,
+                "a processing instruction is not at the beginning of the file; urdfdom refuses the file",
+                found=quoted(f"<?{target} {text}".strip() + "?>"),
+                remedy="remove it, or move it to the beginning; only other instructions may precede it",
+                position=self.here(),
+            )
+
+    def doctype(self, name: str, system: str | None, public: str | None, has_subset: int) -> None:
+        """Report a document type declaration, and stop before its content has an effect."""
+        self.begun = True
+        start = self.report.data.rfind(b"<!DOCTYPE", 0, self.parser.CurrentByteIndex)
+        position = line_and_column(self.report.data, start)
+        if system is None and public is None and not has_subset:
+            self.report.add(
+                DOCTYPE,
+                "a document type declaration has no use in a URDF",
+                found=quoted(f"<!DOCTYPE {name}>"),
+                remedy="remove it; it is ignored",
+                position=position,
+            )
+            return
+        what = "contains definitions" if has_subset else "refers to an external definition"
+        found = quoted(f"<!DOCTYPE {name} [...") if system is None else quoted(system)
+        self.report.add(
+            ENTITY,
+            f"the document type declaration {what}",
+            found=found,
+            remedy="remove it and write the values directly; nothing was expanded or opened",
+            position=position,
+        )
+        raise _Stop
+
+    def skipped(self, name: str, is_parameter: int) -> None:
+        self.undefined_entity(name)
+        raise _Stop
+
+    def undefined_entity(self, name: str | None) -> None:
+        self.report.add(
+            ENTITY,
+            "the file uses an entity that XML does not define",
+            found=quoted(f"&{name};") if name else None,
+            remedy="write the character itself, or one of &lt; &gt; &amp; &quot; &apos;",
+            position=self.here(),
+        )
+
+    def syntax_error(self, error: expat.ExpatError) -> None:
+        """Report a syntax error with its position and the text there."""
+        reason = expat.errors.messages[error.code]
+        if reason == expat.errors.XML_ERROR_UNDEFINED_ENTITY:
+            self.undefined_entity(self._entity_name())
+            return
+        innermost = self.open[-1] if self.open else None
+        message, remedy = _REASONS.get(reason, (reason, None))
+        if innermost is not None:
+            opened = f"<{innermost.tag}>, opened on line {innermost.line},"
+            if reason == expat.errors.XML_ERROR_TAG_MISMATCH:
+                remedy = f"close {opened} first"
+            elif reason in (expat.errors.XML_ERROR_NO_ELEMENTS, expat.errors.XML_ERROR_UNCLOSED_TOKEN):
+                message, remedy = "the file ends too early", f"close {opened}"
+        ended = reason == expat.errors.XML_ERROR_NO_ELEMENTS
+        self.report.add(
+            SYNTAX,
+            f"not well-formed XML: {message}",
+            found=None if ended else self._around(),
+            remedy=remedy,
+            position=(error.lineno, error.offset + 1),
+        )
+
+    def _entity_name(self) -> str | None:
+        """Return the first entity after the position of an error that XML itself does not define."""
+        found = _ENTITY.finditer(self.report.data, self.parser.ErrorByteIndex)
+        return next((match[1].decode() for match in found if match[1] not in _PREDEFINED), None)
+
+    def _around(self) -> str | None:
+        """Return the text at the position of an error, up to the end of its line."""
+        start = self.parser.ErrorByteIndex
+        line = (self.report.data[start : start + 120].splitlines() or [b""])[0]
+        text = line.decode("utf-8", "replace")[:30]
+        return quoted(text) if text.strip() else None
+
+
+_ENTITY = re.compile(rb"&([A-Za-z_:\x80-\xff][^;\s<>&\"']{0,60});")
+_PREDEFINED = (b"lt", b"gt", b"amp", b"quot", b"apos")
+
+#: expat's message -> a clearer message and a remedy.
+_REASONS: dict[str, tuple[str, str | None]] = {
+    expat.errors.XML_ERROR_SYNTAX: ("text instead of an element", "a URDF begins with <robot ...>"),
+    expat.errors.XML_ERROR_INVALID_TOKEN: ("a character that XML does not allow here", None),
+    expat.errors.XML_ERROR_BAD_CHAR_REF: ("a character that XML does not allow", None),
+    expat.errors.XML_ERROR_TAG_MISMATCH: ("a closing tag does not match the open element", None),
+    expat.errors.XML_ERROR_NO_ELEMENTS: ("the file has no element", "a URDF begins with <robot ...>"),
+    expat.errors.XML_ERROR_DUPLICATE_ATTRIBUTE: ("an attribute is given twice", "remove one of the two"),
+    expat.errors.XML_ERROR_MISPLACED_XML_PI: (
+        "the XML declaration is not at the very beginning of the file",
+        "remove the text before <?xml",
+    ),
+    expat.errors.XML_ERROR_JUNK_AFTER_DOC_ELEMENT: (
+        "there is content after the closing tag of the root element",
+        "a file contains one robot",
+    ),
+}
+
+
+BAD_NUMBER = Rule("URDF301", "bad-number", ERROR)
+BAD_VECTOR = Rule("URDF302", "bad-vector", ERROR)
+WHITESPACE = Rule("URDF303", "whitespace-in-number", WARNING, REFUSES)
+UNDERFLOW = Rule("URDF304", "underflow", WARNING)
+NUMBER_TOO_LONG = Rule("URDF305", "number-too-long", ERROR)
+
+#: White space; the pattern is unambiguous, so splitting takes linear time.
+_BLANKS = re.compile(r"[ \t\r\n]+")
+
+
+@dataclass(slots=True)
+class NumberReader:
+    """Reader of numbers in attributes, which reports invalid ones.
+
+    Attributes:
+        report: The reporter, which receives the findings.
+        bad_number: The rule for invalid numbers; another one where kinematics does not use the number.
+        bad_vector: The rule for a wrong count.
+    """
+
+    report: Reporter
+    bad_number: Rule = BAD_NUMBER
+    bad_vector: Rule = BAD_VECTOR
+
+    def scalar(self, element: Element, attribute: str, default: float | None = None) -> float | None:
+        """Return one number; `default` if the attribute is missing, None if it cannot be read."""
+        written = element.attributes.get(attribute)
+        if written is None:
+            return default
+        if self._is_too_long(element, attribute, written, self.report.limits.number):
+            return None
+        value = self._number(element, attribute, _BLANKS.sub(" ", written).strip(" "))
+        if value is not None and written != written.rstrip():
+            self._report_refused(element, attribute, "a space after the number")
+        elif value is not None and self.report.has_raw_blanks:
+            self._check_raw(element, attribute, 1)
+        return value
+
+    def vector(self, element: Element, attribute: str, count: int = 3) -> tuple[float, ...] | None:
+        """Return `count` numbers, or None if the attribute is missing or cannot be read."""
+        written = element.attributes.get(attribute)
+        if written is None:
+            return None
+        longest = self.report.limits.number
+        if self._is_too_long(element, attribute, written, count * longest):
+            return None
+        pieces = [piece for piece in _BLANKS.split(written) if piece]
+        if any(self._is_too_long(element, attribute, piece, longest) for piece in pieces):
+            return None
+        values: list[float] = []
+        for piece in pieces:
+            value = self._number(element, attribute, piece)
+            if value is None:
+                return None
+            values.append(value)
+        if len(values) != count:
+            self.report.add(
+                self.bad_vector,
+                f"{attribute} needs {count} numbers, but has {len(values)}",
+                element,
+                attribute=attribute,
+                found=f"{attribute}={quoted(written)}",
+                remedy=f"write {count} numbers separated by spaces",
+            )
+            return None
+        if self.report.has_raw_blanks:
+            self._check_raw(element, attribute, count)
+        return tuple(values)
+
+    def _number(self, element: Element, attribute: str, piece: str) -> float | None:
+        value = float(piece) if DECIMAL.fullmatch(piece) else None
+        if value is not None and math.isfinite(value):
+            if value == 0.0 and any(digit in _NOT_ZERO for digit in re.split("[eE]", piece)[0]):
+                self.report.add(
+                    UNDERFLOW,
+                    f"{attribute} contains a number too small for a double; it is read as zero",
+                    element,
+                    attribute=attribute,
+                    found=quoted(piece),
+                    remedy="check the exponent",
+                )
+            return value
+        what = attribute if element.tag in _PLAIN else f"{attribute} of <{element.tag}>"
+        if value is not None:
+            message, remedy = "is too large for a double", "check the exponent"
+        else:
+            message, remedy = "is not a number", _remedy(piece)
+        self.report.add(
+            self.bad_number,
+            f"{what} {message}" if piece == element.attributes[attribute] else f"a part of {what} {message}",
+            element,
+            attribute=attribute,
+            found=quoted(piece),
+            remedy=remedy,
+        )
+        return None
+
+    def _is_too_long(self, element: Element, attribute: str, written: str, most: int) -> bool:
+        """Return whether a text is too long for numbers; their conversion takes quadratic time."""
+        if len(written) <= most:
+            return False
+        self.report.add(
+            NUMBER_TOO_LONG,
+            f"{attribute} is too long for a number",
+            element,
+            attribute=attribute,
+            found=f"{quoted(written, 30)} of {len(written)} characters, more than {most}",
+            remedy="write 17 digits, enough for every double, or raise the limit with --max-number",
+            severity=self.bad_number.severity,
+        )
+        return True
+
+    def _check_raw(self, element: Element, attribute: str, count: int) -> None:
+        """Report a value whose tabs or line ends urdfdom refuses. XML parsers replace them by spaces."""
+        raw = self.report.raw(element, attribute)
+        if raw is None or self._is_too_long(element, attribute, raw, count * self.report.limits.number):
+            return
+        seen = html.unescape(_LEADING_ZEROS.sub(r"\1", raw))
+        pieces = [seen] if count == 1 else [piece for piece in seen.split(" ") if piece]
+        if not all(DECIMAL.fullmatch(piece.lstrip("\t\r\n ")) for piece in pieces):
+            self._report_refused(element, attribute, "a tab or line end between or after the numbers")
+
+    def _report_refused(self, element: Element, attribute: str, what: str) -> None:
+        needed = self.bad_number is BAD_NUMBER
+        self.report.add(
+            # If kinematics does not use the number, urdfdom ignores it and accepts the file.
+            WHITESPACE if needed else self.bad_number,
+            f"{attribute} has {what}, which urdfdom {'refuses' if needed else 'does not read'}",
+            element,
+            attribute=attribute,
+            found=quoted(self.report.raw(element, attribute) or element.attributes[attribute]),
+            remedy="write single spaces between numbers and none around them",
+            fix=lambda: self.report.rewritten(
+                element, attribute, " ".join(element.attributes[attribute].split())
+            ),
+        )
+
+
+_NOT_ZERO = "123456789"
+
+#: Elements whose tag is not named in messages.
+_PLAIN = ("origin", "axis", "limit")
+
+#: Leading zeros of a character reference; Python's conversion refuses thousands of them.
+_LEADING_ZEROS = re.compile(r"(&#[xX]?)0+")
+
+#: Pattern for an invalid number -> remedy; the first match counts.
+_REMEDIES = (
+    (r"[+-]?(nan|inf|infinity)", "write a finite number"),
+    (r".*\$[({].*", "expand the xacro first"),
+    (r".*,.*", "separate numbers by spaces, and write decimals with a point"),
+    (r"[+-]?0x.*", "write decimal digits"),
+    (r"[+-]?[0-9.]+d[+-]?[0-9]+", "write the exponent with e"),
+    (r".*[^\x00-\x7f].*", "write ASCII digits"),
+    (r".*_.*", "write the digits without underscores"),
+    (r"[\[({].*|.*[\])}]", "write the numbers without brackets"),
+    (r"[+-]?[0-9.]+e[+-]?", "write digits after the e"),
+    (r"[+-]?[0-9.]+[a-z]+", "write the number without a unit"),
+    (r"", "it is empty; write a number, or remove the attribute"),
+)
+
+
+def _remedy(piece: str) -> str:
+    """Return the remedy for a text that is not a number."""
+    found = (text for pattern, text in _REMEDIES if re.fullmatch(pattern, piece, re.IGNORECASE | re.DOTALL))
+    return next(found, "write a number such as -1.5 or 2e-3")
+
+
+NOT_URDF = Rule("URDF201", "not-a-urdf", ERROR)
+VERSION = Rule("URDF203", "urdf-version", ERROR)
+NEWER_VERSION = Rule("URDF204", "newer-urdf-version", WARNING)
+MISSING_ELEMENT = Rule("URDF210", "missing-element", ERROR)
+MISSING_ATTRIBUTE = Rule("URDF211", "missing-attribute", ERROR)
+MISSING_NAME = Rule("URDF401", "missing-name", ERROR)
+DUPLICATE_NAME = Rule("URDF402", "duplicate-name", ERROR)
+UNKNOWN_TYPE = Rule("URDF501", "unknown-joint-type", ERROR)
+EMPTY_AXIS = Rule("URDF504", "axis-without-xyz", ERROR)
+MISSING_LIMIT = Rule("URDF506", "missing-limit", ERROR)
+IGNORED = Rule("URDF510", "ignored-value", WARNING)
+QUATERNION_IGNORED = Rule("URDF511", "quat-xyzw-ignored", WARNING)
+QUATERNION = Rule("URDF512", "quat-xyzw", WARNING)
+BAD_QUATERNION = Rule("URDF513", "bad-quaternion", ERROR)
+#: The joint types of the specification.
+JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "planar", "floating")
+
+#: Newest URDF version that urdfdom 6 supports.
+NEWEST = (1, 2)
+_VERSION = re.compile(r"\s*\+?([0-9]+)\.\+?([0-9]+)")
+
+#: Range of lengths whose square neither underflows nor overflows.
+SHORTEST, LONGEST = 1e-150, 1e150
+
+
+def read_robot(report: Reporter, root: Element) -> RobotRecord | None:
+    """Return the links and joints of a document, or None if the document is not a URDF.
+
+    Everything that cannot be read is reported.
+    """
+    if root.tag != "robot":
+        _other_format(report, root)
+        return None
+    version = _version(report, root)
+    robot = RobotRecord(root, version)
+    for element in root.all("link"):
+        name = named(report, element)
+        if name and name in robot.links:
+            report_duplicate(report, element, robot.links[name])
+        elif name:
+            robot.links[name] = element
+    reader = JointReader(report, version)
+    seen: dict[str, Element] = {}
+    for element in root.all("joint"):
+        joint = reader.read(element)
+        if joint.name and joint.name in seen:
+            report_duplicate(report, element, seen[joint.name])
+        seen.setdefault(joint.name, element)
+        robot.joints.append(joint)
+    return robot
+
+
+#: Root element of another format -> remedy.
+_FORMATS = {
+    "sdf": "this is an SDF file; convert it to a URDF first",
+    "mujoco": "this is MJCF, which `load` and all other commands read; a file of it ends in .xml or .mjcf",
+    "mujocoinclude": "this is a part of an MJCF file; load the file that includes it",
+    "model": "this is a part of an SDF file; convert it to a URDF first",
+    "world": "this is a part of an SDF file; convert it to a URDF first",
+    "collada": "this is a COLLADA file",
+    "html": "this is a web page, not the file it shows",
+    "launch": "this is a launch file; the URDF is what it loads",
+    "package": "this is a package manifest; the URDF is another file",
+    "drake": "this is a Drake file; convert it to a URDF first",
+}
+
+
+def _other_format(report: Reporter, root: Element) -> None:
+    prefix, _, local = root.tag.rpartition(":")
+    if local == "robot" and prefix:
+        remedy = f"write <robot> without the prefix {prefix!r}"
+    elif local.lower() == "robot":
+        remedy = "write it in lower case"
+    else:
+        remedy = _FORMATS.get(local.lower(), "a URDF begins with <robot name=...>")
+    report.add(NOT_URDF, "the root element is not <robot>", root, found=f"<{root.tag}>", remedy=remedy)
+
+
+def _version(report: Reporter, root: Element) -> tuple[int, int]:
+    written = root.attributes.get("version")
+    if written is None:
+        return (1, 0)
+    match = _VERSION.fullmatch(written)
+    version = (int(match[1]), int(match[2])) if match and len(written) < 20 else None
+    rule, remedy = VERSION, 'write version="1.0" if the file follows it, or remove the attribute'
+    if version is None:
+        message = "a URDF version has the form 1.0"
+    elif version > NEWEST:
+        message = "the URDF version is later than 1.2, the last that urdfdom and Pinocchio read"
+        remedy = "write the version that the file follows, 1.0 to 1.2"
+    elif version < (1, 0):
+        message = "this URDF version does not exist"
+    elif version == (1, 0):
+        return version
+    else:
+        rule, message = NEWER_VERSION, "most readers support only URDF 1.0"
+        remedy = "remove the attribute unless the file uses features of the version"
+    report.add(rule, message, root, attribute="version", found=quoted(written), remedy=remedy)
+    return version if version is not None and rule is NEWER_VERSION else (1, 0)
+
+
+def named(report: Reporter, element: Element) -> str:
+    """Return the name of a link or joint; an empty string after a finding that it has none."""
+    name = element.attributes.get("name")
+    if not name:
+        what = "has no name" if name is None else "has an empty name"
+        report.add(
+            MISSING_NAME,
+            f"a {element.tag} {what}",
+            element,
+            attribute="name",
+            remedy=f'write <{element.tag} name="...">',
+        )
+    return name or ""
+
+
+def report_duplicate(report: Reporter, element: Element, first: Element) -> None:
+    """Report a second link or joint with the same name."""
+    report.add(
+        DUPLICATE_NAME,
+        f"another {element.tag} has this name",
+        element,
+        attribute="name",
+        remedy=f"the first is on line {first.line}; rename one",
+    )
+
+
+class JointReader:
+    """Reader of the `<joint>` elements of a file.
+
+    Args:
+        report: The reporter of the file.
+        version: The URDF version of the file.
+    """
+
+    def __init__(self, report: Reporter, version: tuple[int, int]) -> None:
+        self.report, self.version = report, version
+        self.numbers = NumberReader(report)
+
+    def read(self, element: Element) -> JointRecord:
+        """Read one joint; a value that cannot be read is reported and has its default in the record."""
+        joint = JointRecord(element, named(self.report, element))
+        joint.kind = self._kind(element)
+        joint.parent, joint.child = self._end(element, "parent"), self._end(element, "child")
+        self._origin(joint)
+        self._axis(joint)
+        self._limit(joint)
+        self._mimic(joint)
+        self._others(joint)
+        return joint
+
+    def required(self, element: Element, attribute: str, example: str, *, number: bool = False) -> str | None:
+        """Return a required attribute, or None after a finding that it is missing or empty.
+
+        Args:
+            element: The element.
+            attribute: The name of the attribute.
+            example: An example for the remedy.
+            number: Whether the attribute is a number. `NumberReader` reports an empty number.
+        """
+        value = element.attributes.get(attribute)
+        if value is None or not (value or number):
+            self.report.add(
+                MISSING_ATTRIBUTE,
+                f"<{element.tag}> needs {attribute}" + ("" if value is None else ", and it is empty"),
+                element,
+                attribute=attribute,
+                found=quoted(element.text) if element.text else None,
+                remedy=f"write {example}",
+            )
+        return value or None
+
+    def _kind(self, element: Element) -> str | None:
+        written = self.required(element, "type", '<joint name="..." type="revolute">')
+        if written is None or written in JOINT_TYPES:
+            return written
+        close = nearest_tag(written, frozenset(JOINT_TYPES))
+        self.report.add(
+            UNKNOWN_TYPE,
+            "unknown joint type",
+            element,
+            attribute="type",
+            found=quoted(written),
+            remedy=f"did you mean {close}?" if close else f"the types are {', '.join(JOINT_TYPES)}",
+        )
+        return None
+
+    def _end(self, element: Element, tag: str) -> str | None:
+        """Return the link that a joint's `<parent>` or `<child>` names."""
+        end = element.first(tag)
+        if end is None:
+            self.report.add(
+                MISSING_ELEMENT, f"the joint has no <{tag}>", element, remedy=f'write <{tag} link="..."/>'
+            )
+            return None
+        return self.required(end, "link", f'<{tag} link="..."/>')
+
+    def _origin(self, joint: JointRecord) -> None:
+        origin = joint.origin_element = joint.element.first("origin")
+        if origin is None:
+            return
+        joint.xyz = self.numbers.vector(origin, "xyz") or joint.xyz
+        joint.rpy = self.numbers.vector(origin, "rpy") or joint.rpy
+        if "quat_xyzw" in origin.attributes:
+            self._quaternion(joint, origin)
+
+    def _quaternion(self, joint: JointRecord, origin: Element) -> None:
+        found = f"quat_xyzw={quoted(origin.attributes['quat_xyzw'])}"
+
+        def add(rule: Rule, message: str, remedy: str) -> None:
+            self.report.add(rule, message, origin, attribute="quat_xyzw", found=found, remedy=remedy)
+
+        if self.version < (1, 1):
+            message = 'quat_xyzw needs version="1.1" and is ignored'
+            add(QUATERNION_IGNORED, message, "write the rotation as rpy")
+            return
+        quaternion = self.numbers.vector(origin, "quat_xyzw", 4)
+        if quaternion is None:
+            return
+        both, zero = "rpy" in origin.attributes, not SHORTEST < sum(map(abs, quaternion)) < LONGEST
+        if both:
+            add(BAD_QUATERNION, "rpy and quat_xyzw are both given", "remove one of the two")
+        elif zero:
+            add(BAD_QUATERNION, "the quaternion has no direction", 'the identity is "0 0 0 1"')
+        else:
+            joint.quaternion = quaternion
+            message = "quat_xyzw is used, but most readers ignore it"
+            add(QUATERNION, message, "write the rotation as rpy for these readers")
+
+    def _axis(self, joint: JointRecord) -> None:
+        axis = joint.axis_element = joint.element.first("axis")
+        if axis is None:
+            return
+        if joint.kind in ("fixed", "floating"):
+            # No reader uses this axis, so a bad number in it is only URDF510.
+            numbers = NumberReader(self.report, IGNORED, IGNORED)
+            numbers.vector(axis, "xyz")
+            return
+        if "xyz" in axis.attributes:
+            joint.axis = self.numbers.vector(axis, "xyz")
+            return
+        if not axis.attributes and (axis.text or any(x.tag == "xyz" and x.text for x in axis.children)):
+            return  # an error already: the value is written as text (URDF212)
+        self.report.add(
+            EMPTY_AXIS,
+            "<axis> without xyz is 1 0 0 to some readers and 0 0 0 to urdfdom",
+            axis,
+            remedy='write the axis, for example <axis xyz="1 0 0"/>',
+            # A planar joint moves in the XY plane, whatever its axis (URDF505).
+            severity=Severity.WARNING if joint.kind == "planar" else None,
+        )
+
+    def _limit(self, joint: JointRecord) -> None:
+        limit = joint.element.first("limit")
+        bounded = joint.kind in ("revolute", "prismatic")
+        if limit is None:
+            if bounded:
+                self.report.add(
+                    MISSING_LIMIT,
+                    f"a {joint.kind} joint needs a <limit>",
+                    joint.element,
+                    remedy=f"write {_EXAMPLE_LIMIT}"
+                    if joint.kind == "prismatic"
+                    else f'write {_EXAMPLE_LIMIT}, or type="continuous" if it rotates without limits',
+                )
+            return
+        required = ("effort", "velocity") if self.version < (1, 2) else ("lower", "upper") if bounded else ()
+        for attribute in required:
+            self.required(limit, attribute, _EXAMPLE_LIMIT, number=True)
+        names = ("lower", "upper", "effort", "velocity", *(FURTHER_LIMITS if self.version >= (1, 2) else ()))
+        values = {name: self.numbers.scalar(limit, name) for name in names}
+        joint.limit = LimitRecord(limit, **values)
+
+    def _mimic(self, joint: JointRecord) -> None:
+        mimic = joint.element.first("mimic")
+        if mimic is None:
+            return
+        leader = self.required(mimic, "joint", '<mimic joint="..."/>')
+        multiplier = self.numbers.scalar(mimic, "multiplier", 1.0)
+        offset = self.numbers.scalar(mimic, "offset", 0.0)
+        if leader is not None and multiplier is not None and offset is not None:
+            joint.mimic = MimicRecord(mimic, leader, multiplier, offset)
+
+    def _others(self, joint: JointRecord) -> None:
+        """Check the elements that kinematics does not use, but for which urdfdom refuses a file."""
+        dynamics = joint.element.first("dynamics")
+        if dynamics is not None:
+            if not {"damping", "friction"} & dynamics.attributes.keys():
+                self.required(dynamics, "damping", '<dynamics damping="0"/>, or remove it')
+            for attribute in ("damping", "friction"):
+                self.numbers.scalar(dynamics, attribute)
+        safety = joint.element.first("safety_controller")
+        if safety is not None:
+            self.required(
+                safety, "k_velocity", '<safety_controller k_velocity="0"/>, or remove it', number=True
+            )
+            for attribute in ("k_velocity", "k_position", "soft_lower_limit", "soft_upper_limit"):
+                self.numbers.scalar(safety, attribute)
+        calibration = joint.element.first("calibration")
+        if calibration is not None:
+            for attribute in ("rising", "falling"):
+                self.numbers.scalar(calibration, attribute)
+
+
+_EXAMPLE_LIMIT = '<limit lower="-1" upper="1" effort="10" velocity="1"/>'
+
+
+def nearest_tag(word: str, known: frozenset[str]) -> str | None:
+    """Return the known word most similar to `word`, or None."""
+    return _nearest_tag(word, known) if len(word) <= _LONGEST_WORD else None
+
+
+#: Longer words are not similar to any word of URDF.
+_LONGEST_WORD = 32
+
+
+@lru_cache(1024)
+def _nearest_tag(word: str, known: frozenset[str]) -> str | None:
+    folded = {name.lower(): name for name in known}
+    close = difflib.get_close_matches(word.lower(), folded, n=1, cutoff=0.8)
+    if close:
+        return folded[close[0]]
+    letters = sorted(word.lower())
+    return next((name for name in sorted(known) if sorted(name.lower()) == letters), None)
