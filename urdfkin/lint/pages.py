@@ -19,11 +19,11 @@ from typing import Any
 
 from urdfkin.errors import Question, UnknownNameError
 from urdfkin.errors.escape import printable
-from urdfkin.lint.rules import bodies, dialect, joints, left_out, suspicious
+from urdfkin.lint.rules import bodies, dialect, joints, left_out
 from urdfkin.urdf import parser
 from urdfkin.urdf.findings import Rule
 
-_MODULES = (parser, dialect, joints, suspicious, bodies)
+_MODULES = (parser, dialect, joints, bodies)
 
 #: Topic -> rules.
 TOPICS: dict[str, tuple[Rule, ...]] = {

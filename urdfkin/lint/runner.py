@@ -20,8 +20,7 @@ from urdfkin.lint.rules.dialect import (
     check_vocabulary,
     read_comments,
 )
-from urdfkin.lint.rules.joints import check_axes, check_mimic, check_ranges, check_structure
-from urdfkin.lint.rules.suspicious import check_suspicious
+from urdfkin.lint.rules.joints import check_axes, check_mimic, check_ranges, check_structure, check_suspicious
 from urdfkin.urdf.findings import Finding, Findings, Reporter
 from urdfkin.urdf.parser import read_document, read_robot
 from urdfkin.urdf.records import DEFAULT_LIMITS, Limits, RobotRecord

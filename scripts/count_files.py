@@ -1,0 +1,72 @@
+"""Count the files of urdfkin whose functions run during `load` and during `same`.
+
+A reader who follows a call through the code opens about as many files. Code that runs while a module is
+imported does not count.
+
+    python scripts/count_files.py               load and same of two robots of this repository
+    python scripts/count_files.py ARM.urdf      load of another file
+    python scripts/count_files.py A.urdf B.urdf load of A, and same of A and B
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import FrameType
+
+import urdfkin
+
+ROOT = Path(urdfkin.__file__).parent
+ROBOTS = Path(__file__).parents[1] / "robots"
+
+#: The files that are read without arguments.
+A, B = ROBOTS / "elbow.urdf", ROBOTS / "planar_two_link.urdf"
+
+
+def files_run(call: Callable[[], object]) -> list[str]:
+    """Return the files of urdfkin, relative to the package, whose functions run during a call."""
+    found: set[str] = set()
+    importing = 0
+
+    def profile(frame: FrameType, event: str, _: object) -> None:
+        nonlocal importing
+        code = frame.f_code
+        if code.co_name == "<module>":
+            importing += (event == "call") - (event == "return")
+        elif event == "call" and not importing:
+            found.add(code.co_filename)
+
+    sys.setprofile(profile)
+    try:
+        call()
+    finally:
+        sys.setprofile(None)
+    inside = (Path(file) for file in found if Path(file).is_relative_to(ROOT))
+    return sorted(path.relative_to(ROOT).as_posix() for path in inside)
+
+
+def files_of_load(source: Path) -> list[str]:
+    """Return the files through which `load` runs."""
+    load = urdfkin.load
+    return files_run(lambda: load(source))
+
+
+def files_of_same(first: Path, second: Path) -> list[str]:
+    """Return the files through which `same` runs."""
+    same = urdfkin.same
+    return files_run(lambda: same(first, second))
+
+
+def main(words: list[str]) -> None:
+    """Print the files and their number."""
+    first, second = (*map(Path, words), *(() if words else (A, B)), None)[:2]
+    counts = {"load": files_of_load(first)}
+    if second is not None:
+        counts["same"] = files_of_same(first, second)
+    for name, files in counts.items():
+        print(f"{name}: {len(files)} files", *(f"  {file}" for file in files), sep="\n")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
