@@ -28,7 +28,7 @@ from urdfkin.urdf.mjcf import is_mjcf, is_text, name_of
 from urdfkin.urdf.packages import described
 from urdfkin.urdf.parser import NEWER_VERSION
 from urdfkin.urdf.reader import read_tree
-from urdfkin.urdf.sources import Origin, Source, Text, as_word, read_source
+from urdfkin.urdf.sources import Origin, Source, Text, as_word, is_urdf_path, read_source
 from urdfkin.urdf.writer import to_urdf as write_urdf
 from urdfkin.verify.chain_checks import check_screws
 from urdfkin.verify.mjcf_check import check_mjcf_source, read_mjcf
@@ -104,6 +104,8 @@ def load(
     0.7
     """
     how: How = {"verify": verify, "mimic": mimic, "root_joint": root_joint, "oracle": oracle}
+    if is_urdf_path(source):
+        return robot_of(read_source(source, xacro_args=xacro_args), **how)
     if (found := described(source)) is not None:
         source = found.path
         xacro_args = {**found.xacro_args, **(xacro_args or {})}
@@ -121,9 +123,10 @@ def load(
             robot.verifier.reading = "from a yourdfpy object, which drops quat_xyzw; the file was not read"
         return robot
     text = read_source(cast("Source", source), xacro_args=xacro_args)
-    if (source == "-" or hasattr(source, "read")) and is_mjcf(text.data):
-        return _load_mjcf(text.data, None, text, **how)
-    return robot_of(text, **how)
+    streamed = source == "-" or hasattr(source, "read")
+    return (
+        _load_mjcf(text.data, None, text, **how) if streamed and is_mjcf(text.data) else robot_of(text, **how)
+    )
 
 
 def _load_table(

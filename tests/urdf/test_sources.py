@@ -12,6 +12,7 @@ import pytest
 
 from urdfkin.errors import SourceError
 from urdfkin.system.files import MOST, read_standard_input
+from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.sources import read_source
 
 MOST_HERE = 1000
@@ -67,3 +68,7 @@ def test_an_address_in_a_package_leads_to_its_file(tmp_path: Path, monkeypatch: 
 def test_a_package_that_is_nowhere_is_called_as_it_was_written() -> None:
     with pytest.raises(SourceError, match=r"^package://nowhere/arm.urdf: the package 'nowhere' is"):
         read_source("package://nowhere/arm.urdf")
+
+
+def test_no_name_of_the_catalogue_has_a_point_or_a_separator() -> None:
+    assert not [name for name in catalogue() if set(name) & {".", "/", os.sep}]

@@ -37,7 +37,8 @@ __all__ = [
 
 def frozen(array: ArrayLike) -> FloatArray:
     """Return a read-only, C-contiguous float64 copy of `array`; raises InputError if it is not numeric."""
-    copy = np.array(floats(array, "an array"), dtype=np.float64, order="C")
+    numeric = type(array) is np.ndarray and array.dtype == np.float64
+    copy = np.array(array if numeric else floats(array, "an array"), dtype=np.float64, order="C")
     copy.setflags(write=False)
     return copy
 

@@ -12,9 +12,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.kinematics.rotation.euler import rotation_from_rpy, rpy_of
+from urdfkin.kinematics.rotation.euler import coordinate_rotation, rpy_of
 from urdfkin.kinematics.rotation.quaternion import rotation_of
-from urdfkin.model.pose import pose
 from urdfkin.model.tree import (
     FloatArray,
     Joint,
@@ -79,12 +78,16 @@ def _root_kind(word: str) -> JointKind:
 def _joint(joint: JointRecord, rule: Mimic | None) -> Joint:
     kind = JointKind(joint.kind)
     quaternion = joint.quaternion
-    R = rotation_from_rpy(joint.rpy if quaternion is None else rpy_of_quaternion(quaternion))
+    roll, pitch, yaw = np.array(joint.rpy) if quaternion is None else rpy_of_quaternion(quaternion)
+    # The parser has checked the numbers, which `rotation_from_rpy` would do again for each joint.
+    T = np.eye(4)
+    T[:3, :3] = coordinate_rotation(2, yaw) @ coordinate_rotation(1, pitch) @ coordinate_rotation(0, roll)
+    T[:3, 3] = joint.xyz
     return Joint(
         name=joint.name,
         kind=kind,
         parent=0,
-        T_parent_joint=pose(R, joint.xyz),
+        T_parent_joint=T,
         axis=_unit(np.array(joint.axis), joint.name) if kind.has_axis else np.array([1.0, 0.0, 0.0]),
         limit=_limit(joint.limit, kind),
         mimic=rule,

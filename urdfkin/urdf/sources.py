@@ -146,7 +146,7 @@ def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, objec
     """
     if xacro_args is not None and not isinstance(xacro_args, Mapping):
         raise InputError("xacro_args must be a mapping from names to values", found=safe_repr(xacro_args))
-    if isinstance(source, str) and (address := split_uri(source)) is not None:
+    if isinstance(source, str) and "://" in source and (address := split_uri(source)) is not None:
         source = _in_package(*address)
     if is_xacro(source):
         return _expand_xacro(at_home(source), xacro_args or {})
@@ -175,9 +175,25 @@ def is_xacro(source: object) -> TypeGuard[str | os.PathLike[str]]:
     >>> is_xacro("arm.urdf.xacro"), is_xacro("arm.urdf"), is_xacro("<robot/>")
     (True, False, False)
     """
-    if isinstance(source, str) and source.lstrip().startswith("<"):
-        return False
-    return isinstance(source, str | os.PathLike) and Path(source).suffix.lower() == ".xacro"
+    return _suffix(source) == ".xacro"
+
+
+def is_urdf_path(source: object) -> TypeGuard[str | os.PathLike[str]]:
+    """Return whether a source is the path of a URDF, by its suffix.
+
+    >>> is_urdf_path("arm.urdf"), is_urdf_path("arm.xacro"), is_urdf_path("<robot/>")
+    (True, False, False)
+    """
+    return _suffix(source) == ".urdf"
+
+
+def _suffix(source: object) -> str:
+    """Return the suffix of a path in lower case; an empty string for text and any other source."""
+    if not isinstance(source, str | os.PathLike) or (
+        isinstance(source, str) and source.lstrip().startswith("<")
+    ):
+        return ""
+    return Path(source).suffix.lower()
 
 
 def _expand_xacro(path: Path, arguments: Mapping[str, object]) -> Text:
@@ -198,7 +214,7 @@ def _read_string(word: str, most: int) -> Text:
         return Text(read_start_of_standard_input(most + 1), "<stdin>", "-")
     if word.lstrip("\ufeff \t\r\n").startswith("<"):
         return _encode(word, "<text>", "<text>")
-    if (entry := catalogue().get(word)) is not None:
+    if (entry := _entry(word)) is not None:
         read = _read_file(entry.path, most)
         return Text(read.data, read.label, word, entry)
     path = at_home(word)
@@ -242,7 +258,12 @@ def _read_file(path: Path, most: int) -> Text:
 def as_word(path: Path) -> str:
     """Return a path as a word that is no catalogue name, option, `-` or text: add `./` if necessary."""
     word = str(path)
-    return f"./{word}" if word in catalogue() or word.startswith(("-", "<")) else word
+    return f"./{word}" if word.startswith(("-", "<")) or _entry(word) is not None else word
+
+
+def _entry(word: str) -> Entry | None:
+    """Return the catalogue entry of a name; None for a path, which has a point or a separator."""
+    return None if "." in word or os.sep in word else catalogue().get(word)
 
 
 def _nearest_file(path: Path) -> str:

@@ -1,0 +1,30 @@
+"""`load` and `same` run through few files, so that a reader can follow them."""
+
+from collections.abc import Callable
+
+from scripts.count_files import ROOT, A, B, files_of_load, files_of_same, files_run
+from urdfkin.urdf.catalogue import catalogue
+
+
+def test_load_of_a_urdf_file_runs_through_at_most_18_files() -> None:
+    files = files_of_load(A)
+    assert {"loading.py", "urdf/parser.py", "lint/rules/joints.py", "urdf/reader.py"} <= set(files)
+    assert len(files) <= 18, files
+
+
+def test_load_of_a_file_with_mimic_joints_and_warnings_runs_through_at_most_20_files() -> None:
+    files = files_of_load(catalogue()["panda"].path)
+    assert len(files) <= 20, files
+
+
+def test_same_of_two_urdf_files_runs_through_at_most_55_files() -> None:
+    files = files_of_same(A, B)
+    assert {"loading.py", "comparison/verdict.py"} <= set(files)
+    assert len(files) <= 55, files
+
+
+def test_a_call_counts_and_code_that_runs_during_an_import_does_not() -> None:
+    names: dict[str, Callable[[], None]] = {}
+    imported = compile("def f(): pass\nf()", ROOT / "invented.py", "exec")
+    assert files_run(lambda: exec(imported, names)) == []
+    assert files_run(names["f"]) == ["invented.py"]
