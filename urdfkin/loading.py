@@ -22,10 +22,10 @@ from urdfkin.lint.runner import read_urdf
 from urdfkin.model.tree import with_poses, with_tilts
 from urdfkin.robot import Robot
 from urdfkin.system.files import at_home, read_bytes
+from urdfkin.urdf.catalogue import described
 from urdfkin.urdf.findings import Finding, PinocchioReading, Reporter, Severity, UrdfError, UrdfWarning
 from urdfkin.urdf.foreign import XmlElement, XmlTree, is_model, lost_quaternions, text_of, tree_of_model
 from urdfkin.urdf.mjcf import is_mjcf, is_text, name_of
-from urdfkin.urdf.packages import described
 from urdfkin.urdf.parser import NEWER_VERSION
 from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.sources import Origin, Source, Text, as_word, is_urdf_path, read_source

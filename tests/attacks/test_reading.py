@@ -26,7 +26,7 @@ from urdfkin.system.cache import get
 from urdfkin.system.files import MOST, read_bytes, read_if_there, read_start
 from urdfkin.system.git import version_before
 from urdfkin.urdf import mjcf, xacro
-from urdfkin.urdf.packages import find_package
+from urdfkin.urdf.catalogue import find_package
 from urdfkin.validation.campaign import StoreWarning, validate
 from urdfkin.validation.store import Store
 

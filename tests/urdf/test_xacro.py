@@ -11,7 +11,7 @@ import pytest
 import urdfkin
 from urdfkin.errors import InputError, SourceError
 from urdfkin.urdf import xacro
-from urdfkin.urdf.packages import find_package
+from urdfkin.urdf.catalogue import find_package
 from urdfkin.urdf.sources import read_source
 from urdfkin.urdf.xacro import XacroError, expand
 

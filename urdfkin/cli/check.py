@@ -20,7 +20,6 @@ from urdfkin.cli.streams import command_lines, harmless, say, say_file, say_styl
 from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
 from urdfkin.lint import Finding, Limits, Severity
 from urdfkin.lint.autofix import mend, patch
-from urdfkin.lint.baseline import baseline_text, read_baseline
 from urdfkin.lint.formats import as_github, as_json, as_sarif, statistics, summary
 from urdfkin.lint.pages import RULES, page
 from urdfkin.lint.runner import Examined, examine, file_of
@@ -28,10 +27,12 @@ from urdfkin.lint.settings import (
     INCLUDE,
     Choice,
     Settings,
+    baseline_text,
     codes,
     collected,
     find_settings,
     known_before,
+    read_baseline,
     read_settings,
 )
 from urdfkin.system.files import demand_regular, write_file

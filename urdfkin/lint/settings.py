@@ -1,4 +1,6 @@
-"""Settings of `check`, from the table [tool.urdfkin] of pyproject.toml, and the selection of findings.
+"""The files that `check` reads, its settings, and the selection of findings.
+
+The arguments of `urdfkin check` are files, folders or patterns. Settings are in pyproject.toml:
 
     [tool.urdfkin]
     ignore = ["URDF601"]
@@ -9,13 +11,15 @@
 Files and patterns are relative to the folder of pyproject.toml. A finding is reported if its code is selected
 and neither the baseline nor the older version of the file contains it.
 
-
-Find the files to check: the arguments of `urdfkin check` are files, folders or patterns.
+A baseline is a file of known findings. A finding is known if its file, code, severity, element, name and
+found text are in the baseline. The line does not count: an edit elsewhere does not make a finding new, but a change
+of its value does.
 """
 
 from __future__ import annotations
 
 import glob
+import json
 import os
 import tomllib
 from collections import Counter
@@ -26,7 +30,6 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from urdfkin.errors import InputError, SourceError, UnknownNameError
-from urdfkin.lint.baseline import Baseline, key_of, relative
 from urdfkin.lint.pages import find_rules
 from urdfkin.lint.rules.bodies import MESH_MISSING
 from urdfkin.lint.runner import Examined, file_of
@@ -35,6 +38,107 @@ from urdfkin.system.git import Version
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import Finding, Severity
 from urdfkin.urdf.sources import Text, as_word, is_xacro
+
+#: Version of the file format; it changes when a field changes its meaning or is removed.
+BASELINE_VERSION = 1
+
+Key = tuple[str, ...]
+_FIELDS = ("file", "code", "severity", "element", "name", "found")
+
+
+def key_of(finding: Finding, file: str) -> Key:
+    """Return the key that identifies a finding in a baseline."""
+    words = (finding.severity.value, finding.element or "", finding.name or "", finding.found or "")
+    return (file, finding.code, *words)
+
+
+@dataclass(slots=True)
+class Baseline:
+    """The number of known findings of each key.
+
+    Attributes:
+        counts: The known findings that have no match yet, by key.
+        root: The folder that file names are relative to.
+        met: The number of matches.
+    """
+
+    counts: Counter[Key]
+    root: Path = field(default_factory=Path)
+    met: int = 0
+
+    def knows(self, finding: Finding) -> bool:
+        """Return whether a finding is known. A known finding matches only once."""
+        key = key_of(finding, relative(finding.file, self.root))
+        if self.counts[key] <= 0:
+            return False
+        self.counts[key] -= 1
+        self.met += 1
+        return True
+
+    def gone(self, files: Iterable[str]) -> int:
+        """Return the number of known findings without a match, in the files that were checked."""
+        checked = {relative(file, self.root) for file in files}
+        return sum(count for (file, *_), count in self.counts.items() if count > 0 and file in checked)
+
+
+def relative(file: str, root: Path) -> str:
+    """Return the name of a file relative to a folder, with forward slashes."""
+    if file.startswith("<"):
+        return file
+    path = os.path.relpath(Path(file.removesuffix(" (expanded)")).resolve(), root.resolve())
+    return Path(path).as_posix()
+
+
+def read_baseline(path: Path) -> Baseline:
+    """Read a baseline.
+
+    Raises:
+        SourceError: the file cannot be read.
+        InputError: the file is not a baseline.
+    """
+    try:
+        document = json.loads(read_text(path))
+        if document["schema"] != "urdfkin-baseline" or document["version"] != BASELINE_VERSION:
+            raise ValueError
+        counts = Counter(
+            {
+                tuple(str(entry[name]) for name in _FIELDS): int(entry["count"])
+                for entry in document["findings"]
+            }
+        )
+    except (ValueError, TypeError, LookupError, RecursionError):
+        raise InputError(
+            "this file is not a baseline of urdfkin",
+            where=str(path),
+            remedy="write one with: urdfkin check --write-baseline FILE ...",
+        ) from None
+    return Baseline(counts, path.parent)
+
+
+def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path) -> str:
+    """Return the text of a baseline that contains some findings.
+
+    If the path has an older baseline, its entries for other existing files are copied.
+
+    Args:
+        findings: The findings of the checked files.
+        files: The checked files.
+        path: The path of the new baseline.
+
+    Raises:
+        InputError: the path has a file that is not a baseline.
+    """
+    counts = Counter(key_of(finding, relative(finding.file, path.parent)) for finding in findings)
+    if path.exists():
+        checked = {relative(file, path.parent) for file in files}
+        older = read_baseline(path).counts
+        counts |= Counter(
+            {key: n for key, n in older.items() if key[0] not in checked and (path.parent / key[0]).exists()}
+        )
+    entries = [dict(zip(_FIELDS, key, strict=True)) | {"count": n} for key, n in sorted(counts.items())]
+    document = {"schema": "urdfkin-baseline", "version": BASELINE_VERSION, "findings": entries}
+    return json.dumps(document, indent=1) + "\n"
+
 
 #: Setting -> type.
 _KINDS = {

@@ -1,1 +1,11 @@
-"""Read robot descriptions (URDF, xacro, MJCF) as a `KinematicTree`, and write a tree as URDF."""
+"""Read robot descriptions (URDF, xacro, MJCF) as a `KinematicTree`, and write a tree as URDF.
+
+| Step | Module | Result |
+|---|---|---|
+| Source | `sources`, `catalogue`, `xacro` | `Text`: bytes and a description of their origin |
+| Parser | `parser` | `Element`, then the `RobotRecord` of `records`; problems are `Finding`s of `findings` |
+| Tree | `reader` | `KinematicTree` |
+| Writer | `writer` | URDF text |
+
+Robots in other forms: `mjcf` reads MJCF, and `foreign` reads objects of other libraries.
+"""

@@ -1,15 +1,35 @@
-"""Catalogue of robots by short name: those of example-robot-data, and urdfkin's own."""
+"""Robots and packages by name: the catalogue, robot_descriptions, and `package://name/...` without ROS.
+
+The catalogue has the robots of example-robot-data and urdfkin's own. robot_descriptions is a Python package.
+It clones the repository of a robot into its own cache at the first use. Only modules that it lists as
+descriptions are imported.
+
+The search for a package uses the first of these folders that exists:
+
+1. `ROS_PACKAGE_PATH`: an entry called `name`, a folder `name` in an entry, or one level further down
+   (`src/repository/name`).
+2. `AMENT_PREFIX_PATH`: `share/name` below an entry.
+3. The folders above the file: one called `name`, one whose `package.xml` has this name, or a folder `name`
+   in one of them.
+"""
 
 from __future__ import annotations
 
+import importlib
+import importlib.util
+import os
+import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
-from urdfkin.errors import UnknownNameError
+from urdfkin.errors import InputError, SourceError, UnknownNameError
 from urdfkin.errors.validators import as_str
+from urdfkin.system.files import exists, is_folder, read_start
 from urdfkin.system.resources import example_robots_dir, robots_dir
 
 
@@ -101,3 +121,142 @@ def _read(file: str, *, own: bool) -> dict[str, Entry]:
         )
         for name, row in table.items()
     }
+
+
+#: Environment variables with search paths.
+VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
+
+_NAME = re.compile(rb"<name>([^<]*)</name>")
+
+#: URI schemes that name a package and a path inside it.
+SCHEMES = ("package://", "model://")
+
+
+def split_uri(uri: str) -> tuple[str, str] | None:
+    """Return the package and the path of a `package://` address; None for any other text.
+
+    >>> split_uri("package://ur_description/meshes/base.stl")
+    ('ur_description', 'meshes/base.stl')
+    """
+    for scheme in SCHEMES:
+        if uri.startswith(scheme):
+            package, _, path = uri.removeprefix(scheme).partition("/")
+            return package, path
+    return None
+
+
+def find_package(
+    name: str,
+    beside: Path | None = None,
+    environ: Mapping[str, str] = os.environ,
+    accepts: Callable[[Path], bool] = lambda folder: True,
+) -> Path | None:
+    """Return the folder of a package, or None.
+
+    Args:
+        name: The package.
+        beside: The file that refers to the package; the folders above it are searched.
+        environ: The environment variables.
+        accepts: A filter: returns whether a candidate folder is acceptable.
+    """
+    if not name or name in (".", "..") or "\0" in name:
+        return None
+    found = filter(is_folder, _candidates(name, beside, environ))
+    return next((folder for folder in found if accepts(folder)), None)
+
+
+def _candidates(name: str, beside: Path | None, environ: Mapping[str, str]) -> Iterator[Path]:
+    for entry in _entries(environ.get("ROS_PACKAGE_PATH")):
+        if entry.name == name:
+            yield entry
+        yield entry / name
+        yield from (folder / name for folder in _folders(entry))
+    for entry in _entries(environ.get("AMENT_PREFIX_PATH")):
+        yield entry / "share" / name
+    if beside is not None:
+        for folder in beside.absolute().parents:
+            if folder.name == name or _declares(folder / "package.xml", name):
+                yield folder
+            yield folder / name
+
+
+def _declares(manifest: Path, name: str) -> bool:
+    """Return whether a package.xml contains this name."""
+    try:
+        match = _NAME.search(read_start(manifest, 100_000))
+    except OSError:
+        return False
+    return match is not None and match[1].decode("utf-8", "replace").strip() == name
+
+
+def _entries(variable: str | None) -> list[Path]:
+    return [Path(entry) for entry in (variable or "").split(os.pathsep) if entry]
+
+
+def _folders(entry: Path) -> list[Path]:
+    try:
+        return sorted(child for child in entry.iterdir() if child.is_dir())
+    except OSError:
+        return []
+
+
+_PACKAGE = "robot_descriptions"
+_DESCRIPTION_NAME = re.compile(r"\w+_description")
+
+
+@dataclass(frozen=True, slots=True)
+class Described:
+    """The file of a robot description, and the arguments for a .xacro file."""
+
+    path: Path
+    xacro_args: Mapping[str, object] = field(default_factory=dict)
+
+
+def described(source: object) -> Described | None:
+    """Return the file of a robot description, by its module or name; None for any other source.
+
+    Raises:
+        InputError: the package is not installed, or the description has no URDF and no MJCF.
+        UnknownNameError: there is no description of this name. The message lists the nearest names.
+        SourceError: the description cannot be downloaded.
+    """
+    if isinstance(source, str) and _DESCRIPTION_NAME.fullmatch(source) is not None:
+        if source in catalogue() or exists(Path(source)):
+            return None
+        source = _module(source)
+    return _file(source) if isinstance(source, ModuleType) else None
+
+
+def _module(name: str) -> ModuleType:
+    if importlib.util.find_spec(_PACKAGE) is None:
+        raise InputError(
+            f"{_PACKAGE} is not installed", where=name, remedy=f"pip install {_PACKAGE}, or name a file"
+        )
+    from robot_descriptions import DESCRIPTIONS  # noqa: PLC0415  only for its descriptions
+
+    if name not in DESCRIPTIONS:
+        raise UnknownNameError("robot description", name, DESCRIPTIONS)
+    try:
+        return importlib.import_module(f"{_PACKAGE}.{name}")
+    except Exception as error:  # git has many exception classes
+        message = str(error).strip().splitlines() or [type(error).__name__]
+        raise SourceError(
+            "this robot description cannot be downloaded",
+            where=name,
+            found=message[-1].strip(),
+            remedy="check git and the network: the repository is cloned at the first use",
+        ) from error
+
+
+def _file(module: Any) -> Described:
+    if hasattr(module, "URDF_PATH"):
+        return Described(Path(module.URDF_PATH))
+    if hasattr(module, "XACRO_PATH"):
+        return Described(Path(module.XACRO_PATH), dict(getattr(module, "XACRO_ARGS", {})))
+    if hasattr(module, "MJCF_PATH"):
+        return Described(Path(module.MJCF_PATH))
+    raise InputError(
+        "this module has neither URDF_PATH nor XACRO_PATH nor MJCF_PATH",
+        where=module.__name__,
+        remedy=f"pass a description module of {_PACKAGE}",
+    )

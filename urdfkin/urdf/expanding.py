@@ -14,9 +14,9 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from urdfkin.urdf.catalogue import find_package
 from urdfkin.urdf.confinement import MEMORY, Ground, confine, limit
 from urdfkin.urdf.expressions import RefusedError, evaluate
-from urdfkin.urdf.packages import find_package
 from urdfkin.urdf.xacro import arguments_of
 
 #: Functions of xacro that give an expression access to more than values.

@@ -16,8 +16,7 @@ from typing import IO, Literal, TypeGuard
 from urdfkin.errors import InputError, Question, SourceError, UnknownNameError, nearest
 from urdfkin.errors.validators import as_bool, as_str, safe_repr
 from urdfkin.system.files import MOST, at_home, exists, read_start, read_start_of_standard_input
-from urdfkin.urdf.catalogue import Entry, catalogue
-from urdfkin.urdf.packages import find_package, split_uri
+from urdfkin.urdf.catalogue import Entry, catalogue, find_package, split_uri
 
 
 @dataclass(frozen=True, slots=True)

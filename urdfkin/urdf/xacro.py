@@ -1,7 +1,7 @@
 """Expand a .xacro file to URDF text, in a separate process with restricted rights.
 
 A xacro file is a program, and may come from an untrusted source. `expanding` is the code of the separate
-process. docs/xacro.md lists the operations that a file may do. Packages are found by `urdfkin.urdf.packages`,
+process. docs/xacro.md lists the operations that a file may do. `urdfkin.urdf.catalogue` finds packages
 without ROS.
 
 xacro ignores an argument that the file does not declare; urdfkin raises an error. To find the declared
@@ -25,9 +25,9 @@ from typing import Any
 from urdfkin.errors import Question, SourceError, UnknownNameError, UrdfkinError
 from urdfkin.system.files import read_bytes
 from urdfkin.system.processes import ask_python, own_python
+from urdfkin.urdf.catalogue import VARIABLES
 from urdfkin.urdf.confinement import Ground
 from urdfkin.urdf.expressions import RefusedError
-from urdfkin.urdf.packages import VARIABLES
 
 #: Limits of the search for declared arguments: bytes of a file, and number of files.
 MOST_ARGUMENTS, MOST_FILES = 10_000_000, 200

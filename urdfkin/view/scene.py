@@ -22,8 +22,7 @@ from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.system.files import read_bytes
-from urdfkin.urdf.catalogue import catalogue
-from urdfkin.urdf.packages import find_package, split_uri
+from urdfkin.urdf.catalogue import catalogue, find_package, split_uri
 from urdfkin.urdf.plain_xml import plain_xml
 
 #: Largest size of a mesh, material or texture file in bytes; larger files are not shown.

@@ -1,1 +1,1 @@
-"""The rules, one module for each topic. A TOML file beside the module has the page of each code."""
+"""The rules over the records of a URDF. A TOML file beside each module has the pages of its codes."""

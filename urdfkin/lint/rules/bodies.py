@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from urdfkin.urdf.catalogue import find_package, split_uri
 from urdfkin.urdf.findings import ERROR, WARNING, Reporter, Rule, quoted
-from urdfkin.urdf.packages import find_package, split_uri
 from urdfkin.urdf.parser import NumberReader
 from urdfkin.urdf.records import Element, RobotRecord
 
