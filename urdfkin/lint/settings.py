@@ -12,8 +12,8 @@ Files and patterns are relative to the folder of pyproject.toml. A finding is re
 and neither the baseline nor the older version of the file contains it.
 
 A baseline is a file of known findings. A finding is known if its file, code, severity, element, name and
-found text are in the baseline. The line does not count: an edit elsewhere does not make a finding new, but a change
-of its value does.
+found text are in the baseline. The line does not count: an edit elsewhere does not make a finding new, but a
+change of its value does.
 """
 
 from __future__ import annotations

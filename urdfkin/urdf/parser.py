@@ -48,6 +48,8 @@ from urdfkin.urdf.records import (
     RobotRecord,
 )
 
+# Bytes: UTF-8 and the XML declaration.
+
 EMPTY = Rule("URDF101", "empty-file", ERROR)
 ENCODING = Rule("URDF102", "not-utf8", ERROR)
 DECLARED = Rule("URDF103", "declared-encoding", ERROR)
@@ -171,6 +173,8 @@ def line_and_column(data: bytes, offset: int) -> tuple[int, int]:
     before = data[: max(offset, 0)].decode("utf-8", "replace")
     return before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
 
+
+# XML: elements with positions.
 
 SYNTAX = Rule("URDF105", "xml-syntax", ERROR)
 ENTITY = Rule("URDF106", "entity", ERROR)
@@ -457,6 +461,8 @@ _REASONS: dict[str, tuple[str, str | None]] = {
 }
 
 
+# Numbers and vectors in attributes.
+
 BAD_NUMBER = Rule("URDF301", "bad-number", ERROR)
 BAD_VECTOR = Rule("URDF302", "bad-vector", ERROR)
 WHITESPACE = Rule("URDF303", "whitespace-in-number", WARNING, REFUSES)
@@ -624,6 +630,8 @@ def _remedy(piece: str) -> str:
     found = (text for pattern, text in _REMEDIES if re.fullmatch(pattern, piece, re.IGNORECASE | re.DOTALL))
     return next(found, "write a number such as -1.5 or 2e-3")
 
+
+# Links and joints: records.
 
 NOT_URDF = Rule("URDF201", "not-a-urdf", ERROR)
 VERSION = Rule("URDF203", "urdf-version", ERROR)

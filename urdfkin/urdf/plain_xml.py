@@ -1,10 +1,8 @@
 """Parse XML like urdfdom: names as written, with undeclared namespace prefixes allowed.
 
 ElementTree's own parser refuses an undeclared prefix, which urdfdom accepts. This second parser is
-independent of `urdfkin.urdf.parser` and serves to check its results.
-
-
-Compare the order of the moving joints in a URDF with their order in q.
+independent of `urdfkin.urdf.parser` and serves to check its results. It also
+compares the order of the moving joints in a URDF with their order in q.
 """
 
 from __future__ import annotations
