@@ -120,6 +120,10 @@ EDITED: dict[str, tuple[Callable[[Any], None], str]] = {
         _set(lambda d: _first(d)["chains"][0], share_of_bound=3.0),
         "verified, but something lies outside its bound",
     ),
+    "a second reader that differs": (
+        _set(lambda d: _first(d)["second_reader"], differences=["joint j: axis"]),
+        "verified, but something",
+    ),
     "a table not compared": (_set(lambda d: _first(d)["chains"][0], samples=0), "not compared, but with"),
 }
 

@@ -209,6 +209,16 @@ class Check(TypedDict):
     witness: NotRequired[Witness]
 
 
+class SecondReading(TypedDict):
+    """Comparison of the tree with that of a second reader of the same text."""
+
+    by: str
+    joints: int
+    differences: list[str]
+    known: list[str]
+    unread: str | None
+
+
 class Timings(TypedDict):
     """Computing times in seconds, summed over processes."""
 
@@ -237,6 +247,7 @@ class Robot(TypedDict):
     model: Model | None
     findings: list[Finding]
     chains: list[Chain]
+    second_reader: NotRequired[SecondReading | None]
     checks: list[Check]
     judge: Judgement | None
 

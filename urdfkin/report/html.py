@@ -26,6 +26,7 @@ from urdfkin.report.words import (
     judged_on,
     percent,
     pinocchio,
+    second_reader_words,
     share_of,
     summary,
     units,
@@ -199,6 +200,7 @@ def _robot(robot: Robot, index: int, document: Document) -> dict[str, Any]:
             for chain in robot["chains"]
         ],
         "checks": pages.check_rows(robot),
+        "second_reader": second_reader_words(robot),
         "witness": (title := witness_title([robot])),
         "witness_heads": witness_heads(title) if title else [],
         "witnessed": [

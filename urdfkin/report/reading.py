@@ -22,7 +22,7 @@ from urdfkin.validation.chunk import SPECIAL
 from urdfkin.validation.error_stats import histogram_bin, percentile
 from urdfkin.validation.outcome import Verdict
 from urdfkin.validation.results import SCHEMA
-from urdfkin.validation.robot_summary import chain_disagreement
+from urdfkin.validation.robot_summary import chain_disagreement, reader_disagreement
 
 #: nq and nv of each kind of joint.
 _SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)}
@@ -178,8 +178,12 @@ def _verdict(robot: Robot, samples: int) -> Iterator[str]:
     second_differs = any(
         check["witness"]["urdfkin"]["failed"] for check in robot["checks"] if "witness" in check
     )
+    reading = robot.get("second_reader")
     outside = (
-        robot["failed"] > 0 or second_differs or any(chain_disagreement(chain) for chain in robot["chains"])
+        robot["failed"] > 0
+        or second_differs
+        or any(chain_disagreement(chain) for chain in robot["chains"])
+        or (reading is not None and reader_disagreement(reading) is not None)
     )
     if outside != (verdict is Verdict.DISAGREES):
         yield f"verdict: {verdict}, but {'something lies' if outside else 'nothing lies'} outside its bound"

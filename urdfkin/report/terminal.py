@@ -24,6 +24,7 @@ from urdfkin.report.words import (
     pinocchio,
     quantities,
     quantity_name,
+    second_reader_words,
     share_of,
     summary,
     units,
@@ -199,6 +200,9 @@ def _print_robot(robot: Robot, out: Console, *, cases: bool) -> None:
         out.print(
             f"{robot['source']}: {counted(len(noted), 'warning')}, see: urdfkin check {robot['source']}"
         )
+    reading = robot.get("second_reader")
+    if cases and reading is not None and (reading["known"] or reading["unread"]):
+        out.print(f"{robot['source']}: {second_reader_words(robot)}")
     if robot["judge"] is not None:
         out.print(
             f"{robot['source']}: errors in eps*scale, compared with values at 50 digits;"

@@ -27,6 +27,22 @@ def check_name(check: Check) -> str:
     return check["quantity"] + (f", {reference}" if reference else "")
 
 
+def second_reader_words(robot: Robot) -> str:
+    """Return the result of the comparison with the second reader's tree; empty if there is none."""
+    reading = robot.get("second_reader")
+    if reading is None:
+        return ""
+    if reading["unread"] is not None:
+        return f"not compared with {reading['by']}, which cannot read the file: {reading['unread']}"
+    known = f"; known faults of this reader: {'; '.join(reading['known'])}" if reading["known"] else ""
+    if reading["differences"]:
+        return f"✗ {reading['by']} reads another robot: {'; '.join(reading['differences'])}{known}"
+    return (
+        f"{reading['by']} reads the same links, joints, origins, axes, limits and mimic rules"
+        f" ({counted(reading['joints'], 'joint')}){known}"
+    )
+
+
 def units(value: Units, *, compared: bool = True) -> str:
     """Format a disagreement: `inf` for None (infinity), an empty text if nothing was compared."""
     if not compared:

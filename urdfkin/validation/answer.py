@@ -189,7 +189,9 @@ def _read_result(data: dict[str, Any]) -> ChunkResult:
 
 
 def _portrait_from(data: dict[str, Any]) -> RobotSummary:
-    return RobotSummary(data["model"], tuple(data["findings"]), tuple(data["chains"]))
+    return RobotSummary(
+        data["model"], tuple(data["findings"]), tuple(data["chains"]), data.get("second_reader")
+    )
 
 
 def _tally(tally: Tally) -> list[Any]:

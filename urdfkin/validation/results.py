@@ -147,6 +147,7 @@ class RobotReport:
             "model": self.portrait.model,
             "findings": list(self.portrait.findings),
             "chains": list(self.portrait.chains),
+            "second_reader": self.portrait.second_reader,
             "checks": [self._check(key) for key in self.tallies],
         }
 

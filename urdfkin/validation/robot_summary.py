@@ -25,6 +25,7 @@ from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.verify.pinocchio import Oracle
 from urdfkin.verify.sampling import draw
+from urdfkin.verify.second_reader import second_reading
 from urdfkin.verify.tables import check_table
 
 if TYPE_CHECKING:
@@ -178,21 +179,28 @@ class RobotSummary:
         model: The result of `describe`; None if the robot could not be read.
         findings: The findings in the file, as `Finding.as_dict` returns them.
         chains: Denavit-Hartenberg tables of its chains, each in both conventions.
+        second_reader: The comparison with yourdfpy's tree of the same text; None: not compared.
     """
 
     model: dict[str, Any] | None = None
     findings: tuple[dict[str, Any], ...] = ()
     chains: tuple[dict[str, Any], ...] = ()
+    second_reader: dict[str, Any] | None = None
 
     @classmethod
     def of(cls, robot: Robot, oracle: Oracle | None) -> RobotSummary:
         """Return the summary of a loaded robot. The tables are checked if Pinocchio accepts the robot."""
-        return cls(describe(robot), as_data(robot.findings), chains_of(robot, oracle))
+        mimic, added = robot.verifier.mimic, robot.root_joint is not None
+        reading = second_reading(robot.urdf, robot.tree, mimic=mimic, root_joint=added)
+        return cls(describe(robot), as_data(robot.findings), chains_of(robot, oracle), reading.as_dict())
 
     @property
     def disagreements(self) -> tuple[str, ...]:
-        """A message for each chain with tables outside their bound."""
-        return tuple(text for chain in self.chains if (text := chain_disagreement(chain)) is not None)
+        """A message for each chain with tables outside their bound, and for a different tree of yourdfpy."""
+        found = [text for chain in self.chains if (text := chain_disagreement(chain)) is not None]
+        if self.second_reader and (text := reader_disagreement(self.second_reader)) is not None:
+            found.append(text)
+        return tuple(found)
 
 
 def chain_disagreement(chain: Mapping[str, Any]) -> str | None:
@@ -203,6 +211,13 @@ def chain_disagreement(chain: Mapping[str, Any]) -> str | None:
     how = "by an infinite amount" if share is None else f"{share:.3g} times the bound"
     off = "" if chain["metres"] is None else f", tip {chain['metres']:.2g} m off"
     return f"the Denavit-Hartenberg tables from {chain['base']} to {chain['tip']} disagree: {how}{off}"
+
+
+def reader_disagreement(reading: Mapping[str, Any]) -> str | None:
+    """Return how yourdfpy's tree differs from ours; None if it does not or was not compared."""
+    if not reading["differences"]:
+        return None
+    return f"{reading['by']} reads another robot from the file: {'; '.join(reading['differences'])}"
 
 
 #: Summary of a robot that could not be read.

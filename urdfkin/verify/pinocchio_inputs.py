@@ -56,6 +56,11 @@ def rules_of_text(text: str, joints: Collection[str]) -> dict[str, Mimic]:
         for joint in plain_xml(text).iterfind("joint")
         if (rule := joint.find("mimic")) is not None and (name := joint.get("name", "")) in joints
     }
+    return resolved_rules(rules)
+
+
+def resolved_rules(rules: dict[str, Mimic]) -> dict[str, Mimic]:
+    """Return mimic rules in terms of joints that are not mimic joints."""
     known: dict[str, Mimic] = {}
     return {name: _resolved(name, rules, known) for name in rules}
 

@@ -1,0 +1,225 @@
+"""A second reader of a robot's URDF: yourdfpy reads the same text, and its tree is compared with ours.
+
+Pinocchio checks numbers. This check compares the data behind them: links, joint kinds, origins, axes, limits
+and mimic rules. The two readers share no code.
+
+yourdfpy (0.0.60) is known to differ from the URDF specification in two ways. They are named, not counted:
+
+- It ignores the attribute `quat_xyzw` of an origin.
+- It does not normalise an axis.
+
+yourdfpy returns None for a missing number. The specification's default replaces it before the comparison.
+"""
+
+from __future__ import annotations
+
+import io
+import logging
+import math
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from urdfkin.errors.escape import printable
+from urdfkin.kinematics.roundings import EPS
+from urdfkin.model.tree import Joint, JointKind, KinematicTree, Mimic
+from urdfkin.system.lazy_import import installed_version
+from urdfkin.urdf.plain_xml import plain_xml
+from urdfkin.verify.pinocchio_inputs import resolved_rules
+
+if TYPE_CHECKING:
+    from yourdfpy import urdf as yourdf
+
+#: Largest error of an entry of two rotations from the same angles: on each side a sine and cosine of one eps,
+#: two products and a sum of half an eps each, and terms whose sum is at most 1.
+_ROTATION = 9.0 * EPS
+#: Largest error of an entry of two normalised axes: on each side a length of 2 eps and a quotient.
+_AXIS = 5.0 * EPS
+#: An axis whose length differs by more counts as not normalised, and is named.
+_UNIT = 1e-6
+#: Largest number of differences, or of joints with a known fault, in a report.
+_LISTED = 8
+#: Longest reason why yourdfpy cannot read a text, in characters.
+_QUOTED = 200
+#: Kinds of joints with bounds; the specification ignores those of others.
+_BOUNDED = ("revolute", "prismatic")
+_LOWER_UPPER = ("lower", "upper")
+_VELOCITY_EFFORT = ("velocity", "effort")
+
+
+@dataclass(frozen=True, slots=True)
+class SecondReading:
+    """Result of the comparison with yourdfpy's tree.
+
+    Attributes:
+        by: Name and version of the reader.
+        joints: Number of compared joints, fixed joints included.
+        differences: Differences that are an error of one of the two readers.
+        known: Differences that are known faults of yourdfpy.
+        unread: Why yourdfpy cannot read the text; None if it can.
+    """
+
+    by: str
+    joints: int = 0
+    differences: tuple[str, ...] = ()
+    known: tuple[str, ...] = ()
+    unread: str | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain data for JSON."""
+        return {
+            "by": self.by,
+            "joints": self.joints,
+            "differences": list(self.differences),
+            "known": list(self.known),
+            "unread": self.unread,
+        }
+
+
+def second_reading(
+    text: str, tree: KinematicTree, *, mimic: bool = True, root_joint: bool = False
+) -> SecondReading:
+    """Compare yourdfpy's tree of a URDF text with ours.
+
+    Args:
+        text: The URDF text.
+        tree: Our tree of the same text.
+        mimic: Whether our tree couples the mimic joints; if not, the rules are not compared.
+        root_joint: Whether `load` has added the first joint and link, which the text does not contain.
+    """
+    by = f"yourdfpy {installed_version('yourdfpy') or 'not installed'}"
+    if "<!DOCTYPE" in text:  # it could name files and entities, which yourdfpy would read
+        return SecondReading(by, unread="the file has a document type")
+    try:
+        robot = read(text)
+    except Exception as error:  # lxml and yourdfpy raise many kinds; all mean that the text is not read
+        words = " ".join(str(error).split()) or "no message"
+        return SecondReading(by, unread=printable(f"{type(error).__name__}: {words}")[:_QUOTED])
+    ours = {
+        joint.name: (joint, tree.links[joint.parent], tree.links[i + 1])
+        for i, joint in enumerate(tree.joints)
+        if i >= root_joint
+    }
+    theirs = {joint.name: joint for joint in robot.joints}
+    differences = [
+        *_names("link", tree.links[int(root_joint) :], [link.name for link in robot.links]),
+        *_names("joint", ours, [joint.name for joint in robot.joints]),
+    ]
+    rules = _rules(theirs, ours) if mimic else {}
+    quaternions, faults = _quaternions(text), dict[str, list[str]]()
+    for name in ours.keys() & theirs.keys():
+        for what, fault in _differences(ours[name], theirs[name], rules.get(name), mimic=mimic):
+            if what == "rotation" and name in quaternions:
+                faults.setdefault("ignores quat_xyzw", []).append(name)
+            elif fault:
+                faults.setdefault(fault, []).append(name)
+            else:
+                differences.append(f"joint {name}: {what}")
+    known = [f"{fault}: {_listed(sorted(names))}" for fault, names in sorted(faults.items())]
+    return SecondReading(by, len(ours), tuple(_shortened(sorted(differences))), tuple(known))
+
+
+def read(text: str) -> yourdf.Robot:
+    """Return yourdfpy's robot of a URDF text; no mesh is read.
+
+    Raises:
+        Exception: yourdfpy cannot read the text.
+    """
+    import yourdfpy  # noqa: PLC0415  imports trimesh
+
+    # The text is UTF-8 now, whatever the file declared.
+    plain = re.sub(r"\A\s*<\?xml[^>]*\?>", "", text)
+    logger = logging.getLogger("yourdfpy.urdf")
+    before, logger.disabled = logger.disabled, True
+    try:
+        model = yourdfpy.URDF.load(io.BytesIO(plain.encode()), build_scene_graph=False, load_meshes=False)
+    finally:
+        logger.disabled = before
+    return model.robot
+
+
+def _differences(
+    ours: tuple[Joint, str, str], theirs: yourdf.Joint, rule: Mimic | None, *, mimic: bool
+) -> Iterator[tuple[str, str]]:
+    """Yield each difference of a joint, and the known fault that explains it, if any."""
+    joint, parent, child = ours
+    if theirs.type != joint.kind.value:
+        yield f"type {theirs.type}, not {joint.kind.value}", ""
+    if (theirs.parent, theirs.child) != (parent, child):
+        yield f"from {theirs.parent} to {theirs.child}, not from {parent} to {child}", ""
+    T = np.eye(4) if theirs.origin is None else np.asarray(theirs.origin, dtype=np.float64)
+    if not (T[:3, 3] == joint.T_parent_joint[:3, 3]).all():
+        yield f"origin at {T[:3, 3].tolist()}, not {joint.T_parent_joint[:3, 3].tolist()}", ""
+    if not (np.abs(T - joint.T_parent_joint)[:3, :3] <= _ROTATION).all():
+        yield "rotation", ""
+    if joint.kind.has_axis:
+        length = math.hypot(*theirs.axis)
+        if not (np.abs(theirs.axis / length - joint.axis) <= _AXIS).all():
+            yield f"axis {theirs.axis.tolist()}, not {joint.axis.tolist()}", ""
+        elif abs(length - 1.0) > _UNIT:
+            yield "axis", "does not normalise an axis"
+    if joint.kind is not JointKind.FIXED:
+        found, own = _limit(theirs), _own_limit(joint)
+        if found != own:
+            yield f"limit {found}, not {own}", ""
+    if mimic and rule != joint.mimic:
+        yield f"mimic rule {rule}, not {joint.mimic}", ""
+
+
+def _limit(joint: yourdf.Joint) -> dict[str, float] | None:
+    """Return yourdfpy's limit, with the specification's default for a missing number."""
+    if joint.limit is None:
+        return None
+    bounded = joint.type in _BOUNDED
+    bounds = {x: (getattr(joint.limit, x) or 0.0) if bounded else None for x in _LOWER_UPPER}
+    others = {x: getattr(joint.limit, x) for x in _VELOCITY_EFFORT}
+    endless = {"lower": -math.inf, "upper": math.inf, "velocity": math.inf, "effort": math.inf}
+    return {x: endless[x] if value is None else value for x, value in {**bounds, **others}.items()}
+
+
+def _own_limit(joint: Joint) -> dict[str, float] | None:
+    limit = joint.limit
+    return None if limit is None else {x: getattr(limit, x) for x in (*_LOWER_UPPER, *_VELOCITY_EFFORT)}
+
+
+def _rules(theirs: Mapping[str, yourdf.Joint], ours: Mapping[str, object]) -> dict[str, Mimic]:
+    """Return yourdfpy's mimic rules of moving joints, in terms of joints that are not mimic joints."""
+    return resolved_rules(
+        {
+            name: Mimic(joint.mimic.joint, joint.mimic.multiplier, joint.mimic.offset)
+            for name, joint in theirs.items()
+            if joint.mimic is not None and joint.type != "fixed" and name in ours
+        }
+    )
+
+
+def _quaternions(text: str) -> set[str]:
+    """Return the names of the joints whose origin has the attribute quat_xyzw."""
+    if "quat_xyzw" not in text:
+        return set()
+    return {
+        joint.get("name", "")
+        for joint in plain_xml(text).iterfind("joint")
+        if (origin := joint.find("origin")) is not None and origin.get("quat_xyzw") is not None
+    }
+
+
+def _names(what: str, ours: Iterable[str], theirs: Iterable[str]) -> Iterator[str]:
+    """Yield the names that one reader has and the other has not, or that it has twice."""
+    found, own = Counter(iter(theirs)), Counter(iter(ours))
+    for name in found.keys() | own.keys():
+        if found[name] != own[name]:
+            yield f"{what} {name}: {found[name]} times, not {own[name]}"
+
+
+def _shortened(differences: list[str]) -> list[str]:
+    more = len(differences) - _LISTED
+    return differences if more <= 0 else [*differences[:_LISTED], f"{more} more"]
+
+
+def _listed(names: list[str]) -> str:
+    return ", ".join(_shortened(names))
