@@ -15,6 +15,7 @@ from urdfkin.cli.options import Whole, reject_unused_options
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError, Question, SourceError
 from urdfkin.errors.numbers import parse_int
+from urdfkin.model.reference import Reference
 from urdfkin.system.files import MOST_DATA, read_standard_input, read_text
 
 if TYPE_CHECKING:
@@ -25,7 +26,8 @@ if TYPE_CHECKING:
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
-REFERENCES = ("local", "world", "local_world_aligned")
+#: Names of the reference frames.
+REFERENCES = tuple(reference.name.lower() for reference in Reference)
 #: Number of samples that `random` draws; `random:N` draws N.
 _RANDOM_SAMPLES = 1
 

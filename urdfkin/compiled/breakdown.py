@@ -189,14 +189,14 @@ def _contributions(
     path = tree.path(link)
     Ts = placements(plan, q, base=base, threads=1)
     velocity = velocities(plan, q, v, base=base, threads=1)
-    levers = -Ts[..., :3, 3] if reference is Reference.WORLD else _levers(tree, path, q, Ts[..., :3, :3])
+    levers = -Ts[..., :3, 3] if reference.at_world else _levers(tree, path, q, Ts[..., :3, :3])
     moving = [(k, i) for k, i in enumerate(path) if tree.joints[i].kind.nv]
     for place, (k, i) in enumerate(moving):
         R, d, w_before = Ts[:, k + 1, :3, :3], levers[:, k + 1], velocity[:, k, 3:]
         joint, at = tree.joints[i], tree.v_index[i]
         terms[:, place] = _terms(_moves(joint, v[:, at:], R), _moves(joint, a[:, at:], R), w_before, d)
     of_base = _rigid(base, levers[:, 0])
-    if reference is Reference.LOCAL:
+    if reference.own_axes:
         back = Ts[:, -1, :3, :3].swapaxes(-1, -2)
         of_base = _rotate(back, of_base)
         terms[...] = _rotate(back[:, np.newaxis, np.newaxis], terms)
@@ -250,6 +250,8 @@ def _moves(joint: Joint, x: FloatArray, R: FloatArray) -> _Moves:
         slide[:, :2], turn[:, 2] = x[:, :2], x[:, 2]
     elif joint.kind is JointKind.FLOATING:
         slide[:], turn[:] = x[:, :3], x[:, 3:6]
+    elif not joint.kind.has_axis:
+        raise NotImplementedError(f"the motion of a {joint.kind} joint")
     else:
         factor = joint.mimic.multiplier if joint.mimic else 1.0
         (turn if joint.kind.turns else slide)[:] = factor * x[:, :1] * joint.axis

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from urdfkin.compiled.batch import in_blocks
 from urdfkin.compiled.compiling import Core
-from urdfkin.compiled.kernel_args import KernelArgs, lines, scratch
+from urdfkin.compiled.kernel_args import REFERENCES, KernelArgs, lines, scratch
 from urdfkin.compiled.memory import LANES
 from urdfkin.compiled.plan import LARGE, CompiledTree
 from urdfkin.compiled.program import Program, program_of
@@ -64,7 +64,7 @@ def velocities(
     plan: CompiledTree, q: FloatArray, v: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]
 ) -> FloatArray:
     """Return velocities (n, frames, 6), [linear; angular]: 7.127, 7.128."""
-    local = reference is Reference.LOCAL
+    local = reference.own_axes
     core = _cores().local_velocities if local else _cores().velocities
     return _compute(core, plan, program_of(plan, turned=local), [q, v], reference, (6,), **how)
 
@@ -78,7 +78,7 @@ def accelerations(
     **how: Unpack[How],
 ) -> FloatArray:
     """Return classical accelerations (n, frames, 6), [linear; angular]: 7.129, 7.130."""
-    local = reference is Reference.LOCAL
+    local = reference.own_axes
     core = _cores().local_accelerations if local else _cores().accelerations
     return _compute(core, plan, program_of(plan, turned=local), [q, v, a], reference, (6,), **how)
 
@@ -87,7 +87,7 @@ def jacobians(
     plan: CompiledTree, q: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]
 ) -> FloatArray:
     """Return Jacobians (n, frames, 6, nv): 7.85."""
-    program = program_of(plan, turned=reference is Reference.LOCAL, columns=True)
+    program = program_of(plan, turned=reference.own_axes, columns=True)
     return _compute(_cores().jacobians, plan, program, [q], reference, (6, plan.nv), **how)
 
 
@@ -95,7 +95,7 @@ def jacobian_rates(
     plan: CompiledTree, q: FloatArray, v: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]
 ) -> FloatArray:
     """Return time derivatives of the Jacobians (n, frames, 6, nv): the J-dot of 7.126."""
-    program = program_of(plan, turned=reference is Reference.LOCAL, columns=True)
+    program = program_of(plan, turned=reference.own_axes, columns=True)
     return _compute(_cores().jacobian_rates, plan, program, [q, v], reference, (6, plan.nv), **how)
 
 
@@ -103,7 +103,7 @@ def hessians(
     plan: CompiledTree, q: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]
 ) -> FloatArray:
     """Return derivatives of the Jacobians (n, frames, 6, nv, nv): [..., i, j] of column i by velocity j."""
-    program = program_of(plan, turned=reference is Reference.LOCAL, columns=True, pairs=True)
+    program = program_of(plan, turned=reference.own_axes, columns=True, pairs=True)
     return _compute(_cores().hessians, plan, program, [q], reference, (6, plan.nv, plan.nv), **how)
 
 
@@ -185,7 +185,8 @@ def task_of(
     stage = lines(LANES * width if staged else 0)
     task[KernelArgs.PROGRAM], task[KernelArgs.CONSTANTS] = program.addresses
     task[KernelArgs.SCRATCH], task[KernelArgs.OUT] = memory.ctypes.data, out.ctypes.data
-    task[KernelArgs.REFERENCE], task[KernelArgs.N], task[KernelArgs.WIDTH] = reference, len(out), width
+    task[KernelArgs.N], task[KernelArgs.WIDTH] = len(out), width
+    task[KernelArgs.REFERENCE] = REFERENCES[reference]
     task[KernelArgs.STAGE] = stage.ctypes.data if staged else 0
     for place, of_place, x in zip(_PLACES, _STRIDES, inputs, strict=False):
         task[place], task[of_place] = x.ctypes.data, 0 if len(x) == 1 else x.shape[1]

@@ -8,10 +8,15 @@ import numpy as np
 
 from urdfkin.compiled.memory import LANES
 from urdfkin.compiled.program import Program
+from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
 #: Bytes of a cache line. A vector across two lines would halve the speed.
 _LINE = 64
+#: The reference frames that the kernels know, with their numbers there; a lookup of another one fails.
+REFERENCES = {
+    known: int(known) for known in (Reference.LOCAL, Reference.WORLD, Reference.LOCAL_WORLD_ALIGNED)
+}
 
 
 class KernelArgs(IntEnum):

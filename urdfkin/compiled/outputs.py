@@ -11,12 +11,13 @@ import numpy as np
 
 from urdfkin.compiled import compiled_equations as eq
 from urdfkin.compiled.compiling import compiled
+from urdfkin.compiled.kernel_args import REFERENCES
 from urdfkin.compiled.memory import constant, numbers_of, put, same, write_rows
 from urdfkin.compiled.numbers import nothing, zero
 from urdfkin.compiled.program import ONE_ROW, OUT_ROW, PAIR_WIDTH, ZERO_ROW, Head
 from urdfkin.compiled.recursion import put_vector, vector
 
-_LOCAL, _WORLD, _ALIGNED = 0, 1, 2
+_LOCAL, _WORLD, _ALIGNED = REFERENCES.values()
 _FRAMES, _NV = int(Head.FRAMES), int(Head.NV)
 
 #: The rows of a 4 by 4 pose, row by row, and those of [linear; angular].

@@ -23,7 +23,7 @@ from numba.extending import intrinsic
 
 from urdfkin.compiled import kernels
 from urdfkin.compiled.compiling import Core, compiled, core
-from urdfkin.compiled.kernel_args import KernelArgs, scratch
+from urdfkin.compiled.kernel_args import REFERENCES, KernelArgs, scratch
 from urdfkin.compiled.memory import WHOLE_NUMBERS, whole_numbers_at
 from urdfkin.compiled.plan import CompiledTree, IntArray
 from urdfkin.compiled.program import program_of
@@ -219,7 +219,7 @@ def single(
         which count the results.
     """
     core, local_core, orders, columns = _HOW[quantity]
-    local = reference is Reference.LOCAL
+    local = reference.own_axes
     turned = quantity == "placement" or local
     program = program_of(plan, turned=turned, columns=columns > 0, pairs=columns > 1)
     memory = scratch(program)
@@ -227,7 +227,7 @@ def single(
     address = (local_core if local else core).address
     compute, task = _called(address, orders, shape, plan, program, memory)
     task[KernelArgs.PROGRAM], task[KernelArgs.CONSTANTS] = program.addresses
-    task[KernelArgs.SCRATCH], task[KernelArgs.REFERENCE] = memory.ctypes.data, reference
+    task[KernelArgs.SCRATCH], task[KernelArgs.REFERENCE] = memory.ctypes.data, REFERENCES[reference]
     return compute, task
 
 

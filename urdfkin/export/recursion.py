@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, assert_never
 
 from urdfkin.compiled.plan import Column as ColumnField
 from urdfkin.compiled.plan import CompiledTree, Geometry, Motion
@@ -178,13 +178,18 @@ def hessian(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -
 
 def _recursion(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> TreeRecursion:
     # The reference WORLD needs p, which is computed in the world's axes.
-    return TreeRecursion(plan, kind, inputs, own=reference is not Reference.WORLD)
+    return TreeRecursion(plan, kind, inputs, own=not reference.at_world)
 
 
 def _six_vector(path: TreeRecursion, reference: Reference, linear: Vector, angular: Vector) -> list[Number]:
-    if reference is Reference.LOCAL_WORLD_ALIGNED:
-        for S in reversed(path.turns):
-            linear, angular = path.eq.rotate(S, linear), path.eq.rotate(S, angular)
+    match reference:
+        case Reference.LOCAL_WORLD_ALIGNED:
+            for S in reversed(path.turns):
+                linear, angular = path.eq.rotate(S, linear), path.eq.rotate(S, angular)
+        case Reference.LOCAL | Reference.WORLD:  # computed in these axes
+            pass
+        case _:
+            assert_never(reference)
     return [*linear, *angular]
 
 

@@ -242,7 +242,7 @@ def _norm(joint: Joint) -> float:
 
 
 def _check_single_axis(tree: KinematicTree, joint: Joint, base: str, tip: str) -> None:
-    if joint.kind not in (JointKind.PLANAR, JointKind.FLOATING):
+    if joint.kind.has_axis or not joint.kind.nq:
         return
     child = tree.links[tree.joint_index(joint.name) + 1]
     raise InputError(

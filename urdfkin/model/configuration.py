@@ -281,11 +281,9 @@ def _own_values(tree: KinematicTree, q: FloatArray) -> Iterator[FloatArray | Non
 
 def pinocchio_coordinates(joint: Joint, own: FloatArray) -> FloatArray:
     """Return Pinocchio's coordinates (..., k) of one joint, from urdfkin's (..., joint.kind.nq)."""
-    if joint.kind is JointKind.CONTINUOUS:
-        return np.concatenate((np.cos(own), np.sin(own)), axis=-1)
-    if joint.kind is JointKind.PLANAR:
-        return np.concatenate((own[..., :2], np.cos(own[..., 2:]), np.sin(own[..., 2:])), axis=-1)
-    return own
+    if joint.kind.nq_pinocchio == joint.kind.nq:
+        return own
+    return np.concatenate((own[..., :-1], np.cos(own[..., -1:]), np.sin(own[..., -1:])), axis=-1)
 
 
 def pinocchio_blocks(tree: KinematicTree, q: FloatArray, *, mimic: bool) -> Iterator[tuple[int, FloatArray]]:
@@ -306,9 +304,6 @@ def pinocchio_blocks(tree: KinematicTree, q: FloatArray, *, mimic: bool) -> Iter
         yield i, pinocchio_coordinates(joint, own)
 
 
-_SIZES = {JointKind.CONTINUOUS: 2, JointKind.PLANAR: 4}
-
-
 def _in_pinocchio(joint: Joint, *, mimic: bool) -> bool:
     """Return whether a joint has coordinates in Pinocchio's model (`mimic` as in `pinocchio_blocks`)."""
     return joint.kind.nq > 0 and not (mimic and joint.mimic)
@@ -317,7 +312,7 @@ def _in_pinocchio(joint: Joint, *, mimic: bool) -> bool:
 def _pinocchio_length(tree: KinematicTree, *, mimic: bool) -> int:
     """Return the number of coordinates of Pinocchio's model."""
     present = (joint.kind for joint in tree.joints if _in_pinocchio(joint, mimic=mimic))
-    return sum(_SIZES.get(kind, kind.nq) for kind in present)
+    return sum(kind.nq_pinocchio for kind in present)
 
 
 def to_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> FloatArray:
@@ -351,7 +346,7 @@ def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -
     for i, joint in enumerate(tree.joints):
         if not _in_pinocchio(joint, mimic=mimic):
             continue
-        size = _SIZES.get(joint.kind, joint.kind.nq)
+        size = joint.kind.nq_pinocchio
         values = _angle_back(joint, q[..., at : at + size])
         at += size
         if joint.mimic:
@@ -364,7 +359,7 @@ def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -
 
 
 def _angle_back(joint: Joint, values: FloatArray) -> FloatArray:
-    if joint.kind not in (JointKind.CONTINUOUS, JointKind.PLANAR):
+    if joint.kind.nq_pinocchio == joint.kind.nq:
         return values
     cosine, sine = values[..., -2], values[..., -1]
     norm = np.hypot(cosine, sine)

@@ -87,6 +87,8 @@ def _pose(joint: Joint, own: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return position (..., 3) and rotation (..., 3, 3) of a planar or floating joint."""
     if joint.kind is JointKind.FLOATING:
         return own[..., :3], rotation_of(own[..., 3:])
+    if joint.kind is not JointKind.PLANAR:
+        raise NotImplementedError(f"the pose of a {joint.kind} joint")
     zero = np.zeros((*own.shape[:-1], 1))
     return np.concatenate((own[..., :2], zero), axis=-1), exp_rotation(_about_z(own[..., 2]))
 
@@ -95,6 +97,8 @@ def _screw(joint: Joint, step: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the linear and the angular part of a joint velocity, (..., 3) each."""
     if joint.kind is JointKind.FLOATING:
         return step[..., :3], step[..., 3:]
+    if joint.kind is not JointKind.PLANAR:
+        raise NotImplementedError(f"the screw of a {joint.kind} joint")
     zero = np.zeros((*step.shape[:-1], 1))
     return np.concatenate((step[..., :2], zero), axis=-1), _about_z(step[..., 2])
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, assert_never
 
 from urdfkin.model.reference import Reference
 
@@ -116,18 +116,19 @@ class Recursion:
 
     def velocity(self, s: State, reference: Reference) -> tuple[Vector, Vector]:
         """Return the linear and the angular velocity: 7.127, 7.128."""
-        at_world = reference is Reference.WORLD
-        return self.eq.point_velocity(s.vel, s.w, self.eq.minus(ZERO, s.p)) if at_world else s.vel, s.w
+        if not reference.at_world:
+            return s.vel, s.w
+        return self.eq.point_velocity(s.vel, s.w, self.eq.minus(ZERO, s.p)), s.w
 
     def acceleration(self, s: State, reference: Reference) -> tuple[Vector, Vector]:
         """Return the linear and the angular classical acceleration: 7.129, 7.130."""
-        at_world = reference is Reference.WORLD
-        acc = self.eq.point_acceleration(s.acc, s.alpha, s.w, self.eq.minus(ZERO, s.p)) if at_world else s.acc
-        return acc, s.alpha
+        if not reference.at_world:
+            return s.acc, s.alpha
+        return self.eq.point_acceleration(s.acc, s.alpha, s.w, self.eq.minus(ZERO, s.p)), s.alpha
 
     def in_reference(self, s: State, reference: Reference, linear: Vector, angular: Vector) -> Six:
         """Express a pair of world-axes vectors in the axes of the reference frame."""
-        if reference is Reference.LOCAL:
+        if reference.own_axes:
             back = self.eq.transposed(s.R)
             linear, angular = self.eq.rotate(back, linear), self.eq.rotate(back, angular)
         return (*linear, *angular)
@@ -140,12 +141,12 @@ class Recursion:
 
     def jacobian(self, s: State, columns: Sequence[Column], nv: int, reference: Reference) -> list[Six]:
         """Return the columns of the Jacobian (7.85), one for each joint velocity."""
-        to = ZERO if reference is Reference.WORLD else s.p
+        to = ZERO if reference.at_world else s.p
         return self._add_mimic_columns(s, reference, nv, ((one, *self._column(one, to)) for one in columns))
 
     def jacobian_rate(self, s: State, columns: Sequence[Column], nv: int, reference: Reference) -> list[Six]:
         """Return the columns of the Jacobian's time derivative (7.126)."""
-        to, to_rate = (ZERO, ZERO) if reference is Reference.WORLD else (s.p, s.vel)
+        to, to_rate = (ZERO, ZERO) if reference.at_world else (s.p, s.vel)
         rates = ((one, *self._rate(s, one, to, to_rate, reference)) for one in columns)
         return self._add_mimic_columns(s, reference, nv, rates)
 
@@ -157,7 +158,7 @@ class Recursion:
         if column.turns:
             d, d_rate = eq.minus(to, carrier.p), eq.minus(to_rate, carrier.vel)
             rate, turning = eq.turning_column_rate(column.z, rate, d, d_rate)
-        if reference is Reference.LOCAL:
+        if reference.own_axes:
             rate = eq.rate_in_turning_axes(rate, s.w, linear)
             turning = eq.rate_in_turning_axes(turning, s.w, angular)
         return rate, turning
@@ -178,7 +179,7 @@ class Recursion:
         self, s: State, columns: Sequence[Column], reference: Reference
     ) -> Iterator[tuple[int, int, Number, Six]]:
         """Yield column index, joint velocity index, factor, and derivative of the column."""
-        to = ZERO if reference is Reference.WORLD else s.p
+        to = ZERO if reference.at_world else s.p
         ends = [(one, self._column(one, to)) for one in columns]
         for of, six in ends:
             for by, by_six in ends:
@@ -196,10 +197,13 @@ class Recursion:
         """
         eq = self.eq
         change: tuple[Vector, Vector] = ZERO, ZERO
-        if reference is Reference.WORLD:
-            change = eq.motion_product(*by, *six) if before else change
-        elif reference is Reference.LOCAL:
-            change = change if before else eq.motion_product(*six, *by)
-        else:
-            change = eq.turned_along(by[1], *six) if before else (eq.end_moved(six[1], by[0]), ZERO)
+        match reference:
+            case Reference.WORLD:
+                change = eq.motion_product(*by, *six) if before else change
+            case Reference.LOCAL:
+                change = change if before else eq.motion_product(*six, *by)
+            case Reference.LOCAL_WORLD_ALIGNED:
+                change = eq.turned_along(by[1], *six) if before else (eq.end_moved(six[1], by[0]), ZERO)
+            case _:
+                assert_never(reference)
         return change

@@ -11,6 +11,8 @@ from urdfkin.errors.validators import safe_repr
 class Reference(IntEnum):
     """The three reference frames, with Pinocchio's names.
 
+    Each has a number, which the kernels know, and two properties: its axes and its point.
+
     * `LOCAL`: the frame's own origin, in the frame's axes.
     * `WORLD`: the point of the moving body that is now at the world's origin, in the world's axes.
     * `LOCAL_WORLD_ALIGNED`: the frame's own origin, in the world's axes. The textbook uses this one (7.85).
@@ -21,9 +23,18 @@ class Reference(IntEnum):
     True
     """
 
-    LOCAL = 0
-    WORLD = 1
-    LOCAL_WORLD_ALIGNED = 2
+    own_axes: bool  #: The axes: True: the frame's. False: the world's.
+    at_world: bool  #: The point: True: the one at the world's origin. False: the frame's origin.
+
+    def __new__(cls, number: int, own_axes: bool, at_world: bool) -> Reference:
+        """Make a member; one without axes and point is an error."""
+        member = int.__new__(cls, number)
+        member._value_, member.own_axes, member.at_world = number, own_axes, at_world
+        return member
+
+    LOCAL = 0, True, False
+    WORLD = 1, False, True
+    LOCAL_WORLD_ALIGNED = 2, False, False
 
     @classmethod
     def of(cls, value: Reference | str) -> Reference:

@@ -46,42 +46,26 @@ def frozen(array: ArrayLike) -> FloatArray:
 class JointKind(Enum):
     """The joint types of the URDF specification; each value is the word used in the file."""
 
-    REVOLUTE = "revolute"
-    CONTINUOUS = "continuous"
-    PRISMATIC = "prismatic"
-    FIXED = "fixed"
-    PLANAR = "planar"
-    FLOATING = "floating"
+    nq: int  #: Number of coordinates of such a joint in `q`.
+    nv: int  #: Number of entries of such a joint in `v` and `a`.
+    nq_pinocchio: int  #: Number of its coordinates in Pinocchio's layout, with (cos, sin) for a free angle.
+    has_axis: bool  #: Whether the joint moves about or along its axis.
+    turns: bool  #: Whether the joint rotates about its axis.
+    bounded: bool  #: Whether a URDF gives such a joint a lower and an upper limit.
 
-    @property
-    def nq(self) -> int:
-        """Number of coordinates of such a joint in `q`."""
-        return _SIZES[self][0]
+    def __new__(cls, word: object, *properties: Any) -> JointKind:
+        """Make a member; one without all six properties is an error."""
+        member = object.__new__(cls)
+        member._value_ = word
+        member.nq, member.nv, member.nq_pinocchio, member.has_axis, member.turns, member.bounded = properties
+        return member
 
-    @property
-    def nv(self) -> int:
-        """Number of entries of such a joint in `v` and `a`."""
-        return _SIZES[self][1]
-
-    @property
-    def has_axis(self) -> bool:
-        """Whether the joint moves about or along its axis."""
-        return self in (JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.PRISMATIC)
-
-    @property
-    def turns(self) -> bool:
-        """Whether the joint rotates about its axis."""
-        return self in (JointKind.REVOLUTE, JointKind.CONTINUOUS)
-
-
-_SIZES = {
-    JointKind.REVOLUTE: (1, 1),
-    JointKind.CONTINUOUS: (1, 1),
-    JointKind.PRISMATIC: (1, 1),
-    JointKind.FIXED: (0, 0),
-    JointKind.PLANAR: (3, 3),
-    JointKind.FLOATING: (7, 6),
-}
+    REVOLUTE = "revolute", 1, 1, 1, True, True, True
+    CONTINUOUS = "continuous", 1, 1, 2, True, True, False
+    PRISMATIC = "prismatic", 1, 1, 1, True, False, True
+    FIXED = "fixed", 0, 0, 0, False, False, False
+    PLANAR = "planar", 3, 3, 4, False, False, False
+    FLOATING = "floating", 7, 6, 7, False, False, False
 
 
 @dataclass(frozen=True, slots=True)

@@ -111,11 +111,10 @@ def _unit(axis: FloatArray, joint: str) -> FloatArray:
 def _limit(limit: LimitRecord | None, kind: JointKind) -> Limit | None:
     if limit is None or kind.nv == 0:
         return None
-    bounded = kind in (JointKind.REVOLUTE, JointKind.PRISMATIC)
     # A missing bound is zero, as in urdfdom. The specification ignores the bounds of a continuous joint.
     return Limit(
-        lower=(limit.lower or 0.0) if bounded else -math.inf,
-        upper=(limit.upper or 0.0) if bounded else math.inf,
+        lower=(limit.lower or 0.0) if kind.bounded else -math.inf,
+        upper=(limit.upper or 0.0) if kind.bounded else math.inf,
         velocity=math.inf if limit.velocity is None else limit.velocity,
         effort=math.inf if limit.effort is None else limit.effort,
     )

@@ -19,9 +19,6 @@ from urdfkin.model.tree import Joint, JointKind, KinematicTree, Limit
 from urdfkin.system.files import Edit
 from urdfkin.urdf.records import ATTRIBUTE, START_TAG, Element
 
-#: Joint kinds that need position limits in a URDF.
-_BOUNDED = (JointKind.REVOLUTE, JointKind.PRISMATIC)
-
 
 def to_urdf(tree: KinematicTree) -> str:
     """Write the links and joints of a tree as URDF, without shapes and masses.
@@ -59,7 +56,7 @@ def _needs_newer(joint: Joint) -> bool:
         return False
     infinite = [math.isinf(limit.effort), math.isinf(limit.velocity)]
     # A joint without position limits needs no <limit> if all other limits are infinite.
-    return any(infinite) and (joint.kind in _BOUNDED or not all(infinite))
+    return any(infinite) and (joint.kind.bounded or not all(infinite))
 
 
 def _joint(joint: Joint, parent: str, child: str) -> Iterable[str]:
@@ -80,7 +77,7 @@ def _joint(joint: Joint, parent: str, child: str) -> Iterable[str]:
 
 
 def _limit(joint: Joint, limit: Limit | None) -> Iterable[str]:
-    bounded = joint.kind in _BOUNDED
+    bounded = joint.kind.bounded
     if bounded and (limit is None or math.isinf(limit.lower) or math.isinf(limit.upper)):
         raise InputError(
             "a URDF needs finite position limits for a revolute or prismatic joint",

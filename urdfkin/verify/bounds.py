@@ -265,7 +265,7 @@ def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) 
 def velocity_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
     """Return (n, frames, 6), the size of the terms of [linear; angular] velocities."""
     linear = size.vel
-    if reference is Reference.WORLD:
+    if reference.at_world:
         linear = eq.point_velocity(linear, size.w, size.p)
     return _six(linear, size.w)
 
@@ -286,7 +286,7 @@ def acceleration_scale(plan: CompiledTree, size: Magnitudes, reference: Referenc
     """
     shared = eq.tangential(size.w, size.vel)
     linear = size.acc + shared
-    if reference is Reference.WORLD:
+    if reference.at_world:
         linear = eq.point_acceleration(linear + shared, size.alpha, size.w, size.p)
     return _six(linear, size.alpha)
 
@@ -335,7 +335,7 @@ def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Referen
     w, p, vel = size.w[..., None], size.p[..., None], size.vel[..., None]
     linear, angular = eq.turning_column_rate(turning, eq.axis_rate(w, turning), p, vel)
     linear = linear + eq.axis_rate(w, sliding)
-    if reference is Reference.LOCAL:
+    if reference.own_axes:
         column, axis = eq.turning_column(turning, p)
         linear = eq.rate_in_turning_axes(linear, w, column + sliding)
         angular = eq.rate_in_turning_axes(angular, w, axis)
@@ -381,7 +381,7 @@ def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) ->
         pair = place, rate[i], rate[j]
         np.add.at(turning, pair, both * np.where(before, near, far))
         np.add.at(mixed, pair, one * np.where(before, near_mixed, far_mixed))
-        np.add.at(angular, pair, both * (before != (reference is Reference.LOCAL)))
+        np.add.at(angular, pair, both * (before != reference.own_axes))
     linear = product(turning, size.p[..., np.newaxis, np.newaxis]) + mixed
     scale = np.empty((*linear.shape[:2], 6, *shape[1:]))
     scale[..., :3, :, :] = linear[..., np.newaxis, :, :]
@@ -474,7 +474,7 @@ def movable(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.b
         while step >= 0:
             path.append(step)
             step = int(plan.parents[step])
-        if reference is Reference.WORLD:
+        if reference.at_world:
             levers = np.logical_or.accumulate(extends[path[::-1]])[::-1]
         else:
             levers = np.logical_or.accumulate([plan.lengths[len(turns) + f] > 0.0, *extends[path[:-1]]])

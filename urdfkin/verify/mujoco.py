@@ -21,7 +21,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, assert_never
 from xml.etree.ElementTree import Element, SubElement, tostring
 from xml.parsers.expat import ExpatError
 
@@ -45,8 +45,9 @@ _DEEPEST = 1_000
 #: MuJoCo's joints for a planar or floating joint, in the order of its coordinates.
 _PARTS = {"planar": ("slide x", "slide y", "hinge"), "floating": ("slide x", "slide y", "slide z", "ball")}
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-#: Numbers of coordinates and of joint velocities of a joint in urdfkin's layout; other kinds have (1, 1).
-_SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)}
+#: Numbers of coordinates and of joint velocities of a joint in urdfkin's layout.
+_ONE = ("revolute", "continuous", "prismatic")
+_SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6), **dict.fromkeys(_ONE, (1, 1))}
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,7 +171,7 @@ class MujocoOracle:
         """Yield the indices of each moving joint in urdfkin's layout and in MuJoCo's."""
         leaders, q, v = dict[str, tuple[int, int]](), 0, 0
         for joint in joints:
-            sizes = _SIZES.get(joint.kind, (1, 1))
+            sizes = _SIZES[joint.kind]
             if joint.name and joint.name not in rules:
                 leaders[joint.name] = q, v
                 q, v = q + sizes[0], v + sizes[1]
@@ -257,7 +258,7 @@ class MujocoOracle:
     ) -> FloatArray:
         """Return classical accelerations (n, frames, 6) by `mj_objectAcceleration` without gravity."""
         poses, velocity, acceleration = self._moved(q, v, a, frames, base)
-        if Reference.of(reference) is not Reference.WORLD:
+        if not Reference.of(reference).at_world:
             return _referred(reference, poses, acceleration)
         # Move the spatial acceleration to the world origin, then convert it to the classical one.
         spatial = acceleration.copy()
@@ -306,11 +307,11 @@ class MujocoOracle:
         poses = self._poses(q, v, None, frames, base, read)
         vel, w = velocity[..., None, :3], velocity[..., None, 3:]
         which = Reference.of(reference)
-        if which is Reference.LOCAL:  # the derivative in rotating axes
+        if which.own_axes:  # the derivative in rotating axes
             for rows in (slice(0, 3), slice(3, 6)):
                 rate[..., rows, :] -= np.cross(w, J[..., rows, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         out = _referred(reference, poses, rate, columns=True)
-        if which is Reference.WORLD:  # p x J_angular changes with p, too
+        if which.at_world:  # p x J_angular changes with p, too
             out[..., :3, :] += np.cross(vel, J[..., 3:, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         return out
 
@@ -542,16 +543,18 @@ def _referred(
     reference: Reference | str, poses: FloatArray, values: FloatArray, *, columns: bool = False
 ) -> FloatArray:
     """Convert six-vectors, or Jacobian columns, from LOCAL_WORLD_ALIGNED to another reference frame."""
-    which = Reference.of(reference)
-    if which is Reference.LOCAL_WORLD_ALIGNED:
-        return values
     six = values if columns else values[..., None]
     linear, angular = six[..., :3, :], six[..., 3:, :]
-    if which is Reference.LOCAL:
-        back = poses[..., :3, :3].swapaxes(-1, -2)
-        out = np.concatenate((back @ linear, back @ angular), axis=-2)
-    else:
-        p = poses[..., None, :3, 3]
-        moved = linear + np.cross(p, angular.swapaxes(-1, -2)).swapaxes(-1, -2)
-        out = np.concatenate((moved, angular), axis=-2)
+    match Reference.of(reference):
+        case Reference.LOCAL_WORLD_ALIGNED:
+            return values
+        case Reference.LOCAL:
+            back = poses[..., :3, :3].swapaxes(-1, -2)
+            out = np.concatenate((back @ linear, back @ angular), axis=-2)
+        case Reference.WORLD:
+            p = poses[..., None, :3, 3]
+            moved = linear + np.cross(p, angular.swapaxes(-1, -2)).swapaxes(-1, -2)
+            out = np.concatenate((moved, angular), axis=-2)
+        case other:
+            assert_never(other)
     return out if columns else out[..., 0]

@@ -133,6 +133,8 @@ def pose_of(kind: JointKind, own: FloatArray) -> FloatArray:
     P[..., 3, 3] = 1.0
     if kind is JointKind.PLANAR:
         P[..., :2, 3], P[..., :3, :3] = own[..., :2], rotation_about(_Z, own[..., 2])
+    elif kind is not JointKind.FLOATING:
+        raise NotImplementedError(f"the pose of a {kind} joint")
     else:
         P[..., :3, 3], P[..., :3, :3] = own[..., :3], rotation_of(own[..., 3:])
     return P
@@ -142,6 +144,8 @@ def coordinates_of(kind: JointKind, P: FloatArray) -> FloatArray:
     """Return the coordinates of a pose (..., 4, 4) of a planar or floating joint."""
     if kind is JointKind.PLANAR:
         return np.concatenate((P[..., :2, 3], turn_in_plane(P)[..., np.newaxis]), axis=-1)
+    if kind is not JointKind.FLOATING:
+        raise NotImplementedError(f"the coordinates of a {kind} joint")
     return np.concatenate((P[..., :3, 3], quaternion_of(P[..., :3, :3])), axis=-1)
 
 

@@ -121,6 +121,8 @@ def _moved_freely(
         slide, S = (q[0], q[1], 0), about(IDENTITY[2], q[2], context)
         rates: list[Vector] = [x for y in (v, a) for x in ((y[0], y[1], 0), (0, 0, y[2]))]
         return _RECURSION.free(placed, slide, S, rates), ((0, False), (1, False), (2, True))
+    if kind is not JointKind.FLOATING:
+        raise NotImplementedError(f"the motion of a {kind} joint")
     slide, S = (q[0], q[1], q[2]), from_quaternion((q[3], q[4], q[5], q[6]), context)
     rates = [x for y in (v, a) for x in ((y[0], y[1], y[2]), (y[3], y[4], y[5]))]
     moved = _RECURSION.free(placed, slide, S, rates)

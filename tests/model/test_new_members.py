@@ -1,0 +1,186 @@
+"""A new reference frame, or a new joint kind, is refused by each branch that does not know it.
+
+A branch that took it for another member would return wrong numbers without a word.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+import urdfkin
+from urdfkin.cli.analytical_jacobian import REPRESENTATIONS
+from urdfkin.cli.arguments import REFERENCES
+from urdfkin.compiled.breakdown import acceleration_breakdown
+from urdfkin.compiled.kernel_args import REFERENCES as IN_KERNELS
+from urdfkin.compiled.plan import compile_tree
+from urdfkin.compiled.single import single
+from urdfkin.export.function import function_of
+from urdfkin.export.recursion import QUANTITIES as EXPORTED
+from urdfkin.kinematics.bodies import QUATERNION
+from urdfkin.kinematics.rotation import SEQUENCES
+from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.mechanisms.mechanism import coordinates_of, pose_of
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import JointKind
+from urdfkin.verify.bounds import magnitudes, movable
+from urdfkin.verify.oracles import WITNESSES
+from urdfkin.verify.quantities import QUANTITIES, Quantity
+
+REFUSED = (AttributeError, KeyError, AssertionError, NotImplementedError)
+REFERRED = [row for row in QUANTITIES.values() if row.referred and row.walked and row.of != "columns"]
+
+
+def new_reference(**properties: bool) -> Reference:
+    """Make a member of the enumeration as a new line in its class would, or one without properties."""
+    member = int.__new__(Reference, 3)
+    for name, value in {"_name_": "NEW", "_value_": 3, "_sort_order_": 3, **properties}.items():
+        setattr(member, name, value)
+    return member
+
+
+#: Its axes are the frame's and its point is at the world's origin; and one that states neither.
+NEW = {"mixed": new_reference(own_axes=True, at_world=True), "bare": new_reference()}
+
+
+@pytest.fixture(params=NEW)
+def reference(request: pytest.FixtureRequest) -> Reference:
+    return NEW[request.param]
+
+
+@pytest.fixture(scope="module")
+def robot() -> urdfkin.Robot:
+    return urdfkin.load("ur5", verify=False)
+
+
+def test_a_reference_frame_without_axes_and_point_cannot_be_defined() -> None:
+    with pytest.raises(TypeError, match="own_axes"):
+        cast("Any", Reference)._new_member_(Reference, 3)
+
+
+@pytest.mark.parametrize("row", REFERRED, ids=lambda row: row.name)
+def test_the_recursion_refuses_a_new_reference_frame(
+    robot: urdfkin.Robot, reference: Reference, row: Quantity
+) -> None:
+    plan = compile_tree(robot.tree, [robot.tree.frame_link(robot.tip_frame)])
+    x = np.zeros((1, robot.nq))
+    with pytest.raises(REFUSED):
+        row.ours(plan, (x, x, x), reference)
+
+
+@pytest.mark.parametrize("name", ["velocity", "jacobian", "jacobian rate", "hessian", "acceleration"])
+def test_the_fast_functions_refuse_a_new_reference_frame(
+    robot: urdfkin.Robot, reference: Reference, name: str
+) -> None:
+    plan = compile_tree(robot.tree, [robot.tree.frame_link(robot.tip_frame)])
+    with pytest.raises(REFUSED):
+        single(name.replace(" ", "_"), plan, reference)
+
+
+def test_the_split_of_an_acceleration_refuses_a_new_reference_frame(robot: urdfkin.Robot) -> None:
+    x = np.zeros((1, robot.nq))
+    with pytest.raises(REFUSED):
+        acceleration_breakdown(robot.tree, 3, x, x, x, NEW["bare"])
+
+
+@pytest.mark.parametrize("name", sorted(EXPORTED.keys() - {"placement"}))
+def test_exported_code_refuses_a_new_reference_frame(robot: urdfkin.Robot, name: str) -> None:
+    plan = compile_tree(robot.tree, [robot.tree.frame_link(robot.tip_frame)])
+    with pytest.raises(REFUSED):
+        function_of(plan, QUANTITIES[name], NEW["bare"])
+
+
+@pytest.mark.parametrize("row", REFERRED, ids=lambda row: row.name)
+def test_bounds_refuse_a_reference_frame_without_properties(robot: urdfkin.Robot, row: Quantity) -> None:
+    plan = compile_tree(robot.tree, [robot.tree.frame_link(robot.tip_frame)])
+    x = np.ones((1, robot.nq))
+    size = magnitudes(plan, x, x, x, STILL_STATE)
+    if row.name.split()[-1] == "jacobian":
+        with pytest.raises(REFUSED):
+            movable(plan, NEW["bare"])
+        return  # the size of a Jacobian's terms is the same in each reference frame
+    with pytest.raises(REFUSED):
+        row.bound(plan, size, NEW["bare"])
+
+
+def test_the_bound_of_a_hessian_refuses_a_new_reference_frame(
+    robot: urdfkin.Robot, reference: Reference
+) -> None:
+    plan = compile_tree(robot.tree, [robot.tree.frame_link(robot.tip_frame)])
+    x = np.ones((1, robot.nq))
+    with pytest.raises(REFUSED):
+        QUANTITIES["hessian"].bound(plan, magnitudes(plan, x, x, x, STILL_STATE), reference)
+
+
+@pytest.mark.parametrize("oracle", WITNESSES)
+@pytest.mark.parametrize("row", REFERRED, ids=lambda row: row.name)
+def test_the_oracles_refuse_a_new_reference_frame(
+    robot: urdfkin.Robot, reference: Reference, row: Quantity, oracle: str
+) -> None:
+    if oracle == "mujoco":
+        pytest.importorskip("mujoco")
+        if row.name == "hessian":
+            return
+    x = np.zeros((1, robot.nq))
+    model = WITNESSES[oracle].oracle(robot.urdf, robot.tree)
+    of: Any = (robot.tip_frame,) if row.of == "frames" else slice(0, 1)
+    with pytest.raises(REFUSED):
+        row.theirs(model, (x, x, x), of, reference)
+
+
+def test_the_kernels_and_the_command_line_know_the_members_of_the_enumeration() -> None:
+    assert dict(IN_KERNELS) == {reference: reference.value for reference in Reference}
+    assert tuple(reference.name.lower() for reference in Reference) == REFERENCES
+    assert set(REPRESENTATIONS) == {QUATERNION, *SEQUENCES}
+
+
+# -- joint kinds -----------------------------------------------------------------------------------------
+
+
+def new_kind() -> JointKind:
+    """Make a joint kind with two coordinates and no single axis."""
+    member: JointKind = cast("Any", JointKind)._new_member_(JointKind, "screw", 2, 2, 2, False, False, False)
+    member._name_ = "SCREW"
+    return member
+
+
+def test_a_joint_kind_without_its_properties_cannot_be_defined() -> None:
+    with pytest.raises(ValueError, match="expected 6"):
+        cast("Any", JointKind)._new_member_(JointKind, "screw")
+
+
+BRANCHES: Mapping[str, Callable[[Any], object]] = {
+    "pose": lambda kind: pose_of(kind, np.zeros(2)),
+    "coordinates": lambda kind: coordinates_of(kind, np.eye(4)),
+}
+
+
+@pytest.mark.parametrize("branch", BRANCHES)
+def test_poses_refuse_a_new_joint_kind(branch: str) -> None:
+    with pytest.raises(REFUSED):
+        BRANCHES[branch](new_kind())
+
+
+METHODS: Mapping[str, Callable[[urdfkin.Robot, Any], object]] = {
+    "recursion": lambda robot, x: robot.placement(x, robot.tip_frame, verify=False),
+    "split": lambda robot, x: robot.acceleration_breakdown(x, x, x, robot.tip_frame, verify=False),
+    "integrate": lambda robot, x: robot.integrate(x, x),
+    "difference": lambda robot, x: robot.difference(x, x),
+}
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_each_computation_refuses_a_new_joint_kind(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = urdfkin.load("one_link", verify=False).urdf.replace('type="revolute"', 'type="floating"')
+    kind = new_kind()
+    for name in ("nq", "nv", "nq_pinocchio"):
+        monkeypatch.setattr(JointKind.FLOATING, name, 2)
+    robot = urdfkin.load(text, verify=False)
+    for joint in robot.tree.joints:
+        if joint.kind is JointKind.FLOATING:
+            object.__setattr__(joint, "kind", kind)
+    with pytest.raises(REFUSED):
+        METHODS[method](robot, np.zeros(2))
