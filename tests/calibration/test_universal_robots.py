@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from urdfkin.calibration.parameters import elementary
 from urdfkin.calibration.universal_robots import (
     LINKS,
     calibrated_tree,
@@ -22,6 +21,7 @@ from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.rotation import euler_of
 from urdfkin.loading import load
 from urdfkin.model.chain import chain
+from urdfkin.model.path import elementary
 from urdfkin.model.tree import FloatArray
 
 #: theta, d, a, alpha of a real UR10e, from the driver's documentation: the upper arm is 439 m out.
@@ -57,17 +57,17 @@ NOMINAL = {
 
 def drawn_in() -> list[FloatArray]:
     """The links drawn in along their axes, as the driver does it."""
-    S = [elementary(True, 2, theta) @ elementary(False, 2, d) for theta, d, _, _ in CONTROLLER]
-    X = [elementary(False, 0, a) @ elementary(True, 0, alpha) for _, _, a, alpha in CONTROLLER]
+    S = [elementary(2, True, theta) @ elementary(2, False, d) for theta, d, _, _ in CONTROLLER]
+    X = [elementary(0, False, a) @ elementary(0, True, alpha) for _, _, a, alpha in CONTROLLER]
     for i in (1, 2):
         M = S[i] @ X[i]
         along = -M[2, 3] / M[2, 2]
         x, y, _ = M[:3, 3] + along * M[:3, 2]
         theta = math.atan2(-y, -x)
-        S[i] = elementary(True, 2, theta)
-        X[i] = elementary(False, 0, -math.hypot(x, y)) @ elementary(True, 2, CONTROLLER[i, 0] - theta)
-        X[i] = X[i] @ elementary(True, 0, CONTROLLER[i, 3])
-        S[i + 1] = S[i + 1] @ elementary(False, 2, -along)
+        S[i] = elementary(2, True, theta)
+        X[i] = elementary(0, False, -math.hypot(x, y)) @ elementary(2, True, CONTROLLER[i, 0] - theta)
+        X[i] = X[i] @ elementary(0, True, CONTROLLER[i, 3])
+        S[i + 1] = S[i + 1] @ elementary(2, False, -along)
     return [S[0], *(X[i] @ S[i + 1] for i in range(5))]
 
 

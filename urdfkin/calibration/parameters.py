@@ -1,17 +1,8 @@
 """Parametric models of a path: a URDF's origins or a table's cells as parameters, with their Jacobian.
 
-A model is a product of constants C and of elementary motions E. Each elementary motion is a rotation about,
-or a translation along, a coordinate axis of the current frame:
-
-    T_base_tip = C_0 E_1 C_1 E_2 C_2 ...,      E_k = R_x(phi), T_x(s), R_y(phi), ...
-
-Both a URDF's origins and the rows of a Denavit-Hartenberg table have this form. The derivative of the tip by
-a parameter p is a twist, like that of a joint. With the axis e and its origin O, both in the base,
-
-    rotation   dp_tip/dp = e x (p_tip - O),   w = e;       translation   dp_tip/dp = e,   w = 0
-
-which is a column of 7.85. The gain g of a joint scales its value by (1 + g). The column of g is the joint's
-column times the joint's value.
+A model is a path (`urdfkin.model.path`): both a URDF's origins and the rows of a Denavit-Hartenberg table are
+products of constants and elementary motions. The amount of a motion is a parameter or a joint's value. The
+gain g of a joint scales its value by (1 + g), so the column of g is the joint's column times the value.
 
 **URDF.** Each joint of the path has six parameters of its origin. Let A be the rotation that maps the z axis
 to the joint's axis. The new origin is  T . A . Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry) Rz(rz) . A^-1. So z slides
@@ -29,6 +20,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -36,12 +28,11 @@ from urdfkin.compiled.plan import turned
 from urdfkin.dh.table import Convention, DHRow, DHTable
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.errors.escape import log_line
-from urdfkin.kinematics.number_kinds import array_equations as eq
-from urdfkin.kinematics.rotation.euler import coordinate_rotation
 from urdfkin.kinematics.roundings import EPS, ROUNDINGS
 from urdfkin.model.chain import FrameChain, chain, steps_between
 from urdfkin.model.mimic import Coupling
-from urdfkin.model.pose import inverse, pose
+from urdfkin.model.path import Motion, Path, elementary
+from urdfkin.model.pose import inverse
 from urdfkin.model.tree import FloatArray, Joint, KinematicTree
 
 
@@ -66,19 +57,15 @@ class Parameter:
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
-    """An elementary rotation about, or translation along, a coordinate axis of the current frame.
+class Drive(Motion):
+    """An elementary motion with what determines its amount.
 
     Attributes:
-        axis: The axis: 0, 1 or 2.
-        turns: Whether it is a rotation.
         parameter: Index of the parameter, or of the joint's gain; None if there is none.
         joint: Index of the joint; None for a parameter.
         sense: -1 if the path passes the joint backwards, or if the table's row has the opposite sense.
     """
 
-    axis: int
-    turns: bool
     parameter: int | None
     joint: int | None = None
     sense: float = 1.0
@@ -89,19 +76,25 @@ class ParametricChain:
     """The pose of a tip as a function of parameters and joint values.
 
     Attributes:
-        steps: Constants (4, 4) and elementary motions, from base to tip.
-        parameters: The parameters; each occurs once in the steps.
+        path: Constants and drives, from base to tip.
+        parameters: The parameters; each occurs once in the path.
         start: (p,) values of the parameters in the original model.
     """
 
-    steps: tuple[FloatArray | Motion, ...]
+    path: Path
     parameters: tuple[Parameter, ...]
     start: FloatArray
+
+    @cached_property
+    def _drives(self) -> list[Drive]:
+        return [step for step in self.path.steps if isinstance(step, Drive)]
 
     @property
     def size(self) -> float:
         """Sum of all lengths of the model, metres; 1 if there are none. It converts radians to metres."""
-        lengths = [float(np.linalg.norm(step[:3, 3])) for step in self.steps if not isinstance(step, Motion)]
+        lengths = [
+            float(np.linalg.norm(step[:3, 3])) for step in self.path.steps if not isinstance(step, Motion)
+        ]
         slides = sum(
             abs(self.start[k]) for k, parameter in enumerate(self.parameters) if parameter.unit == "m"
         )
@@ -109,67 +102,33 @@ class ParametricChain:
 
     def poses(self, values: FloatArray, at: FloatArray | None = None) -> FloatArray:
         """Return poses (s, 4, 4) of the tip in the base for joint values (s, n) and parameters `at` (p,)."""
-        return self._forward(values, self.start if at is None else at)[0]
+        return self.path.poses(self._amounts(values, self.start if at is None else at)[0])
 
     def columns(self, values: FloatArray, at: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
         """Return poses (s, 4, 4) and the Jacobian (s, 6, p), [linear; angular], by the parameters."""
-        T, origins, axes, factors = self._forward(values, self.start if at is None else at)
+        amounts, factors = self._amounts(values, self.start if at is None else at)
+        T, twists = self.path.columns(amounts)
         columns = np.zeros((len(values), 6, len(self.parameters)))
-        for k, turns in self._turning.items():
-            linear, angular = axes[k], np.zeros_like(axes[k])
-            if turns:
-                linear, angular = eq.turning_column(axes[k], T[:, :3, 3] - origins[k])
-            columns[:, :, k] = factors[k] * np.hstack([linear, angular])
+        for k, drive in enumerate(self._drives):
+            if drive.parameter is not None:
+                columns[:, :, drive.parameter] = factors[:, k, np.newaxis] * twists[:, :, k]
         return T, columns
 
-    @property
-    def _turning(self) -> dict[int, bool]:
-        return {
-            step.parameter: step.turns
-            for step in self.steps
-            if isinstance(step, Motion) and step.parameter is not None
-        }
-
-    def _forward(
-        self, values: FloatArray, at: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Return tip poses, and origins and axes (p, s, 3) and factors (p, s, 1) of the parameters."""
-        p, s = len(self.parameters), len(values)
-        origins, axes, factors = np.zeros((p, s, 3)), np.zeros((p, s, 3)), np.ones((p, s, 1))
-        T = np.broadcast_to(np.eye(4), (s, 4, 4)).copy()
-        for step in self.steps:
-            if not isinstance(step, Motion):
-                T = T @ step
-                continue
-            amount = np.full(s, step.sense) if step.joint is None else step.sense * values[:, step.joint]
-            if (k := step.parameter) is not None:
-                origins[k], axes[k], factors[k] = T[:, :3, 3], T[:, :3, step.axis], amount[:, np.newaxis]
-                amount = amount * (at[k] if step.joint is None else 1.0 + at[k])
-            T = _apply(T, step, amount)
-        return T, origins, axes, factors
+    def _amounts(self, values: FloatArray, at: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the amount of each drive (s, drives), and its derivative by the drive's parameter."""
+        factors = np.empty((len(values), len(self._drives)))
+        numbers = np.ones(len(self._drives))
+        for k, drive in enumerate(self._drives):
+            factors[:, k] = drive.sense * (1.0 if drive.joint is None else values[:, drive.joint])
+            if drive.parameter is not None:
+                numbers[k] = at[drive.parameter] + (0.0 if drive.joint is None else 1.0)
+        return factors * numbers, factors
 
     def rounding(self, values: FloatArray) -> float:
         """Bound the rounding error of a number of `columns`, metres; divided by `size`, radians."""
-        slid = max((float(np.abs(values[:, j]).max(initial=0.0)) for j in self._slides), default=0.0)
-        return 2.0 * ROUNDINGS * (len(self.steps) + 1) * EPS * (self.size + slid * len(self._slides))
-
-    @property
-    def _slides(self) -> list[int]:
-        return [
-            step.joint
-            for step in self.steps
-            if isinstance(step, Motion) and step.joint is not None and not step.turns
-        ]
-
-
-def _apply(T: FloatArray, step: Motion, amount: FloatArray) -> FloatArray:
-    if step.turns:
-        turned = T.copy()
-        turned[:, :3, :3] = T[:, :3, :3] @ coordinate_rotation(step.axis, amount)
-        return turned
-    slid = T.copy()
-    slid[:, :3, 3] += amount[:, np.newaxis] * T[:, :3, step.axis]
-    return slid
+        slides = [drive.joint for drive in self._drives if drive.joint is not None and not drive.turns]
+        slid = max((float(np.abs(values[:, j]).max(initial=0.0)) for j in slides), default=0.0)
+        return 2.0 * ROUNDINGS * (len(self.path.steps) + 1) * EPS * (self.size + slid * len(slides))
 
 
 #: Radians within which two axes of a table count as parallel. Axes of real arms are off by some mrad. The
@@ -249,7 +208,7 @@ class Model:
         push = np.eye(4)
         for what, turns, axis in SIX:
             if what in values:
-                push = push @ elementary(turns, axis, values[what])
+                push = push @ elementary(axis, turns, values[what])
         return push
 
 
@@ -263,7 +222,7 @@ class _Maker:
         if not fit:
             raise InputError("no parameters to fit", remedy=f"choose among {', '.join(FITTED)}")
         self.fit = fit
-        self.steps: list[FloatArray | Motion] = []
+        self.steps: list[FloatArray | Drive] = []
         self.parameters: list[Parameter] = []
         self.start: list[float] = []
 
@@ -280,7 +239,7 @@ class _Maker:
     def push(self, where: str, only: Collection[str], *, backwards: bool = False, end: bool = False) -> None:
         """Add the six parameters of a joint, base or tool, or some of them."""
         moves = [
-            Motion(axis, turns, self.parameter(where, what, "rad" if turns else "m", end=end))
+            Drive(axis, turns, self.parameter(where, what, "rad" if turns else "m", end=end))
             for what, turns, axis in SIX
             if what in only
         ]
@@ -288,7 +247,7 @@ class _Maker:
 
     def joint(self, where: str, number: int, *, turns: bool, sense: float) -> None:
         gain = self.parameter(where, "gain", "") if "gains" in self.fit else None
-        self.steps.append(Motion(2, turns, gain, number, sense))
+        self.steps.append(Drive(2, turns, gain, number, sense))
 
     def model(
         self,
@@ -305,7 +264,7 @@ class _Maker:
             tuple(at[*place, what] for what in kept.get(place[0], _KEPT[True]) if (*place, what) in at)
             for place in sorted(places, key=lambda place: not place[1])
         )
-        way = ParametricChain(tuple(self.steps), tuple(self.parameters), np.array(self.start))
+        way = ParametricChain(Path(tuple(self.steps)), tuple(self.parameters), np.array(self.start))
         return Model(way, groups, path.coupling, *ends, source)
 
 
@@ -366,16 +325,16 @@ def table_model(table: DHTable, fit: Collection[str]) -> Model:
         own = "theta" if row.kind.turns else "d"
         cells = dict(zip(("a", "alpha", "d", "theta", "beta"), row.cells, strict=True))
         alone = abs(math.sin(row.alpha)) > PARALLEL and not row.beta
-        motions = list[FloatArray | Motion]()
+        motions = list[FloatArray | Drive]()
         for cell, turns, axis in _ROW:
             fitted = "origins" in fit and not (cell == "beta" and alone)
             if fitted or ("offsets" in fit and cell == own):
                 unit = "rad" if turns else "m"
-                motions.append(Motion(axis, turns, maker.parameter(row.joint, cell, unit, cells[cell])))
+                motions.append(Drive(axis, turns, maker.parameter(row.joint, cell, unit, cells[cell])))
             else:
-                motions.append(elementary(turns, axis, cells[cell]))
+                motions.append(elementary(axis, turns, cells[cell]))
         gain = maker.parameter(row.joint, "gain", "") if "gains" in fit else None
-        along = [*motions[:2], Motion(2, row.kind.turns, gain, i, float(row.sense))]
+        along = [*motions[:2], Drive(2, row.kind.turns, gain, i, float(row.sense))]
         between = motions[2:]
         standard = table.convention is Convention.STANDARD
         maker.steps += [*along, *between] if standard else [*between, *along]
@@ -383,12 +342,3 @@ def table_model(table: DHTable, fit: Collection[str]) -> Model:
     maker.end("tool")
     kept = dict.fromkeys((row.joint for row in table.rows), _KEPT_CELLS)
     return maker.model(table, table, (table.base_frame, table.tip_frame), kept)
-
-
-def elementary(turns: bool, axis: int, value: float) -> FloatArray:
-    """Return the rotation about, or translation along, a coordinate axis as a matrix (4, 4)."""
-    return (
-        pose(coordinate_rotation(axis, np.array(value)))
-        if turns
-        else pose(p=np.where(np.arange(3) == axis, value, 0.0))
-    )

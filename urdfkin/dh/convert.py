@@ -114,7 +114,7 @@ def free_tree(table: DHTable) -> KinematicTree:
 
 def frame_poses(table: DHTable) -> list[FloatArray]:
     """Return each joint's frame in the frame before it at zero, then the tip in the last joint's frame."""
-    S = [row.S() for row in table.rows]
+    S = [row.S for row in table.rows]
     X = [row.X for row in table.rows]
     if table.convention is Convention.STANDARD:
         ways = [s @ x for s, x in zip(S, X, strict=True)]

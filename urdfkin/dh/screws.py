@@ -20,12 +20,13 @@ from numpy.typing import ArrayLike
 
 from urdfkin.dh.convert import UNBOUNDED_SLIDE
 from urdfkin.errors import InputError
-from urdfkin.kinematics.rotation import exp_rotation
+from urdfkin.kinematics.rotation import axis_aligning
 from urdfkin.kinematics.rotation.matrix import ROUNDED, polar_factor
 from urdfkin.kinematics.roundings import EPS, of_rows
-from urdfkin.model.chain import FrameChain, motion_about_z
+from urdfkin.model.chain import FrameChain
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.mimic import Coupling, coupling_of
+from urdfkin.model.path import Motion, Path
 from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, build_tree, frozen
 
@@ -98,20 +99,21 @@ class ProductOfExponentials:
         Raises:
             InputError: `q` has the wrong length.
         """
-        values = self.coupling.values(q)
-        T = np.broadcast_to(np.eye(4), (*values.shape[:-1], 4, 4))
-        for i in range(len(self.joints)):
-            T = T @ exp_screw(self.space[i], values[..., i])
-        return np.ascontiguousarray(T @ self.M)
+        return self.path.poses(self.coupling.values(q))
 
-    def jacobian(self, q: Given) -> FloatArray:
-        """Return the (6, joints) space Jacobian of all joints, [angular; linear] (Modern Robotics, 5.11)."""
-        T, columns = np.eye(4), list[FloatArray]()
-        for screw, value in zip(self.space, self.coupling.values(q), strict=True):
-            w, v = T[:3, :3] @ screw[:3], T[:3, :3] @ screw[3:]
-            columns.append(np.concatenate([w, v + np.cross(T[:3, 3], w)]))
-            T = T @ exp_screw(screw, value)
-        return np.array(columns).reshape(-1, 6).T
+    @cached_property
+    def path(self) -> Path:
+        """The same product with elementary motions; the amounts are the joints' values.
+
+        exp([S] q) = A Rz(q) A^-1, or A Tz(q) A^-1, where z of the pose A is along the joint's axis. The
+        constant between two motions is A_i^-1 A_{i+1}; the last one is A_n^-1 M.
+        """
+        steps, R, p = list[FloatArray | Motion](), np.eye(3), np.zeros(3)
+        for joint, screw, point in zip(self.joints, self.space, self.points, strict=True):
+            along = axis_aligning(screw[:3] if joint.kind.turns else screw[3:])
+            steps += [pose(R.T @ along, R.T @ (point - p)), Motion(2, joint.kind.turns)]
+            R, p = along, point
+        return Path((*steps, pose(R.T @ self.M[:3, :3], R.T @ (self.M[:3, 3] - p))))
 
     @property
     def roundings(self) -> float:
@@ -166,16 +168,13 @@ class ProductOfExponentials:
 
 def screws_of(path: FrameChain) -> ProductOfExponentials:
     """Return the screws of a robot's path in the zero configuration."""
-    T, rows = np.eye(4), list[FloatArray]()
-    for joint, A in zip(path.joints, path.constants, strict=False):
-        T = T @ A
+    frames, rows = path.path.frames(np.zeros(len(path.joints)))[::2], list[FloatArray]()
+    for joint, T in zip(path.joints, frames, strict=False):
         z, p = T[:3, 2], T[:3, 3]
         rows.append(np.concatenate([z, np.cross(p, z)] if joint.kind.turns else [np.zeros(3), z]) + 0.0)
     joints = tuple(ScrewJoint(one.name, one.kind, one.mimic, one.limit) for one in path.joints)
     ends = path.robot, path.base, path.tip
-    return ProductOfExponentials(
-        joints, frozen(T @ path.T_last_tip), frozen(np.array(rows).reshape(-1, 6)), *ends
-    )
+    return ProductOfExponentials(joints, frozen(frames[-1]), frozen(np.array(rows).reshape(-1, 6)), *ends)
 
 
 def _rigid(M: FloatArray) -> FloatArray:
@@ -278,16 +277,3 @@ def screws_of_mapping(data: Mapping[str, Any]) -> ProductOfExponentials:
         raise InputError(
             "screws and M must be lists of numbers", where=frame, found=str(error)[:100]
         ) from None
-
-
-def exp_screw(screw: FloatArray, values: ArrayLike) -> FloatArray:
-    """Return (..., 4, 4) exp([S] q) of a screw (w, v) at `values` (...), rad or m (Modern Robotics, 3.88)."""
-    w, v, q = screw[:3], screw[3:], np.asarray(values, dtype=np.float64)
-    T = motion_about_z(np.zeros(q.shape), turns=True)
-    if not w.any():
-        T[..., :3, 3] = q[..., None] * v
-        return T
-    T[..., :3, :3] = exp_rotation(q[..., None] * w)
-    p = np.cross(w, v)  # the point of the axis nearest to the origin; a rotation does not move it
-    T[..., :3, 3] = p - T[..., :3, :3] @ p + q[..., None] * (w @ v) * w
-    return T

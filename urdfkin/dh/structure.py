@@ -39,7 +39,8 @@ from urdfkin.dh.match_table import derive_like, reversed_like
 from urdfkin.dh.screws import ProductOfExponentials
 from urdfkin.dh.table import Convention, DHRow, DHTable
 from urdfkin.errors import InputError
-from urdfkin.model.chain import FrameChain, motion_about_z
+from urdfkin.model.chain import FrameChain
+from urdfkin.model.path import elementary
 from urdfkin.model.tree import FloatArray, JointKind, is_bounded
 
 #: Largest deviation of a reported kind (rad, metres), and of one that is exact (both units).
@@ -288,11 +289,7 @@ def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]
         bounds.append((limit.lower, limit.upper) if is_bounded(limit) else (-math.pi, math.pi))
     lower, upper = np.array(bounds).reshape(-1, 2).T
     values = rng.uniform(lower, upper, (_SAMPLES, len(bounds)))
-    free = ProductOfExponentials(
-        tuple(type(j)(j.name, j.kind) for j in screws.joints), screws.M, screws.space
-    )
-    tips = free.placement(values)[:, :3, 3]
-    return tips, free.jacobian(values[0])
+    return screws.path.poses(values)[:, :3, 3], screws.path.columns(values[0])[1]
 
 
 #: Default tolerance of OPW parameters at the tip (metres, rad), and the number of samples that measure it.
@@ -328,11 +325,11 @@ class Opw:
         x = c2 * np.sin(t[1]) + a2 * np.cos(t[1] + t[2]) + c3 * np.sin(t[1] + t[2]) + a1
         z = c2 * np.cos(t[1]) - a2 * np.sin(t[1] + t[2]) + c3 * np.cos(t[1] + t[2]) + c1
         T = (
-            _rotation(t[0], 2)
-            @ _rotation(t[1] + t[2], 1)
-            @ _rotation(t[3], 2)
-            @ _rotation(t[4], 1)
-            @ _rotation(t[5], 2)
+            elementary(2, True, t[0])
+            @ elementary(1, True, t[1] + t[2])
+            @ elementary(2, True, t[3])
+            @ elementary(1, True, t[4])
+            @ elementary(2, True, t[5])
         )
         T[..., :3, 3] = np.stack(
             [x * np.cos(t[0]) - b * np.sin(t[0]), x * np.sin(t[0]) + b * np.cos(t[0]), z], -1
@@ -419,13 +416,6 @@ def _read(table: DHTable) -> Opw:
     )
     names, signs = tuple(row.joint for row in rows), tuple(row.sense for row in rows)
     return Opw(names, lengths, tuple(offsets), signs, table.base, table.tool)
-
-
-def _rotation(angle: FloatArray, axis: int) -> FloatArray:
-    """Return the (..., 4, 4) rotation about y (1) or z (2)."""
-    T = motion_about_z(np.asarray(angle), turns=True)
-    order = [1, 2, 0, 3] if axis == 1 else [0, 1, 2, 3]  # permutation of the axes of a rotation about z
-    return np.asarray(T[..., order, :][..., :, order])
 
 
 def axes_and_steps(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:

@@ -39,6 +39,7 @@ from urdfkin.errors.escape import log_line
 from urdfkin.kinematics.roundings import ANGLE, EPS, of_rows
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.mimic import Coupling, coupling_of
+from urdfkin.model.path import Motion, Path
 from urdfkin.model.tree import FloatArray, JointKind, Limit, Mimic, frozen
 from urdfkin.system.lazy_import import hook
 
@@ -127,14 +128,10 @@ class DHRow:
         """The (4, 4) transform Tx(a) Rx(alpha) Ry(beta)."""
         return between_axes(self.a, self.alpha, self.beta)
 
-    def S(self, value: ArrayLike = 0.0) -> FloatArray:
-        """Return the (..., 4, 4) transform Rz(theta) Tz(d) with the joint at `value` (rad or m)."""
-        moved = self.sense * np.asarray(value, dtype=np.float64)
-        return (
-            along_axis(self.theta + moved, self.d)
-            if self.kind.turns
-            else along_axis(self.theta, self.d + moved)
-        )
+    @property
+    def S(self) -> FloatArray:
+        """The (4, 4) transform Rz(theta) Tz(d), with the joint at zero."""
+        return along_axis(self.theta, self.d)
 
 
 #: Largest rounding error of a handwritten multiple of 15 degrees, as a fraction of 15 degrees.
@@ -416,13 +413,23 @@ class DHTable(Displayable):
             InputError: `q` has the wrong length.
         """
         values = self.coupling.values(np.zeros(len(self.joint_names)) if q is None else q)
-        poses = np.empty((*values.shape[:-1], len(self.rows) + 1, 4, 4))
-        poses[..., 0, :, :] = self.base
-        for i, row in enumerate(self.rows):
-            S = row.S(values[..., i])
-            step = S @ row.X if self.convention is Convention.STANDARD else row.X @ S
-            poses[..., i + 1, :, :] = poses[..., i, :, :] @ step
-        return poses
+        constants = np.array([row.theta if row.kind.turns else row.d for row in self.rows])
+        senses = np.array([row.sense for row in self.rows])
+        return self._path.frames(constants + senses * values)[..., ::2, :, :]
+
+    @cached_property
+    def _path(self) -> Path:
+        """The base, then a motion and a constant for each row; in a modified table the constant is first.
+
+        The amount of a motion is the row's variable, theta or d. The constant contains the row's other cells.
+        """
+        steps: list[FloatArray | Motion] = [self.base]
+        for row in self.rows:
+            motion = Motion(2, row.kind.turns)
+            own = along_axis(0.0, row.d) if row.kind.turns else along_axis(row.theta, 0.0)
+            standard = self.convention is Convention.STANDARD
+            steps += [motion, own @ row.X] if standard else [row.X @ own, motion]
+        return Path(tuple(steps))
 
     def placement(self, q: Given) -> FloatArray:
         """Return the (..., 4, 4) pose T_base_tip: the product of base, rows and tool.

@@ -36,7 +36,7 @@ from urdfkin.dh.units import Units
 from urdfkin.errors import InputError
 from urdfkin.errors.escape import csv_cell, csv_text, markdown_code, printable
 from urdfkin.kinematics.roundings import EPS, of_rows
-from urdfkin.model.chain import motion_about_z
+from urdfkin.model.path import elementary
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, frozen
 
 _SIGMA = {JointKind.REVOLUTE: 0, JointKind.CONTINUOUS: 0, JointKind.PRISMATIC: 1, JointKind.FIXED: 2}
@@ -168,7 +168,7 @@ class TreeParameters:
             constant = along_axis(row.gamma, row.b) @ between_axes(row.d, row.alpha, row.beta)
             T = T @ constant @ along_axis(row.theta, row.r)
             if row.sigma < 2:
-                T = T @ motion_about_z(values[..., j], row.sigma == 0)
+                T = T @ elementary(2, row.sigma == 0, values[..., j])
             frames[..., j, :, :] = T
         return np.asarray(frames @ self.T_frame_link)
 

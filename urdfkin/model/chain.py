@@ -21,6 +21,7 @@ from urdfkin.errors.escape import log_line
 from urdfkin.kinematics.rotation import axis_aligning
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.mimic import Coupling, coupling_of
+from urdfkin.model.path import Motion, Path
 from urdfkin.model.pose import inverse, pose
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, frozen
 
@@ -118,6 +119,12 @@ class FrameChain(Displayable):
         return (*(joint.T_previous_joint for joint in self.joints), self.T_last_tip)
 
     @cached_property
+    def path(self) -> Path:
+        """The constants and motions A_0, M_1, A_1 ... M_n, A_n; the amounts are the joint values."""
+        moving = ((joint.T_previous_joint, Motion(2, joint.kind.turns)) for joint in self.joints)
+        return Path((*(step for pair in moving for step in pair), self.T_last_tip))
+
+    @cached_property
     def reach(self) -> float:
         """Sum (m) of the constant offsets between joints, with the tip offset, without the base offset."""
         return float(self.lengths[1:].sum())
@@ -132,13 +139,7 @@ class FrameChain(Displayable):
             InputError: `q` has the wrong length.
         """
         values = self.coupling.values(np.zeros(len(self.joint_names)) if q is None else q)
-        poses = np.empty((*values.shape[:-1], len(self.joints) + 1, 4, 4))
-        T_base_here: FloatArray = np.broadcast_to(np.eye(4), (*values.shape[:-1], 4, 4))
-        for i, joint in enumerate(self.joints):
-            poses[..., i, :, :] = T_base_here @ joint.T_previous_joint
-            T_base_here = poses[..., i, :, :] @ motion_about_z(values[..., i], joint.kind.turns)
-        poses[..., -1, :, :] = T_base_here @ self.T_last_tip
-        return poses
+        return self.path.frames(values)[..., ::2, :, :]
 
     def placement(self, q: Given) -> FloatArray:
         """Return T_base_tip (..., 4, 4) for `q` (..., coordinates); raises InputError for a wrong length."""
@@ -211,20 +212,6 @@ def steps_between(tree: KinematicTree, tip: str, base: str) -> list[tuple[Joint,
         common += 1
     backwards = [(tree.joints[i], True) for i in reversed(up[common:])]
     return backwards + [(tree.joints[i], False) for i in down[common:]]
-
-
-def motion_about_z(values: FloatArray, turns: bool) -> FloatArray:
-    """Return Rz(values) or Tz(values), (..., 4, 4)."""
-    T = np.zeros((*values.shape, 4, 4))
-    T[..., 2, 2] = T[..., 3, 3] = 1.0
-    if turns:
-        T[..., 0, 0] = T[..., 1, 1] = np.cos(values)
-        T[..., 1, 0] = np.sin(values)
-        T[..., 0, 1] = -T[..., 1, 0]
-    else:
-        T[..., 0, 0] = T[..., 1, 1] = 1.0
-        T[..., 2, 3] = values
-    return T
 
 
 def _poses_around(joint: Joint, backwards: bool) -> tuple[FloatArray, FloatArray]:

@@ -14,14 +14,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from urdfkin.dh.snapping import rotation_angle
-from urdfkin.dh.table import along_axis, between_axes
 from urdfkin.kinematics.rotation import exp_rotation, log_rotation
 from urdfkin.kinematics.roundings import NOT_ZERO
+from urdfkin.model.path import Motion, Path
 from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray
 
-#: Cells in the order of their transforms.
+#: Cells in the order of their transforms, and these transforms.
 CELLS = ("theta", "d", "a", "alpha", "beta")
+_ROW = (Motion(2, True), Motion(2, False), Motion(0, False), Motion(0, True), Motion(1, True))
 #: Largest step: radians, and metres per metre of reach.
 LONGEST_STEP = 0.5
 #: Largest number of steps; smallest relative improvement; mean error that counts as zero.
@@ -60,57 +61,35 @@ class Model:
     def first(self) -> FloatArray:
         """(4, 4) pose of the first revolute joint's frame relative to `base`, with all joints at zero."""
         turning = np.flatnonzero(self.turns)
-        return self._rows(0, int(turning[0]) if turning.size else 0)
+        end = len(CELLS) * int(turning[0]) if turning.size else 0
+        return Path((np.eye(4), *self._motions[:end])).poses(self.cells.ravel()[:end])
 
     @property
     def last(self) -> FloatArray:
         """(4, 4) pose of the tip in the last revolute joint's frame, with the later joints at zero."""
-        turning, n = np.flatnonzero(self.turns), len(self.cells)
-        k = int(turning[-1]) if turning.size else n - 1
-        _, _, a, alpha, beta = self.cells[k]
-        step = between_axes(a, alpha) @ between_axes(0.0, 0.0, beta)
-        return np.asarray(step @ self._rows(k + 1, n) @ self.tool)
+        turning = np.flatnonzero(self.turns)
+        begin = len(CELLS) * int(turning[-1] if turning.size else len(self.cells) - 1) + CELLS.index("a")
+        return Path((*self._motions[begin:], self.tool)).poses(self.cells.ravel()[begin:])
 
     def own(self, i: int) -> int:
         """Return the index of the cell with the joint's variable in row i."""
         return 0 if self.turns[i] else 1
 
-    def _rows(self, begin: int, end: int) -> FloatArray:
-        T = np.eye(4)
-        for theta, d, a, alpha, beta in self.cells[begin:end]:
-            T = T @ along_axis(theta, d) @ between_axes(a, alpha) @ between_axes(0.0, 0.0, beta)
-        return T
+    @property
+    def _motions(self) -> tuple[Motion, ...]:
+        return _ROW * len(self.cells)
+
+    def path_at(self, values: FloatArray) -> tuple[Path, FloatArray]:
+        """Return the path from base to tip, and its amounts (s, 5 n) at joint values (s, n): all cells."""
+        amounts = np.tile(self.cells.ravel(), (len(values), 1))
+        for i in range(len(self.cells)):
+            amounts[:, len(CELLS) * i + self.own(i)] += self.senses[i] * values[:, i]
+        return Path((self.base, *self._motions, self.tool)), amounts
 
     def poses(self, values: FloatArray) -> FloatArray:
         """Return the (s, 4, 4) poses of the tip."""
-        thetas, ds, *between = self.cells.T
-        moved = self.senses * values
-        joints = along_axis(thetas + self.turns * moved, ds + (1.0 - self.turns) * moved)
-        T: FloatArray = np.broadcast_to(self.base, (len(values), 4, 4))
-        for i, step in enumerate(map(between_axes, *between)):
-            T = T @ (joints[:, i] @ step)
-        return T @ self.tool
-
-    def walk(self, values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Run the forward recursion for the tip's poses and the lines of motion of all cells.
-
-        Returns:
-            The tip's poses (s, 4, 4), and the origins and axes (s, n, 5, 3) of each cell's motion.
-        """
-        samples, n = len(values), len(self.cells)
-        origins, axes = np.empty((2, samples, n, 5, 3))
-        T: FloatArray = np.broadcast_to(self.base, (samples, 4, 4))
-        for i, (theta, d, a, alpha, beta) in enumerate(self.cells):
-            moved = self.senses[i] * values[:, i]
-            axes[:, i, :2] = T[:, None, :3, 2]
-            origins[:, i, :2] = T[:, None, :3, 3]
-            T = T @ along_axis(theta + self.turns[i] * moved, d + (1.0 - self.turns[i]) * moved)
-            axes[:, i, 2:4] = T[:, None, :3, 0]
-            T = T @ between_axes(a, alpha)
-            axes[:, i, 4] = T[:, :3, 1]
-            T = T @ between_axes(0.0, 0.0, beta)
-            origins[:, i, 2:] = T[:, None, :3, 3]
-        return T @ self.tool, origins, axes
+        path, amounts = self.path_at(values)
+        return path.poses(amounts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,16 +125,13 @@ def columns(model: Model, wanted: TargetPoses) -> tuple[FloatArray, FloatArray, 
     order of (n, 5). Angles are multiplied by the scale.
     """
     scale = wanted.scale
-    poses, origins, axes = model.walk(wanted.values)
-    tip = poses[:, None, None, :3, 3]
-    turning = np.array([True, False, False, True, True])
-    linear = np.where(turning[:, None], np.cross(axes, tip - origins), axes)
-    angular = np.where(turning[:, None], axes, 0.0)
+    path, amounts = model.path_at(wanted.values)
+    poses, twists = path.columns(amounts)
     # Angular cells are in metres at the distance `scale`, like the angular part of a twist.
-    per_cell = np.where(turning, 1.0 / scale, 1.0)[:, None]
-    cells = np.concatenate([linear * per_cell, scale * angular * per_cell], axis=-1)
-    n = len(model.cells)
-    cells = np.moveaxis(cells.reshape(len(poses), 5 * n, 6), 1, 2).reshape(-1, 5 * n)
+    n, turning = len(model.cells), np.tile([motion.turns for motion in _ROW], len(model.cells))
+    twists = twists * np.where(turning, 1.0 / scale, 1.0)
+    twists[:, 3:] *= scale
+    cells = twists.reshape(-1, len(CELLS) * n)
     own = [5 * i + model.own(i) for i in range(n)]
     first = np.broadcast_to(model.base @ model.first, poses.shape)
     ends = [_end(poses, first, scale), _end(poses, poses @ np.linalg.inv(model.last), scale)]

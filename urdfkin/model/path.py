@@ -1,0 +1,106 @@
+"""A path: the product of constant poses and elementary motions, with its poses and Jacobian columns.
+
+    T(x) = C_0 E_1(x_1) C_1 E_2(x_2) ...,      E_k = Rx, Ry, Rz, Tx, Ty or Tz of the amount x_k
+
+Chains, Denavit-Hartenberg tables, screws, and the models that `dh --compare` and `calibrate` fit have this
+form. They differ only in the amounts: joint values, cells of a table, or parameters. The derivative of the
+last pose by an amount is a twist. With the axis e and its origin O, in the frame before the path,
+
+    rotation   dp/dx = e x (p - O),   w = e;       translation   dp/dx = e,   w = 0
+
+which is a column of 7.85.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from urdfkin.kinematics.number_kinds import array_equations as eq
+from urdfkin.kinematics.rotation.euler import coordinate_rotation
+from urdfkin.model.tree import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """A rotation about, or a translation along, a coordinate axis of the current frame.
+
+    Attributes:
+        axis: The axis: 0, 1 or 2.
+        turns: Whether it is a rotation.
+    """
+
+    axis: int
+    turns: bool
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Path:
+    """A product of constant poses and elementary motions.
+
+    Attributes:
+        steps: Constant poses (4, 4) and motions, first to last.
+
+    Example:
+        >>> arm = Path((Motion(2, turns=True), elementary(0, False, 2.0)))
+        >>> arm.poses([np.pi / 2])[:3, 3].round(12).tolist()
+        [0.0, 2.0, 0.0]
+        >>> arm.columns([0.0])[1].ravel().tolist()
+        [0.0, 2.0, 0.0, 0.0, 0.0, 1.0]
+    """
+
+    steps: tuple[FloatArray | Motion, ...]
+
+    def frames(self, amounts: ArrayLike) -> FloatArray:
+        """Return the poses (..., steps, 4, 4) after each step, for amounts (..., motions) in rad or m."""
+        amounts = np.asarray(amounts, np.float64)
+        frames = np.empty((*amounts.shape[:-1], len(self.steps), 4, 4))
+        T: FloatArray = np.broadcast_to(np.eye(4), (*amounts.shape[:-1], 4, 4))
+        k = 0
+        for i, step in enumerate(self.steps):
+            if isinstance(step, Motion):
+                T = _moved(T, step, amounts[..., k])
+                k += 1
+            else:
+                T = T @ step
+            frames[..., i, :, :] = T
+        return frames
+
+    def poses(self, amounts: ArrayLike) -> FloatArray:
+        """Return the last pose (..., 4, 4) for amounts (..., motions)."""
+        return np.ascontiguousarray(self.frames(amounts)[..., -1, :, :])
+
+    def columns(self, amounts: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Return the last pose, and its Jacobian (..., 6, motions), [linear; angular], by the amounts."""
+        frames = self.frames(amounts)
+        T = frames[..., -1, :, :]
+        motions = [(i, step) for i, step in enumerate(self.steps) if isinstance(step, Motion)]
+        # A motion leaves its own axis where it is, so the frame after it has the axis too.
+        columns = np.zeros((*T.shape[:-2], 6, len(motions)))
+        for k, (i, step) in enumerate(motions):
+            axis = frames[..., i, :3, step.axis]
+            linear = axis
+            if step.turns:
+                linear, columns[..., 3:, k] = eq.turning_column(axis, T[..., :3, 3] - frames[..., i, :3, 3])
+            columns[..., :3, k] = linear
+        return T, columns
+
+
+def elementary(axis: int, turns: bool, amount: ArrayLike) -> FloatArray:
+    """Return the rotation about, or translation along, a coordinate axis by amounts (...), (..., 4, 4)."""
+    amount = np.asarray(amount, np.float64)
+    return _moved(np.tile(np.eye(4), (*amount.shape, 1, 1)), Motion(axis, turns), amount)
+
+
+def _moved(T: FloatArray, motion: Motion, amount: FloatArray) -> FloatArray:
+    """Return the product of poses (..., 4, 4) and an elementary motion by amounts (...)."""
+    if not amount.any():  # many cells of a table are zero
+        return T
+    moved = np.array(T)
+    if motion.turns:
+        moved[..., :3, :3] = T[..., :3, :3] @ coordinate_rotation(motion.axis, amount)
+    else:
+        moved[..., :3, 3] += amount[..., np.newaxis] * T[..., :3, motion.axis]
+    return moved
