@@ -15,7 +15,7 @@ Among the columns that are nearly as independent as the most independent one, th
 is kept. So no fitted parameter becomes large to compensate for a fixed one. Without this rule, four
 parameters of nearly parallel axes would become hundreds of metres that cancel.
 
-**Fit.** Damped Gauss-Newton (Levenberg, 1944; Marquardt, 1963) minimizes the tip's errors, each divided by
+**Fit.** Damped Gauss-Newton (`urdfkin.kinematics.least_squares`) minimizes the tip's errors, each divided by
 its noise. At the minimum, let J be the weighted Jacobian and r the weighted residuals. Then
 
     C = (J^T J)^-1       is the covariance of the parameters,
@@ -47,8 +47,9 @@ from numpy.typing import NDArray
 
 from urdfkin.calibration.parameters import Model
 from urdfkin.errors import InputError
+from urdfkin.kinematics.least_squares import least_squares
 from urdfkin.kinematics.rotation import euler_of, log_rotation
-from urdfkin.kinematics.roundings import EPS
+from urdfkin.kinematics.roundings import NOT_ZERO
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singular_values import singular_values
 
@@ -151,17 +152,6 @@ def _reason(model: Model, J: FloatArray, error: FloatArray, kept: Sequence[int],
     return f"same effect as {', '.join(names)}{more}{' together' if len(order) > 1 else ''}"
 
 
-_ROUNDS = 100
-#: Initial and largest damping, as shares of the largest singular value.
-_DAMPING, _MOST = 1e-4, 1e3
-#: Minimum damping, below which it is 0; reset value after that.
-_UNDAMPED, _AGAIN = _DAMPING**3, _DAMPING**2
-#: Factors on the damping after a successful and after a failed step.
-_EASING, _HARDER = 0.03, 10.0
-#: Share of the squared errors below which a step is no gain.
-_NOTHING = 1e-13
-#: Change of the sum of squares by rounding, in eps for each measured number.
-_ROUNDED = 4.0
 #: Redundancy below which there is none.
 _ONE_OR_MORE = 0.5
 #: Share of a pose's largest redundancy; a direction with less is fully absorbed by the fit.
@@ -338,32 +328,19 @@ def _whitened(
 def _minimize(
     model: Model, measured: Measured, kept: Sequence[int], noise: Noise, at: FloatArray
 ) -> FloatArray:
-    scale, damping = noise.of(measured.complete), _DAMPING
+    scale = noise.of(measured.complete)
 
-    def size(at: FloatArray) -> float:
-        return float(np.linalg.norm(errors(model, measured, at) / scale))
+    def moved(at: FloatArray, step: FloatArray) -> FloatArray:
+        trial = at.copy()
+        trial[list(kept)] += step
+        return trial
 
-    now = size(at)
-    for _ in range(_ROUNDS):
-        r, J = _whitened(model, measured, kept, noise, at)
-        units = np.linalg.norm(J, axis=0)
-        units[units == 0.0] = 1.0
-        U, S, Vt = np.linalg.svd(J / units, full_matrices=False)
-        before, along = now, U.T @ r
-        if float(along @ along) <= _NOTHING * now**2:
-            break
-        while damping <= _MOST:
-            factor = S / (S**2 + (damping * S[0]) ** 2) if S.size else S
-            trial = at.copy()
-            trial[list(kept)] += Vt.T @ (factor * along) / units
-            if (after := size(trial)) < now:
-                at, now, damping = trial, after, _EASING * damping
-                break
-            damping = max(_HARDER * damping, _AGAIN)
-        if now >= before * (1.0 - _ROUNDED * EPS * len(r)):
-            break
-        damping = 0.0 if damping < _UNDAMPED else damping
-    return at
+    return least_squares(
+        at,
+        lambda at: _whitened(model, measured, kept, noise, at),
+        lambda at: float(np.linalg.norm(errors(model, measured, at) / scale)),
+        moved,
+    )[0]
 
 
 def _evaluate(model: Model, measured: Measured, kept: Sequence[int], noise: Noise, at: FloatArray) -> Fit:
@@ -421,7 +398,8 @@ def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]
         return ~free
     x, C = moved.copy(), covariance.copy()
     while (rest := np.flatnonzero(stays & free)).size:
-        sizes = np.abs(x[rest]) / np.sqrt(C[rest, rest])
+        # The difference of two variances may round to 0 or less: the change is then exact beside the noise.
+        sizes = np.abs(x[rest]) / np.sqrt(np.maximum(C[rest, rest], NOT_ZERO))
         k = rest[int(np.argmin(sizes))]
         if sizes.min() > SIGMAS:
             break

@@ -1,6 +1,6 @@
 """Fit base, tool and joint offsets of a reference table to a URDF, with its cells unchanged.
 
-The method is damped least squares (Levenberg, 1944; Marquardt, 1963) on the tip's twists. Two joints with
+The method is damped least squares (`urdfkin.kinematics.least_squares`) on the tip's twists. Two joints with
 nearly coinciding axes have nearly the same effect. Opposite changes of their offsets follow a curved valley
 of the error, along which the error falls by at most the distance of the axes. The damping therefore decreases
 while steps succeed. At the end of a descent, opposite rotations of such pairs are tried as new starts.
@@ -17,16 +17,13 @@ import numpy as np
 from urdfkin.dh.compare.align import Alignment, align
 from urdfkin.dh.compare.fit import LONGEST_STEP, Model, TargetPoses, columns, moved
 from urdfkin.dh.table import DHTable, along_axis, between_axes
+from urdfkin.kinematics.least_squares import least_squares
 from urdfkin.kinematics.roundings import EPS, of_a_fit
 from urdfkin.model.chain import FrameChain
+from urdfkin.model.tree import FloatArray
 
-_ROUNDS = 60
-#: Damping relative to the largest singular value: at the start, least and most.
-_DAMPING, _LEAST, _MOST = 1e-3, 1e-14, 1e2
-#: Factors of the damping after a success and after a failure.
-_EASING, _HARDER = 0.03, 10.0
-#: A step is slow if it leaves more than this fraction; a descent ends after this many slow steps.
-_SLOW, _PATIENCE = 0.99, 4
+#: A descent ends after this many slow steps.
+_PATIENCE = 4
 #: Mean error at which a fit ends, relative to the reach.
 _ROUNDING = 1e-13
 #: A fast fit fits this many sign patterns, and keeps this many at each joint.
@@ -145,25 +142,18 @@ def _size(model: Model, wanted: TargetPoses) -> float:
 
 
 def _descend(model: Model, wanted: TargetPoses, ends: bool) -> tuple[Model, float]:
-    size, damping, slow = _size(model, wanted), _DAMPING, 0
-    for _ in range(_ROUNDS):
+    def linearized(model: Model) -> tuple[FloatArray, FloatArray]:
         poses, freedoms, _ = columns(model, wanted)
-        U, S, Vt = np.linalg.svd(freedoms[:, : 12 if ends else None], full_matrices=False)
-        along = U.T @ wanted.errors(poses)
-        before = size
-        while damping <= _MOST:
-            free = Vt.T @ (S / (S**2 + (damping * S[0]) ** 2) * along)
-            if np.abs(free).max() <= LONGEST_STEP * wanted.scale:
-                trial = moved(model, free, wanted.scale)
-                if (trial_size := _size(trial, wanted)) < size:
-                    model, size = trial, trial_size
-                    break
-            damping *= _HARDER
-        slow = slow + 1 if size > _SLOW * before else 0
-        if size == before or slow == _PATIENCE:
-            break
-        damping = max(_EASING * damping, _LEAST)
-    return model, size
+        return wanted.errors(poses), freedoms[:, : 12 if ends else None]
+
+    return least_squares(
+        model,
+        linearized,
+        lambda model: _size(model, wanted),
+        lambda model, free: moved(model, free, wanted.scale),
+        longest=LONGEST_STEP * wanted.scale,
+        patience=_PATIENCE,
+    )
 
 
 def _opposite_rotations(model: Model) -> list[Model]:
