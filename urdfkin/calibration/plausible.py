@@ -230,8 +230,7 @@ def _coordinates(model: Model) -> Iterator[tuple[str, bool, float, float]]:
     """Yield each coordinate of the path: name, whether it is an angle, lower and upper limit."""
     kinds = dict(zip(model.coupling.joints, model.coupling.kinds, strict=True))
     for name in model.coupling.names:
-        lower, upper = -math.inf, math.inf
-        kind = kinds.get(name)
+        lower, upper, kind = -math.inf, math.inf, kinds.get(name)
         if isinstance(model.source, KinematicTree):
             joint = model.source.joints[model.source.joint_index(name)]
             kind = joint.kind

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError
-from urdfkin.kinematics.inputs import scalars
+from urdfkin.kinematics.inputs import rotation_defect, scalars
 from urdfkin.kinematics.rotation import rotation_of
 from urdfkin.model.tree import FloatArray
 from urdfkin.motion.columns import read_columns
@@ -118,8 +118,7 @@ def _with_quaternions(p: FloatArray, quat: FloatArray, where: str) -> FloatArray
 def _with_exact_rotations(T: FloatArray, where: str) -> FloatArray:
     """Return the poses with exact rotations; their digits may be rounded."""
     R = T[:, :3, :3]
-    off = np.abs(R.swapaxes(-1, -2) @ R - np.eye(3)).max(axis=(-2, -1), initial=0.0)
-    bad = (off > _WRITTEN) | (np.linalg.det(R) < 0.0)
+    bad = rotation_defect(R) > _WRITTEN
     if bad.any():
         raise InputError(
             "a pose must be a rotation and a translation",

@@ -29,6 +29,7 @@ from urdfkin.kinematics.rotation import rotation_from_euler
 from urdfkin.loading import load
 from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.pose import pose
+from urdfkin.model.ranges import values_within
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, build_tree
 from urdfkin.robot import Robot
 from urdfkin.system.files import read_text
@@ -207,7 +208,7 @@ def _verify_written(result: Rewritten, calibrated: FrameChain, prefix: str) -> C
 def distance(one: Mapping[str, FloatArray], other: Mapping[str, FloatArray]) -> tuple[float, float]:
     """Return the largest distance and angle (m, rad) between the tools of two calibrations, on samples."""
     paths = [chain(calibrated_tree(origins), "tool0", "base") for origins in (one, other)]
-    q = np.random.default_rng(0).uniform(-np.pi, np.pi, (_COMPARED, len(LINKS)))
+    q = values_within([(-np.pi, np.pi)] * len(LINKS), _COMPARED)
     T, S = (path.placement(q) for path in paths)
     turn = T[:, :3, :3].swapaxes(-1, -2) @ S[:, :3, :3]
     angle = np.linalg.norm(turn - np.eye(3), axis=(-2, -1)) / np.sqrt(2.0)

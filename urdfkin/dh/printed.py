@@ -13,10 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from urdfkin.dh.export.text import at_most, constant_of
-from urdfkin.dh.snapping import SAMPLES, range_of, travel, values_within
+from urdfkin.dh.snapping import SAMPLES, UNKNOWN, travel
 from urdfkin.dh.table import DHRow, DHTable
 from urdfkin.dh.tree_parameters import TreeParameters, TreeRow
 from urdfkin.dh.units import Units, cell_in_si, read_number
+from urdfkin.model.ranges import axis_range, values_within
 from urdfkin.model.tree import FloatArray
 
 
@@ -55,8 +56,8 @@ def printed(table: DHTable, units: Units, pose_digits: int | None = None) -> Pri
     digits = pose_digits or units.digits
     rows = tuple(_row(row, units) for row in table.rows)
     base, tool = (_pose(T, digits) for T in (table.base, table.tool))
-    bounds = {row.joint: range_of(row) for row in table.rows if row.mimic is None}
-    q = values_within(bounds, table.joint_names, SAMPLES)
+    bounds = {row.joint: axis_range(row.kind, row.limit) for row in table.rows if row.mimic is None}
+    q = values_within([bounds.get(name, UNKNOWN) for name in table.joint_names], SAMPLES)
     # The rounded entries of base and tool are not a rotation, so these are multiplied outside the table.
     between = replace(table, rows=rows, base=np.eye(4), tool=np.eye(4)).placement(q)
     off = np.linalg.norm((base @ between @ tool - table.placement(q))[:, :3, 3], axis=-1)
@@ -113,7 +114,7 @@ def _bound(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, tool: Floa
         slides = 0.0 if row.kind.turns else travel(row.limit)
         lever += abs(row.a) + abs(row.d) + slides
         if row.mimic is not None and other.mimic is not None:
-            slides = max(abs(bound) for bound in range_of(row))
+            slides = max(abs(bound) for bound in axis_range(row.kind, row.limit))
             total += abs(row.mimic.multiplier - other.mimic.multiplier) * slides * max(lever, 1.0)
         changes = np.abs(np.subtract(row.cells, other.cells))
         total += float(changes[[0, 2]].sum() + changes[[1, 3, 4]].sum() * lever)

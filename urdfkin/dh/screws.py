@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from urdfkin.dh.convert import UNBOUNDED_SLIDE
 from urdfkin.errors import InputError
+from urdfkin.kinematics.inputs import rotation_defect
 from urdfkin.kinematics.rotation import axis_aligning
 from urdfkin.kinematics.rotation.matrix import ROUNDED, polar_factor
 from urdfkin.kinematics.roundings import EPS, of_rows
@@ -182,7 +183,7 @@ def _rigid(M: FloatArray) -> FloatArray:
     T = np.eye(4)
     T[:3] = M[:3]
     R = T[:3, :3]
-    if np.abs(R.T @ R - np.eye(3)).max() > _WRITTEN or np.linalg.det(R) < 0:
+    if rotation_defect(R) > _WRITTEN:
         raise InputError("M must be a rotation and a translation", where="M", found=str(R.tolist()))
     nearest = polar_factor(R)
     if np.abs(nearest - R).max() > ROUNDED:

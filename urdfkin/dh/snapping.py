@@ -23,13 +23,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from urdfkin.dh.table import Convention, DHRow, DHTable, SnapChange, SnapReport, nearest_twelfth, wrapped
+from urdfkin.dh.table import Convention, DHTable, SnapChange, SnapReport, nearest_twelfth, wrapped
 from urdfkin.errors import InputError
 from urdfkin.errors.validators import real_number
 from urdfkin.kinematics.rotation.euler import coordinate_rotation
 from urdfkin.kinematics.roundings import ANGLE, EPS, TURN
-from urdfkin.model.chain import ChainJoint, FrameChain, chain, steps_between
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, frozen, is_bounded
+from urdfkin.model.chain import FrameChain, chain, steps_between
+from urdfkin.model.ranges import axis_range, values_within
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, frozen
 
 #: Largest tolerance (rad): 5 degrees. Beyond 7.5 degrees the nearest multiple of 15 degrees changes.
 LARGEST_TOLERANCE = math.pi / 36.0
@@ -93,8 +94,8 @@ def statement(
     reached = {joint.name: travel(joint.limit) for joint in exact.joints}
     metres = sum((change.tip for change in changes), 0.0)
     metres += sum(rate * reached[name] for name, rate in per_metre.items())
-    bounds = {joint.name: range_of(joint) for joint in exact.joints if joint.mimic is None}
-    q = values_within(bounds, exact.joint_names, SAMPLES)
+    bounds = {one.name: axis_range(one.kind, one.limit) for one in exact.joints if one.mimic is None}
+    q = values_within([bounds.get(name, UNKNOWN) for name in exact.joint_names], SAMPLES)
     T_exact, T_table = exact.placement(q), table.placement(q)
     shift = np.linalg.norm(T_exact[:, :3, 3] - T_table[:, :3, 3], axis=-1)
     turn = rotation_angle(T_exact[:, :3, :3], T_table[:, :3, :3])
@@ -218,22 +219,13 @@ def row_of_constant(table: DHTable, k: int) -> int:
     return k - 1 if table.convention is Convention.STANDARD else k
 
 
+#: Range of a coordinate whose own joint is not on the path (rad or metres).
+UNKNOWN = (-1.0, 1.0)
+
+
 def travel(limit: Limit | None) -> float:
     """Return the largest distance of a prismatic joint from zero (metres); one metre without limits."""
     return 1.0 if limit is None else max(abs(limit.lower), abs(limit.upper))
-
-
-def values_within(bounds: Mapping[str, tuple[float, float]], names: Sequence[str], count: int) -> FloatArray:
-    """Draw (count, coordinates) values uniformly within bounds by name; within -1 to 1 without bounds."""
-    lower, upper = np.array([bounds.get(name, (-1.0, 1.0)) for name in names]).reshape(-1, 2).T
-    return np.random.default_rng(0).uniform(lower, upper, (count, len(names)))
-
-
-def range_of(joint: ChainJoint | DHRow) -> tuple[float, float]:
-    """Return a joint's limits; without limits -pi to pi (revolute) or -1 m to 1 m (prismatic)."""
-    if joint.kind is not JointKind.CONTINUOUS and is_bounded(joint.limit):
-        return joint.limit.lower, joint.limit.upper
-    return (-math.pi, math.pi) if joint.kind.turns else (-1.0, 1.0)
 
 
 #: Largest difference that looks rounded: radians from a multiple of 15 degrees; metres per metre of span.

@@ -41,7 +41,8 @@ from urdfkin.dh.table import Convention, DHRow, DHTable
 from urdfkin.errors import InputError
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.path import elementary
-from urdfkin.model.tree import FloatArray, JointKind, is_bounded
+from urdfkin.model.ranges import axis_range, values_within
+from urdfkin.model.tree import FloatArray, JointKind
 
 #: Largest deviation of a reported kind (rad, metres), and of one that is exact (both units).
 NEAR_ANGLE, NEAR_LENGTH, EXACT = 0.02, 0.005, 1e-9
@@ -283,12 +284,8 @@ def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
 
 def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
     """Return the tip's positions at samples within the limits, and the Jacobian at the first sample."""
-    rng, bounds = np.random.default_rng(0), []
-    for joint in screws.joints:
-        limit = joint.limit
-        bounds.append((limit.lower, limit.upper) if is_bounded(limit) else (-math.pi, math.pi))
-    lower, upper = np.array(bounds).reshape(-1, 2).T
-    values = rng.uniform(lower, upper, (_SAMPLES, len(bounds)))
+    ranges = [axis_range(joint.kind, joint.limit, slide=math.pi) for joint in screws.joints]
+    values = values_within(ranges, _SAMPLES)
     return screws.path.poses(values)[:, :3, 3], screws.path.columns(values[0])[1]
 
 
@@ -363,7 +360,7 @@ def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
     if [joint.kind.turns for joint in path.joints] != [True] * 6:
         raise InputError("an OPW arm must have six revolute joints", where=where, found=str(len(path.joints)))
     free = replace(path, joints=tuple(replace(joint, mimic=None) for joint in path.joints))
-    q = np.random.default_rng(0).uniform(-np.pi, np.pi, (SAMPLES, len(path.joints)))
+    q = values_within([(-np.pi, np.pi)] * len(path.joints), SAMPLES)
     wanted, best, reason = free.placement(q), None, ""
     for guide in _candidate_tables(path):
         try:

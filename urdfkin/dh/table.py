@@ -40,6 +40,7 @@ from urdfkin.kinematics.roundings import ANGLE, EPS, of_rows
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.mimic import Coupling, coupling_of
 from urdfkin.model.path import Motion, Path
+from urdfkin.model.pose import is_rigid
 from urdfkin.model.tree import FloatArray, JointKind, Limit, Mimic, frozen
 from urdfkin.system.lazy_import import hook
 
@@ -457,8 +458,6 @@ def _rigid(T: ArrayLike, where: str) -> FloatArray:
         raise InputError(
             "a pose must be a (4, 4) array of finite numbers", where=where, found=f"shape {pose.shape}"
         )
-    with np.errstate(over="ignore", invalid="ignore"):  # an overflow is rejected below
-        off = np.abs(pose[:3, :3].T @ pose[:3, :3] - np.eye(3)).max()
-    if off > _TYPED or np.linalg.det(pose[:3, :3]) < 0.0 or pose[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
+    if not is_rigid(pose, _TYPED):
         raise InputError("a pose must be a rotation and a translation", where=where, found=str(pose.tolist()))
     return pose

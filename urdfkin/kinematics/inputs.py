@@ -90,14 +90,26 @@ def unit_vectors(value: ArrayLike, name: str) -> FloatArray:
 def rotations(value: ArrayLike, name: str) -> FloatArray:
     """Return `value` as (..., 3, 3) rotation matrices; otherwise raise InputError with its name."""
     array = matrices(value, name)
-    residual = np.abs(array @ array.swapaxes(-1, -2) - np.eye(3)).max(initial=0.0)
-    if residual > ROTATION_TOLERANCE:
-        raise InputError(
-            f"{name} must be a rotation", found=f"R R^T differs from the identity by {residual:.3g}"
+    defect = rotation_defect(array).max(initial=0.0)
+    if defect > ROTATION_TOLERANCE:
+        reflected = np.isinf(defect) and (determinant(array) < 0.0).any()
+        found = (
+            "a reflection, determinant -1"
+            if reflected
+            else f"R R^T differs from the identity by {defect:.3g}"
         )
-    if (determinant(array) < 0.0).any():
-        raise InputError(f"{name} must be a rotation", found="a reflection, determinant -1")
+        raise InputError(f"{name} must be a rotation", found=found)
     return array
+
+
+def rotation_defect(R: FloatArray) -> FloatArray:
+    """Return the largest entry (...,) of R R^T - I for matrices (..., 3, 3); inf for a reflection.
+
+    It is 0 for a rotation. Each caller has its own tolerance, because it knows how the matrix was written.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):  # an overflow is no rotation
+        defect = np.abs(R @ R.swapaxes(-1, -2) - np.eye(3)).max(axis=(-2, -1))
+        return np.where((defect >= 0.0) & (determinant(R) > 0.0), defect, np.inf)
 
 
 def determinant(matrix: FloatArray) -> FloatArray:

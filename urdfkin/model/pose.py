@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from urdfkin.kinematics.inputs import rotation_defect
 from urdfkin.model.tree import FloatArray
 
 
@@ -20,6 +21,11 @@ def pose(R: ArrayLike | None = None, p: ArrayLike | None = None) -> FloatArray:
     if p is not None:
         T[:3, 3] = p
     return T
+
+
+def is_rigid(T: FloatArray, tolerance: float) -> bool:
+    """Return whether a matrix (4, 4) is a rotation and a translation; the rotation within a tolerance."""
+    return bool(rotation_defect(T[:3, :3]) <= tolerance) and T[3].tolist() == [0.0, 0.0, 0.0, 1.0]
 
 
 def inverse(T: FloatArray) -> FloatArray:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from urdfkin.kinematics.roundings import EPS, FOLLOWER
-from urdfkin.model.tree import Joint, JointKind, KinematicTree, Limit, Mimic
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, is_bounded
 
 #: Largest bound of a range (rad or m); also used when a limit is missing.
 WIDEST = 10.0
@@ -47,6 +48,22 @@ def range_words(ends: tuple[float, float]) -> str:
     '-0.005 to 0.055'
     """
     return f"{ends[0]:.6g} to {ends[1]:.6g}"
+
+
+def axis_range(kind: JointKind, limit: Limit | None, slide: float = 1.0) -> tuple[float, float]:
+    """Return the limits of a joint with one axis.
+
+    Without limits the range is -pi to pi (revolute), or -slide to slide (prismatic; metres).
+    """
+    if kind is not JointKind.CONTINUOUS and is_bounded(limit):
+        return limit.lower, limit.upper
+    return (-math.pi, math.pi) if kind.turns else (-slide, slide)
+
+
+def values_within(ranges: Sequence[tuple[float, float]], count: int, seed: int = 0) -> FloatArray:
+    """Draw values (count, ranges) uniformly within ranges (lower, upper)."""
+    lower, upper = np.array(ranges).reshape(-1, 2).T
+    return np.random.default_rng(seed).uniform(lower, upper, (count, len(ranges)))
 
 
 def own_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:

@@ -19,6 +19,7 @@ from urdfkin.dh.snapping import rotation_angle
 from urdfkin.dh.table import Convention, DHTable
 from urdfkin.errors import InputError
 from urdfkin.model.chain import LEAST_SIZE, FrameChain
+from urdfkin.model.ranges import values_within
 from urdfkin.model.tree import FloatArray, JointKind, Limit, is_bounded
 
 #: Default tolerance at the tip (metres): 1.5 times the effect of rounding one or two cells to 0.1 mm.
@@ -171,9 +172,8 @@ def _target_poses(chain: FrameChain) -> tuple[TargetPoses, TargetPoses]:
 def _samples(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray, FloatArray]:
     """Return values of all joints (count, n) without mimic rules, and the tip's poses at them."""
     slides = _slides(chain)
-    bounds = [slides.get(joint.name, (-math.pi, math.pi)) for joint in chain.joints]
-    lower, upper = np.array(bounds).T
-    values = np.random.default_rng(seed).uniform(lower, upper, (count, len(bounds)))
+    ranges = [slides.get(joint.name, (-math.pi, math.pi)) for joint in chain.joints]
+    values = values_within(ranges, count, seed)
     free = replace(chain, joints=tuple(replace(joint, mimic=None) for joint in chain.joints))
     return values, free.placement(values)
 

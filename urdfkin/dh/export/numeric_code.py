@@ -7,14 +7,13 @@ last bit. The other code formats use the functions for identifiers, headers and 
 from __future__ import annotations
 
 import keyword
-import math
 import re
 
 from urdfkin.dh.export.text import formula
 from urdfkin.dh.table import Convention, DHRow, DHTable
 from urdfkin.dh.units import Units
 from urdfkin.errors import InputError
-from urdfkin.model.tree import FloatArray
+from urdfkin.model.tree import FloatArray, is_bounded
 
 
 def identifier(name: str) -> str:
@@ -76,10 +75,7 @@ def demand_free(table: DHTable, what: str) -> None:
 
 def bounds(row: DHRow) -> str:
     """Return the lower and upper limit separated by a comma; "" if one of them is infinite."""
-    limit = row.limit
-    if limit is None or not (math.isfinite(limit.lower) and math.isfinite(limit.upper)):
-        return ""
-    return numbers([limit.lower, limit.upper])
+    return numbers([row.limit.lower, row.limit.upper]) if is_bounded(row.limit) else ""
 
 
 _NUMPY_BODY = '''

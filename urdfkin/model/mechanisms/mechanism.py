@@ -30,7 +30,7 @@ from urdfkin.kinematics.rotation.matrix import axis_aligning
 from urdfkin.kinematics.rotation.quaternion import quaternion_of, rotation_of
 from urdfkin.kinematics.roundings import EPS, of_two_texts
 from urdfkin.model.chain import LEAST_SIZE
-from urdfkin.model.pose import pose
+from urdfkin.model.pose import is_rigid, pose
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
 #: Below this length across an axis (of a unit vector, or in metres), a vector counts as parallel to it.
@@ -151,9 +151,8 @@ def coordinates_of(kind: JointKind, P: FloatArray) -> FloatArray:
 
 def is_pose(kind: JointKind, T: FloatArray) -> bool:
     """Return whether a planar or floating joint can reach a matrix; a floating joint reaches every pose."""
-    R = T[:3, :3]
     near = NEARLY * (1.0 + np.abs(T).max())
-    if np.abs(R @ R.T - np.eye(3)).max() > near or np.linalg.det(R) < 0.0 or T[3].tolist() != [0, 0, 0, 1]:
+    if not is_rigid(T, near):
         return False
     return kind is JointKind.FLOATING or bool(np.abs(onto_plane(T) - T).max() <= near)
 
