@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import urdfkin
 from urdfkin.dh.compare import compare
-from urdfkin.dh.references import reference_path
+from urdfkin.dh.parse_table import reference_path
 
 robot = urdfkin.load("ur5")
 published = urdfkin.read_table(reference_path("ur5"))  # or a .toml, .json or .csv of your own

@@ -10,8 +10,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, TypedDict, Unpack, cast
 
+from urdfkin.dh.compare.slips import doubts
 from urdfkin.dh.convert import to_urdf
-from urdfkin.dh.hypotheses import doubts
 from urdfkin.dh.parse_table import is_table_file, read_table_or_screws
 from urdfkin.dh.screws import ProductOfExponentials
 from urdfkin.dh.table import DHTable

@@ -20,7 +20,7 @@ import numpy as np
 from scripts.forms import poses
 from urdfkin.dh import DHTable, export, read_table, to_urdf
 from urdfkin.dh.convert import link_names
-from urdfkin.dh.export.numeric_code import plain
+from urdfkin.dh.export.code import plain
 from urdfkin.lint import UrdfWarning
 from urdfkin.loading import load
 from urdfkin.model.tree import FloatArray

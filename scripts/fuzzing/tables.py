@@ -10,8 +10,7 @@ from scripts.fuzzing import COMPARED, Case
 from scripts.fuzzing.judge import Outcome
 from urdfkin.dh.compare import compare
 from urdfkin.dh.export import export
-from urdfkin.dh.parse_table import read_table, table_from_text
-from urdfkin.dh.references import reference_path
+from urdfkin.dh.parse_table import read_table, reference_path, table_from_text
 from urdfkin.errors import UrdfkinError
 from urdfkin.loading import load
 from urdfkin.model.chain import FrameChain

@@ -15,8 +15,7 @@ from tests.cli.running import urdfkin as command
 from urdfkin.dh import DHTable, dh_table, read_table, units_of
 from urdfkin.dh.compare import compare, comparison_text
 from urdfkin.dh.convert import to_tree
-from urdfkin.dh.parse_table import read_mapping, table_of
-from urdfkin.dh.references import reference_path
+from urdfkin.dh.parse_table import read_mapping, reference_path, table_of
 from urdfkin.dh.rows import last_digits
 from urdfkin.kinematics.rotation import exp_rotation
 from urdfkin.model.chain import FrameChain, chain

@@ -13,8 +13,8 @@ import pytest
 import urdfkin
 from tests.cli.running import urdfkin as command
 from urdfkin.dh import DHTable, Units, dh_table
+from urdfkin.dh.parse_table import reference_path
 from urdfkin.dh.printed import printed
-from urdfkin.dh.references import reference_path
 from urdfkin.dh.units import Angles, Lengths
 from urdfkin.errors import UnknownNameError
 from urdfkin.urdf.xacro import arguments_of

@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 
 import urdfkin
 from urdfkin.dh import export, read_table, table_from_mapping, table_from_rows
-from urdfkin.dh.parse_table import read_mapping, table_from_text
-from urdfkin.dh.references import references
+from urdfkin.dh.parse_table import read_mapping, references, table_from_text
 from urdfkin.dh.rows import last_digits
 from urdfkin.errors import InputError, UnknownNameError, UrdfkinError
 

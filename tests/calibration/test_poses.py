@@ -9,7 +9,7 @@ import pytest
 
 from tests.calibration.arms import pose
 from tests.cli.running import urdfkin
-from urdfkin.calibration.poses import read_poses
+from urdfkin.calibration.calibrate import read_poses
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import quaternion_of
 from urdfkin.model.tree import FloatArray

@@ -20,7 +20,7 @@ import urdfkin as library
 from tests.attacks.hostile import IN_XML, chain_of_all
 from tests.cli.running import urdfkin
 from urdfkin.cli import commands
-from urdfkin.dh.references import references
+from urdfkin.dh.parse_table import references
 from urdfkin.kinematics.registry import equations
 from urdfkin.lint.pages import RULES
 from urdfkin.urdf.catalogue import catalogue

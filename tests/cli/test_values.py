@@ -12,7 +12,7 @@ import urdfkin as library
 from tests.cli.running import process, urdfkin
 from tests.robots.odd_urdfs import urdf_of
 from urdfkin.dh import read_table
-from urdfkin.dh.references import references
+from urdfkin.dh.parse_table import references
 from urdfkin.model.tree import FloatArray
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.verify.sampling import sample

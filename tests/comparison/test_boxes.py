@@ -12,15 +12,13 @@ import pytest
 
 import urdfkin
 from tests.comparison.pairs import changed, robot
-from urdfkin.comparison.branch_and_bound import Boxes, curvature, moved_together, tightened
+from urdfkin.comparison.bounds import Boxes, Search, curvature, moved_together, tightened
 from urdfkin.comparison.certificate import certificate, recheck
-from urdfkin.comparison.lower_bound import Search
 from urdfkin.comparison.result import Verdict
 from urdfkin.comparison.verdict import Comparator
-from urdfkin.model.mechanisms.alignment import FramePair
+from urdfkin.model.mechanisms.alignment import FramePair, variables_of
 from urdfkin.model.mechanisms.matcher import align
 from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
-from urdfkin.model.mechanisms.variables import variables_of
 from urdfkin.model.tree import FloatArray
 
 #: Robots, changes, frames: turns alone, a slide, followers, an axis that alone is bent.

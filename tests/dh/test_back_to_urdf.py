@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from tests.random_chains import configurations, trees
 from urdfkin import loading
 from urdfkin.dh import DHTable, dh_table, read_table, table_from_rows, to_tree, to_urdf
-from urdfkin.dh.references import references
+from urdfkin.dh.parse_table import references
 from urdfkin.errors import InputError
 from urdfkin.loading import load
 from urdfkin.model.tree import FloatArray, KinematicTree

@@ -16,8 +16,7 @@ from tests.dh.test_compare import disguised, elbow
 from tests.random_chains import configurations, rotation, shift, trees
 from urdfkin.dh import Convention, DHTable, dh_table, export, read_table, table_from_rows, units_of
 from urdfkin.dh.convert import to_convention
-from urdfkin.dh.parse_table import read_mapping
-from urdfkin.dh.references import published, reference_path, references
+from urdfkin.dh.parse_table import published, read_mapping, reference_path, references
 from urdfkin.errors import InputError
 from urdfkin.loading import load
 from urdfkin.model.chain import chain

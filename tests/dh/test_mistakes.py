@@ -16,7 +16,7 @@ from tests.dh.test_compare import elbow
 from urdfkin.dh import DHTable, dh_table, read_table, table_from_rows, units_of
 from urdfkin.dh.compare import Comparison, compare, comparison_text
 from urdfkin.dh.convert import to_tree
-from urdfkin.dh.references import reference_path, references
+from urdfkin.dh.parse_table import reference_path, references
 from urdfkin.loading import load
 from urdfkin.model.chain import FrameChain, chain
 

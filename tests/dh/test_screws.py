@@ -15,7 +15,7 @@ from scipy.linalg import expm
 
 from tests.cli.test_dh import run_any
 from tests.random_chains import trees
-from urdfkin.dh.export.screws import write_screws
+from urdfkin.dh.export.toolboxes import write_screws
 from urdfkin.dh.screws import ProductOfExponentials, screws_from, screws_of
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import exp_rotation

@@ -14,10 +14,15 @@ from hypothesis import strategies as st
 from tests.cli.test_dh import run
 from tests.random_chains import trees
 from urdfkin.dh import dh_table, export, read_table, table_from_rows, to_convention, units_of
-from urdfkin.dh.expression import NoCellError, cell_of
-from urdfkin.dh.parse_table import is_table_file, mapping_from_text, table_from_text
-from urdfkin.dh.references import reference_path, references
+from urdfkin.dh.parse_table import (
+    is_table_file,
+    mapping_from_text,
+    reference_path,
+    references,
+    table_from_text,
+)
 from urdfkin.dh.rows import last_digits
+from urdfkin.dh.units import NoCellError, cell_of
 from urdfkin.errors import InputError
 from urdfkin.loading import load
 from urdfkin.model.tree import KinematicTree

@@ -14,8 +14,8 @@ from tests.cli.test_dh import run
 from tests.dh.test_compare import elbow
 from urdfkin.dh import DHTable, dh_table, read_table, table_from_rows
 from urdfkin.dh.compare import TOLERANCE, diagnose
-from urdfkin.dh.hypotheses import as_said, doubts, other_readings
-from urdfkin.dh.references import reference_path
+from urdfkin.dh.compare.slips import as_said, doubts, other_readings
+from urdfkin.dh.parse_table import reference_path
 from urdfkin.dh.rows import ORDER
 from urdfkin.errors import InputError
 from urdfkin.loading import load

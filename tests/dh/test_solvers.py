@@ -14,7 +14,7 @@ import pytest
 
 from tests.dh.test_opw import NAMES, table
 from urdfkin.dh import export
-from urdfkin.dh.export.screws import write_screws
+from urdfkin.dh.export.toolboxes import write_screws
 from urdfkin.dh.structure import opw_of, structure
 from urdfkin.loading import load
 from urdfkin.model.tree import FloatArray

@@ -10,7 +10,7 @@ import pytest
 
 from urdfkin.dh import read_table
 from urdfkin.dh.compare import compare
-from urdfkin.dh.references import reference_path, references
+from urdfkin.dh.parse_table import reference_path, references
 from urdfkin.errors import UnknownNameError
 from urdfkin.loading import load
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from urdfkin.dh.common_normals import left_out
 from urdfkin.dh.make import dh_table
-from urdfkin.dh.noise import left_out
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.loading import load
 from urdfkin.urdf.catalogue import examples

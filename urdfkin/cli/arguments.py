@@ -298,7 +298,7 @@ def read_batch(path: Path, option: str, layouts: Sequence[Sequence[str]]) -> tup
     """
     import numpy as np  # noqa: PLC0415  keeps --help fast
 
-    from urdfkin.motion.columns import read_columns, width_of  # noqa: PLC0415
+    from urdfkin.motion.trajectory import read_columns, width_of  # noqa: PLC0415
 
     text = _standard_input() if str(path) == "-" else read_text(path, MOST_DATA, pipes=True)
     width = width_of(text, str(path)) if len(layouts) > 1 else None

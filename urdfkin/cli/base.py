@@ -84,7 +84,7 @@ def _rows(text: str, option: str, layouts: Sequence[Sequence[str]]) -> tuple[Flo
     """Return the (n, width) numbers, and the layout that has as many columns."""
     import numpy as np  # noqa: PLC0415
 
-    from urdfkin.motion.columns import numbers  # noqa: PLC0415
+    from urdfkin.motion.trajectory import numbers  # noqa: PLC0415
 
     if text.startswith("@"):
         return read_batch(Path(text[1:]), option, layouts)

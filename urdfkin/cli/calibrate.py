@@ -155,8 +155,7 @@ def _reject_unused(context: click.Context, given: list[str]) -> None:
 
 def _run(context: click.Context, robot: Robot) -> Calibration:
     """Run the calibration that the command's options request."""
-    from urdfkin.calibration.calibrate import calibrate  # noqa: PLC0415
-    from urdfkin.calibration.poses import read_poses  # noqa: PLC0415
+    from urdfkin.calibration.calibrate import calibrate, read_poses  # noqa: PLC0415
     from urdfkin.dh.parse_table import is_table_file, read_table_or_screws  # noqa: PLC0415
     from urdfkin.dh.table import DHTable  # noqa: PLC0415
 
@@ -191,7 +190,7 @@ def _run(context: click.Context, robot: Robot) -> Calibration:
 
 
 def _noise(text: str | None) -> tuple[float, float] | None:
-    from urdfkin.motion.columns import numbers  # noqa: PLC0415
+    from urdfkin.motion.trajectory import numbers  # noqa: PLC0415
 
     if text is None:
         return None

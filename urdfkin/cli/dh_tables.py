@@ -25,9 +25,8 @@ from urdfkin.dh.compare import (
 )
 from urdfkin.dh.convert import to_urdf
 from urdfkin.dh.export.data import to_mapping
-from urdfkin.dh.parse_table import read_mapping, read_table_or_screws, table_of
+from urdfkin.dh.parse_table import published, read_mapping, read_table_or_screws, reference_path, table_of
 from urdfkin.dh.printed import printed, printed_tree
-from urdfkin.dh.references import published, reference_path
 from urdfkin.dh.rows import last_digits
 from urdfkin.dh.snapping import snap_hint
 from urdfkin.dh.tree_parameters import as_mapping, tree_parameters, write_tree

@@ -45,7 +45,7 @@ def command(
     .npz file. With --root-joint floating, the pose of the base is part of --q. For details, run `urdfkin
     explain gravity-in-an-acceleration`.
     """
-    from urdfkin.motion.columns import numbers  # noqa: PLC0415  keeps --help fast
+    from urdfkin.motion.trajectory import numbers  # noqa: PLC0415  keeps --help fast
 
     run = Computing(context)
     if trajectory is None:

@@ -106,7 +106,7 @@ def command(
             holds = f"the certificate holds: {document['verdict']}{''.join(first)}"
             say("the certificate does not hold" if errors else holds)
             context.exit(1 if errors or document["verdict"] == "differs" else 0)
-        from urdfkin.comparison.branch_and_bound import MOST  # noqa: PLC0415
+        from urdfkin.comparison.bounds import MOST  # noqa: PLC0415
         from urdfkin.comparison.result import Question  # noqa: PLC0415
         from urdfkin.comparison.verdict import parse_map, same  # noqa: PLC0415
 

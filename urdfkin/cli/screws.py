@@ -30,7 +30,7 @@ def command(robot: Robot, base: str | None, tip: str | None, digits: int, verify
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
     from urdfkin.cli.streams import say  # noqa: PLC0415  keeps --help fast
-    from urdfkin.dh.export.screws import write_screws  # noqa: PLC0415
+    from urdfkin.dh.export.toolboxes import write_screws  # noqa: PLC0415
     from urdfkin.verify.chain_checks import check_screws  # noqa: PLC0415
 
     screws = robot.screws(tip, base, verify=False)

@@ -9,17 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.comparison.branch_and_bound import tightened
-from urdfkin.comparison.lower_bound import Search, pinocchios, urdfkins
+from urdfkin.comparison.bounds import Search, pinocchios, tightened, urdfkins
 from urdfkin.comparison.result import Difference, Interval, JointMap, Sameness
 from urdfkin.comparison.verdict import CONFIRMED, Comparator, digest
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.model.mechanisms.alignment import Alignment, FramePair, Gauge
+from urdfkin.model.mechanisms.alignment import Alignment, FramePair, Gauge, Variables, variables_of
 from urdfkin.model.mechanisms.matcher import align
 from urdfkin.model.mechanisms.mechanism import JointTransform, apart, is_pose
 from urdfkin.model.mechanisms.upper_bound import COARSE, FINE, upper_bounds
-from urdfkin.model.mechanisms.variables import Variables, variables_of
 from urdfkin.model.tree import JointKind
 from urdfkin.robot import Robot
 

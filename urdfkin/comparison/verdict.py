@@ -9,20 +9,34 @@ from dataclasses import replace
 
 import numpy as np
 
-from urdfkin.comparison.branch_and_bound import MOST, tightened
-from urdfkin.comparison.lower_bound import Search, pinocchios
-from urdfkin.comparison.result import FREE, Interval, JointMap, Sameness, Verdict, demand_joint_names
-from urdfkin.comparison.wording import differences, put_right, remarks
+from urdfkin.comparison.bounds import MOST, Search, pinocchios, tightened
+from urdfkin.comparison.result import (
+    FREE,
+    Interval,
+    JointMap,
+    Sameness,
+    Verdict,
+    demand_joint_names,
+    differences,
+    put_right,
+    remarks,
+)
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.validators import real_number, whole_number
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.loading import load
-from urdfkin.model.mechanisms.alignment import AS_WRITTEN, IDENTITY, Alignment, FramePair
+from urdfkin.model.mechanisms.alignment import (
+    AS_WRITTEN,
+    IDENTITY,
+    Alignment,
+    FramePair,
+    Variables,
+    variables_of,
+)
 from urdfkin.model.mechanisms.matcher import align
 from urdfkin.model.mechanisms.mechanism import Mechanism, Tolerance, apart, tolerance_of
 from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
-from urdfkin.model.mechanisms.variables import Variables, variables_of
 from urdfkin.model.pose import inverse
 from urdfkin.model.ranges import WIDEST, narrowed_ranges
 from urdfkin.model.tree import FloatArray, KinematicTree

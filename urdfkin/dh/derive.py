@@ -23,16 +23,18 @@ import numpy as np
 from urdfkin.dh.common_normals import (
     NEARLY_PARALLEL,
     NearParallel,
+    Noise,
     PairLike,
     Step,
     cleaned_angle,
     cleaned_length,
     lifted,
     near,
+    noises,
     step_between,
     steps_like,
+    tilt_of,
 )
-from urdfkin.dh.noise import Noise, noises, tilt_of
 from urdfkin.dh.table import Convention, DHRow, DHTable, along_axis, as_step, between_axes, convention_of
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.roundings import ANGLE, ENTRY, EPS

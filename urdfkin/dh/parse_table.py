@@ -6,6 +6,8 @@ A table in text has a line of headings, with a, alpha, d and theta in any order,
 joint. Commas, semicolons, tabs, bars, ampersands or blanks separate the cells. The lines around the table may
 give the convention, names, base and tool. urdfkin's own printed tables have this form. The result is plain
 data for `urdfkin.dh.rows`. Nothing is guessed: a table without a convention is an error there.
+
+`references` finds the reference tables in urdfkin: tables of vendors and textbooks, each with its source.
 """
 
 from __future__ import annotations
@@ -22,16 +24,17 @@ from typing import Any, TypeGuard, TypeVar
 
 import numpy as np
 
-from urdfkin.dh.expression import Cell, NoCellError, cell_of, spelled
 from urdfkin.dh.rows import ORDER, Literal, table_from_mapping
 from urdfkin.dh.screws import ProductOfExponentials, screws_of_mapping
 from urdfkin.dh.table import DHTable
-from urdfkin.errors import InputError, SourceError, UrdfkinError
+from urdfkin.dh.units import Cell, NoCellError, cell_of, spelled
+from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
 from urdfkin.errors.escape import from_csv_cell
 from urdfkin.errors.numbers import UNITS
 from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.rotation.matrix import ROUNDED, polar_factor
-from urdfkin.system.files import read_text
+from urdfkin.system.files import exists, read_text
+from urdfkin.system.resources import robots_dir
 
 #: Largest difference of a printed rotation (six digits) from a rotation; a larger one is not corrected.
 _PRINTED = 1e-5
@@ -506,3 +509,34 @@ _PARSERS: dict[str, Callable[[str], Any]] = {
     ".json": _from_json,
     **dict.fromkeys((".csv", ".tsv", ".md", ".tex", ".txt"), from_sheet),
 }
+
+
+def references() -> dict[str, Path]:
+    """Return name -> file for each reference table in urdfkin."""
+    return {path.stem: path for path in sorted((robots_dir() / "dh").glob("*.toml"))}
+
+
+def published(robot: str) -> list[str]:
+    """Return a line with the option `--like` for each published table of a robot."""
+    lines = []
+    for name, path in references().items():
+        data = read_mapping(path)
+        if data.get("robot") == robot:
+            snap = f" --snap {data['snap']:.0e}" if "snap" in data else ""
+            lines.append(f"published {data['convention']} table of this robot: --like {name}{snap}")
+    return lines
+
+
+def reference_path(name: str) -> Path:
+    """Return the file of a table, given its path or the name of a reference table.
+
+    Raises:
+        UnknownNameError: neither; the message lists the nearest names.
+    """
+    path = Path(name)
+    if path.suffix or exists(path):
+        return path
+    shipped = references()
+    if name not in shipped:
+        raise UnknownNameError("reference table", name, shipped)
+    return shipped[name]

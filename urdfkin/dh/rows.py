@@ -30,9 +30,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.dh.expression import Cell, NoCellError, cell_of
 from urdfkin.dh.table import DHRow, DHTable, convention_of, looks_round
-from urdfkin.dh.units import Angles, Units, cell_in_si, read_number, units_of
+from urdfkin.dh.units import Angles, Cell, NoCellError, Units, cell_in_si, cell_of, read_number, units_of
 from urdfkin.errors import InputError, Question, UnknownNameError
 from urdfkin.errors.validators import safe_repr
 from urdfkin.model.tree import FloatArray, JointKind, Limit, Mimic

@@ -12,7 +12,7 @@ al., 2014). An OPW arm is the standard table
     a1 -90 c1 q1    c2 0 0 q2-90    a2 90 b q3+90    0 -90 c3 q4    0 90 0 q5    0 0 c4 q6
 
 with cells in the order a, alpha, d, theta. Its parameters are the URDF's numbers in the frames of this table
-(`urdfkin.dh.match_table`), with this table's zeros and senses. OPW has no parameter for a tilt from
+(`urdfkin.dh.make`), with this table's zeros and senses. OPW has no parameter for a tilt from
 calibration, so the tilt is dropped. `Opw.placement` is the solver's own forward kinematics; it measures the
 resulting error.
 
@@ -35,7 +35,7 @@ from typing import Any
 import numpy as np
 
 from urdfkin.dh.derive import Choices, Last, derive
-from urdfkin.dh.match_table import derive_like, reversed_like
+from urdfkin.dh.make import derive_like, reversed_like
 from urdfkin.dh.screws import ProductOfExponentials
 from urdfkin.dh.table import Convention, DHRow, DHTable
 from urdfkin.errors import InputError

@@ -27,10 +27,19 @@ from typing import Any
 import numpy as np
 
 from urdfkin.compiled.plan import turned
-from urdfkin.dh.common_normals import NearParallel, Step, cleaned_angle, cleaned_length, step_between
+from urdfkin.dh.common_normals import (
+    NearParallel,
+    Noise,
+    Step,
+    cleaned_angle,
+    cleaned_length,
+    demand_squares,
+    noise_of,
+    step_between,
+    tilt_of,
+)
 from urdfkin.dh.derive import RIGHT_ANGLE_SLACK
 from urdfkin.dh.export.text import added, aligned
-from urdfkin.dh.noise import Noise, demand_squares, noise_of, tilt_of
 from urdfkin.dh.table import along_axis, between_axes
 from urdfkin.dh.units import Units
 from urdfkin.errors import InputError
@@ -90,7 +99,7 @@ class TreeParameters:
         ways: (joints,) path length from the root to each joint: the sum of the URDF's offsets (metres).
         T_frame_link: (joints, 4, 4) pose of the URDF's link frame in the row's frame. The row's frame has z
             along the joint's axis and x along the common normal.
-        left_out: Largest sum, over all paths, of the tilts that count as rounding (rad; `urdfkin.dh.noise`).
+        left_out: Largest sum, over all paths, of the tilts that count as rounding (rad; `urdfkin.dh.common_normals`).
     """
 
     robot: str

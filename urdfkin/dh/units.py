@@ -1,19 +1,24 @@
-"""Convert a table's numbers from and to text: fractions of pi, degrees, millimetres.
+r"""Convert a table's numbers from and to text: fractions of pi, degrees, millimetres.
 
 A table itself is always in metres and radians. Other units exist only in its input and output.
+
+A cell is parsed from a text such as `q1 + pi/2`, `90 deg`, `107 mm`, `-θ₂*`, `\frac{\pi}{2}` or `180°`.
+It is a sum. At most one term is the joint's variable; the others are numbers or multiples of pi, with or
+without a unit. Invalid cells are rejected here. `urdfkin.dh.rows` supplies a missing unit, and decides which
+cells may have a variable.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from enum import StrEnum
 from fractions import Fraction
 from numbers import Real
 
-from urdfkin.dh.expression import cell_of
 from urdfkin.errors import InputError
-from urdfkin.errors.numbers import in_radians
+from urdfkin.errors.numbers import UNITS, in_radians
 from urdfkin.errors.validators import safe_repr
 
 
@@ -171,3 +176,176 @@ def cell_in_si(name: str, number: float, units: Units) -> float:
     if name in ("a", "d"):
         return number / 1000.0 if units.counts_millimetres else number
     return number if units.angles is Angles.RADIANS else in_radians(number)
+
+
+#: Characters of web pages, PDFs and LaTeX -> plain text.
+_SAME = str.maketrans(
+    {
+        **dict.fromkeys("\u2212\u2013\u2010\u2011\ufe63", "-"),
+        **dict.fromkeys("π\U0001d70b\U0001d6d1", " pi "),
+        **dict.fromkeys("°º˚", " deg "),
+        **dict.fromkeys("θϑ\U0001d703", "theta"),
+        **dict.fromkeys("α⍺\U0001d6fc", "alpha"),
+        **dict.fromkeys("β\U0001d6fd", "beta"),
+        **dict.fromkeys("·⋅×∙", "*"),
+        **dict.fromkeys("\u00a0\u2009\u202f\u2007", " "),
+        **dict(zip("₀₁₂₃₄₅₆₇₈₉₋₊ᵢⱼₙ", "0123456789-+ijn", strict=True)),
+        "\u200b": "",
+        "ℓ": "l",
+    }
+)
+_LATEX = (
+    (r"\\[dt]?frac\{([^{}]*)\}\{([^{}]*)\}", r"\1/\2"),
+    (r"\^\{?\\circ\}?|\\degree|\\textdegree|\\circ", " deg "),
+    (r"\\(?:mathrm|text|mathit|rm|mathbf|operatorname|textbf|textit|texttt|emph)\s*\{([^{}]*)\}", r"\1"),
+    (r"(?:\\cdot|\\times|\*)\s*10\^\{?([+-]?[0-9]+)\}?", r"e\1"),
+    (r"\\(?:[,;:! ]|quad|qquad|left|right)|~", " "),
+    (r"\\(?:cdot|times)", "*"),
+    (r"\\(?:var)?(pi|theta|alpha|beta)(?![a-z])", r" \1"),
+    (r"\\_", "_"),
+    (r"\^\{?\*\}?", "*"),
+    (r"\$|\\\(|\\\)", ""),
+)
+_TOKEN = re.compile(
+    r"\s*(?:(?P<number>(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)"
+    r"|(?P<variable>(?:q|theta|th|d)_?\{?[0-9]+\}?\*?|(?:q|theta|var|variable)(?:_?\{?[ij]\}?)?\*?)"
+    r"|(?P<name>[A-Za-z]+)|(?P<sign>[-+*/]))"
+)
+_LONGEST = 200
+
+
+class NoCellError(ValueError):
+    """A text that is not a cell; the message names the invalid part."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """The content of a cell.
+
+    Attributes:
+        number: The constant part, in `unit`, or in the table's unit if that is None.
+        unit: "rad" (also for a multiple of pi), "deg", "m" or "mm"; None without a unit.
+        times: Factor of the joint's variable; None without a variable.
+        variable: Number of the variable (3 for q3); None without a number.
+        text: The constant's text if it is a single number; "" if it is computed.
+    """
+
+    number: float
+    unit: str | None = None
+    times: float | None = None
+    variable: int | None = None
+    text: str = ""
+
+
+def spelled(text: str) -> str:
+    r"""Convert a text with symbols or LaTeX to plain letters.
+
+    >>> spelled("−π/2"), spelled(r"$\frac{\pi}{2} + \theta_{1}$").split(), spelled("θ₁*")
+    ('- pi /2', ['pi/2', '+', 'theta_{1}'], 'theta1*')
+    """
+    for pattern, plain in _LATEX:
+        text = re.sub(pattern, plain, text)
+    return text.translate(_SAME).strip()
+
+
+def cell_of(written: str) -> Cell:
+    """Parse a cell.
+
+    Raises:
+        NoCellError: an invalid cell; the message names the invalid part.
+
+    Example:
+        >>> cell_of("-q2 + 90°")
+        Cell(number=90.0, unit='deg', times=-1.0, variable=2, text='90')
+    """
+    if len(written) > _LONGEST:
+        raise NoCellError(f"a cell of {len(written)} characters")
+    text = spelled(written)
+    text = "var" if text == "*" else text
+    terms = _terms(text[1:-1] if text.startswith("(") and text.endswith(")") else text)
+    own = [term for term in terms if term.variable]
+    numbers = [term for term in terms if not term.variable]
+    if len(own) > 1:
+        raise NoCellError("two variables in one cell")
+    units = {UNITS[unit] for term in terms for unit in term.units} | {"rad" for one in terms if one.turns}
+    if len(units) > 1:
+        raise NoCellError(f"{' and '.join(sorted(units))} in one cell")
+    number = numbers[0].value if numbers else 0.0
+    number = sum((term.value for term in numbers[1:]), number)
+    if not math.isfinite(number):
+        raise NoCellError("not a finite number")
+    digits = re.sub(r"[^0-9]", "", own[0].variable) if own else ""
+    return Cell(
+        number,
+        min(units, default=None),
+        own[0].value if own else None,
+        int(digits) if digits else None,
+        numbers[0].text if len(numbers) == 1 else "",
+    )
+
+
+@dataclass(slots=True)
+class _Term:
+    """A term: the text between two signs."""
+
+    sign: float = 1.0
+    size: float | None = None
+    variable: str = ""
+    units: tuple[str, ...] = ()
+    turns: bool = False
+    text: str = ""
+    operator: str = ""
+
+    @property
+    def value(self) -> float:
+        return self.sign * (1.0 if self.size is None else self.size)
+
+    @property
+    def is_empty(self) -> bool:
+        return self.size is None and not self.variable
+
+    def take(self, token: str, kind: str) -> None:
+        """Add a token; raise NoCellError if it is invalid here."""
+        divides, joined = self.operator == "/", self.operator == ""
+        if kind == "sign" and not self.is_empty and joined:
+            self.operator = token
+            return
+        if kind == "variable" and not self.variable and not divides:
+            self.variable = token
+        elif kind == "number" and (self.size is None or not joined):
+            self.text = "" if self.text or self.turns else token
+            self._times(float(token), divides)
+        elif token == "pi":
+            self.turns, self.text = True, ""
+            self._times(math.pi, divides)
+        elif token in UNITS and not self.is_empty and joined:
+            self.units = (*self.units, token)
+        else:
+            raise NoCellError(f"{token!r} is not understood")
+        self.operator = ""
+
+    def _times(self, factor: float, divides: bool) -> None:
+        size = 1.0 if self.size is None else self.size
+        if divides and not factor:
+            raise NoCellError("a division by zero")
+        self.size = size / factor if divides else size * factor
+
+
+def _terms(text: str) -> list[_Term]:
+    terms, signed, position = [_Term()], False, 0
+    while position < len(text):
+        if (found := _TOKEN.match(text, position)) is None:
+            raise NoCellError(f"{text[position:]!r} is not understood")
+        position, token, kind = found.end(), found[0].strip(), found.lastgroup or ""
+        if token in ("+", "-"):
+            if signed or terms[-1].operator:
+                raise NoCellError(f"two signs before {text[position:]!r}")
+            if not terms[-1].is_empty:
+                terms.append(_Term())
+            signed, terms[-1].sign = True, -1.0 if token == "-" else 1.0
+        else:
+            terms[-1].take(token, kind)
+            signed = False
+    if signed or terms[-1].operator or terms[-1].is_empty:
+        raise NoCellError("it ends too early" if text else "it is empty")
+    return terms

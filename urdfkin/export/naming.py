@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from urdfkin.dh.export.numeric_code import plain
+from urdfkin.dh.export.code import plain
 
 #: Longest identifier; MATLAB allows names of 63 letters, with the prefix.
 _LONGEST = 40

@@ -164,7 +164,7 @@ MJCF_RULE = 8.0
 #: Roundings for each row of a table; derived above.
 ROW = 8.0
 
-# Rounding errors in the constant pose between two joint axes (`urdfkin.dh.noise`).
+# Rounding errors in the constant pose between two joint axes (`urdfkin.dh.common_normals`).
 
 #: For each URDF joint with a constant transform in the pose, by two parsers. The worst case is 18.9 (the
 #: table above without the rotation about the axis). The standard deviation is 2.4, and this is nearly six

@@ -22,8 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from urdfkin.comparison.result import angle, length
-from urdfkin.comparison.wording import pose_words
+from urdfkin.comparison.result import angle, length, pose_words
 from urdfkin.dh.snapping import rotation_angle
 from urdfkin.errors.escape import log_line
 from urdfkin.errors.escape import markdown_text as text

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from urdfkin.dh.noise import left_out
+from urdfkin.dh.common_normals import left_out
 from urdfkin.dh.screws import ProductOfExponentials
 from urdfkin.dh.structure import Opw
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, of_joints

@@ -29,8 +29,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from urdfkin.dh.common_normals import left_out
 from urdfkin.dh.motion import acceleration, jacobian
-from urdfkin.dh.noise import left_out
 from urdfkin.dh.snapping import LARGEST_TOLERANCE, rotation_angle
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import UrdfkinError
@@ -245,7 +245,7 @@ class Sizes:
         rates: (n,) sum of all |joint velocity|, rad/s and m/s.
         accelerations: (n,) sum of all |joint acceleration|, rad/s^2 and m/s^2.
         rounding: (n,) number of roundings times eps, the rounding of angles included; plus the tilts that a
-            table omits (`urdfkin.dh.noise`).
+            table omits (`urdfkin.dh.common_normals`).
     """
 
     reach: FloatArray

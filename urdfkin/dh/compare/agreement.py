@@ -1,4 +1,9 @@
-"""Compare a URDF with a published table: cell by cell, and in millimetres at the tip."""
+"""Compare a URDF with a published table: cell by cell, and in millimetres at the tip.
+
+`max_tip_error_bound` proves a bound for every configuration, by the method of `urdfkin same`. The path and
+the table become two mechanisms with the same joints. `urdfkin.model.mechanisms` matches them joint by joint,
+as they are written. Support functions carry the differences from the tip to the base.
+"""
 
 from __future__ import annotations
 
@@ -8,19 +13,30 @@ from dataclasses import replace
 
 import numpy as np
 
-from urdfkin.dh.compare.fit import CELLS, Model, TargetPoses, columns, fit_cells, hidden_cells
-from urdfkin.dh.compare.freedoms import as_written, fitted_model
+from urdfkin.dh.common_normals import demand_squares_of
+from urdfkin.dh.compare.fit import (
+    CELLS,
+    Model,
+    TargetPoses,
+    as_written,
+    columns,
+    fit_cells,
+    fitted_model,
+    hidden_cells,
+)
 from urdfkin.dh.compare.mistakes import Search
-from urdfkin.dh.compare.proof import max_tip_error_bound
 from urdfkin.dh.compare.result import EXPLAINED, AbsorbedOffset, CellDifference, Comparison
-from urdfkin.dh.convert import to_convention
-from urdfkin.dh.noise import demand_squares_of
+from urdfkin.dh.convert import free_tree, link_names, to_convention
 from urdfkin.dh.snapping import rotation_angle
 from urdfkin.dh.table import Convention, DHTable
 from urdfkin.errors import InputError
 from urdfkin.model.chain import LEAST_SIZE, FrameChain
+from urdfkin.model.mechanisms.alignment import AS_WRITTEN, variables_of
+from urdfkin.model.mechanisms.matcher import align
+from urdfkin.model.mechanisms.mechanism import Mechanism, tolerance_of
+from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
 from urdfkin.model.ranges import values_within
-from urdfkin.model.tree import FloatArray, JointKind, Limit, is_bounded
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree, is_bounded
 
 #: Default tolerance at the tip (metres): 1.5 times the effect of rounding one or two cells to 0.1 mm.
 TOLERANCE = 2e-4
@@ -291,3 +307,35 @@ def _fitted_table(chain: FrameChain, standard: DHTable, fitted: Model) -> DHTabl
     return DHTable(
         Convention.STANDARD, tuple(rows), fitted.base, fitted.tool, chain.robot, chain.base, chain.tip
     )
+
+
+def max_tip_error_bound(
+    path: FrameChain, table: DHTable, slides: Mapping[str, tuple[float, float]]
+) -> tuple[float, float]:
+    """Return a bound of the tip error of a table (metres, radians), without rounding.
+
+    Args:
+        path: The path; its mimic rules are ignored.
+        table: The table. Its variables are the path's coordinates; it contains senses and zeros.
+        slides: Ranges of the prismatic joints (metres).
+    """
+    mechanisms = Mechanism(_free(path, table, slides)), Mechanism(free_tree(table))
+    found = align(*mechanisms, {row.joint: row.joint for row in table.rows}, AS_WRITTEN)
+    variables = variables_of(found, tolerance_of(*mechanisms))
+    tip = link_names(table)[-1]
+    frame = next(frame for frame in found.frames if found.a.tree.links[frame.a] == tip)
+    return upper_bounds(found, variables, frame, FINE)
+
+
+def _free(path: FrameChain, table: DHTable, slides: Mapping[str, tuple[float, float]]) -> KinematicTree:
+    """Return a path as a tree with the names of the table's links, without mimic rules."""
+    names, z = link_names(table), np.array([0.0, 0.0, 1.0])
+    joints = list[tuple[Joint, str, str]]()
+    for i, joint in enumerate(path.joints):
+        kind = JointKind.CONTINUOUS if joint.kind.turns else JointKind.PRISMATIC
+        limit = Limit(*slides[joint.name], math.inf, math.inf) if joint.name in slides else None
+        one = Joint(joint.name, kind, 0, joint.T_previous_joint, z, limit)
+        joints.append((one, names[i], names[i + 1]))
+    last = free_tree(table).joints[-1]
+    joints.append((replace(last, T_parent_joint=path.T_last_tip), names[-2], names[-1]))
+    return build_tree(path.robot, names[0], joints)

@@ -15,8 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.dh.compare.fit import Model, TargetPoses
-from urdfkin.dh.compare.freedoms import HASTY, as_written, ends_gathered, fit_freedoms, starts
+from urdfkin.dh.compare.fit import HASTY, Model, TargetPoses, as_written, ends_gathered, fit_freedoms, starts
 from urdfkin.dh.compare.result import CellDifference, Fitted, Mistake, MistakeKind, resolution
 from urdfkin.dh.convert import to_convention
 from urdfkin.dh.snapping import rotation_angle

@@ -146,7 +146,7 @@ class Comparison:
         metres: Position error of the fitted table's tip at the worst sample.
         radians: Orientation error of the fitted table's tip at the worst sample.
         most_metres: Proven bound of the fitted table's position error at any joint values, without rounding
-            (`urdfkin.dh.compare.proof`).
+            (`urdfkin.dh.compare.agreement`).
         most_radians: Proven bound of its orientation error.
         written_metres: Position error at the worst sample of the table as it is written.
         written_radians: Orientation error at the worst sample of the table as it is written.

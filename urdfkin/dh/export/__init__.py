@@ -20,15 +20,15 @@ FORMATS: dict[str, tuple[str, str]] = {
     "csv": ("urdfkin.dh.export.data", "comma-separated, read back by urdfkin"),
     "json": ("urdfkin.dh.export.data", "JSON, read back by urdfkin"),
     "toml": ("urdfkin.dh.export.data", "TOML, read back by urdfkin"),
-    "numpy": ("urdfkin.dh.export.numeric_code", "Python code on NumPy"),
-    "matlab": ("urdfkin.dh.export.numeric_code", "MATLAB code, plain matrices"),
-    "sympy": ("urdfkin.dh.export.symbolic_code", "Python code for SymPy, exact"),
-    "casadi": ("urdfkin.dh.export.symbolic_code", "Python code for CasADi"),
-    "matlab-symbolic": ("urdfkin.dh.export.symbolic_code", "MATLAB code for the Symbolic Math Toolbox"),
+    "numpy": ("urdfkin.dh.export.code", "Python code on NumPy"),
+    "matlab": ("urdfkin.dh.export.code", "MATLAB code, plain matrices"),
+    "sympy": ("urdfkin.dh.export.code", "Python code for SymPy, exact"),
+    "casadi": ("urdfkin.dh.export.code", "Python code for CasADi"),
+    "matlab-symbolic": ("urdfkin.dh.export.code", "MATLAB code for the Symbolic Math Toolbox"),
     "matlab-rst": ("urdfkin.dh.export.toolboxes", "MATLAB code for the Robotics System Toolbox"),
     "roboticstoolbox": ("urdfkin.dh.export.toolboxes", "Python code for roboticstoolbox's DHRobot"),
-    "ets": ("urdfkin.dh.export.ets", "elementary transforms, Python code for roboticstoolbox"),
-    "c": ("urdfkin.dh.export.numeric_code", "C99 code"),
+    "ets": ("urdfkin.dh.export.toolboxes", "elementary transforms, Python code for roboticstoolbox"),
+    "c": ("urdfkin.dh.export.code", "C99 code"),
 }
 
 

@@ -10,24 +10,29 @@ Hayati rows. The code therefore sets each joint's frame by a matrix of the table
 
 The MATLAB code is tested in Octave with substitutes for the toolbox's classes (`scripts/forms/octave`). It
 has not been tested in MATLAB.
+
+roboticstoolbox also accepts a sequence of elementary transforms (Haviland and Corke). Each elementary
+transform is a rotation, a translation or a joint. The fifth parameter of a Hayati row is one more transform.
+The numerical solvers of roboticstoolbox accept such a sequence.
+
+`write_screws` exports a product of exponentials as text, LaTeX, TOML, JSON and code; data and code are exact.
 """
 
 from __future__ import annotations
 
+import json
+from collections.abc import Callable
+
 from urdfkin.dh.convert import frame_poses
-from urdfkin.dh.export import ets
-from urdfkin.dh.export.numeric_code import (
-    bounds,
-    demand_free,
-    docstring,
-    header,
-    identifier,
-    matrix,
-    numbers,
-    plain,
-)
+from urdfkin.dh.export.code import bounds, demand_free, docstring, header, identifier, matrix, numbers, plain
+from urdfkin.dh.export.text import aligned, fitted, is_identity, maths, pose, pose_lines
+from urdfkin.dh.screws import ProductOfExponentials
+from urdfkin.dh.structure import axes_and_steps
 from urdfkin.dh.table import Convention, DHRow, DHTable
 from urdfkin.dh.units import Units
+from urdfkin.errors.display import six_digits
+from urdfkin.errors.escape import latex_text, printable
+from urdfkin.model.tree import FloatArray
 
 
 def write_roboticstoolbox(table: DHTable, units: Units) -> str:
@@ -37,7 +42,7 @@ def write_roboticstoolbox(table: DHTable, units: Units) -> str:
         InputError: a mimic joint, which neither class supports.
     """
     if table.has_hayati_rows or not table.rows:
-        return ets.write_ets(table, units)
+        return write_ets(table, units)
     demand_free(table, "DHRobot")
     lines = docstring(table)
     lines += ["import numpy as np", "import roboticstoolbox as rtb", "", "robot = rtb.DHRobot(", "    ["]
@@ -56,7 +61,7 @@ def _link(row: DHRow, convention: Convention) -> str:
         else ("Prismatic", f"theta={row.theta!r}", row.d)
     )
     given = [constant, f"a={row.a!r}", f"alpha={row.alpha!r}", f"offset={offset!r}"]
-    return f"rtb.{kind}{suffix}({', '.join([*given, *ets.joint(row)])})"
+    return f"rtb.{kind}{suffix}({', '.join([*given, *joint_transform(row)])})"
 
 
 def write_matlab_rst(table: DHTable, units: Units) -> str:
@@ -83,3 +88,136 @@ def write_matlab_rst(table: DHTable, units: Units) -> str:
     lines += [*matrix("T", poses[-1].tolist(), 4), f"body = rigidBody('{plain(table.tip_frame)}_tip');"]
     lines += ["setFixedTransform(body.Joint, T);", f"addBody(robot, body, {parent});", "end"]
     return "\n".join(lines) + "\n"
+
+
+def write_ets(table: DHTable, units: Units) -> str:
+    """Return a module with `ets`, and `robot`, a Robot of these transforms.
+
+    Raises:
+        InputError: a mimic joint.
+    """
+    del units
+    demand_free(table, "a sequence of elementary transforms")
+    lines = docstring(table)
+    lines += ["import numpy as np", "import roboticstoolbox as rtb", "from roboticstoolbox import ET", ""]
+    lines += ["ets = rtb.ETS(", "    [", *_pose(table.base, always=not table.rows)]
+    lines += [
+        f"        {', '.join(_row(row, table.convention))},  # {plain(row.joint)}" for row in table.rows
+    ]
+    lines += [*_pose(table.tool), "    ]", ")", f'robot = rtb.Robot(ets, name="{plain(table.robot)}")']
+    return "\n".join(lines) + "\n"
+
+
+def joint_transform(row: DHRow) -> list[str]:
+    """Return roboticstoolbox's arguments for a joint's sense and limits."""
+    limits = bounds(row)
+    return ["flip=True"] * (row.sense < 0) + ([f"qlim=[{limits}]"] if limits else [])
+
+
+def _row(row: DHRow, convention: Convention) -> list[str]:
+    moves = ", ".join(joint_transform(row))
+    along = [
+        *_unless_zero("Rz", row.theta),
+        *([f"ET.Rz({moves})"] * row.kind.turns),
+        *_unless_zero("tz", row.d),
+    ]
+    along += [f"ET.tz({moves})"] * (not row.kind.turns)
+    across = [*_unless_zero("tx", row.a), *_unless_zero("Rx", row.alpha), *_unless_zero("Ry", row.beta)]
+    return along + across if convention is Convention.STANDARD else across + along
+
+
+def _unless_zero(name: str, value: float) -> list[str]:
+    return [f"ET.{name}({value!r})"] if value else []
+
+
+def _pose(T: FloatArray, *, always: bool = False) -> list[str]:
+    if is_identity(T) and not always:
+        return []
+    return [f"        ET.SE3(np.array([{numbers(T.ravel())}]).reshape(4, 4)),"]
+
+
+FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn), screws (w, v)"
+
+
+def write_screws(screws: ProductOfExponentials, form: str, digits: int = 10) -> str:
+    """Return the screws as "terminal", "latex", "toml", "json", "numpy" or "matlab"."""
+    return _FORMS[form](screws, digits)
+
+
+def _terminal(screws: ProductOfExponentials, digits: int) -> str:
+    path = f"{screws.robot}: {screws.base_frame} to {screws.tip_frame}"
+    lines = [f"{path}, product of exponentials (metres, angular first)", FORMULA]
+    for what, rows in (("space screws S", screws.space), ("body screws B", screws.body)):
+        body = [["i", "joint", "w_x", "w_y", "w_z", "v_x", "v_y", "v_z"]]
+        body += [
+            [str(i), joint.name, *(six_digits(x, digits=digits) for x in row)]
+            for i, (joint, row) in enumerate(zip(screws.joints, rows, strict=True), 1)
+        ]
+        lines += ["", what, *aligned(body)]
+    lines += ["", "M, the tip in the zero configuration (metres):"]
+    lines += ["  " + line for line in pose_lines(screws.M, digits)]
+    return "\n".join(map(printable, lines)) + "\n"
+
+
+def _latex(screws: ProductOfExponentials, digits: int) -> str:
+    names = f"{latex_text(screws.robot)}, {latex_text(screws.base_frame)} to {latex_text(screws.tip_frame)}"
+    heads = r"$i$ & joint & $\omega_x$ & $\omega_y$ & $\omega_z$ & $v_x$ & $v_y$ & $v_z$ \\"
+    rows = []
+    for i, (joint, row) in enumerate(zip(screws.joints, screws.space, strict=True), 1):
+        numbers = " & ".join(maths(six_digits(x, digits=min(digits, 6))) for x in row)
+        rows.append(rf"  {i} & {latex_text(joint.name)} & {numbers} \\")
+    frame = [r"\begin{tabular}{rlrrrrrr}", r"  \toprule", f"  {heads}", r"  \midrule"]
+    lines = [r"\begin{table}", r"  \centering", rf"  \caption{{Space screws of {names}, metres.}}"]
+    lines += fitted([*frame, *rows, r"  \bottomrule", r"\end{tabular}"])
+    return "\n".join([*lines, *pose("$M$", screws.M), r"\end{table}"]) + "\n"
+
+
+def _toml(screws: ProductOfExponentials, _digits: int) -> str:
+    return "".join(f"{key} = {json.dumps(value)}\n" for key, value in screws.as_mapping().items())
+
+
+def _json(screws: ProductOfExponentials, _digits: int) -> str:
+    return json.dumps(screws.as_mapping(), indent=2) + "\n"
+
+
+def _numpy(screws: ProductOfExponentials, _digits: int) -> str:
+    lines = [
+        f'"""{plain(screws.robot)}: M, space and body screws as columns (w, v), metres: Modern Robotics."""'
+    ]
+    lines += ["", "import numpy as np", ""]
+    for name, rows in (("M", screws.M), ("Slist", screws.space), ("Blist", screws.body)):
+        lines += _array(name, rows, ")" if name == "M" else ").reshape(-1, 6).T")
+    if all(joint.kind.turns for joint in screws.joints):
+        H, P = axes_and_steps(screws)
+        lines += [
+            "",
+            "# EAIK's HPRobot(H, P), ik-geo: p = P0 + R(h1, q1) (P1 + R(h2, q2) (P2 + ...)).",
+            "# Give them the rotation R @ R6T.T, where R is the rotation of the tip.",
+        ]
+        for name, rows in (("H", H), ("P", P)):
+            lines += _array(name, rows, ").reshape(-1, 3)")
+        lines.append("R6T = M[:3, :3]")
+    return "\n".join(lines) + "\n"
+
+
+def _array(name: str, rows: FloatArray, end: str) -> list[str]:
+    return [f"{name} = np.array(", "    [", *(f"        [{numbers(row)}]," for row in rows), "    ]", end]
+
+
+def _matlab(screws: ProductOfExponentials, _digits: int) -> str:
+    lines = [f"function [M, Slist, Blist] = {identifier(screws.robot)}_screws()"]
+    lines += [f"% {plain(screws.robot)}: screws are columns (w; v), metres, as in Modern Robotics"]
+    lines += matrix("M", screws.M, 4)
+    for name, rows in (("Slist", screws.space), ("Blist", screws.body)):
+        lines += [*matrix(name, rows, 6), f"{name} = {name}';"]
+    return "\n".join([*lines, "end"]) + "\n"
+
+
+_FORMS: dict[str, Callable[[ProductOfExponentials, int], str]] = {
+    "terminal": _terminal,
+    "latex": _latex,
+    "toml": _toml,
+    "json": _json,
+    "numpy": _numpy,
+    "matlab": _matlab,
+}

@@ -34,9 +34,8 @@ import numpy as np
 
 from urdfkin.kinematics.rotation.axis_angle import rotation_about
 from urdfkin.kinematics.rotation.matrix import axis_aligning
-from urdfkin.model.mechanisms.alignment import IDENTITY, Alignment, FramePair, Step
+from urdfkin.model.mechanisms.alignment import IDENTITY, Alignment, FramePair, Pair, Step, Variables
 from urdfkin.model.mechanisms.mechanism import Screw, apart
-from urdfkin.model.mechanisms.variables import Pair, Variables
 from urdfkin.model.tree import FloatArray
 
 _WHOLE = 2.0 * math.pi

@@ -1,0 +1,503 @@
+"""Bound the distance between a frame of two models from below by search, and from above by branch and bound.
+
+**Search.** The distance at the configuration found is attained, so it is a lower bound of the largest
+distance. The upper bound (`urdfkin.model.mechanisms.upper_bound`) limits how far the search can be off. Each
+joint value enters a position as a sine and a cosine. Therefore coordinate search from the worst of many
+random configurations works well.
+
+**Branch and bound.** `urdfkin.model.mechanisms.upper_bound` adds the effects of all differences, each at its
+own worst configuration. Where many things differ, that sum is too large. `Boxes` bounds D(q) = p_B - p_A in
+boxes of all variables together. In a box with middle c and half widths h,
+
+    |D(q)| <= max |D(c) + sum_i D_i(c) x_i| + (1/2) sum_ij M_ij h_i h_j,     |x_i| <= h_i.
+
+Here M_ij bounds the second derivatives at every configuration. Boxes whose bound is small enough are
+dropped. The others are halved.
+
+M_ij is computed joint by joint. The derivative of a rotation about the axis u is the rotation, followed by
+u x. Let y be the position of B's frame, and d its distance from A's frame. The derivatives of both are
+
+    y_i = u' x (Y - o'),    d_i = u x (Y - e(S t) (y - d)) + (u' - u) x (Y - o') + u x (o - o'),
+
+with Y = e(S' t') y. The joints in front transform these derivatives as free vectors
+(`urdfkin.model.mechanisms.upper_bound`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from urdfkin.kinematics.roundings import EPS, FOLLOWER, NOT_ZERO
+from urdfkin.model.configuration import neutral
+from urdfkin.model.mechanisms.alignment import IDENTITY, Alignment, FramePair, Line, Pair, Step, Variables
+from urdfkin.model.mechanisms.mechanism import Screw, apart
+from urdfkin.model.mechanisms.upper_bound import (
+    COARSE,
+    Support,
+    at_the_frame,
+    before_it,
+    behind_first,
+    difference,
+    passed,
+    point,
+)
+from urdfkin.model.pose import inverse, pose
+from urdfkin.model.ranges import WIDEST
+from urdfkin.model.tree import FloatArray
+from urdfkin.robot import Robot
+from urdfkin.verify.sampling import sample
+
+#: Number of random configurations, and of corners of all ranges, at the start of a search.
+SAMPLES, CORNERS = 512, 128
+#: Number of the worst configurations that the search starts from, and of values tried along a coordinate.
+STARTS, ALONG = 4, 13
+#: Frames that are searched in one batch.
+SEARCHED_TOGETHER = 24
+#: Share of its range within which a coordinate is varied, round by round.
+WINDOWS = (1.0, 1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001)
+
+#: Computes the poses (n, frames, 4, 4) of a robot's frames at q.
+Placements = Callable[[Robot, FloatArray, Sequence[str]], FloatArray]
+
+
+class Search:
+    """Search over the common variables of two aligned robots.
+
+    Args:
+        robots: A and B.
+        found: The alignment of the robots.
+        variables: The variables that move both robots.
+        seed: Seed of the random configurations.
+    """
+
+    def __init__(
+        self, robots: tuple[Robot, Robot], found: Alignment, variables: Variables, seed: int = 0
+    ) -> None:
+        self.robots, self.found, self.variables = robots, found, variables
+        self.names = list(variables.ranges)
+        self.ends = np.array([self._ends(name) for name in self.names]).reshape(-1, 2)
+        self.rng = np.random.default_rng(seed)
+        #: (4, 4) pose of B's base link in A's root frame; it moves with A's base link.
+        self.hold = found.X @ found.b.homes[found.base[1]]
+        #: For each robot, whether its base link is on the root body.
+        self.stands = tuple(
+            m.body_of[link] == 0 for m, link in zip((found.a, found.b), found.base, strict=True)
+        )
+
+    def _ends(self, name: str) -> tuple[float, float]:
+        low, high = self.variables.ranges[name]
+        tree = self.robots[name.startswith("b:")].tree
+        widest = math.pi if tree.joints[tree.joint_index(name[2:])].kind.turns else WIDEST
+        if math.isinf(low) and math.isinf(high):
+            return -widest, widest
+        return (high - 2.0 * widest if math.isinf(low) else low), (
+            low + 2.0 * widest if math.isinf(high) else high
+        )
+
+    def configurations(self, z: FloatArray, *, moved: bool = False) -> tuple[FloatArray, FloatArray]:
+        """Return configurations (n, nq) of A and of B for values (n, variables).
+
+        Args:
+            z: The values of the variables.
+            moved: Whether A's planar and floating joints are random instead of neutral.
+        """
+        values = dict(zip(self.names, z.T, strict=True))
+        tree_a, tree_b = (robot.tree for robot in self.robots)
+        q_a = sample(tree_a, len(z), self.rng) if moved else np.tile(neutral(tree_a), (len(z), 1))
+        q_b = np.tile(neutral(tree_b), (len(z), 1))
+        for step in self.found.steps:
+            joint = tree_a.joints[step.a]
+            if joint.kind.nq > 1 and not step.unlike:
+                at, to = tree_a.q_index[step.a], tree_b.q_index[step.b]
+                own = q_a[:, at : at + joint.kind.nq]
+                converted = own if step.conversion is None else step.conversion(joint.kind, own)
+                q_b[:, to : to + joint.kind.nq] = converted
+        for joint, at in zip(tree_a.joints, tree_a.q_index, strict=True):
+            if joint.nq == 1:
+                q_a[:, at] = values.get(f"a:{joint.name}", 0.0)
+        for name, line in self.variables.leaders.items():
+            q_b[:, tree_b.q_index[tree_b.joint_index(name)]] = _value(line, values)
+        return q_a, q_b
+
+    def belong_together(self, q_a: FloatArray, q_b: FloatArray) -> bool:
+        """Return whether two configurations (1, nq) correspond and are within all ranges, to rounding."""
+        sizes = tuple(robot.nq for robot in self.robots)
+        if (q_a.shape, q_b.shape) != ((1, sizes[0]), (1, sizes[1])):
+            return False
+        z = np.zeros((1, len(self.names)))
+        for k, name in enumerate(self.names):
+            tree, q = (self.robots[0].tree, q_a) if name.startswith("a:") else (self.robots[1].tree, q_b)
+            z[0, k] = q[0, tree.q_index[tree.joint_index(name[2:])]]
+        low, high = self.ends.T
+        room = EPS * FOLLOWER * (1.0 + np.maximum(np.abs(low), np.abs(high)))
+        mapped = self.configurations(z)[1]
+        off = np.abs(mapped - q_b) <= EPS * FOLLOWER * (1.0 + np.abs(mapped))
+        return bool(off.all() and (low - room <= z).all() and (z <= high + room).all())
+
+    def poses(self, z: FloatArray, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
+        """Return poses (n, frames, 4, 4) of A and of B, on A's base, at values (n, variables)."""
+        return self.poses_at(*self.configurations(z), frames, urdfkins)
+
+    def poses_at(
+        self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return `poses` at configurations (n, nq) of each robot, computed by the function `computed`."""
+        a, b = self.robots
+        Ts_a = computed(a, q_a, [a.tree.link_frames[frame.a] for frame in frames])
+        base = b.tree.link_frames[self.found.base[1]]
+        Ts_b = computed(b, q_b, [base, *(b.tree.link_frames[frame.b] for frame in frames)])
+        tools = np.array([inverse(frame.tool) for frame in frames]).reshape(-1, 4, 4)
+        hold = self.hold
+        if not self.stands[0]:
+            link = self.found.base[0]
+            moved = computed(a, q_a, [a.tree.link_frames[link]])
+            hold = moved @ inverse(self.found.a.homes[link]) @ hold
+        return Ts_a, hold @ np.linalg.inv(Ts_b[:, :1]) @ Ts_b[:, 1:] @ tools
+
+    def at(
+        self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
+    ) -> FloatArray:
+        """Return distances (n, frames), metres, at configurations (n, nq) of each robot."""
+        return _distances(*self.poses_at(q_a, q_b, frames, computed))
+
+    def random(self, n: int) -> FloatArray:
+        """Return random values (n, variables) within their ranges."""
+        low, high = self.ends.T
+        return np.asarray(low + (high - low) * self.rng.random((n, len(self.names))))
+
+    def metres(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
+        """Return distances (n, frames) of the frames' origins, metres; arguments as for `poses`."""
+        return _distances(*self.poses(z, frames))
+
+    def seen(self, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
+        """Return distances (n, frames) at random values and at corners of the ranges, and these values."""
+        low, high = self.ends.T
+        z = self.random(SAMPLES)
+        corners = np.where(self.rng.random((CORNERS, len(self.names))) < 0.5, low, high)
+        z = np.concatenate((np.clip(np.zeros((1, len(self.names))), low, high), corners, z))
+        return self.metres(z, frames), z
+
+    def worst(self, frames: Sequence[FramePair]) -> list[tuple[float, FloatArray]]:
+        """Return for each frame the largest distance found, metres, and the values there."""
+        found: list[tuple[float, FloatArray]] = []
+        for first in range(0, len(frames), SEARCHED_TOGETHER):
+            some = frames[first : first + SEARCHED_TOGETHER]
+            off, z = self.seen(some)
+            found += self._climb(some, z[np.argsort(-off, axis=0)[:STARTS].T])
+        return found
+
+    def most_turned(self, frame: FramePair) -> FloatArray:
+        """Return the sampled values (variables,) at which a frame's orientations differ most."""
+        z = self.seen([frame])[1]
+        Ts_a, Ts_b = self.poses(z, [frame])
+        turned = [apart(T, other)[0] for T, other in zip(Ts_a[:, 0], Ts_b[:, 0], strict=True)]
+        return np.asarray(z[int(np.argmax(turned))])
+
+    def _climb(self, frames: Sequence[FramePair], z: FloatArray) -> list[tuple[float, FloatArray]]:
+        """Maximize each frame's distance by coordinate search.
+
+        Args:
+            frames: The frames; each is searched separately, all in one batch.
+            z: (frames, starts, variables) start values.
+        """
+        ways = [self._variables_of(frame) for frame in frames]
+        low, high = self.ends.T
+        k, s = np.ogrid[: len(frames), : z.shape[1]]
+        best = self._own_distances(z[:, :, np.newaxis], frames)[..., 0]
+        steps = np.linspace(-0.5, 0.5, ALONG)
+        for window in WINDOWS:
+            for turn in range(max(map(len, ways))):
+                i = np.array([way[turn % len(way)] if way else 0 for way in ways])
+                span = (high - low)[i][:, np.newaxis]
+                middle = (
+                    ((low + high) / 2.0)[i][:, np.newaxis] if window == 1.0 else z[k, s, i[:, np.newaxis]]
+                )
+                values = middle[..., np.newaxis] + window * span[..., np.newaxis] * steps
+                values = np.clip(
+                    values, low[i][:, np.newaxis, np.newaxis], high[i][:, np.newaxis, np.newaxis]
+                )
+                tried = np.repeat(z[:, :, np.newaxis], ALONG, axis=2)
+                tried[
+                    k[..., np.newaxis], s[..., np.newaxis], np.arange(ALONG), i[:, np.newaxis, np.newaxis]
+                ] = values
+                off = self._own_distances(tried, frames)
+                at = off.argmax(axis=2)
+                better = off[k, s, at] > best
+                z = np.where(better[..., np.newaxis], tried[k, s, at], z)
+                best = np.where(better, off[k, s, at], best)
+        at = best.argmax(axis=1)
+        return [(float(best[n, m]), z[n, m]) for n, m in enumerate(at)]
+
+    def _own_distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
+        """Return distances (frames, starts, values) of each frame at its own values, variables last."""
+        flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])  # also for robots without variables
+        off = self.metres(flat, frames).reshape(*z.shape[:-1], len(frames))
+        n = np.arange(len(frames))
+        return np.asarray(off[n, :, :, n])
+
+    def _variables_of(self, frame: FramePair) -> list[int]:
+        """Return the indices of the variables that move a frame in at least one model."""
+        steps = set(self.found.indices(frame.previous))
+        names = {
+            line.variable
+            for i, pair in enumerate(self.variables.pairs)
+            if pair is not None and i in steps
+            for line in (pair.a, pair.b)
+            if line.slope
+        }
+        trees = self.robots[0].tree, self.robots[1].tree
+        for step in (self.found.steps[i] for i in steps):
+            if step.unlike == "kind":
+                names |= {f"a:{trees[0].joints[step.a].name}", f"b:{trees[1].joints[step.b].name}"}
+        return [i for i, name in enumerate(self.names) if name in names]
+
+
+def _distances(a: FloatArray, b: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.norm(a[..., :3, 3] - b[..., :3, 3], axis=-1))
+
+
+def urdfkins(robot: Robot, q: FloatArray, frames: Sequence[str]) -> FloatArray:
+    """Return poses (n, frames, 4, 4) computed by the forward recursion."""
+    return robot.placement(q, frames, verify=False)
+
+
+def pinocchios(robot: Robot, q: FloatArray, frames: Sequence[str]) -> FloatArray:
+    """Return poses (n, frames, 4, 4) computed by Pinocchio from the robot's text."""
+    return robot.verifier.oracle().placements(q, frames)
+
+
+def _value(line: Line, values: dict[str, FloatArray]) -> FloatArray | float:
+    return line.constant + (line.slope * values.get(line.variable, 0.0) if line.slope else 0.0)
+
+
+_ORIGIN = np.zeros(3)
+_Vectors = tuple[Support, Support]
+
+
+def curvature(
+    steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables, frame: FramePair
+) -> tuple[list[str], FloatArray]:
+    """Return names of variables, and bounds (variables, variables) of the second derivatives of D, metres.
+
+    Bounds are inf where two variables move one pair of joints, or one variable moves them by two factors.
+    """
+    names = list(dict.fromkeys(line.variable for pair in pairs for line in (pair.a, pair.b) if line.slope))
+    found = np.zeros((len(names), len(names)))
+    for i, j, most in _second_derivatives(steps, pairs, variables, frame):
+        if not most:
+            continue
+        if not all(pairs[k].a.slope and pairs[k].a.slope == pairs[k].b.slope for k in (i, j)):
+            return names, np.full_like(found, math.inf)
+        bend = most * abs(pairs[i].a.slope * pairs[j].a.slope)
+        at, to = (names.index(pairs[k].a.variable) for k in (i, j))
+        found[at, to] += bend
+        if i != j:
+            found[to, at] += bend
+    return names, found
+
+
+def _second_derivatives(
+    steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables, frame: FramePair
+) -> Iterator[tuple[int, int, float]]:
+    """Yield i, j <= i and the largest second derivative by the values of joints i and j."""
+    free = [_as_free_vectors(step) for step in steps]
+    d, y = at_the_frame(frame, COARSE)
+    for i in reversed(range(len(steps))):
+        first = _derivatives(steps[i], pairs[i], variables, d, y)
+        if steps[i].kind == "turns":
+            yield i, i, _pass_to_front(_cross_products(free[i], *first), free[: i + 1], pairs, variables)
+        vectors = before_it(free[i], *first)
+        for j in reversed(range(i)):
+            if steps[j].kind == "turns":
+                second = _derivatives(free[j], pairs[j], variables, *vectors)
+                yield i, j, _pass_to_front(second, free[: j + 1], pairs, variables)
+                vectors = passed(free[j], pairs[j], variables, *vectors)
+            else:
+                vectors = before_it(free[j], *vectors)
+        d, y = passed(steps[i], pairs[i], variables, d, y)
+
+
+def _pass_to_front(
+    vectors: _Vectors, steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables
+) -> float:
+    """Return the largest d in front of all steps, from vectors behind the last step's L."""
+    vectors = before_it(steps[-1], *vectors)
+    for step, pair in zip(reversed(steps[:-1]), reversed(pairs[: len(steps) - 1]), strict=True):
+        slides = step.kind != "turns"
+        vectors = before_it(step, *vectors) if slides else passed(step, pair, variables, *vectors)
+    return vectors[0].largest()
+
+
+def _derivatives(step: Step, pair: Pair, variables: Variables, d: Support, y: Support) -> _Vectors:
+    """Return the derivatives of d and y by a joint's value, behind its L."""
+    if step.kind != "turns":
+        u, other = step.axis.direction, step.other.direction
+        return point(d.grid, other - u), point(d.grid, other)
+    d, y = difference(step, pair, variables, y, d), y.turned(step.other, *variables.range(pair.b))
+    return _cross_products(step, d, y)
+
+
+def _cross_products(step: Step, d: Support, y: Support) -> _Vectors:
+    """Return the cross products of u with d and of u' with y."""
+    G, axis, other = d.grid.points, step.axis, step.other
+    most = 0.0
+    if other is not axis:
+        reach = Support(d.grid, y.values - G @ other.point).largest()
+        most = float(np.linalg.norm(other.direction - axis.direction)) * reach
+        most += float(np.linalg.norm(np.cross(axis.direction, axis.point - other.point)))
+    across, there = np.cross(G, axis.direction), np.cross(G, other.direction)
+    bent = Support(d.grid, d.at(across) + most * d.grid.lengths)
+    return bent, Support(d.grid, y.at(there) - there @ other.point)
+
+
+def _as_free_vectors(step: Step) -> Step:
+    """Return the step's effect on free vectors."""
+    axis = Screw(step.axis.direction, _ORIGIN)
+    other = axis if step.other is step.axis else Screw(step.other.direction, _ORIGIN)
+    before = IDENTITY if step.before is IDENTITY else pose(step.before[:3, :3])
+    return replace(step, axis=axis, other=other, before=before)
+
+
+#: Largest number of boxes at a time: one or two seconds of a processor for a frame.
+MOST = 2**17
+#: Boxes computed in one batch: Jacobians of more would take gigabytes.
+TOGETHER = 2**16
+
+
+class Boxes:
+    """Bounds of one frame's distance in boxes of configurations.
+
+    Args:
+        search: Both robots.
+        frame: The frame.
+        names: Names of the variables that move it: see `moved_together`.
+    """
+
+    def __init__(self, search: Search, frame: FramePair, names: Sequence[str]) -> None:
+        self.search = search
+        self.at = [search.names.index(name) for name in names]
+        self.middle = search.ends.mean(axis=1)
+        trees = [robot.tree for robot in search.robots]
+        self.frames = trees[0].link_frames[frame.a], trees[1].link_frames[frame.b]
+        # B's frame as a tool, expressed in A's root frame.
+        q = search.configurations(self.middle[np.newaxis])[1]
+        base = trees[1].link_frames[search.found.base[1]]
+        self.seen = search.hold @ inverse(urdfkins(search.robots[1], q, [base])[0, 0])
+        self.tool = inverse(frame.tool)[:3, 3]
+        #: (nv, variables) derivatives of each robot's joint values by the variables.
+        self.rates = [np.zeros((tree.nv, len(names))) for tree in trees]
+        lines = {joint.name: Line(f"a:{joint.name}", 1.0, 0.0) for joint in trees[0].joints if joint.nv == 1}
+        for rates, tree, own in zip(self.rates, trees, (lines, search.variables.leaders), strict=True):
+            for joint, line in own.items():
+                if line.variable in names:
+                    rates[tree.v_index[tree.joint_index(joint)], names.index(line.variable)] = line.slope
+
+    def bounds(self, c: FloatArray, h: FloatArray) -> FloatArray:
+        """Bound |D + sum_i D_i x_i| over |x_i| <= h_i, (n,) for middles (n, variables)."""
+        D, G = self.at_middles(c)
+        size = np.sqrt((D * D).sum(axis=1))
+        along = (D[:, :, np.newaxis] * G).sum(axis=1) / np.maximum(size, NOT_ZERO)[:, np.newaxis]
+        across = np.sqrt(np.maximum((G * G).sum(axis=1) - along * along, 0.0))
+        return np.asarray(np.hypot(size + np.abs(along) @ h, across @ h))
+
+    def at_middles(self, c: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return D (n, 3) and its derivatives (n, 3, variables) at values (n, variables)."""
+        z = np.tile(self.middle, (len(c), 1))
+        z[:, self.at] = c
+        (a, b), (q_a, q_b) = self.search.robots, self.search.configurations(z)
+        p_a, J_a = self._origin(a, q_a, self.frames[0], np.zeros(3))
+        p_b, J_b = self._origin(b, q_b, self.frames[1], self.tool)
+        R, p = self.seen[:3, :3], self.seen[:3, 3]
+        return p_b @ R.T + p - p_a, R @ (J_b @ self.rates[1]) - J_a @ self.rates[0]
+
+    def _origin(
+        self, robot: Robot, q: FloatArray, frame: str, tool: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the position (n, 3) of a frame's point, and its Jacobian (n, 3, nv)."""
+        T, J = urdfkins(robot, q, [frame])[:, 0], robot.jacobian(q, frame, verify=False)
+        if not tool.any():
+            return T[:, :3, 3], J[:, :3]
+        lever = T[:, :3, :3] @ tool
+        return T[:, :3, 3] + lever, J[:, :3] + np.cross(J[:, 3:], lever[:, :, np.newaxis], axis=1)
+
+
+def tightened(search: Search, frame: FramePair, target: float, upper: float, most: int = MOST) -> float:
+    """Return a bound of a frame's distance, metres: `target` if it can be proven, else up to `upper`.
+
+    Args:
+        search: Both robots.
+        frame: The frame.
+        target: The bound to prove.
+        upper: The bound that is proven already.
+        most: Largest number of boxes at a time.
+    """
+    variables = search.variables
+    steps, pairs = moved_together(search.found, variables, frame)
+    some = [pair for pair in pairs if pair is not None]
+    all_round = all(
+        step.kind == "turns" and abs(line.slope) == 1.0
+        for step, pair in zip(steps, some, strict=False)
+        for line in (pair.a, pair.b)
+        if line.slope and math.inf in np.abs(variables.ranges[line.variable])
+    )
+    if not target < upper < math.inf or len(some) < len(pairs) or not (all(search.stands) and all_round):
+        return upper
+    names, M = curvature(steps, some, variables, frame)
+    boxes = Boxes(search, frame, names)
+    ends = search.ends[boxes.at]
+    c, h, proven = ends.mean(axis=1)[np.newaxis], (ends[:, 1] - ends[:, 0]) / 2.0, np.array([upper])
+    if not np.isfinite(M).all() or 2 ** _halvings(h, M, upper) > most:
+        return upper
+    if not names:  # no joint of the path changes the distance
+        return min(upper, float(boxes.bounds(c, h)[0]))
+    while len(c) and 2 * len(c) <= most:
+        i = _longest(h, M)
+        h[i] /= 2.0
+        c, proven = np.repeat(c, 2, axis=0), np.repeat(proven, 2)
+        c[::2, i] -= h[i]
+        c[1::2, i] += h[i]
+        if (rest := 0.5 * float(h @ M @ h)) < upper:
+            bounds = [boxes.bounds(c[k : k + TOGETHER], h) for k in range(0, len(c), TOGETHER)]
+            proven = np.minimum(proven, np.concatenate(bounds) + rest)
+            keep = proven > target
+            c, proven = c[keep], proven[keep]
+    return float(proven.max(initial=target))
+
+
+def moved_together(
+    found: Alignment, variables: Variables, frame: FramePair
+) -> tuple[list[Step], list[Pair | None]]:
+    """Return the steps to a frame, from the first that differs or shares a variable with one that does.
+
+    A joint before the first difference rotates D and does not change its length. But its variable may also
+    move a mimic joint behind the difference. Then D depends on both motions, and the step is included.
+    """
+    steps, pairs = found.path(frame.previous), [variables.pairs[i] for i in found.indices(frame.previous)]
+    first = len(steps) - len(behind_first(found, variables, frame)[0])
+    for i in reversed(range(first)):
+        if _variables(pairs[i : i + 1]) & _variables(pairs[first:]):
+            first = i  # the steps between have variables too
+    return steps[first:], pairs[first:]
+
+
+def _variables(pairs: Sequence[Pair | None]) -> set[str]:
+    lines = (line for pair in pairs if pair is not None for line in (pair.a, pair.b))
+    return {line.variable for line in lines if line.slope}
+
+
+def _longest(h: FloatArray, M: FloatArray) -> int:
+    """Return the index of the variable that contributes most to the second-order term."""
+    return int((h * (M @ h)).argmax())
+
+
+def _halvings(h: FloatArray, M: FloatArray, upper: float) -> int:
+    """Return how often a box must be halved until its bound can be below `upper`."""
+    h, count = h.copy(), 0
+    while 0.5 * h @ M @ h >= upper:
+        h[_longest(h, M)] /= 2.0
+        count += 1
+    return count
