@@ -1,4 +1,4 @@
-"""The result of comparing two models: verdict, differences, joint map and intervals of distance, and their words."""
+"""The result of comparing two models, and its words: verdict, differences, joint map, intervals of distance."""
 
 from __future__ import annotations
 

@@ -11,8 +11,8 @@ Positions stay as they are in the file, so each change only turns the rest of th
 origin. `urdfkin.dh.table` derives the bound from this.
 
 `snap_hint` finds cells that look like angles rounded by the file (1.5708, 3.14159265359). A tilt of 5e-12 rad
-is larger than the rounding of the computation (`urdfkin.dh.common_normals`). A table therefore contains it, and the
-offsets of about 1e-12 m that it causes. The hint states that these numbers come from the file.
+is larger than the rounding of the computation (`urdfkin.dh.common_normals`). A table therefore contains it,
+and the offsets of about 1e-12 m that it causes. The hint states that these numbers come from the file.
 """
 
 from __future__ import annotations

@@ -99,7 +99,8 @@ class TreeParameters:
         ways: (joints,) path length from the root to each joint: the sum of the URDF's offsets (metres).
         T_frame_link: (joints, 4, 4) pose of the URDF's link frame in the row's frame. The row's frame has z
             along the joint's axis and x along the common normal.
-        left_out: Largest sum, over all paths, of the tilts that count as rounding (rad; `urdfkin.dh.common_normals`).
+        left_out: Largest sum, over all paths, of the tilts that count as rounding (rad;
+            `urdfkin.dh.common_normals`).
     """
 
     robot: str

@@ -352,8 +352,8 @@ def module(table: DHTable, number: Doubles, imports: str, kind: str, split: str 
     lines += [f"    [{', '.join(names)}] = {split}", "    return ["]
     lines += [f"        ({row})," for row in rows(table, number, times=" * ")] + ["    ]", "", ""]
     for what, T in (("BASE", table.base), ("TOOL", table.tool)):
-        body = (f"        [{row}]," for row in pose_rows(T, number))
-        lines += [f"{what} = matrix(", "    [", *body, "    ]", ")"]
+        entries = (f"        [{row}]," for row in pose_rows(T, number))
+        lines += [f"{what} = matrix(", "    [", *entries, "    ]", ")"]
     product = "S @ X" if table.convention is Convention.STANDARD else "X @ S"
     body = _BODY.format(formula=formula(table), product=product, n=len(names), kind=kind)
     return "\n".join([*lines, ""]) + "\n" + body
