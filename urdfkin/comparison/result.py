@@ -1,4 +1,4 @@
-"""The result of comparing two models, and its words: verdict, differences, joint map, intervals of distance."""
+"""The result of comparing two models, in numbers and words: verdict, differences, joint map, distances."""
 
 from __future__ import annotations
 
