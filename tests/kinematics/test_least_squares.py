@@ -1,0 +1,47 @@
+"""The solver on Rosenbrock's valley, and its limits on steps."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from urdfkin.kinematics.least_squares import least_squares
+from urdfkin.model.tree import FloatArray
+
+
+def residuals(x: FloatArray) -> FloatArray:
+    return np.array([10.0 * (x[1] - x[0] ** 2), 1.0 - x[0]])
+
+
+def linearized(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    return -residuals(x), np.array([[-20.0 * x[0], 10.0], [-1.0, 0.0]])
+
+
+def size(x: FloatArray) -> float:
+    return float(np.linalg.norm(residuals(x)))
+
+
+def test_the_minimum_of_a_curved_valley_is_found() -> None:
+    found, left = least_squares(np.array([-1.2, 1.0]), linearized, size, np.add)
+    np.testing.assert_allclose(found, 1.0, atol=1e-12)
+    assert left == size(found) < 1e-12
+
+
+def test_no_step_is_longer_than_the_limit() -> None:
+    steps = list[float]()
+
+    def moved(x: FloatArray, step: FloatArray) -> FloatArray:
+        steps.append(float(np.abs(step).max()))
+        return x + step
+
+    found, _ = least_squares(np.array([-1.2, 1.0]), linearized, size, moved, longest=0.5)
+    assert max(steps) <= 0.5
+    np.testing.assert_allclose(found, 1.0, atol=1e-12)
+
+
+def test_without_parameters_the_start_is_the_result() -> None:
+    start = np.zeros(2)
+    found, left = least_squares(start, lambda x: (-residuals(x), np.empty((2, 0))), size, np.add)
+    assert found is start
+    assert math.isclose(left, 1.0)
