@@ -66,6 +66,7 @@ _HOMES = {
 register_hook("a table in a form", lazy_import("urdfkin.dh.export:export"))
 register_hook("a report as a page", lazy_import("urdfkin.report.html:as_html"))
 register_hook("a report as a comment", lazy_import("urdfkin.report.markdown:as_markdown"))
+register_hook("a comparison as a document", lazy_import("urdfkin.report.same:as_document"))
 register_hook("a robot in a cell", lazy_import("urdfkin.report.notebook:Cell"))
 
 __all__ = [

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from copy import copy
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,8 +46,8 @@ from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.configuration_like import Given, listed
 from urdfkin.model.frame_names import FrameName, LinkFrame
 from urdfkin.model.reference import Reference
-from urdfkin.model.summary import described
-from urdfkin.model.tree import FloatArray, Joint, KinematicTree
+from urdfkin.model.summary import Joints, described
+from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.system.lazy_import import hook
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import Finding, Findings
@@ -69,6 +70,7 @@ from urdfkin.verify.quantities import (
 )
 from urdfkin.verify.sampling import Verify, sample
 from urdfkin.verify.singular_values import SingularValues, singular_values
+from urdfkin.verify.singularity import columns_of
 from urdfkin.verify.verifier import Verifier
 
 if TYPE_CHECKING:
@@ -79,6 +81,8 @@ _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 #: m/s^2, in world axes; the default of Pinocchio and MuJoCo.
 GRAVITY = (0.0, 0.0, -9.81)
 _ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
+#: Number of random configurations whose Jacobians show the usual rank.
+_GENERIC = 3
 #: Members for internal use, hidden from name completion.
 _INSIDE = {"plan", "verifier"}
 #: Largest number of float64 values that an array can address.
@@ -377,15 +381,17 @@ class Robot(Displayable):
         return self.tip_frame
 
     @property
-    def joints(self) -> dict[str, Joint]:
+    def joints(self) -> Joints:
         """All joints by name, fixed joints included, in Pinocchio's order: kind, axis, limit, mimic rule.
+
+        The result is a dict of `Joint`; `print` and notebooks show it as a table.
 
         >>> import urdfkin
         >>> joint = urdfkin.load("planar_two_link").joints["joint_2"]
         >>> joint.axis.tolist(), joint.limit.lower, joint.limit.upper
         ([0.0, 0.0, 1.0], -3.0, 3.0)
         """
-        return {joint.name: joint for joint in self.tree.joints}
+        return Joints(self.tree)
 
     @property
     def frames(self) -> dict[str, str]:
@@ -1047,7 +1053,8 @@ class Robot(Displayable):
         The bounds include the rounding error of J and of the decomposition. Columns of J that are 0 for every
         q are left out. The values are the same in LOCAL and LOCAL_WORLD_ALIGNED. With rows "all" they mix
         metres and radians in SI units. `found.manipulability_gradient(robot.hessian(q, frame))` returns the
-        gradient of the manipulability.
+        gradient of the manipulability. `print(found)` shows a table, and explains a singularity:
+        `found.singularity()` names the lost direction and the joints that cause it.
 
         Args:
             q: (..., nq) rad, m.
@@ -1079,8 +1086,12 @@ class Robot(Displayable):
         size = magnitudes(call.plan, call.q, None, None, call.state)
         bound = JACOBIAN.bound(call.plan, size, _ALIGNED)
         error = (EPS * bound.k * bound.scale)[:, 0].reshape(*call.shape, 6, self.nv)
-        moving = np.asarray(movable(call.plan)[0, which].any(axis=0))
-        return singular_values(J, error, moving, which)
+        active = movable(call.plan)[0]
+        columns = columns_of(
+            self.tree, J, error, frame, self.rate_names, active, partial(self._sampled, frame),
+            moving_base=base is not None,
+        )  # fmt: skip
+        return singular_values(J, error, active[which].any(axis=0), which, columns)
 
     def analytical_jacobian(
         self,
@@ -1583,6 +1594,12 @@ class Robot(Displayable):
         result = call.in_shape(found) if out is None else out
         self.verifier.check(row, call, result, verify)
         return result
+
+    def _sampled(self, frame: str) -> FloatArray:
+        """Return Jacobians (n, 6, nv) of a frame at random configurations, without a check or a record."""
+        call = Call(self.tree, self.plan, frame, _ALIGNED, None, (self.sample(_GENERIC),))
+        found: FloatArray = call.compute(JACOBIAN.ours, call.plan, (call.q,), _ALIGNED)
+        return found[:, 0]
 
     def _fast(
         self, frame: str | Sequence[str] | None, reference: Reference | str, verify: Verify | None

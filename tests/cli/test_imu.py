@@ -153,3 +153,16 @@ def test_what_is_no_number_is_null_in_json() -> None:
     document = json.loads(urdfkin(*words).out)
     assert document["condition"]["upper"] == [None]
     assert document["manipulability_gradient"] == [[None, None]]
+    assert [one["rank"] for one in document["singularities"]] == [1]
+    assert document["verified"]
+
+
+def test_a_singularity_is_explained_in_place_of_a_gradient() -> None:
+    text = urdfkin("manipulability", "ur5", "--frame", "tool0", "--q", "neutral").text
+    assert "Singular within rounding: rank 5 of 6" in text
+    assert "Lost direction: rotation of tool0 about (1, 0, 0), in world axes." in text
+    assert "wrist_1_joint are parallel and lie in one plane." in text
+    assert "nan" not in text
+    regular = urdfkin("manipulability", "ur5", "--frame", "tool0", "--q", "random").text
+    assert "ingular within" not in regular
+    assert "manipulability changes by" in regular

@@ -67,8 +67,11 @@ def command(
 
     Each value has a guaranteed lower and upper bound. The bounds include the error of the Jacobian and the
     rounding of the decomposition. Manipulability is Yoshikawa's sqrt(det J J^T), the product of the singular
-    values. Its derivative for each joint velocity comes from the Hessian. The derivative is nan where the
-    smallest singular value is not distinguishable from 0.
+    values. Its derivative for each joint velocity comes from the Hessian.
+
+    At a singularity the command prints the rank, the lost directions and the joints that cause them. There
+    the manipulability may have no derivative; it is nan in CSV and null in JSON. See `urdfkin explain
+    singularity`.
     """
     format_ = format_from_suffix(context, output, _ENDINGS, "csv")
     loaded = load_robot(robot, verify=verify)
@@ -104,6 +107,11 @@ def _print(out: Console, x: Inputs, rows: str, found: SingularValues, gradient: 
         for name, between in (("condition", found.condition), ("manipulability", found.manipulability)):
             lines.append((name, *(f"{side[k]:.15g}" for side in between)))
         print_named(out, ["", "value", "no less than", "no more than"], lines)
+        singularity = found.singularity(k)
+        for line in str(singularity).splitlines() if singularity else []:
+            out.print(line, soft_wrap=True)
+        if singularity:
+            continue  # the manipulability has no derivative
         slopes = zip(x.robot.rate_names, gradient[k].tolist(), strict=True)
         print_named(out, ["joint", "manipulability changes by"], slopes)
     if len(gradient) > _SHOWN:
@@ -127,6 +135,12 @@ def _as_json(x: Inputs, rows: str, found: SingularValues, gradient: FloatArray, 
             side: _finite(numbers.tolist()) for side, numbers in sides.items()
         }
     document["manipulability_gradient"] = _finite(gradient.tolist())
+    document["singularities"] = [
+        {"rank": one.rank, "full": one.full, "lost": one.lost.tolist(), "reasons": one.reasons}
+        if one
+        else None
+        for one in (found.singularity(k) for k in range(len(gradient)))
+    ]
     document["verified"] = x.robot.certificate().verified
     document["check"] = check
     return json_text(document) + "\n"

@@ -13,12 +13,14 @@ from numpy.typing import ArrayLike
 from urdfkin.dh.table import nearest_twelfth
 from urdfkin.dh.units import units_of
 from urdfkin.errors import InputError
+from urdfkin.errors.display import Displayable, TextDocument
 from urdfkin.errors.escape import log_line
 from urdfkin.kinematics.rotation.euler import rpy_of
 from urdfkin.model.configuration import checked, neutral
 from urdfkin.model.mechanisms.alignment import IDENTITY, Alignment, FramePair, Step, Variables, limits
 from urdfkin.model.mechanisms.mechanism import JointTransform, Mechanism, Tolerance, apart, tolerance_of
 from urdfkin.model.tree import FloatArray, Joint, KinematicTree
+from urdfkin.system.lazy_import import hook
 
 #: Smallest number printed with a prefix (0.1 to four digits); the unit alone is used from 9 times it on.
 _TENTH, _NINE = 0.09995, 9.0
@@ -110,9 +112,11 @@ class JointMap:
     conversion: JointTransform | None = None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Sameness:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Sameness(Displayable):
     """Whether two models are the same robot; the result of `urdfkin.same`.
+
+    `print` and notebooks show the answer, by how much the models differ, and the reasons.
 
     Attributes:
         names: The robots' names.
@@ -169,6 +173,10 @@ class Sameness:
         after = self.verdict is Verdict.SAME_AFTER
         how = f"equivalent up to {', '.join(self.up_to)}" if after else self.verdict.value
         return log_line(f"<Sameness {self.names[0]}, {self.names[1]}: {how}>")
+
+    def _sheet(self) -> TextDocument:
+        found: TextDocument = hook("a comparison as a document")(self)
+        return found
 
     @property
     def worst(self) -> Interval | None:

@@ -20,6 +20,8 @@ from numpy.typing import ArrayLike
 
 from urdfkin.dh.convert import UNBOUNDED_SLIDE
 from urdfkin.errors import InputError
+from urdfkin.errors.display import Displayable, Table, TextDocument
+from urdfkin.errors.escape import log_line
 from urdfkin.kinematics.inputs import rotation_defect
 from urdfkin.kinematics.rotation import axis_aligning
 from urdfkin.kinematics.rotation.matrix import ROUNDED, polar_factor
@@ -45,9 +47,9 @@ class ScrewJoint:
     limit: Limit | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class ProductOfExponentials:
-    """A robot's path as a product of exponentials.
+@dataclass(frozen=True, eq=False, repr=False)
+class ProductOfExponentials(Displayable):
+    """A robot's path as a product of exponentials; `print` and notebooks show it as tables.
 
     Attributes:
         joints: The joints, base to tip.
@@ -70,6 +72,25 @@ class ProductOfExponentials:
     robot: str = "robot"
     base_frame: str = "base"
     tip_frame: str = "tip"
+
+    def __repr__(self) -> str:
+        path = f"{self.robot}: {self.base_frame} to {self.tip_frame}"
+        return log_line(f"<ProductOfExponentials {path}, {len(self.joints)} joints>")
+
+    def _sheet(self) -> TextDocument:
+        names = [joint.name for joint in self.joints]
+        parts: list[str | Table] = [
+            "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn)"
+        ]
+        for words, rows in (("Space screws S", self.space), ("Body screws B", self.body)):
+            cells = [(name, *row) for name, row in zip(names, rows.tolist(), strict=True)]
+            heads = ("joint", "w_x", "w_y", "w_z", "v_x", "v_y", "v_z")
+            parts += [f"{words}, angular part first (1, m):", Table(heads, cells)]
+        pose_rows = [(axis, *row) for axis, row in zip("xyz", self.M[:3].tolist(), strict=True)]
+        heads = (f"axis of {self.base_frame}", "x of tip", "y of tip", "z of tip", "position [m]")
+        parts += ["M, the pose of the tip in the zero configuration:", Table(heads, pose_rows)]
+        title = f"{self.robot}: {self.base_frame} to {self.tip_frame}, product of exponentials"
+        return TextDocument(title, parts)
 
     @cached_property
     def body(self) -> FloatArray:

@@ -80,6 +80,7 @@ class Question(Enum):
     XACRO = "xacro-without-ros"
     GRAVITY = "gravity-in-an-acceleration"
     FLOATING_BASES = "floating-bases"
+    SINGULARITY = "singularity"
 
     def __str__(self) -> str:
         return f"see `urdfkin explain {self.value}`"

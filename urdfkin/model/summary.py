@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from urdfkin.errors.display import Table, TextDocument
+from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.model.ranges import narrowed_ranges
-from urdfkin.model.tree import KinematicTree
+from urdfkin.model.tree import Joint, KinematicTree
 
 #: Columns of a joint: limits in rad and rad/s, for prismatic joints in m and m/s.
 COLUMNS = ("kind", "axis", "q", "v", "lower", "upper", "speed", "follows")
 #: Indices of the text columns; link and joint are columns 0 and 1.
 WORDS = (0, 1, 2, 3, 4, 5, 9)
+#: The same for a table with a joint, its parent link and its child link first.
+_AFTER_JOINT = (1, 2, *(i + 1 for i in WORDS[2:]))
 
 
 def described(tree: KinematicTree, base: str, tip: str, order: str) -> TextDocument:
@@ -42,6 +44,28 @@ def described(tree: KinematicTree, base: str, tip: str, order: str) -> TextDocum
             order,
         ),
     )
+
+
+class Joints(dict[str, Joint], Displayable):
+    """The joints of a robot by name: a dict that `print` and notebooks show as a table."""
+
+    def __init__(self, tree: KinematicTree) -> None:
+        super().__init__((joint.name, joint) for joint in tree.joints)
+        self._tree = tree
+
+    def __str__(self) -> str:
+        return self._sheet().text()
+
+    def _sheet(self) -> TextDocument:
+        tree = self._tree
+        columns = COLUMNS if any(joint.mimic for joint in self.values()) else COLUMNS[:-1]
+        links = zip(tree.joints, tree.links[1:], strict=True)
+        rows = [
+            (joint.name, tree.links[joint.parent], child, *cells_of(tree, i)[: len(columns)])
+            for i, (joint, child) in enumerate(links)
+        ]
+        heads = ("joint", "parent", "child", *columns)
+        return TextDocument(f"{tree.name}: {len(self)} joints", [Table(heads, rows, left=(0, *_AFTER_JOINT))])
 
 
 def guides(tree: KinematicTree) -> Iterator[str]:

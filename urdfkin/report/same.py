@@ -18,6 +18,7 @@ import numpy as np
 from urdfkin.comparison.certificate import LAYOUT
 from urdfkin.comparison.result import BOUNDED, Interval, Question, Sameness, Verdict, angle, length, up_to
 from urdfkin.comparison.verdict import base_as_written
+from urdfkin.errors.display import Table, TextDocument
 from urdfkin.errors.escape import markdown_text
 from urdfkin.kinematics.roundings import NOT_ZERO
 from urdfkin.model.mechanisms.mechanism import Mechanism
@@ -189,6 +190,27 @@ def print_sameness(
     _print_lines(out, "different names", renamed(found), some)
     _print_lines(out, "differences without effect on motion", [one.words for one in found.remarks], some)
     out.print(found.checked, soft_wrap=True)
+
+
+def as_document(found: Sameness) -> TextDocument:
+    """Return the answer, the reasons and the farthest frames, for `print` and notebooks."""
+    a, b = (f"{name} ({source})" for name, source in zip(found.names, found.sources, strict=True))
+    parts: list[str | Table] = [f"A: {a}", f"B: {b}"]
+    for head, lines in (
+        ("Change of B", [*found.after, as_written(found)] if found.after else []),
+        ("Difference", [one.words for one in found.differences]),
+        ("Without effect on motion", [one.words for one in found.remarks]),
+    ):
+        parts += [f"{head}: {line}" for line in lines[:SHOWN] if line]
+        parts += [f"... and {len(lines) - SHOWN} more"] if len(lines) > SHOWN else []
+    if frames := far_frames(found):
+        parts += [
+            "Largest distance over all configurations within limits:", Table(HEADS, rows(frames[:SHOWN])),
+        ]  # fmt: skip
+        parts += [f"... and {len(frames) - SHOWN} more"] if len(frames) > SHOWN else []
+        if off := attained(frames[0]):
+            parts.append(f"{frames[0].frame} is {off} off at: {where(found, frames[0])}")
+    return TextDocument(headline(found), [*parts, found.checked])
 
 
 def attained(frame: Interval) -> str:

@@ -22,11 +22,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from urdfkin.errors import InputError
+from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.kinematics.roundings import EPS, SMALLEST
 from urdfkin.model.tree import FloatArray
+from urdfkin.verify.singularity import FrameColumns, Singularity, explain
 
 #: Bound on the relative rounding of a few dozen sums and products of positive numbers.
 _OUTWARD = 256.0 * EPS
+#: Number of samples of a batch that `print` shows.
+_SHOWN = 10
 
 
 class Between(NamedTuple):
@@ -44,20 +49,79 @@ class Between(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class SingularValues:
+class SingularValues(Displayable):
     """The singular values of some rows of a Jacobian, without columns that are always 0.
+
+    `print` and notebooks show them as a table, and explain a singularity.
 
     Attributes:
         rows: The rows of the Jacobian.
         values: (..., k), largest first; k is the smaller of the numbers of rows and columns.
         U: (..., rows, k) left singular vectors, directions of the frame's velocity.
         V: (..., nv, k) right singular vectors, directions of v; 0 for joints that do not move the frame.
+        columns: The Jacobian, its frame and joints; None for another matrix.
     """
 
     rows: slice
     values: Between
     U: FloatArray
     V: FloatArray
+    columns: FrameColumns | None = None
+
+    def __repr__(self) -> str:
+        batch = f", {self.values.value.shape[:-1]}" if self.values.value.ndim > 1 else ""
+        return f"<SingularValues{self._title()}{batch}>"
+
+    def _title(self) -> str:
+        rows = {3: "angular"}.get(self.rows.start, "linear" if self.rows.stop == len("xyz") else "all")
+        return "" if self.columns is None else f" of {self.columns.frame}, {rows} rows"
+
+    def _sheet(self) -> TextDocument:
+        title = f"Singular values{self._title()}"
+        k, shape = self.values.value.shape[-1], self.values.value.shape[:-1]
+        names = [f"sigma_{i + 1}" for i in range(k)]
+        if shape:
+            flat = [x.reshape(-1, *x.shape[len(shape) :]) for x in (self.values.value, self.condition.value)]
+            size, ranks = self.manipulability.value.ravel(), (self.values.lower > 0.0).sum(axis=-1).ravel()
+            rows: list[list[str | float]] = [
+                [str(list(index)).strip("[]"), *values.tolist(), condition, w, f"{rank} of {k}"]
+                for index, values, condition, w, rank in zip(
+                    np.ndindex(*shape), flat[0], flat[1].tolist(), size.tolist(), ranks, strict=True
+                )
+            ]
+            heads = ["sample", *names, "condition", "manipulability", "rank"]
+            rest = len(rows) - _SHOWN
+            more = [f"... and {rest} more samples"] if rest > 0 else []
+            return TextDocument(title, [Table(heads, rows[:_SHOWN]), *more])
+        lines = [[name, *(f"{side[i]:.15g}" for side in self.values)] for i, name in enumerate(names)]
+        for name, between in (("condition", self.condition), ("manipulability", self.manipulability)):
+            lines.append([name, *(f"{side:.15g}" for side in between)])
+        table = Table(["", "value", "no less than", "no more than"], lines)
+        found = self.singularity() if self.columns is not None else None
+        return TextDocument(title, [table, *(str(found).splitlines() if found else [])])
+
+    def singularity(self, *sample: int) -> Singularity:
+        """Return the rank in one configuration, the lost directions, and the joints that cause a loss.
+
+        Args:
+            sample: Indices of the configuration in a batch; none for a single configuration.
+
+        Raises:
+            InputError: the wrong number of indices, or an index that does not exist.
+
+        >>> import urdfkin
+        >>> arm = urdfkin.load("planar_two_link")
+        >>> print(arm.singular_values([0.0, 0.0], "tip", "linear").singularity())
+        Singular within rounding: rank 1 of 2; sigma_2 is at most 9.5e-14.
+        Lost direction: translation of the origin of tip along (1, 0, 0), in world axes.
+        The axes of joints joint_1 and joint_2 lie in one plane with the origin of tip.
+        """
+        shape = self.values.value.shape[:-1]
+        inside = len(sample) == len(shape) and all(-n <= i < n for i, n in zip(sample, shape, strict=True))
+        if not inside or self.columns is None:
+            raise InputError("no such configuration", found=str(sample), where=f"a batch of shape {shape}")
+        bounds = self.values.lower[sample], self.values.upper[sample]
+        return explain(self.columns, sample, self.rows, *bounds)
 
     @cached_property
     def manipulability(self) -> Between:
@@ -115,7 +179,11 @@ class SingularValues:
 
 
 def singular_values(
-    J: FloatArray, error: FloatArray, moving: NDArray[np.bool_], rows: slice = slice(None)
+    J: FloatArray,
+    error: FloatArray,
+    moving: NDArray[np.bool_],
+    rows: slice = slice(None),
+    columns: FrameColumns | None = None,
 ) -> SingularValues:
     """Return the singular values of some rows of matrices, with guaranteed bounds.
 
@@ -124,6 +192,7 @@ def singular_values(
         error: (..., m, nv) bound on the error of each number of J.
         moving: (nv,) bool, False for columns that are always 0.
         rows: The rows to use.
+        columns: The Jacobian, its frame and joints; None for another matrix.
 
     >>> found = singular_values(np.array([[3.0, 0.0], [0.0, 4.0]]), np.zeros((2, 2)), np.array([True, True]))
     >>> found.values.value.tolist(), bool(found.values.upper[0] - found.values.lower[0] < 1e-12)
@@ -143,7 +212,7 @@ def singular_values(
         upper = s * _up(1.0 + skew)[..., np.newaxis] + residual[..., np.newaxis]
     # A bound that is not finite becomes 0 (lower) or inf (upper).
     lower, upper = np.nan_to_num(_down(lower), nan=0.0), np.nan_to_num(_up(upper), nan=np.inf, posinf=np.inf)
-    return SingularValues(rows, Between(s, np.maximum(lower, 0.0), upper), U, V)
+    return SingularValues(rows, Between(s, np.maximum(lower, 0.0), upper), U, V, columns)
 
 
 def _skew(U: FloatArray) -> FloatArray:

@@ -1,0 +1,391 @@
+"""Explain a singular Jacobian: its rank, the lost directions, and the joints that cause the loss.
+
+A left null vector u of J is a direction without velocity: u^T J v = 0 for every v. A right null vector is a
+null motion: joint velocities that do not move the frame. A smallest set of dependent columns names the
+joints. Its geometric reason is stated only if the columns satisfy the condition within the error bound of J.
+
+A column of a revolute joint is [a x z; z], where z is the axis and a leads from the frame's origin to a point
+of the axis. So two axes are collinear if their columns are equal up to sign, and an axis passes through the
+frame's origin if its linear rows are 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urdfkin.errors.display import Displayable, TextDocument, six_digits
+from urdfkin.kinematics.roundings import EPS
+from urdfkin.model.tree import FloatArray, KinematicTree
+
+#: Largest set of dependent columns that is searched, and the largest number of columns for the search.
+_LARGEST_SET, _MOST_COLUMNS = 4, 16
+#: Roundings of a small decomposition, per row or column.
+_ROUNDINGS = 16.0
+#: Smallest singular value of a regular sample, relative to the size of its Jacobian.
+_USUAL = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class FrameColumns:
+    """A robot's Jacobian, with the frame and the joints of its columns.
+
+    Attributes:
+        J: (..., 6, nv) Jacobian at the frame's origin in world axes.
+        error: (..., 6, nv) bound on the error of each number of J.
+        frame: Name of the frame.
+        joints: (nv,) name of each column.
+        turns: (nv,) True for the axis of a revolute joint, False for that of a prismatic joint; None for a
+            column that is not the axis of a single joint.
+        active: (6, nv) False for numbers that are 0 for every q.
+        samples: Return (n, 6, nv) Jacobians at random configurations on a fixed base.
+        moving_base: Whether the base is given, so that the samples' axes are not those of the result.
+    """
+
+    J: FloatArray
+    error: FloatArray
+    frame: str
+    joints: tuple[str, ...]
+    turns: tuple[bool | None, ...]
+    active: NDArray[np.bool_]
+    samples: Callable[[], FloatArray]
+    moving_base: bool
+
+
+def columns_of(
+    tree: KinematicTree,
+    J: FloatArray,
+    error: FloatArray,
+    frame: str,
+    joints: Sequence[str],
+    active: NDArray[np.bool_],
+    samples: Callable[[], FloatArray],
+    *,
+    moving_base: bool,
+) -> FrameColumns:
+    """Return the description of a Jacobian's columns.
+
+    Args:
+        tree: The robot.
+        J: (..., 6, nv) Jacobian at the frame's origin in world axes.
+        error: (..., 6, nv) bound on the error of each number of J.
+        frame: Name of the frame.
+        joints: (nv,) name of each column.
+        active: (6, nv) False for numbers that are 0 for every q.
+        samples: Return (n, 6, nv) Jacobians at random configurations on a fixed base.
+        moving_base: Whether the base is given.
+    """
+    turns: list[bool | None] = [None] * len(joints)
+    moving = [(i, joint) for i, joint in enumerate(tree.joints) if joint.kind.nv]
+    for i, joint in moving:
+        at = tree.v_index[i]
+        if joint.kind.nv == 1 and sum(tree.v_index[k] == at for k, _ in moving) == 1:
+            turns[at] = joint.kind.turns
+    return FrameColumns(J, error, str(frame), tuple(joints), tuple(turns), active, samples, moving_base)
+
+
+@dataclass(frozen=True, eq=False)
+class Singularity(Displayable):
+    """The rank of a Jacobian in one configuration, and the reason for a loss.
+
+    Attributes:
+        rank: Number of singular values that are provably not 0.
+        full: Largest possible rank: the smaller of the numbers of rows and columns.
+        least: Upper bound of the smallest singular value.
+        lost: (d, 6) lost directions [linear; angular] in world axes, at the frame's origin; empty if the
+            Jacobian has more rows than columns.
+        motions: (e, nv) joint velocities that do not move the frame.
+        reasons: The lost directions and their reasons, one sentence each.
+    """
+
+    rank: int
+    full: int
+    least: float
+    lost: FloatArray
+    motions: FloatArray
+    reasons: tuple[str, ...]
+
+    def __bool__(self) -> bool:
+        """Whether the Jacobian is singular within rounding."""
+        return self.rank < self.full
+
+    def __repr__(self) -> str:
+        return f"<Singularity: rank {self.rank} of {self.full}>"
+
+    def _sheet(self) -> TextDocument:
+        title = f"rank {self.rank} of {self.full}"
+        if not self:
+            return TextDocument(f"Not singular: {title}.")
+        where = f"sigma_{self.full} is at most {self.least:.2g}"
+        return TextDocument(f"Singular within rounding: {title}; {where}.", self.reasons)
+
+
+def explain(
+    columns: FrameColumns, sample: tuple[int, ...], rows: slice, lower: FloatArray, upper: FloatArray
+) -> Singularity:
+    """Return the rank of some rows of a Jacobian, and the reason for a loss.
+
+    Args:
+        columns: The Jacobian, its frame and joints.
+        sample: Indices of the configuration in the batch.
+        rows: The rows to use.
+        lower: (k,) lower bounds of the singular values.
+        upper: (k,) upper bounds of the singular values.
+    """
+    rank, full = int((lower > 0.0).sum()), len(lower)
+    nothing = np.zeros((0, 6)), np.zeros((0, columns.J.shape[-1]))
+    if rank == full:
+        return Singularity(rank, full, float(upper[-1]) if full else 0.0, *nothing, ())
+    return _Explanation(columns, sample, rows, rank).result(full, float(upper[-1]))
+
+
+class _Explanation:
+    """The reasons for the loss of rank of one matrix.
+
+    Args:
+        columns: The Jacobian, its frame and joints.
+        sample: Indices of the configuration in the batch.
+        rows: The rows to use.
+        rank: The rank of these rows.
+    """
+
+    def __init__(self, columns: FrameColumns, sample: tuple[int, ...], rows: slice, rank: int) -> None:
+        J, error = columns.J[sample], columns.error[sample]
+        chosen = np.zeros(6, dtype=bool)
+        chosen[rows] = True
+        self._linear_only, self._angular_only = not chosen[3:].any(), not chosen[:3].any()
+        active = columns.active & chosen[:, None]
+        self._rows, self._moving = np.flatnonzero(active.any(axis=1)), np.flatnonzero(active.any(axis=0))
+        self._J, self._error, self._columns, self._rank = J, error, columns, rank
+        self._A = J[np.ix_(self._rows, self._moving)]
+        self._off = error[np.ix_(self._rows, self._moving)]
+        self._names = [columns.joints[i] for i in self._moving]
+
+    def result(self, full: int, least: float) -> Singularity:
+        """Return the explanation.
+
+        Args:
+            full: The largest possible rank.
+            least: Upper bound of the smallest singular value.
+        """
+        U, s, Vt = np.linalg.svd(self._A)
+        self._noise = (
+            8.0
+            * (float(np.linalg.norm(self._off)) + self._rounding(self._A))
+            / (s[self._rank - 1] if self._rank else 1.0)
+        )
+        motions = np.zeros((len(Vt) - self._rank, self._J.shape[1]))
+        motions[:, self._moving] = _sparse(Vt[self._rank :])
+        usual, never = self._of_samples()
+        directions = U[:, self._rank :].T
+        directions = _basis(directions - directions @ never @ never.T)
+        # On an arm with fewer joints than rows, other directions are unreachable in each configuration.
+        known = len(directions) == usual - self._rank and not (self._columns.moving_base and never.size)
+        lost = np.zeros((len(directions) if known else 0, 6))
+        if known:
+            lost[:, self._rows] = _sparse(directions)
+            lost /= np.linalg.norm(lost, axis=1, keepdims=True)
+            first = np.abs(lost).argmax(axis=1)[:, None]
+            lost = lost * np.sign(np.take_along_axis(lost, first, axis=1)) + 0.0
+        if self._rank == usual:
+            reasons = [
+                "Random configurations have the same rank: the cause is the arm, not this configuration."
+            ]
+        else:
+            reasons = [*self._directions(lost), *self._causes(lost, motions)]
+        return Singularity(self._rank, full, least, lost, motions, tuple(reasons))
+
+    def _of_samples(self) -> tuple[int, FloatArray]:
+        """Return the rank at random configurations, and an orthonormal basis of their lost directions."""
+        samples = self._columns.samples()[:, self._rows[:, None], self._moving]
+        usual = max(int(np.linalg.matrix_rank(one, tol=_USUAL * np.linalg.norm(one))) for one in samples)
+        U, s, _ = np.linalg.svd(np.concatenate(list(samples), axis=1))
+        return usual, U[:, int((s > _USUAL * s[0]).sum()) :]
+
+    def _without_noise(self, rows: FloatArray) -> FloatArray:
+        """Return vectors with a 0 for each number that the error of the Jacobian does not tell from 0."""
+        return np.where(np.abs(rows) <= self._noise, 0.0, rows)
+
+    def _directions(self, lost: FloatArray) -> Iterator[str]:
+        frame = self._columns.frame
+        for u in self._without_noise(lost):
+            linear, angular = _vector(u[:3]), _vector(u[3:])
+            if not u[3:].any():
+                yield f"Lost direction: translation of the origin of {frame} along {linear}, in world axes."
+            elif not u[:3].any():
+                yield f"Lost direction: rotation of {frame} about {angular}, in world axes."
+            else:
+                at = f"at the origin of {frame} in world axes"
+                yield f"Lost direction: linear {linear}, angular {angular}, {at}."
+
+    def _causes(self, lost: FloatArray, motions: FloatArray) -> Iterator[str]:
+        if sets := list(self._dependent_sets()):
+            yield from map(self._reason, self._joined(sets))
+            return
+        if len(lost) == 1 and (line := self._line(self._without_noise(lost)[0])) is not None:
+            yield line
+        if len(motions) == 1:
+            yield self._null_motion(motions[0, self._moving])
+        else:
+            joints = _listed(
+                [
+                    n
+                    for n, x in zip(self._names, self._without_noise(motions)[:, self._moving].T, strict=True)
+                    if x.any()
+                ]
+            )
+            yield f"{len(motions)} independent joint motions of {joints} do not move {self._columns.frame}."
+
+    def _dependent_sets(self) -> Iterator[tuple[int, ...]]:
+        """Yield the smallest sets of dependent columns, as indices into the moving columns."""
+        if self._A.shape[1] > _MOST_COLUMNS:
+            return
+        found: list[set[int]] = []
+        for size in range(1, min(_LARGEST_SET, *self._A.shape) + 1):
+            for one in combinations(range(self._A.shape[1]), size):
+                if any(smaller <= set(one) for smaller in found):
+                    continue
+                columns, off = self._A[:, one], self._off[:, one]
+                least = np.linalg.svd(columns, compute_uv=False)[-1]
+                if least <= np.linalg.norm(off) + self._rounding(columns):
+                    found.append(set(one))
+                    yield one
+
+    def _joined(self, sets: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
+        """Join pairs of one row of collinear or parallel axes: dependency of two columns is transitive."""
+        joined: list[set[int]] = []
+        if self._linear_only:
+            return sets
+        for pair in (set(one) for one in sets if len(one) == len(("a", "pair"))):
+            near = [one for one in joined if one & pair]
+            joined = [one for one in joined if not one & pair] + [pair.union(*near)]
+        others = [one for one in sets if len(one) != len(("a", "pair"))]
+        return [*(tuple(sorted(one)) for one in joined), *others]
+
+    def _reason(self, one: tuple[int, ...]) -> str:
+        indices = self._moving[list(one)]
+        turns = [self._columns.turns[i] for i in indices]
+        reason = None
+        if None not in turns:
+            if self._angular_only:
+                reason = self._of_angular_rows(one)
+            elif self._linear_only:
+                reason = self._of_linear_rows(one, turns)
+            elif all(turns):
+                reason = self._of_revolute_axes(one)
+            elif not any(turns) and np.linalg.matrix_rank(self._A[:, one], tol=_USUAL) == 1:
+                reason = f"{self._joints(one)} slide along parallel axes."
+        if reason is not None:
+            return reason
+        _, _, Vt = np.linalg.svd(self._A[:, one])
+        motion = np.zeros(len(self._names))
+        motion[list(one)] = Vt[-1]
+        return self._null_motion(motion)
+
+    def _of_angular_rows(self, one: tuple[int, ...]) -> str | None:
+        if np.linalg.matrix_rank(self._A[:, one], tol=_USUAL) == 1:
+            return f"The axes of {self._joints(one)} are parallel."
+        return f"The axes of {self._joints(one)} are parallel to one plane."
+
+    def _of_linear_rows(self, one: tuple[int, ...], turns: list[bool | None]) -> str | None:
+        frame = self._columns.frame
+        if len(one) == 1 and turns[0]:
+            return f"The axis of {self._joints(one)} passes through the origin of {frame}."
+        if len(one) == 2 and all(turns):
+            return f"The axes of {self._joints(one)} lie in one plane with the origin of {frame}."
+        if len(one) == 3:
+            return f"{self._joints(one)} move the origin of {frame} in one plane only."
+        return None
+
+    def _of_revolute_axes(self, one: tuple[int, ...]) -> str | None:
+        """Return the reason why the axes of a smallest dependent set are dependent; None if none is found."""
+        indices = self._moving[list(one)]
+        z, v = self._J[3:, indices].T, self._J[:3, indices].T
+        size = 1.0 + float(np.abs(v).max())
+        off = 2.0 * float(np.linalg.norm(self._error[:, indices])) * size
+        off += self._rounding(self._J[:, indices]) * size
+        parallel = bool((np.linalg.norm(np.cross(z[:1], z), axis=1) <= off).all())
+        axes = f"The axes of {self._joints(one)}"
+        signs = np.sign(z @ z[0])[:, None]
+        if parallel and np.abs(v - signs * v[0]).max() <= off:
+            return f"{axes} are collinear."
+        if parallel:  # three dependent parallel lines lie in one plane; four are always dependent
+            return f"{axes} are parallel{' and lie in one plane' if len(one) == 3 else ''}."
+        # a x z = v for each axis, if they all pass through the point a.
+        crosses = np.concatenate([_cross_matrix(-axis) for axis in z])
+        a, *_ = np.linalg.lstsq(crosses, v.ravel(), rcond=None)
+        if np.abs(crosses @ a - v.ravel()).max() > off * float(np.linalg.cond(crosses)):
+            return None
+        # Three dependent lines through one point lie in one plane.
+        return f"{axes} intersect in one point{' and lie in one plane' if len(one) == 3 else ''}."
+
+    def _line(self, u: FloatArray) -> str | None:
+        """Return the line that all axes meet, if the lost direction is a line; None otherwise."""
+        f, m = u[:3], u[3:]
+        if self._linear_only or self._angular_only or not f.any():
+            return None
+        if not all(self._columns.turns[i] for i in self._moving):
+            return None
+        off = (
+            4.0 * (float(np.linalg.norm(self._off)) + self._rounding(self._A)) * (1.0 + np.abs(self._A).max())
+        )
+        if abs(f @ m) > off * float(f @ f):
+            return None
+        point = np.cross(f, m) / (f @ f)
+        return (
+            f"All axes meet, or are parallel to, the line along {_vector(f / np.linalg.norm(f))} through the"
+            f" point at {_vector(point)} m from the origin of {self._columns.frame}."
+        )
+
+    def _null_motion(self, motion: FloatArray) -> str:
+        motion = motion / motion[np.argmax(np.abs(motion))]
+        parts = [
+            f"{name} {six_digits(float(x))}"
+            for name, x in zip(self._names, motion, strict=True)
+            if abs(x) > np.sqrt(EPS)
+        ]
+        return f"These joint velocities do not move {self._columns.frame}: {', '.join(parts)}."
+
+    def _joints(self, one: Sequence[int]) -> str:
+        names = _listed([self._names[i] for i in one])
+        return f"{'joint' if len(one) == 1 else 'joints'} {names}"
+
+    @staticmethod
+    def _rounding(A: FloatArray) -> float:
+        return float(_ROUNDINGS * sum(A.shape) * EPS * np.linalg.norm(A))
+
+
+def _sparse(rows: FloatArray) -> FloatArray:
+    """Return a basis of the same space with many zeros, by elimination."""
+    basis, n = rows.copy(), len(rows)
+    free = list(range(basis.shape[1])) if n > 1 else []
+    for i in range(n if n > 1 else 0):
+        k = max(free, key=lambda column: abs(basis[i, column]))
+        free.remove(k)
+        basis[i] /= basis[i, k]
+        for other in range(n):
+            if other != i:
+                basis[other] -= basis[other, k] * basis[i]
+    return basis
+
+
+def _basis(rows: FloatArray) -> FloatArray:
+    """Return an orthonormal basis of the space of some rows, which are orthonormal up to a projection."""
+    _, s, Vt = np.linalg.svd(rows, full_matrices=False)
+    return Vt[: int((s > 0.5).sum())]  # a projection leaves lengths 1 or 0
+
+
+def _cross_matrix(z: FloatArray) -> FloatArray:
+    return np.array([[0.0, -z[2], z[1]], [z[2], 0.0, -z[0]], [-z[1], z[0], 0.0]])
+
+
+def _vector(x: FloatArray) -> str:
+    return f"({', '.join(six_digits(value, 1e-12, 4) for value in x.tolist())})"
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
