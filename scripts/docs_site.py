@@ -7,6 +7,8 @@ between $` and `$ becomes MathML. A lesson is also available as a notebook.
 from __future__ import annotations
 
 import html
+import importlib
+import inspect
 import json
 import re
 from pathlib import Path
@@ -18,6 +20,66 @@ import urdfkin
 from urdfkin.cli import cli
 
 LESSONS = "lessons/"
+#: The equations that a docstring's first line names.
+_EQUATIONS = re.compile(r" \(eq\. [^)]*\)")
+_ROBOT = "urdfkin.robot.Robot"
+#: Pages of the library: path -> (title, introduction, names). A name of the package or of a method of `Robot`
+#: stands for itself, another class has its full path.
+LIBRARY: dict[str, tuple[str, str, str]] = {
+    "api/robot.md": (
+        "Load a robot",
+        "`load` reads a robot; the class `Robot` has its names, joints, limits and all computations.",
+        "load robots Robot name source path origin sha256 urdf joints joint_names link_names "
+        "link_frames frame_names all_frames frames tip_frame coordinate_names rate_names nq nv "
+        "root_joint limits velocity_limits view",
+    ),
+    "api/configurations.md": (
+        "Configurations",
+        "Joint values `q`: named poses, samples, limits, integration, and the conversion to Pinocchio's.",
+        "neutral poses sample limit_violations integrate difference to_pinocchio from_pinocchio "
+        "pinocchio_model",
+    ),
+    "api/kinematics.md": (
+        "Kinematics",
+        "Poses, velocities, Jacobians and accelerations. Each result is checked against Pinocchio.",
+        "placement relative_placement velocity jacobian jacobian_rate hessian acceleration "
+        "acceleration_breakdown analytical_jacobian imu compute enclose Reference BaseMotion",
+    ),
+    "api/singularities.md": (
+        "Singular values",
+        "Singular values within guaranteed bounds, manipulability, and the reason for a singularity.",
+        "singular_values urdfkin.verify.singular_values.SingularValues "
+        "urdfkin.verify.singularity.Singularity",
+    ),
+    "api/fast.md": (
+        "Fast evaluation",
+        "Evaluators of one frame for a control loop, and kinematics as source code.",
+        "prepare urdfkin.compiled.prepared.PreparedFrame compiled "
+        "urdfkin.export.compiled_frame.CompiledFrame export",
+    ),
+    "api/tables.md": (
+        "Chains and tables",
+        "Denavit-Hartenberg tables, products of exponentials and chains between two frames.",
+        "dh chain screws tree_parameters select DHTable DHRow read_table table_from_rows FrameChain "
+        "urdfkin.dh.screws.ProductOfExponentials",
+    ),
+    "api/models.md": (
+        "Compare and calibrate",
+        "Compare two models, list the changes between two versions, fit parameters to measured poses.",
+        "same urdfkin.comparison.result.Sameness diff calibrate",
+    ),
+    "api/checks.md": (
+        "Checks and reports",
+        "Certificates of results, validation of robots, and findings about URDF files.",
+        "certificate Certificate validate check Finding",
+    ),
+    "api/errors.md": (
+        "Errors",
+        "All exceptions derive from `UrdfkinError`; a message has a location, the value found and a remedy.",
+        "UrdfkinError InputError UnknownNameError SourceError UrdfError TableError "
+        "VerificationError NotVerifiedWarning UrdfWarning",
+    ),
+}
 _FORMULA = re.compile(r"(?:<p>)?\$<code>(.*?)</code>\$(?:</p>)?", re.DOTALL)
 _DISPLAYED = re.compile(r"^```math\n(.*?)\n```$", re.DOTALL | re.MULTILINE)
 #: A LaTeX command before an argument without braces.
@@ -40,6 +102,7 @@ def on_files(files: Any, config: Any) -> Any:
     from mkdocs.structure.files import File  # noqa: PLC0415  of the extra `docs`
 
     made = {"cli.md": commands_page(), "api.md": library_page()}
+    made |= {page: subject_page(page) for page in LIBRARY}
     for file in files.documentation_pages():
         if file.src_uri.startswith(LESSONS):
             made[str(Path(file.src_uri).with_suffix(".ipynb"))] = json.dumps(
@@ -108,9 +171,53 @@ def _cell(kind: str, source: str, **more: Any) -> dict[str, Any]:
 
 
 def library_page() -> str:
-    """Return the page of all public names with their docstrings."""
-    names = [f"::: {urdfkin._HOMES[name]}.{name}" for name in urdfkin.__all__]
-    return "\n\n".join(["# Library", "`import urdfkin` offers these names.", *names]) + "\n"
+    """Return the overview of the library: a table of names for each subject."""
+    parts = ["# Library", "`import urdfkin`, then `urdfkin.load` a robot. Every example is run as a test."]
+    for page, (title, words, names) in LIBRARY.items():
+        parts += [f"## [{title}]({page})", words, "| Name | Purpose |\n|---|---|"]
+        rows = [
+            f"| [`{_short(name)}`]({page}#{address(name)}) | {_purpose(name)} |" for name in names.split()
+        ]
+        parts[-1] = "\n".join([parts[-1], *rows])
+    return "\n\n".join(parts) + "\n"
+
+
+def subject_page(page: str) -> str:
+    """Return the page of one subject with the docstrings of its names."""
+    title, words, names = LIBRARY[page]
+    parts = [f"# {title}", words]
+    for name in names.split():
+        options = [f"heading: {_short(name)}", f"toc_label: {_short(name).removeprefix('Robot.')}"]
+        # The methods of `Robot` have headings of their own, on the pages of their subjects.
+        options += ["members: []"] if name == "Robot" else []
+        lines = "\n".join(f"      {option}" for option in options)
+        parts.append(f"::: {address(name)}\n    options:\n{lines}")
+    return "\n\n".join(parts) + "\n"
+
+
+def address(name: str) -> str:
+    """Return the full path of a name in `LIBRARY`."""
+    if "." in name:
+        return name
+    return f"{urdfkin._HOMES[name]}.{name}" if name in urdfkin.__all__ else f"{_ROBOT}.{name}"
+
+
+def _short(name: str) -> str:
+    if "." in name:
+        return name.rpartition(".")[2]
+    return name if name in urdfkin.__all__ else f"Robot.{name}"
+
+
+def _purpose(name: str) -> str:
+    """Return the first sentence of a docstring."""
+    module, _, own = address(name).rpartition(".")
+    if module == _ROBOT:
+        module, own = "urdfkin.robot", f"Robot.{own}"
+    found: Any = importlib.import_module(module)
+    for part in own.split("."):
+        found = inspect.getattr_static(found, part)
+    first = (inspect.getdoc(found) or "").partition("\n\n")[0]
+    return _EQUATIONS.sub("", " ".join(first.split())).replace("|", "\\|")
 
 
 def commands_page() -> str:

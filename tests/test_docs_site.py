@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import urdfkin
-from scripts.docs_site import commands_page, library_page, notebook
+from scripts.docs_site import LIBRARY, address, commands_page, library_page, notebook, subject_page
 from tests.pages import DOCS, blocks, pages
 from tests.report.browser import Browser, opened
 from urdfkin.cli import commands
@@ -41,7 +41,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.slow
 def test_every_page_is_built_and_in_the_menu(site: Path) -> None:
     built = {str(path.relative_to(site)) for path in site.rglob("*.html")} - {"404.html"}
-    assert built == {page.removesuffix("md") + "html" for page in pages()} | {"cli.html", "api.html"}
+    assert built == {page.removesuffix("md") + "html" for page in (*pages(), "cli.md", "api.md", *LIBRARY)}
     menu = (site / "index.html").read_text("utf-8").partition('class="md-nav__list"')[2]
     assert built - set(re.findall(r'href="([^"#]+)"', menu)) == set()
 
@@ -83,6 +83,9 @@ def test_no_page_is_wider_than_a_phone(site: Path, desk: Browser) -> None:
             "lessons/planar-arm",
             "cli",
             "api",
+            "api/robot",
+            "api/kinematics",
+            "api/tables",
         ):
             desk.open(site / f"{page}.html")
             desk.settle()
@@ -102,7 +105,18 @@ def test_the_pages_of_commands_and_of_the_library_hold_every_name() -> None:
     page = commands_page()
     assert [name for name in commands() if f"\n## urdfkin {name}\n" not in page] == []
     assert "Usage: urdfkin campaign merge" in page
-    assert re.findall(r"^::: .*\.(\w+)$", library_page(), re.MULTILINE) == list(urdfkin.__all__)
+    shown = [name for _, _, names in LIBRARY.values() for name in names.split()]
+    assert sorted(name for name in shown if name in urdfkin.__all__) == sorted(urdfkin.__all__)
+    members = {
+        name for name in dir(urdfkin.load("one_link")) if name in vars(urdfkin.Robot) and name[0] != "_"
+    }
+    assert {name for name in shown if "." not in name} - set(urdfkin.__all__) == members
+    assert shown[0] == "load"
+    for path, (_, _, names) in LIBRARY.items():
+        assert re.findall(r"^::: (.*)$", subject_page(path), re.MULTILINE) == list(
+            map(address, names.split())
+        )
+        assert [name for name in names.split() if f"({path}#{address(name)})" not in library_page()] == []
 
 
 @pytest.mark.parametrize("page", [page for page in pages() if page.startswith("lessons/")])
