@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import logging
 import os
+import pydoc
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -117,6 +119,26 @@ def test_the_pages_of_commands_and_of_the_library_hold_every_name() -> None:
             map(address, names.split())
         )
         assert [name for name in names.split() if f"({path}#{address(name)})" not in library_page()] == []
+
+
+def _documented() -> list[str]:
+    """The full path of each name on the pages of the library, and of each public member of a class there."""
+    found = []
+    for name in " ".join(names for _, _, names in LIBRARY.values()).split():
+        path = address(name)
+        module, _, own = path.rpartition(".")
+        found.append(path)
+        if name != "Robot" and isinstance(cls := getattr(pydoc.locate(module), own), type):
+            members = {k: v for k, v in vars(cls).items() if not k.startswith("_") and inspect.getdoc(v)}
+            found += [f"{path}.{k}" for k, v in members.items() if callable(v) or hasattr(v, "__get__")]
+    return found
+
+
+@pytest.mark.parametrize("path", _documented())
+def test_each_name_in_the_reference_has_an_example(path: str) -> None:
+    """Doctests are run with the package's other tests."""
+    module, _, own = path.rpartition(".")
+    assert ">>> " in (inspect.getdoc(inspect.getattr_static(pydoc.locate(module), own)) or "")
 
 
 @pytest.mark.parametrize("page", [page for page in pages() if page.startswith("lessons/")])

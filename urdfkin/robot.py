@@ -872,6 +872,11 @@ class Robot(Displayable):
             InputError: a wrong length, a number that is not finite, or batch shapes that do not broadcast.
             UnknownNameError: the frame, reference or joint does not exist.
             VerificationError: Pinocchio's result differs by more than the bound.
+
+        >>> import urdfkin
+        >>> arm = urdfkin.load("planar_two_link")
+        >>> arm.jacobian_rate([0.0, 0.0], [1.0, 0.0], "tip")[0].tolist()  # of the x row, 1/s
+        [-0.9, -0.4]
         """
         return self._computed("jacobian rate", (q, v), frame, reference, base, out, verify, threads)
 

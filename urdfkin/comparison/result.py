@@ -142,6 +142,11 @@ class Sameness(Displayable):
             range of the joint itself.
         checked: Pinocchio's confirmation, or the reason why there is none.
         trees: The two robot models.
+
+    >>> import urdfkin
+    >>> found = urdfkin.same("ur5", "ur10")
+    >>> bool(found), found.verdict.value, found.differences[0].words
+    (False, 'differs', 'link shoulder_link is 38.14 mm off on its body')
     """
 
     names: tuple[str, str]
@@ -180,7 +185,13 @@ class Sameness(Displayable):
 
     @property
     def worst(self) -> Interval | None:
-        """The frame with the largest bound of its distance, or of its angle; None if all are rounding."""
+        """The frame with the largest bound of its distance, or of its angle; None if all are rounding.
+
+        >>> import urdfkin
+        >>> found = urdfkin.same("ur5", "ur10")
+        >>> found.worst.frame, length(found.worst.lower)
+        ('ee_link', '429.7 mm')
+        """
         metres, radians = self.rounding
         return max(
             (one for one in self.frames if one.lower > 0.0 or one.upper > metres or one.radians > radians),
@@ -190,7 +201,13 @@ class Sameness(Displayable):
 
     @property
     def worst_as_written(self) -> Interval | None:
-        """The frame with the largest bound at equal coordinates, without the changes in `after`."""
+        """The frame with the largest bound at equal coordinates, without the changes in `after`.
+
+        >>> import urdfkin
+        >>> found = urdfkin.same("ur5", "ur10")
+        >>> length(found.worst_as_written.lower)
+        '432.1 mm'
+        """
         return self.as_written or self.worst
 
     def within(self, most: float) -> bool:
@@ -198,11 +215,22 @@ class Sameness(Displayable):
 
         The roots coincide, and equal coordinates are compared. So a different base, zero or tool counts.
         The result is False if a joint has another kind or exists in one model only.
+
+        >>> import urdfkin
+        >>> found = urdfkin.same("ur5", "ur10")
+        >>> found.within(0.01), found.within(1.0)
+        (False, True)
         """
         return {one.what for one in self.differences} <= BOUNDED and max(self.written) <= most
 
     def holds(self, question: Question) -> bool:
-        """Return whether the answer to a question is yes."""
+        """Return whether the answer to a question is yes.
+
+        >>> import urdfkin
+        >>> found = urdfkin.same("ur5", "ur10")
+        >>> found.holds(Question(within=1.0))
+        True
+        """
         if not (bool(self) if question.within is None else self.within(question.within)):
             return False
         return not (question.strict and (self.verdict is Verdict.SAME_AFTER or self.remarks))
@@ -213,6 +241,11 @@ class Sameness(Displayable):
         Args:
             strict: Whether equivalent models and models with remarks count as different.
             within: Largest allowed distance of a frame as written, in metres and in radians.
+
+        >>> import urdfkin
+        >>> found = urdfkin.same("ur5", "ur10")
+        >>> found.exit_code(), found.exit_code(within=1.0)
+        (1, 0)
         """
         return int(not self.holds(Question(within, strict)))
 
@@ -223,6 +256,11 @@ class Sameness(Displayable):
 
         Raises:
             InputError: q does not have A's length.
+
+        >>> import urdfkin
+        >>> found = urdfkin.same("ur5", "ur10")
+        >>> found.to_b([0.1, 0.2, 0.3, 0.4, 0.5, 0.6]).round(6).tolist()
+        [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
         """
         return _mapped(self.trees, {one.a: one for one in self.joints}, checked(self.trees[0], q, "q"))
 

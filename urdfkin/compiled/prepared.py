@@ -88,31 +88,61 @@ class PreparedFrame:
     # The functions count their results for the ledger themselves.
 
     def placement(self, q: Given, out: FloatArray | None = None) -> FloatArray:
-        """Return T_world_frame (4, 4): eq. 7.77."""
+        """Return T_world_frame (4, 4): eq. 7.77.
+
+        >>> import urdfkin
+        >>> tip = urdfkin.load("planar_two_link").prepare("tip")
+        >>> tip.placement([0.0, 0.0])[:3, 3].tolist()
+        [0.9, 0.0, 0.0]
+        """
         if (pose := self._placement(q, out)) is not None:
             return pose
         return self._robot.placement(q, self.frame, out=out, verify=False, threads=1)
 
     def velocity(self, q: Given, v: Given, out: FloatArray | None = None) -> FloatArray:
-        """Return the velocity (6,), [linear; angular], m/s and rad/s: eq. 7.127, 7.128."""
+        """Return the velocity (6,), [linear; angular], m/s and rad/s: eq. 7.127, 7.128.
+
+        >>> import urdfkin
+        >>> tip = urdfkin.load("planar_two_link").prepare("tip")
+        >>> tip.velocity([0.0, 0.0], [1.0, 0.0]).tolist()
+        [0.0, 0.9, 0.0, 0.0, 0.0, 1.0]
+        """
         if (six := self._velocity(q, v, out)) is not None:
             return six
         return self._robot.velocity(q, v, self.frame, self.reference, out=out, verify=False, threads=1)
 
     def jacobian(self, q: Given, out: FloatArray | None = None) -> FloatArray:
-        """Return the Jacobian (6, nv): eq. 7.85."""
+        """Return the Jacobian (6, nv): eq. 7.85.
+
+        >>> import urdfkin
+        >>> tip = urdfkin.load("planar_two_link").prepare("tip")
+        >>> tip.jacobian([0.0, 0.0])[1].tolist()
+        [0.9, 0.4]
+        """
         if (J := self._jacobian(q, out)) is not None:
             return J
         return self._robot.jacobian(q, self.frame, self.reference, out=out, verify=False, threads=1)
 
     def hessian(self, q: Given, out: FloatArray | None = None) -> FloatArray:
-        """Return the derivatives (6, nv, nv) of `jacobian` by each joint velocity."""
+        """Return the derivatives (6, nv, nv) of `jacobian` by each joint velocity.
+
+        >>> import urdfkin
+        >>> tip = urdfkin.load("planar_two_link").prepare("tip")
+        >>> tip.hessian([0.0, 0.0])[0].tolist()
+        [[-0.9, -0.4], [-0.4, -0.4]]
+        """
         if (H := self._hessian(q, out)) is not None:
             return H
         return self._robot.hessian(q, self.frame, self.reference, out=out, verify=False, threads=1)
 
     def acceleration(self, q: Given, v: Given, a: Given, out: FloatArray | None = None) -> FloatArray:
-        """Return the classical acceleration (6,), [linear; angular], m/s^2 and rad/s^2: eq. 7.129, 7.130."""
+        """Return the classical acceleration (6,), [linear; angular], m/s^2 and rad/s^2: eq. 7.129, 7.130.
+
+        >>> import urdfkin
+        >>> tip = urdfkin.load("planar_two_link").prepare("tip")
+        >>> tip.acceleration([0.0, 0.0], [1.0, 0.0], [0.0, 0.0])[0].item()
+        -0.9
+        """
         if (six := self._acceleration(q, v, a, out)) is not None:
             return six
         return self._robot.acceleration(q, v, a, self.frame, self.reference, out=out, verify=False, threads=1)

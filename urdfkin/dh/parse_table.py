@@ -432,6 +432,11 @@ def read_table(path: str | os.PathLike[str]) -> DHTable:
     Raises:
         SourceError: the file cannot be read.
         InputError: another suffix, invalid syntax, or an error of `table_from_mapping`; with the file's name.
+
+    >>> import urdfkin
+    >>> table = urdfkin.read_table("robots/dh/ur5.toml")
+    >>> len(table.rows), table.convention.value
+    (6, 'standard')
     """
     return table_of(read_mapping(path), str(path))
 

@@ -94,19 +94,37 @@ class ProductOfExponentials(Displayable):
 
     @cached_property
     def body(self) -> FloatArray:
-        """(n, 6) screws in the tip frame: B = Ad(M^-1) S."""
+        """(n, 6) screws in the tip frame: B = Ad(M^-1) S.
+
+        >>> import urdfkin
+        >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
+        >>> screws.body[1].tolist()
+        [0.0, 0.0, 1.0, 0.0, 0.4, 0.0]
+        """
         R, p = self.M[:3, :3], self.M[:3, 3]
         w, v = self.space[:, :3], self.space[:, 3:]
         return frozen(np.hstack([w @ R, (v - np.cross(p, w)) @ R]))
 
     @cached_property
     def coupling(self) -> Coupling:
-        """The map from the path's coordinates to its joints' values."""
+        """The map from the path's coordinates to its joints' values.
+
+        >>> import urdfkin
+        >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
+        >>> screws.coupling.names
+        ('joint_1', 'joint_2')
+        """
         return coupling_of([(joint.name, joint.mimic, joint.kind) for joint in self.joints])
 
     @property
     def points(self) -> FloatArray:
-        """(n, 3) point of each revolute axis nearest to the base; a prismatic joint: the previous point."""
+        """(n, 3) point of each revolute axis nearest to the base; a prismatic joint: the previous point.
+
+        >>> import urdfkin
+        >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
+        >>> screws.points.tolist()
+        [[0.0, 0.0, 0.0], [0.5, 0.0, -0.0]]
+        """
         here, found = np.zeros(3), []
         for joint, screw in zip(self.joints, self.space, strict=True):
             here = np.cross(screw[:3], screw[3:]) if joint.kind.turns else here
@@ -120,6 +138,11 @@ class ProductOfExponentials(Displayable):
 
         Raises:
             InputError: `q` has the wrong length.
+
+        >>> import urdfkin
+        >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
+        >>> screws.placement([0.0, 0.0])[:3, 3].tolist()
+        [0.9, 0.0, 0.0]
         """
         return self.path.poses(self.coupling.values(q))
 
@@ -129,6 +152,11 @@ class ProductOfExponentials(Displayable):
 
         exp([S] q) = A Rz(q) A^-1, or A Tz(q) A^-1, where z of the pose A is along the joint's axis. The
         constant between two motions is A_i^-1 A_{i+1}; the last one is A_n^-1 M.
+
+        >>> import urdfkin
+        >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
+        >>> screws.path.poses(np.zeros(2))[:3, 3].tolist()
+        [0.9, 0.0, 0.0]
         """
         steps, R, p = list[FloatArray | Motion](), np.eye(3), np.zeros(3)
         for joint, screw, point in zip(self.joints, self.space, self.points, strict=True):
@@ -142,11 +170,22 @@ class ProductOfExponentials(Displayable):
         """Bound of the rotation error of `placement` by rounding, in eps, without the rounding of q.
 
         It counts the rounding of two table rows for each exponential.
+
+        >>> import urdfkin
+        >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
+        >>> screws.roundings < 1000
+        True
         """
         return 2.0 * of_rows(len(self.joints))
 
     def rounding(self, q: Given) -> FloatArray:
-        """Return the (...,) bound of the rounding error in the position of `placement(q)`, in metres."""
+        """Return the (...,) bound of the rounding error in the position of `placement(q)`, in metres.
+
+        >>> import urdfkin
+        >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
+        >>> bool(screws.rounding([0.0, 0.0]) < 1e-13)
+        True
+        """
         values = np.abs(self.coupling.values(q))
         turns = np.array([joint.kind.turns for joint in self.joints], dtype=bool)
         way = np.vstack([np.zeros(3), self.points, self.M[:3, 3]])
@@ -159,6 +198,11 @@ class ProductOfExponentials(Displayable):
 
         In the zero configuration each link frame is parallel to the base frame. Its origin is on its joint's
         axis.
+
+        >>> import urdfkin
+        >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
+        >>> screws.to_tree().links
+        ('base', 'joint_1_link', 'joint_2_link', 'tip')
         """
         links = [self.base_frame, *(f"{joint.name}_link" for joint in self.joints)]
         joints, here = list[tuple[Joint, str, str]](), np.zeros(3)
@@ -176,7 +220,13 @@ class ProductOfExponentials(Displayable):
         return build_tree(self.robot, self.base_frame, [*joints, (end, links[-1], self.tip_frame)])
 
     def as_mapping(self) -> dict[str, Any]:
-        """Return plain data for `screws_of_mapping`; mimic rules and limits are not part of it."""
+        """Return plain data for `screws_of_mapping`; mimic rules and limits are not part of it.
+
+        >>> import urdfkin
+        >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
+        >>> screws.as_mapping()["joints"]
+        ['joint_1', 'joint_2']
+        """
         return {
             "robot": self.robot,
             "base_frame": self.base_frame,

@@ -80,6 +80,12 @@ class DHRow:
         beta: Rotation about y, after alpha; 0 except in a Hayati row.
         mimic: The mimic rule; None if the joint has a coordinate.
         limit: The joint's limits, or None.
+
+    >>> import urdfkin
+    >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
+    >>> row = table.rows[0]
+    >>> row.joint, row.a, row.alpha
+    ('joint_1', 0.5, 0.0)
     """
 
     a: float
@@ -111,7 +117,13 @@ class DHRow:
 
     @property
     def cells(self) -> tuple[float, float, float, float, float]:
-        """(a, alpha, d, theta, beta)."""
+        """(a, alpha, d, theta, beta).
+
+        >>> import urdfkin
+        >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
+        >>> table.rows[0].cells
+        (0.5, 0.0, 0.0, 0.0, 0.0)
+        """
         return (self.a, self.alpha, self.d, self.theta, self.beta)
 
     @property
@@ -120,18 +132,35 @@ class DHRow:
 
         In a Hayati row, x reaches the next axis at the distance `a`. There the axis is tilted by `beta` along
         x and by `alpha` across x. The foot of the common normal is at a sin(beta) / sin^2(tilt).
+
+        >>> import urdfkin
+        >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
+        >>> table.rows[0].foot
+        0.0
         """
         across, along = math.sin(self.alpha) * math.cos(self.beta), math.sin(self.beta)
         return abs(self.a * along) / (across**2 + along**2) if self.beta else 0.0
 
     @property
     def X(self) -> FloatArray:
-        """The (4, 4) transform Tx(a) Rx(alpha) Ry(beta)."""
+        """The (4, 4) transform Tx(a) Rx(alpha) Ry(beta).
+
+        >>> import urdfkin
+        >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
+        >>> table.rows[0].X[:3, 3].tolist()
+        [0.5, 0.0, 0.0]
+        """
         return between_axes(self.a, self.alpha, self.beta)
 
     @property
     def S(self) -> FloatArray:
-        """The (4, 4) transform Rz(theta) Tz(d), with the joint at zero."""
+        """The (4, 4) transform Rz(theta) Tz(d), with the joint at zero.
+
+        >>> import urdfkin
+        >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
+        >>> table.rows[0].S[0].tolist()
+        [1.0, -0.0, 0.0, 0.0]
+        """
         return along_axis(self.theta, self.d)
 
 
@@ -286,6 +315,20 @@ class DHTable(Displayable):
 
     Raises:
         InputError: two rows name the same joint, or base or tool is not a rigid transform.
+
+    >>> import urdfkin
+    >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
+    >>> print(table)
+    planar_two_link: base to tip, standard Denavit-Hartenberg parameters
+    T(i-1, i) = Rz(theta) Tz(d) Tx(a) Rx(alpha)
+    <BLANKLINE>
+    i  joint    a [m]  alpha [rad]  d [m]  theta [rad]
+    --------------------------------------------------
+    1  joint_1    0.5            0      0           q1
+    2  joint_2    0.4            0      0           q2
+    <BLANKLINE>
+    base: the identity
+    tool: the identity
     """
 
     convention: Convention
@@ -329,15 +372,32 @@ class DHTable(Displayable):
 
         Raises:
             InputError: an unknown unit.
+
+        >>> import urdfkin
+        >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
+        >>> print(table.to_markdown("degrees", "millimetres").splitlines()[4])
+        | 1 | `joint_1` | 500 | 0 | 0 | q1 |
         """
         return self._written("markdown", units_of(angles, lengths, digits))
 
     def to_latex(self, angles: str = "radians", lengths: str = "metres", digits: int = 10) -> str:
-        """Return the table in LaTeX (amsmath, booktabs, graphicx); arguments as in `to_markdown`."""
+        """Return the table in LaTeX (amsmath, booktabs, graphicx); arguments as in `to_markdown`.
+
+        >>> import urdfkin
+        >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
+        >>> "tabular" in table.to_latex()
+        True
+        """
         return self._written("latex", units_of(angles, lengths, digits))
 
     def to_html(self, angles: str = "radians", lengths: str = "metres", digits: int = 10) -> str:
-        """Return the table in HTML, for a web page; arguments as in `to_markdown`."""
+        """Return the table in HTML, for a web page; arguments as in `to_markdown`.
+
+        >>> import urdfkin
+        >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
+        >>> "<table" in table.to_html()
+        True
+        """
         return self._written("html", units_of(angles, lengths, digits))
 
     def _written(self, form: str, units: Units) -> str:
@@ -356,24 +416,48 @@ class DHTable(Displayable):
 
     @cached_property
     def coupling(self) -> Coupling:
-        """The map from the table's coordinates to its joints' values."""
+        """The map from the table's coordinates to its joints' values.
+
+        >>> import urdfkin
+        >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
+        >>> table.coupling.names
+        ('joint_1', 'joint_2')
+        """
         return coupling_of([(row.joint, row.mimic, row.kind) for row in self.rows])
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the table's coordinates: independent joints in row order, mimicked joints included."""
+        """Names of the table's coordinates: independent joints in row order, mimicked joints included.
+
+        >>> import urdfkin
+        >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
+        >>> table.joint_names
+        ('joint_1', 'joint_2')
+        """
         return self.coupling.names
 
     # -- sizes ---------------------------------------------------------------------------------------
 
     @property
     def has_hayati_rows(self) -> bool:
-        """Whether any row has a fifth parameter, beta."""
+        """Whether any row has a fifth parameter, beta.
+
+        >>> import urdfkin
+        >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
+        >>> table.has_hayati_rows
+        False
+        """
         return any(row.beta != 0.0 for row in self.rows)
 
     @cached_property
     def span(self) -> float:
-        """Sum of all |a| and |d| and of the tool's length, with all joints at zero (metres)."""
+        """Sum of all |a| and |d| and of the tool's length, with all joints at zero (metres).
+
+        >>> import urdfkin
+        >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
+        >>> table.span
+        0.9
+        """
         lengths = sum(abs(row.a) + abs(row.d) for row in self.rows)
         return lengths + math.hypot(*self.tool[:3, 3])
 
@@ -381,6 +465,11 @@ class DHTable(Displayable):
         """Return the (...,) bound of the rounding of `placement(q)` in metres; divided by `span`, in radians.
 
         It is the rounding of the rows (`urdfkin.kinematics.roundings`) and of their angles, times the lever.
+
+        >>> import urdfkin
+        >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
+        >>> bool(table.rounding([0.0, 0.0]) < 1e-13)
+        True
         """
         values = np.abs(self.coupling.values(q))
         turns = np.array([row.kind.turns for row in self.rows], dtype=bool)
@@ -392,6 +481,12 @@ class DHTable(Displayable):
         """Return the (...,) bounds of the difference from the URDF's placement, in metres and in radians.
 
         For an exact table this is the bound of rounding. For a snapped table its snapping bound is added.
+
+        >>> import urdfkin
+        >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
+        >>> metres, radians = table.tolerance([0.0, 0.0])
+        >>> bool(metres < 1e-13), bool(radians < 1e-13)
+        (True, True)
         """
         metres = self.rounding(q)
         radians = EPS * of_rows(len(self.rows)) + np.zeros_like(metres)
@@ -412,6 +507,11 @@ class DHTable(Displayable):
 
         Raises:
             InputError: `q` has the wrong length.
+
+        >>> import urdfkin
+        >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
+        >>> table.frames([0.0, 0.0])[:, 0, 3].tolist()  # x of the base, of link 1 and of the tip, m
+        [0.0, 0.5, 0.9]
         """
         values = self.coupling.values(np.zeros(len(self.joint_names)) if q is None else q)
         constants = np.array([row.theta if row.kind.turns else row.d for row in self.rows])

@@ -99,6 +99,10 @@ class UrdfkinError(Exception):
         remedy: Instruction for the user.
         question: A related section of docs/questions.md. The message ends with the command that prints it.
         is_disagreement: True if urdfkin and Pinocchio disagree; False if the input is wrong.
+
+    >>> error = UrdfkinError("a length is negative", where="arm.urdf:3", found="-1", remedy="remove the sign")
+    >>> print(error)
+    arm.urdf:3: a length is negative: found -1; remove the sign
     """
 
     is_disagreement = False
@@ -141,7 +145,16 @@ def _rebuild(cls: type[_E], state: dict[str, Any]) -> _E:
 
 
 class InputError(UrdfkinError, ValueError):
-    """An argument is invalid: for example a wrong length, a value that is not finite, or no rotation."""
+    """An argument is invalid: for example a wrong length, a value that is not finite, or no rotation.
+
+    >>> import urdfkin
+    >>> arm = urdfkin.load("planar_two_link")
+    >>> try:
+    ...     T = arm.placement([0.0])
+    ... except urdfkin.InputError as error:
+    ...     print(error.found)
+    shape (1,)
+    """
 
 
 class NotFiniteError(InputError):
@@ -158,6 +171,14 @@ class UnknownNameError(UrdfkinError, LookupError):
     Attributes:
         name: The unknown name.
         nearest: Up to three similar existing names.
+
+    >>> import urdfkin
+    >>> arm = urdfkin.load("planar_two_link")
+    >>> try:
+    ...     T = arm.placement([0.0, 0.0], "tipp")
+    ... except urdfkin.UnknownNameError as error:
+    ...     print(error.nearest)
+    ('tip',)
     """
 
     def __init__(
@@ -191,7 +212,15 @@ class InstallationError(UrdfkinError, ImportError):
 
 
 class SourceError(UrdfkinError, OSError):
-    """A file cannot be read or written."""
+    """A file cannot be read or written.
+
+    >>> import urdfkin
+    >>> try:
+    ...     robot = urdfkin.load("missing/arm.urdf")
+    ... except urdfkin.SourceError as error:
+    ...     print(error.where)
+    missing/arm.urdf
+    """
 
 
 class RepresentationSingularityError(InputError):

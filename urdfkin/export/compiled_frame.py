@@ -220,7 +220,13 @@ class CompiledFrame:
         return self._robot.compiled, (self.frame, self.reference)
 
     def placement(self, q: Given, out: FloatArray | None = None, *, threads: int | None = None) -> FloatArray:
-        """Return T_world_frame (..., 4, 4), eq. 7.77; arguments and errors as for `Robot.placement`."""
+        """Return T_world_frame (..., 4, 4), eq. 7.77; arguments and errors as for `Robot.placement`.
+
+        >>> import urdfkin
+        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip.placement([0.0, 0.0])[:3, 3].tolist()
+        [0.9, 0.0, 0.0]
+        """
         if threads is None and (one := self._placement(q, out)) is not None:
             return one
         return self._compute_batch("placement", (q,), out, threads)
@@ -228,13 +234,25 @@ class CompiledFrame:
     def velocity(
         self, q: Given, v: Given, out: FloatArray | None = None, *, threads: int | None = None
     ) -> FloatArray:
-        """Return the velocity (..., 6), [linear; angular], m/s and rad/s: eq. 7.127, 7.128."""
+        """Return the velocity (..., 6), [linear; angular], m/s and rad/s: eq. 7.127, 7.128.
+
+        >>> import urdfkin
+        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip.velocity([0.0, 0.0], [1.0, 0.0]).tolist()
+        [0.0, 0.9, 0.0, 0.0, 0.0, 1.0]
+        """
         if threads is None and (one := self._velocity(q, v, out)) is not None:
             return one
         return self._compute_batch("velocity", (q, v), out, threads)
 
     def jacobian(self, q: Given, out: FloatArray | None = None, *, threads: int | None = None) -> FloatArray:
-        """Return the Jacobian (..., 6, nv): eq. 7.85."""
+        """Return the Jacobian (..., 6, nv): eq. 7.85.
+
+        >>> import urdfkin
+        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip.jacobian([0.0, 0.0])[1].tolist()
+        [0.9, 0.4]
+        """
         if threads is None and (one := self._jacobian(q, out)) is not None:
             return one
         return self._compute_batch("jacobian", (q,), out, threads)
@@ -242,13 +260,25 @@ class CompiledFrame:
     def jacobian_rate(
         self, q: Given, v: Given, out: FloatArray | None = None, *, threads: int | None = None
     ) -> FloatArray:
-        """Return the time derivative of the Jacobian (..., 6, nv): eq. 7.126."""
+        """Return the time derivative of the Jacobian (..., 6, nv): eq. 7.126.
+
+        >>> import urdfkin
+        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip.jacobian_rate([0.0, 0.0], [1.0, 0.0])[0].tolist()
+        [-0.9, -0.4]
+        """
         if threads is None and (one := self._jacobian_rate(q, v, out)) is not None:
             return one
         return self._compute_batch("jacobian rate", (q, v), out, threads)
 
     def hessian(self, q: Given, out: FloatArray | None = None, *, threads: int | None = None) -> FloatArray:
-        """Return the Hessian (..., 6, nv, nv): the terms of eq. 7.126 before their sum."""
+        """Return the Hessian (..., 6, nv, nv): the terms of eq. 7.126 before their sum.
+
+        >>> import urdfkin
+        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip.hessian([0.0, 0.0])[0].tolist()
+        [[-0.9, -0.4], [-0.4, -0.4]]
+        """
         if threads is None and (one := self._hessian(q, out)) is not None:
             return one
         return self._compute_batch("hessian", (q,), out, threads)
@@ -262,7 +292,13 @@ class CompiledFrame:
         *,
         threads: int | None = None,
     ) -> FloatArray:
-        """Return the classical acceleration (..., 6), [linear; angular], m/s^2, rad/s^2: eq. 7.129, 7.130."""
+        """Return the classical acceleration (..., 6), [linear; angular], m/s^2, rad/s^2: eq. 7.129, 7.130.
+
+        >>> import urdfkin
+        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip.acceleration([0.0, 0.0], [1.0, 0.0], [0.0, 0.0])[0].item()
+        -0.9
+        """
         if threads is None and (one := self._acceleration(q, v, a, out)) is not None:
             return one
         return self._compute_batch("acceleration", (q, v, a), out, threads)

@@ -27,6 +27,12 @@ class BaseMotion:
 
     Raises:
         InputError: a field has a wrong shape or a non-finite number, or the placement is not a rigid motion.
+
+    >>> import urdfkin
+    >>> arm = urdfkin.load("planar_two_link")
+    >>> moving = urdfkin.BaseMotion(velocity=[0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
+    >>> arm.velocity([0.0, 0.0], [1.0, 0.0], "tip", base=moving).tolist()
+    [0.1, 0.9, 0.0, 0.0, 0.0, 1.0]
     """
 
     placement: FloatArray = field(default_factory=lambda: np.eye(4))
@@ -59,13 +65,22 @@ class BaseMotion:
 
     @property
     def batch_shape(self) -> tuple[int, ...]:
-        """The common batch shape of the three fields."""
+        """The common batch shape of the three fields.
+
+        >>> import numpy as np
+        >>> BaseMotion(velocity=np.zeros((5, 6))).batch_shape
+        (5,)
+        """
         return np.broadcast_shapes(
             self.placement.shape[:-2], self.velocity.shape[:-1], self.acceleration.shape[:-1]
         )
 
     def state(self, batch_shape: tuple[int, ...]) -> FloatArray:
-        """Return rows [R, p, w, v, alpha, a] (n, 24) for the kernels; one row without batch axes."""
+        """Return rows [R, p, w, v, alpha, a] (n, 24) for the kernels; one row without batch axes.
+
+        >>> BaseMotion().state(()).shape
+        (1, 24)
+        """
         shape = batch_shape if self.batch_shape else ()
         parts = (
             self._rotation.reshape(*self.placement.shape[:-2], 9),

@@ -68,6 +68,16 @@ class FrameChain(Displayable):
         lengths: (n + 1,) path lengths between joint origins, m, summed over the folded fixed joints. Entry k
             bounds the distance from joint k's origin to the next, for any rotations.
         folded: (n + 1,) number of URDF joint poses, fixed joints' too, that are multiplied in each constant.
+
+    >>> import urdfkin
+    >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
+    >>> print(path)
+    planar_two_link: base to tip, 2 joints
+    With every coordinate at 0, in base (m); the tip is at (0.9, 0, 0).
+    joint    kind      lower  upper    x  y  z  axis x  axis y  axis z
+    ------------------------------------------------------------------
+    joint_1  revolute     -3      3    0  0  0       0       0       1
+    joint_2  revolute     -3      3  0.5  0  0       0       0       1
     """
 
     robot: str
@@ -105,17 +115,35 @@ class FrameChain(Displayable):
 
     @cached_property
     def coupling(self) -> Coupling:
-        """The map from the path's coordinates to its joint values."""
+        """The map from the path's coordinates to its joint values.
+
+        >>> import urdfkin
+        >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
+        >>> path.coupling.names
+        ('joint_1', 'joint_2')
+        """
         return coupling_of([(joint.name, joint.mimic, joint.kind) for joint in self.joints])
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the path's coordinates, in the order that `placement` expects."""
+        """Names of the path's coordinates, in the order that `placement` expects.
+
+        >>> import urdfkin
+        >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
+        >>> path.joint_names
+        ('joint_1', 'joint_2')
+        """
         return self.coupling.names
 
     @property
     def constants(self) -> tuple[FloatArray, ...]:
-        """The n + 1 constant poses A_0 ... A_n."""
+        """The n + 1 constant poses A_0 ... A_n.
+
+        >>> import urdfkin
+        >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
+        >>> [T[0, 3].item() for T in path.constants]  # m
+        [0.0, 0.5, 0.4]
+        """
         return (*(joint.T_previous_joint for joint in self.joints), self.T_last_tip)
 
     @cached_property
@@ -126,7 +154,13 @@ class FrameChain(Displayable):
 
     @cached_property
     def reach(self) -> float:
-        """Sum (m) of the constant offsets between joints, with the tip offset, without the base offset."""
+        """Sum (m) of the constant offsets between joints, with the tip offset, without the base offset.
+
+        >>> import urdfkin
+        >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
+        >>> path.reach
+        0.9
+        """
         return float(self.lengths[1:].sum())
 
     def frames(self, q: Given | None = None) -> FloatArray:
@@ -137,24 +171,53 @@ class FrameChain(Displayable):
 
         Raises:
             InputError: `q` has the wrong length.
+
+        >>> import urdfkin
+        >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
+        >>> path.frames([0.0, 0.0])[:, 0, 3].tolist()  # m
+        [0.0, 0.5, 0.9]
         """
         values = self.coupling.values(np.zeros(len(self.joint_names)) if q is None else q)
         return self.path.frames(values)[..., ::2, :, :]
 
     def placement(self, q: Given) -> FloatArray:
-        """Return T_base_tip (..., 4, 4) for `q` (..., coordinates); raises InputError for a wrong length."""
+        """Return T_base_tip (..., 4, 4) for `q` (..., coordinates); raises InputError for a wrong length.
+
+        >>> import urdfkin
+        >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
+        >>> path.placement([0.0, 0.0])[:3, 3].tolist()
+        [0.9, 0.0, 0.0]
+        """
         return np.ascontiguousarray(self.frames(q)[..., -1, :, :])
 
     def axes(self, q: Given | None = None) -> FloatArray:
-        """Return the unit axes z_{i-1} (..., n, 3) in the base; None for `q` is the zero configuration."""
+        """Return the unit axes z_{i-1} (..., n, 3) in the base; None for `q` is the zero configuration.
+
+        >>> import urdfkin
+        >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
+        >>> path.axes().tolist()
+        [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0]]
+        """
         return np.ascontiguousarray(self.frames(q)[..., :-1, :3, 2])
 
     def origins(self, q: Given | None = None) -> FloatArray:
-        """Return the joint origins O_{i-1} (..., n + 1, 3) in the base, m; the last is the tip's origin."""
+        """Return the joint origins O_{i-1} (..., n + 1, 3) in the base, m; the last is the tip's origin.
+
+        >>> import urdfkin
+        >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
+        >>> path.origins()[-1].tolist()  # of the tip, m
+        [0.9, 0.0, 0.0]
+        """
         return np.ascontiguousarray(self.frames(q)[..., :3, 3])
 
     def interorigin(self, q: Given | None = None) -> FloatArray:
-        """Return the interorigin vectors d_{i-1,i} (..., n, 3) in the base, m; the last leads to the tip."""
+        """Return the interorigin vectors d_{i-1,i} (..., n, 3) in the base, m; the last leads to the tip.
+
+        >>> import urdfkin
+        >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
+        >>> path.interorigin().tolist()
+        [[0.5, 0.0, 0.0], [0.4, 0.0, 0.0]]
+        """
         return np.ascontiguousarray(np.diff(self.origins(q), axis=-2))
 
 

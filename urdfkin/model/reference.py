@@ -38,7 +38,11 @@ class Reference(IntEnum):
 
     @classmethod
     def of(cls, value: Reference | str) -> Reference:
-        """Return the member for a member or a name; raises UnknownNameError for an unknown name."""
+        """Return the member for a member or a name; raises UnknownNameError for an unknown name.
+
+        >>> Reference.of("local").name
+        'LOCAL'
+        """
         if isinstance(value, Reference):
             return value
         name = value if isinstance(value, str) else safe_repr(value)

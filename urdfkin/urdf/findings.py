@@ -184,6 +184,11 @@ class Finding:
         also: The lines of further findings of the same kind, combined into this one.
         width: Number of marked characters from `column` on; 0: no position in the text.
         fix: The automatic fix, or None.
+
+    >>> import urdfkin
+    >>> finding = urdfkin.check('<robot name="r"><link name="a"/><link name="a"/></robot>')[0]
+    >>> print(finding)
+    <text>:1:39: URDF402 error: link 'a': another link has this name; the first is on line 1; rename one
     """
 
     code: str
@@ -203,7 +208,13 @@ class Finding:
 
     @property
     def subject(self) -> str:
-        """The element and its name, for example `joint 'elbow'`; an empty string for the whole file."""
+        """The element and its name, for example `joint 'elbow'`; an empty string for the whole file.
+
+        >>> import urdfkin
+        >>> finding = urdfkin.check('<robot name="r"><link name="a"/><link name="a"/></robot>')[0]
+        >>> finding.subject
+        "link 'a'"
+        """
         if self.element is None:
             return ""
         tag = shortened(self.element)
@@ -211,7 +222,13 @@ class Finding:
 
     @property
     def count(self) -> int:
-        """The number of findings, those in `also` included."""
+        """The number of findings, those in `also` included.
+
+        >>> import urdfkin
+        >>> finding = urdfkin.check('<robot name="r"><link name="a"/><link name="a"/></robot>')[0]
+        >>> finding.count
+        1
+        """
         return 1 + len(self.also)
 
     @property
@@ -226,7 +243,13 @@ class Finding:
 
     @property
     def sentence(self) -> str:
-        """The finding in one line, without its position and code."""
+        """The finding in one line, without its position and code.
+
+        >>> import urdfkin
+        >>> finding = urdfkin.check('<robot name="r"><link name="a"/><link name="a"/></robot>')[0]
+        >>> finding.sentence
+        "link 'a': another link has this name; the first is on line 1; rename one"
+        """
         subject = f"{self.subject}: " if self.element and self.name is not None else ""
         found = f": found {self.found}" if self.found else ""
         also = f" ({self._others})" if self.also else ""
@@ -238,7 +261,13 @@ class Finding:
         return log_line(f"{place}: {self.code} {self.severity.value}: {self.sentence}")
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the finding for the JSON of a report: enums as strings, tuples as lists, without `fix`."""
+        """Return the finding for the JSON of a report: enums as strings, tuples as lists, without `fix`.
+
+        >>> import urdfkin
+        >>> finding = urdfkin.check('<robot name="r"><link name="a"/><link name="a"/></robot>')[0]
+        >>> finding.as_dict()["code"]
+        'URDF402'
+        """
         data = asdict(self)
         del data["width"], data["fix"]
         data["severity"] = self.severity.value
@@ -269,6 +298,13 @@ class UrdfError(UrdfkinError, ValueError):
 
     Attributes:
         findings: All findings of the file by line, warnings and notes included.
+
+    >>> import urdfkin
+    >>> try:
+    ...     robot = urdfkin.load('<robot name="r"><link name="a"/><link name="a"/></robot>')
+    ... except ValueError as error:  # a UrdfError is one
+    ...     print(error.findings[0].code)
+    URDF402
     """
 
     #: Number of errors in the message; further errors are counted.
@@ -295,7 +331,12 @@ class UrdfError(UrdfkinError, ValueError):
 
 
 class UrdfWarning(UserWarning):
-    """The Python warning for each warning in a loaded URDF."""
+    """The Python warning for each warning in a loaded URDF.
+
+    >>> import urdfkin
+    >>> issubclass(urdfkin.UrdfWarning, UserWarning)
+    True
+    """
 
 
 ERROR, WARNING, NOTE = Severity.ERROR, Severity.WARNING, Severity.NOTE

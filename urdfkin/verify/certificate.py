@@ -42,6 +42,10 @@ class VerificationError(UrdfkinError):
         bound: Largest allowed difference of each number.
         units: The difference, in eps * scale.
         reproduce: A command or a line of Python that computes the case again.
+
+    >>> import urdfkin
+    >>> issubclass(urdfkin.VerificationError, urdfkin.UrdfkinError)
+    True
     """
 
     is_disagreement = True
@@ -162,6 +166,12 @@ class Certificate(Displayable):
         source: Source of the robot: a path, a catalogue name or "<text>".
         sha256: Digest of the URDF text as UTF-8, or of the MJCF file.
         urdfkin: Version of urdfkin.
+
+    >>> import urdfkin
+    >>> arm = urdfkin.load("planar_two_link")
+    >>> J = arm.jacobian([0.0, 0.0], "tip")
+    >>> arm.certificate().lines[0].quantity, arm.certificate().verified
+    ('jacobian', True)
     """
 
     robot: str
@@ -175,13 +185,27 @@ class Certificate(Displayable):
 
     @property
     def verified(self) -> bool:
-        """True if there are results, and each of them was checked and is within its bound."""
+        """True if there are results, and each of them was checked and is within its bound.
+
+        >>> import urdfkin
+        >>> arm = urdfkin.load("planar_two_link")
+        >>> J = arm.jacobian([0.0, 0.0], "tip")
+        >>> arm.certificate().verified
+        True
+        """
         return any(line.checked for line in self.lines) and not any(
             line.unchecked or not line.share <= 1.0 for line in self.lines
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """Return plain data for JSON; a value that is not finite becomes null."""
+        """Return plain data for JSON; a value that is not finite becomes null.
+
+        >>> import urdfkin
+        >>> arm = urdfkin.load("planar_two_link")
+        >>> J = arm.jacobian([0.0, 0.0], "tip")
+        >>> arm.certificate().as_dict()["lines"][0]["quantity"]
+        'jacobian'
+        """
         lines = [asdict(line) for line in self.lines]
         for line in lines:
             line |= {key: None for key in ("worst", "share") if not math.isfinite(line[key])}
@@ -198,6 +222,17 @@ class Certificate(Displayable):
 
         Raises:
             SourceError: the folder does not exist, or the file cannot be written (permission, disk full).
+
+        >>> import urdfkin
+        >>> arm = urdfkin.load("planar_two_link")
+        >>> J = arm.jacobian([0.0, 0.0], "tip")
+        >>> import tempfile
+        >>> from pathlib import Path
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     path = Path(folder) / "certificate.json"
+        ...     arm.certificate().save(path)
+        ...     path.exists()
+        True
         """
         write_file(at_home(path), (json_text(self.as_dict()) + "\n").encode())
 

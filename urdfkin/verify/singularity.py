@@ -100,6 +100,12 @@ class Singularity(Displayable):
             Jacobian has more rows than columns.
         motions: (e, nv) joint velocities that do not move the frame.
         reasons: The lost directions and their reasons, one sentence each.
+
+    >>> import urdfkin
+    >>> arm = urdfkin.load("planar_two_link")
+    >>> found = arm.singular_values([0.0, 0.0], "tip", "linear").singularity()
+    >>> found.rank, found.full, found.lost.tolist()
+    (1, 2, [[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
     """
 
     rank: int

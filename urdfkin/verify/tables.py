@@ -47,7 +47,12 @@ PROMISED = 10.0
 
 
 class TableError(UrdfkinError):
-    """A table and Pinocchio disagree by more than rounding and snapping can explain."""
+    """A table and Pinocchio disagree by more than rounding and snapping can explain.
+
+    >>> import urdfkin
+    >>> issubclass(urdfkin.TableError, urdfkin.UrdfkinError)
+    True
+    """
 
     is_disagreement = True
 

@@ -40,7 +40,12 @@ TABLE_SAMPLES = 40
 
 
 class NotVerifiedWarning(UserWarning):
-    """The oracle could not check some results; the message gives the reason."""
+    """The oracle could not check some results; the message gives the reason.
+
+    >>> import urdfkin
+    >>> issubclass(urdfkin.NotVerifiedWarning, UserWarning)
+    True
+    """
 
 
 class Verifier:
