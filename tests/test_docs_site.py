@@ -106,7 +106,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 def test_the_pages_of_commands_and_of_the_library_hold_every_name() -> None:
     page = commands_page()
     assert [name for name in commands() if f"\n## urdfkin {name}\n" not in page] == []
-    assert "Usage: urdfkin campaign merge" in page
+    assert "Usage: urdfkin report merge" in page
     shown = [name for _, _, names in LIBRARY.values() for name in names.split()]
     assert sorted(name for name in shown if name in urdfkin.__all__) == sorted(urdfkin.__all__)
     members = {

@@ -101,7 +101,7 @@ ASKED: dict[Question, list[Callable[[], str]]] = {
     Question.FLOATING_BASES: [
         _raised(lambda: urdfkin.load(WHEEL, root_joint="floating").placement({"root_joint": np.zeros(6)}))
     ],
-    Question.SINGULARITY: [_typed("manipulability", "--help")],
+    Question.SINGULARITY: [_typed("singular-values", "--help")],
 }
 
 

@@ -57,8 +57,8 @@ def test_the_page_of_conventions_has_fast_calls_that_run() -> None:
 
 def test_every_command_has_a_row_on_the_page_of_commands() -> None:
     page = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\|[^|]*\| `urdfkin ([a-z-]+)", page, re.MULTILINE)
-    assert rows == list(commands())
+    rows = re.findall(r"^\| `([a-z-]+)", page, re.MULTILINE)
+    assert list(dict.fromkeys(rows)) == list(commands())
 
 
 def test_the_front_page_names_a_command_for_each_of_its_four_people() -> None:

@@ -1120,8 +1120,8 @@ class Robot(Displayable):
         Args:
             q: (..., nq) rad, m.
             frame: Name of a link or joint, or a list of names; None: the robot's only tip.
-            representation: Euler sequence by SciPy's name, or "quaternion". "ZYZ" is the textbook's, "xyz" is
-                roll-pitch-yaw.
+            representation: Euler sequence by SciPy's name, "rpy" (the same as "xyz": roll, pitch, yaw), or
+                "quaternion". "ZYZ" is the textbook's.
             nearest: Smallest accepted distance from the representational singularity, rad.
             base: Placement of the root link; None: at the world origin.
             out: Output array, C-contiguous float64 of the result's shape.
@@ -1142,11 +1142,12 @@ class Robot(Displayable):
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
-        >>> J = arm.analytical_jacobian([0.3, 0.4], representation="xyz")
+        >>> J = arm.analytical_jacobian([0.3, 0.4], representation="rpy")
         >>> J.shape, J[5].tolist()  # yaw = q1 + q2
         ((6, 2), [1.0, 1.0])
         """
         representation, nearest = as_str(representation, "representation"), real_number(nearest, "nearest")
+        representation = "xyz" if representation == "rpy" else representation
         options: dict[str, Any] = {"representation": representation, "nearest": nearest}
         frame = self._default_frame() if frame is None else frame
         call = Call(self.tree, self.plan, frame, _ALIGNED, base, (q,), **options)

@@ -101,7 +101,7 @@ def test_on_a_moving_base_the_replay_line_computes_the_parts(monkeypatch: pytest
 def test_without_one_the_replay_line_is_the_command_that_explains(monkeypatch: pytest.MonkeyPatch) -> None:
     spoiled(monkeypatch)
     words = shlex.split(disagreement(urdfkin.load("panda"), None).reproduce)
-    assert words[:3] == ["urdfkin", "acceleration", "--explain"]
+    assert words[:3] == ["urdfkin", "acceleration", "--breakdown"]
     assert command(*words[1:]).code == 1
     monkeypatch.undo()
     assert command(*words[1:]).code == 0

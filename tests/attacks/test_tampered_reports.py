@@ -1,4 +1,4 @@
-"""A report that was edited is refused with what contradicts, or told by `compare`: never a traceback."""
+"""An edited report is refused with its contradiction, or `report compare` names it: never a traceback."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ def test_a_report_that_contradicts_itself_is_refused_with_what_contradicts(name:
     edit(document)
     assert any(words in said for said in contradictions(document)), list(contradictions(document))
     path, good = written(document, tmp_path / "edited.json"), written(arms(), tmp_path / "good.json")
-    for command in (("report", path), ("compare", good, path), ("compare", path, good)):
+    for command in (("report", path), ("report", "compare", good, path), ("report", "compare", path, good)):
         done = run(*command)
         assert done.code == 2, done.text
         assert f"{path}: the report contradicts itself: found " in done.err
@@ -183,7 +183,9 @@ def test_another_axis_or_place_is_told_as_a_change_of_the_robot(
 ) -> None:
     document = arms()
     edit(document)
-    done = run("compare", written(arms(), tmp_path / "a.json"), written(document, tmp_path / "b.json"))
+    done = run(
+        "report", "compare", written(arms(), tmp_path / "a.json"), written(document, tmp_path / "b.json")
+    )
     assert done.code == 0
     assert f"panda: joint {_joint(arms())['name']}, {what}: " in done.text
 
@@ -191,11 +193,11 @@ def test_another_axis_or_place_is_told_as_a_change_of_the_robot(
 @pytest.mark.parametrize(
     "text", ["NaN", "Infinity", "-Infinity", "1e999", "[" * 100_000, '{"seed": 1' + "0" * 5000]
 )
-@pytest.mark.parametrize("command", ["report", "compare"])
+@pytest.mark.parametrize("command", ["show", "compare"])
 def test_json_that_no_document_can_be_is_refused(text: str, command: str, tmp_path: Path) -> None:
     path = tmp_path / "odd.json"
     path.write_text(json.dumps(arms()).replace('"seconds": ', f'"seconds": {text}, "other": ', 1))
-    done = run(command, *([path] if command == "report" else [path, path]))
+    done = run("report", command, *([path] if command == "show" else [path, path]))
     assert done.code == 2
     assert "not a JSON file" in done.err
 

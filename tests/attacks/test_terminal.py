@@ -37,8 +37,10 @@ ROBOT = {
     "jacobian-rate": [[], ["--format", "csv"]],
     "hessian": [[], ["--format", "csv"]],
     "imu": [[], ["--format", "csv"], *(["--trajectory", file] for file in (FILE, f"{FILE}.npz"))],
-    "manipulability": [[], ["--format", "csv"], ["--format", "json"], ["--frame", FILE]],
-    "acceleration": [[], ["--explain", "--v", "random"], ["--explain", "--v", "random", "--format", "csv"]],
+    "singular-values": [[], ["--format", "csv"], ["--format", "json"], ["--frame", FILE]],
+    "acceleration": [
+        [], ["--breakdown", "--v", "random"], ["--breakdown", "--v", "random", "--format", "csv"],
+    ],
     "dh": [
         *(["--format", form, "--no-mimic"] for form in (*FORMATS, "urdf", "svg")),
         *(["--tree", "--format", form] for form in ("terminal", "markdown", "csv", "json")),
@@ -60,15 +62,22 @@ ROBOT = {
 OTHERS: dict[str, list[list[str]]] = {
     "robots": [[], ["--format", "json"], ["--family", FILE]],
     "explain": [["URDF502"], ["7.130"], [FILE]],
-    "report": [["REPORT"], ["REPORT", "--cases"], [FILE]],
+    "report": [
+        ["REPORT"],
+        ["REPORT", "--cases"],
+        [FILE],
+        ["compare", "REPORT", "REPORT"],
+        ["compare", "REPORT", "REPORT", "--format", "json"],
+        ["compare", "REPORT", FILE],
+        ["status", FILE],
+        ["merge", FILE, FILE],
+    ],
     "same": [["ROBOT", "ROBOT"], ["ROBOT", "elbow"], ["ROBOT", "ROBOT", "--format", "json"], ["ROBOT", FILE]],
     "diff": [
         ["ROBOT", "elbow", "--no-effects"],
         ["ROBOT", "elbow", "--no-effects", "--format", "json"],
         ["ROBOT", FILE],
     ],
-    "compare": [["REPORT", "REPORT"], ["REPORT", "REPORT", "--format", "json"], ["REPORT", FILE]],
-    "campaign": [["status", FILE], ["merge", FILE, FILE]],
     "view": [[FILE]],
     "warm": [[], [FILE]],
     "completion": [["bash"], ["zsh"], ["fish"], [FILE]],
@@ -192,7 +201,7 @@ def test_each_name_alone_adds_no_line(kind: str, tmp_path: Path, monkeypatch: py
         path.write_text(urdf(name), encoding="utf-8")
         counts = []
         for words in (["info"], ["jacobian"], ["dh"], ["dh", "--format", "markdown"], ["dh", "--tree"],
-                      ["acceleration", "--explain", "--v", "random"], ["dh", "--format", "c"]):  # fmt: skip
+                      ["acceleration", "--breakdown", "--v", "random"], ["dh", "--format", "c"]):  # fmt: skip
             done = urdfkin(words[0], str(path), *words[1:])
             harmless(done, words)
             counts.append(done.text.count("\n"))

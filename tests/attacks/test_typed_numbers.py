@@ -50,7 +50,8 @@ OPTIONS = [
     ("plot", "ur5", "--to", "neutral", "-o", "x.svg", "--duration"),
     ("plot", "ur5", "--to", "neutral", "-o", "x.svg", "--samples"),
     ("placement", "ur5", "--seed"), ("validate", "ur5", "--samples"), ("validate", "ur5", "--jobs"),
-    ("check", "ur5", "--max-bytes"), ("compare", "a.json", "b.json", "--factor"), ("view", "ur5", "--port"),
+    ("check", "ur5", "--max-bytes"), ("report", "compare", "a.json", "b.json", "--factor"),
+    ("view", "ur5", "--port"),
 ]  # fmt: skip
 
 

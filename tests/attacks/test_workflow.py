@@ -32,7 +32,7 @@ def test_what_follows_the_first_check_runs_although_it_or_validation_failed() ->
 
 
 def test_the_comparison_needs_nothing_but_the_two_files_it_compares() -> None:
-    condition = steps()[index("urdfkin compare")]["if"]
+    condition = steps()[index("urdfkin report compare")]["if"]
     assert "hashFiles('main.json')" in condition
     assert "hashFiles('results.json')" in condition
 

@@ -1,4 +1,4 @@
-"""`acceleration --explain` and `jacobian-rate` through the command itself."""
+"""`acceleration --breakdown` and `jacobian-rate` through the command itself."""
 
 import csv
 import io
@@ -23,7 +23,7 @@ def run(*words: str) -> "subprocess.CompletedProcess[str]":
 
 
 def test_the_parts_of_the_polar_robots_acceleration_are_shown_with_their_sum() -> None:
-    result = run("acceleration", *POLAR, "--explain")
+    result = run("acceleration", *POLAR, "--breakdown")
     assert result.returncode == 0, result.stderr
     rows = [line.split() for line in result.stdout.splitlines() if line.strip().startswith(("joint_", "sum"))]
     assert [row[:2] for row in rows[:-1]] == [
@@ -38,7 +38,7 @@ def test_the_parts_of_the_polar_robots_acceleration_are_shown_with_their_sum() -
 
 
 def test_as_json_the_parts_sum_to_the_acceleration_exactly() -> None:
-    result = run("acceleration", *POLAR, "--explain", "--format", "json")
+    result = run("acceleration", *POLAR, "--breakdown", "--format", "json")
     document = json.loads(result.stdout)
     terms = np.array(document["terms"])
     assert terms.shape == (1, 2, 4, 6)
@@ -51,7 +51,7 @@ def test_as_json_the_parts_sum_to_the_acceleration_exactly() -> None:
 
 
 def test_as_csv_there_is_a_line_for_each_part_and_one_for_the_sum() -> None:
-    result = run("acceleration", *POLAR, "--explain", "--format", "csv")
+    result = run("acceleration", *POLAR, "--breakdown", "--format", "csv")
     rows = list(csv.DictReader(io.StringIO(result.stdout)))
     assert [row["kind"] for row in rows] == ["transverse", "centripetal", "coriolis", "sliding", ""]
     assert float(rows[-1]["vx"]) == pytest.approx(sum(float(row["vx"]) for row in rows[:-1]), abs=1e-14)

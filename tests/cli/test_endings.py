@@ -35,7 +35,7 @@ def test_the_form_stands_where_the_ending_says_nothing(tmp_path: Path) -> None:
 
 
 def test_a_breakdown_goes_by_the_ending_too(tmp_path: Path) -> None:
-    words = ("acceleration", "elbow", "--explain", "--v", "random", "-o", str(tmp_path / "parts.json"))
+    words = ("acceleration", "elbow", "--breakdown", "--v", "random", "-o", str(tmp_path / "parts.json"))
     assert urdfkin(*words).code == 0
     assert json.loads((tmp_path / "parts.json").read_text())["quantity"] == "acceleration breakdown"
 

@@ -12,10 +12,12 @@ import click
 import numpy as np
 import pytest
 
+import urdfkin as library
 from tests.cli.running import process, urdfkin
 from tests.robots.odd_urdfs import urdf_of
-from urdfkin.cli import cli, commands
+from urdfkin.cli import _ABSENT, _SYNONYMS, cli, commands, groups
 from urdfkin.loading import load
+from urdfkin.robot import Robot
 from urdfkin.system.resources import robots_dir
 from urdfkin.urdf.catalogue import catalogue
 
@@ -25,9 +27,9 @@ HEAVY = {"numpy", "numba", "llvmlite", "pinocchio", "yourdfpy", "trimesh", "lxml
 
 def examples(command: str) -> list[str]:
     """The examples of the command in its help."""
-    text = urdfkin(command, "--help").text.partition("Example:")[2].partition("Options:")[0]
+    text = urdfkin(*command.split(), "--help").text.partition("Example:")[2].partition("Options:")[0]
     lines = " ".join(text.split()).split("urdfkin ")[1:]
-    return [line.strip() for line in lines if line.split()[0] == command]
+    return [line.strip() for line in lines if f"{line} ".startswith(f"{command} ")]
 
 
 def run_examples(command: str) -> None:
@@ -62,7 +64,7 @@ def test_every_command_has_help_with_an_example_of_itself(command: str) -> None:
     assert urdfkin(command, "-h").out == done.out
 
 
-AFTER_WORK = ("validate", "report", "compare", "campaign")
+AFTER_WORK = ("validate", "report", "report compare", "report status")
 #: Serves until it is stopped; tests/view looks at what it serves.
 ENDLESS = ("view",)
 
@@ -147,3 +149,18 @@ def test_the_families_that_the_help_names_are_those_that_exist() -> None:
     page = " ".join(urdfkin("robots", "--help").text.split())
     named = page.partition("Show only one family: ")[2].partition(".")[0].split(", ")
     assert named == sorted({entry.family for entry in catalogue().values()})
+
+
+def test_each_other_word_for_a_command_leads_to_a_command_and_is_none_itself() -> None:
+    assert set(_SYNONYMS) & set(commands()) == set()
+    assert set(_ABSENT) & (set(commands()) | set(_SYNONYMS)) == set()
+    for meant in _SYNONYMS.values():
+        assert meant.split()[0] in commands()
+
+
+def test_a_command_that_computes_has_the_librarys_name() -> None:
+    own = set(groups()["Compute"]) | {"dh", "screws", "chain", "export", "view"}
+    assert [name for name in own if not hasattr(Robot, name.replace("-", "_"))] == []
+    assert [
+        name for name in ("same", "diff", "calibrate", "validate", "check") if not hasattr(library, name)
+    ] == []

@@ -1,4 +1,4 @@
-"""`urdfkin imu` and `urdfkin manipulability`: the library's numbers, along trajectories and in every form."""
+"""`urdfkin imu` and `urdfkin singular-values`: the library's numbers in every form."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def test_options_without_effect_and_half_a_vector_are_refused(
 
 def test_manipulability_has_the_librarys_numbers_in_every_form(tmp_path: Path) -> None:
     robot = library.load("panda")
-    words = ["manipulability", "panda", "--frame", "panda_hand", "--rows", "linear", "--q", "random:3"]
+    words = ["singular-values", "panda", "--frame", "panda_hand", "--rows", "linear", "--q", "random:3"]
     q = robot.sample(3, 0)
     found = robot.singular_values(q, "panda_hand", "linear")
     gradient = found.manipulability_gradient(robot.hessian(q, "panda_hand"))
@@ -149,7 +149,7 @@ def test_manipulability_has_the_librarys_numbers_in_every_form(tmp_path: Path) -
 
 
 def test_what_is_no_number_is_null_in_json() -> None:
-    words = ["manipulability", "planar_two_link", "--rows", "linear", "--q", "0.3,0", "--format", "json"]
+    words = ["singular-values", "planar_two_link", "--rows", "linear", "--q", "0.3,0", "--format", "json"]
     document = json.loads(urdfkin(*words).out)
     assert document["condition"]["upper"] == [None]
     assert document["manipulability_gradient"] == [[None, None]]
@@ -158,11 +158,11 @@ def test_what_is_no_number_is_null_in_json() -> None:
 
 
 def test_a_singularity_is_explained_in_place_of_a_gradient() -> None:
-    text = urdfkin("manipulability", "ur5", "--frame", "tool0", "--q", "neutral").text
+    text = urdfkin("singular-values", "ur5", "--frame", "tool0", "--q", "neutral").text
     assert "Singular within rounding: rank 5 of 6" in text
     assert "Lost direction: rotation of tool0 about (1, 0, 0), in world axes." in text
     assert "wrist_1_joint are parallel and lie in one plane." in text
     assert "nan" not in text
-    regular = urdfkin("manipulability", "ur5", "--frame", "tool0", "--q", "random").text
+    regular = urdfkin("singular-values", "ur5", "--frame", "tool0", "--q", "random").text
     assert "ingular within" not in regular
     assert "manipulability changes by" in regular

@@ -148,7 +148,7 @@ def test_every_quantity_takes_what_it_needs_of_the_bases_motion(command: str) ->
 
 
 def test_an_explained_acceleration_has_the_bases_part() -> None:
-    done = urdfkin("acceleration", "ur5", "--explain", "--base-acceleration", "0,0,9.81,0,0,0")
+    done = urdfkin("acceleration", "ur5", "--breakdown", "--base-acceleration", "0,0,9.81,0,0,0")
     assert done.code == 0, done.err
     assert [line.split()[-4] for line in done.text.splitlines() if line.startswith("base ")] == ["9.81"]
 

@@ -100,7 +100,7 @@ def test_a_shard_says_what_it_came_to_and_what_comes_next(tmp_path: Path) -> Non
     done = urdfkin(*words, "--shard", "2/2")
     assert done.code == 0
     assert f"shard 2/2 of {where}: 1 robot, " in done.text
-    assert "next: urdfkin campaign merge" in done.text
+    assert "next: urdfkin report merge" in done.text
     assert urdfkin("report", where).code == 130
     assert urdfkin(*words, "--shard", "1/2").code == 0
     assert urdfkin("report", where).code == 0

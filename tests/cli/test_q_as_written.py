@@ -50,7 +50,7 @@ def test_every_command_that_takes_q_reads_it_so(tmp_path: Path) -> None:
     q = "shoulder_pan_joint=30deg, shoulder_lift_joint=-90deg, elbow_joint=90deg, wrist_1_joint=0,"
     q += "wrist_2_joint=pi/2 , wrist_3_joint=0"
     at = library.load("ur5").placement(q, "tool0")[:3, 3]
-    for command in ("imu", "manipulability"):
+    for command in ("imu", "singular-values"):
         done = urdfkin(command, "ur5", "--q", q, "--format", "json")
         assert (done.code, done.data["q"][0][0]) == (0, math.pi / 6)
     picture = tmp_path / "way.svg"

@@ -99,13 +99,13 @@ def test_report_hands_out_the_schema() -> None:
 
 @pytest.mark.slow
 def test_compare_exits_1_on_a_regression_and_0_the_other_way(good: Path, bad: Path, tmp_path: Path) -> None:
-    done = urdfkin("compare", good, bad, "--markdown", tmp_path / "c.md")
+    done = urdfkin("report", "compare", good, bad, "--markdown", tmp_path / "c.md")
     assert done.code == 1
     assert "REGRESSION panda: verdict: verified -> disagrees" in done.text
     assert (tmp_path / "c.md").read_text().startswith("## ❌")
-    assert urdfkin("compare", bad, good).code == 1  # a robot is gone
-    assert urdfkin("compare", good, good).code == 0
-    found = json.loads(urdfkin("compare", good, bad, "--format", "json").text)
+    assert urdfkin("report", "compare", bad, good).code == 1  # a robot is gone
+    assert urdfkin("report", "compare", good, good).code == 0
+    found = json.loads(urdfkin("report", "compare", good, bad, "--format", "json").text)
     assert found["schema"] == "urdfkin-comparison/1"
     assert found["regressions"] == sum(change["regression"] for change in found["changes"]) > 0
 
@@ -118,7 +118,7 @@ def test_compare_lists_a_changed_axis_and_states_that_changes_alone_exit_with_0(
     joint["axis"] = [-x for x in joint["axis"]]
     new = tmp_path / "new.json"
     new.write_text(json.dumps(changed))
-    done = urdfkin("compare", good, new)
+    done = urdfkin("report", "compare", good, new)
     assert done.code == 0
     words = " ".join(done.text.split())
     assert f"ur5: joint {joint['name']}, axis: z -> -z, rotated by 3.142 rad" in words
@@ -131,7 +131,7 @@ def test_compare_lists_a_changed_axis_and_states_that_changes_alone_exit_with_0(
     [
         (("report", "none.json"), "none.json: cannot be read"),
         (("report",), "give the file"),
-        (("compare", "none.json", "none.json"), "cannot be read"),
+        (("report", "compare", "none.json", "none.json"), "cannot be read"),
         (("validate", "ur5", "--html", "/nowhere/a.html"), "/nowhere/a.html: cannot be written"),
         (("plot", "ur5", "-o", "a.svg"), "--to VALUES"),
         (("plot", "ur5", "--to", "neutral", "-o", "/nowhere/a.svg"), "cannot be written"),

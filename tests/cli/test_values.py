@@ -94,7 +94,7 @@ def test_the_table_says_what_was_computed_checked_and_how_closely(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("words", [("jacobian",), ("acceleration", "--v", "random", "--explain")])
+@pytest.mark.parametrize("words", [("jacobian",), ("acceleration", "--v", "random", "--breakdown")])
 @pytest.mark.parametrize("columns", [80, 200])
 def test_a_table_folds_no_name_and_is_no_wider_than_the_terminal(
     words: tuple[str, ...], columns: int, monkeypatch: pytest.MonkeyPatch
@@ -327,7 +327,7 @@ LONG = "a_joint_of_the_left_manipulator_whose_name_is_as_long_as_names_of_people
 @pytest.mark.parametrize(
     "words",
     [
-        "info ROBOT", "jacobian ROBOT", "acceleration ROBOT --explain --v 1", "dh ROBOT", "dh ROBOT --tree",
+        "info ROBOT", "jacobian ROBOT", "acceleration ROBOT --breakdown --v 1", "dh ROBOT", "dh ROBOT --tree",
         "validate ROBOT --samples 0", "validate ROBOT elbow --samples 0",
     ],
 )  # fmt: skip

@@ -17,7 +17,7 @@ import click
 from urdfkin.cli import streams
 from urdfkin.cli.exit import run
 from urdfkin.cli.streams import guard
-from urdfkin.errors import UnknownNameError
+from urdfkin.errors import UnknownNameError, UrdfkinError
 from urdfkin.verify.quantities import by_command
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ _COMPUTE = "Compute"
 _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {
         "robots": ("urdfkin.cli.robots", "List the robots that have a short name."),
-        "info": ("urdfkin.cli.info", "Show a robot's links, joints, limits, frames and coordinates."),
+        "info": ("urdfkin.cli.info", "Show the whole robot: links, joints, limits, frames and coordinates."),
         "view": ("urdfkin.cli.view", "Show a robot in a browser tab, with sliders and checked numbers."),
         "plot": ("urdfkin.cli.plot", "Plot a frame's motion along a trajectory."),
     },
@@ -38,35 +38,45 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
             "urdfkin.cli.analytical_jacobian",
             "Compute the derivatives of a frame's position and orientation angles.",
         ),
-        "manipulability": (
+        "singular-values": (
             "urdfkin.cli.manipulability",
-            "Compute a Jacobian's singular values, condition number and manipulability.",
+            "Compute a Jacobian's singular values and manipulability; explain a singularity.",
         ),
         "imu": ("urdfkin.cli.imu", "Compute the readings of an accelerometer and a gyroscope on a frame."),
     },
     "Tables and code": {
         "dh": ("urdfkin.cli.dh", "Derive Denavit-Hartenberg tables, or compare one with a published table."),
         "screws": ("urdfkin.cli.screws", "Derive the product of exponentials: zero pose and joint screws."),
-        "chain": ("urdfkin.cli.chain", "List the joint axes between two frames."),
-        "structure": ("urdfkin.cli.structure", "Classify an arm: wrist, parallel axes, closed-form solvers."),
+        "chain": ("urdfkin.cli.chain", "Show one path of the robot: the joint axes between two frames."),
+        "structure": (
+            "urdfkin.cli.structure",
+            "Classify the arm along a path: wrist, parallel axes, closed-form solvers.",
+        ),
         "export": (
             "urdfkin.cli.export",
             "Export kinematics as code in C, Python, MATLAB and more, with a check.",
         ),
     },
     "Compare and calibrate": {
-        "same": ("urdfkin.cli.same", "Prove that two models are the same robot, or bound their distance."),
-        "diff": ("urdfkin.cli.diff", "List the changes between two versions of a model and their effect."),
+        "same": (
+            "urdfkin.cli.same",
+            "Prove that two models move alike, whatever their files, or bound their distance.",
+        ),
+        "diff": (
+            "urdfkin.cli.diff",
+            "List the edits between two versions of one file, and their effect on motion.",
+        ),
         "calibrate": (
             "urdfkin.cli.calibrate",
             "Fit a robot's parameters to measured poses; write them to the URDF.",
         ),
     },
     "Validate against Pinocchio": {
-        "validate": ("urdfkin.cli.validate", "Compare all frames and joints with Pinocchio on many samples."),
-        "campaign": ("urdfkin.cli.campaign", "Show the progress of a resumable validation; merge several."),
-        "report": ("urdfkin.cli.report", "Show or convert the report of an earlier validation."),
-        "compare": ("urdfkin.cli.compare", "Compare the reports of two validations."),
+        "validate": (
+            "urdfkin.cli.validate",
+            "Compute all frames and joints on many samples, and compare with Pinocchio.",
+        ),
+        "report": ("urdfkin.cli.report", "Show, convert, compare or merge the results of validations."),
     },
     "Check files": {
         "check": ("urdfkin.cli.check", "Lint URDF files; every finding has a code, a line and a remedy."),
@@ -94,6 +104,63 @@ def commands() -> dict[str, tuple[str, str]]:
     return {name: entry for entries in groups().values() for name, entry in entries.items()}
 
 
+#: Other words for a command -> the command; a text that is no command is what urdfkin has in its place.
+_SYNONYMS = {
+    **dict.fromkeys(("fk", "forward", "forward-kinematics", "pose", "transform", "tf"), "placement"),
+    **dict.fromkeys(("relative-placement", "relative-pose"), "placement --relative-to FRAME"),
+    **dict.fromkeys(("rpy", "quaternion"), "placement --as rpy or --as quaternion"),
+    **dict.fromkeys(("jac", "j", "geometric-jacobian"), "jacobian"),
+    **dict.fromkeys(("jdot", "jacobian-dot", "jacobian-derivative"), "jacobian-rate"),
+    **dict.fromkeys(("twist", "vel"), "velocity"),
+    **dict.fromkeys(("acc", "accel"), "acceleration"),
+    **dict.fromkeys(("breakdown", "acceleration-breakdown", "coriolis"), "acceleration --breakdown"),
+    **dict.fromkeys(
+        ("svd", "manipulability", "condition", "singularity", "singularities"), "singular-values"
+    ),
+    **dict.fromkeys(("dh-table", "dh-parameters", "denavit-hartenberg", "table", "mdh"), "dh"),
+    **dict.fromkeys(("poe", "product-of-exponentials", "twists"), "screws"),
+    **dict.fromkeys(("show", "joints", "links", "frames", "limits", "summary", "tree"), "info"),
+    **dict.fromkeys(("visualize", "visualise", "viewer", "display", "gui"), "view"),
+    **dict.fromkeys(
+        ("compare", "comparison"), "report compare (reports), same (models), diff (versions of a file)"
+    ),
+    **dict.fromkeys(("campaign", "status", "progress"), "report status"),
+    "merge": "report merge",
+    **dict.fromkeys(("lint", "validate-urdf", "check-urdf"), "check"),
+    **dict.fromkeys(("test", "verify"), "validate"),
+    **dict.fromkeys(("codegen", "generate"), "export"),
+    **dict.fromkeys(("identify", "fit", "calibration"), "calibrate"),
+    **dict.fromkeys(("equal", "equivalent"), "same"),
+    **dict.fromkeys(("list", "catalogue", "catalog"), "robots"),
+}
+#: Words for subjects that urdfkin does not have -> the nearest commands.
+_ABSENT = {
+    **dict.fromkeys(
+        ("ik", "inverse", "inverse-kinematics", "solve"),
+        "urdfkin has no inverse kinematics; `structure` names closed-form solvers for an arm, and `placement`"
+        " and `jacobian` compute the terms of an iterative solver",
+    ),
+    **dict.fromkeys(
+        ("dynamics", "rnea", "inertia", "torque", "mass-matrix"),
+        "urdfkin has no dynamics; use Pinocchio's (`robot.pinocchio_model()` in Python)",
+    ),
+    "collision": "urdfkin has no collision checks; use Pinocchio's",
+}
+
+
+def _unknown(name: str) -> UrdfkinError:
+    """Return the error for an unknown command; it knows other words for the commands."""
+    word = name.lower().replace("_", "-")
+    if word in commands():
+        return UnknownNameError("command", name, [word])
+    error = UnknownNameError("command", name, commands())
+    if (absent := _ABSENT.get(word)) is not None:
+        error.remedy, error.nearest = absent, ()
+    elif (meant := _SYNONYMS.get(word)) is not None:
+        error.remedy, error.nearest = f"did you mean {meant}?", (meant,)
+    return error
+
+
 class LazyGroup(click.Group):
     """A command group that imports a command only when it is used."""
 
@@ -116,7 +183,7 @@ class LazyGroup(click.Group):
         if args and args[0] not in commands() and not args[0].startswith("-"):
             if ctx.resilient_parsing:  # shell completion
                 return None, None, args
-            raise UnknownNameError("command", args[0], commands())
+            raise _unknown(args[0])
         return super().resolve_command(ctx, args)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem[str]]:

@@ -14,10 +14,10 @@ from urdfkin.verify.quantities import ANALYTICAL_JACOBIAN
 
 #: A copy of `urdfkin.kinematics.rotation.SEQUENCES`: importing it would slow --help down.
 _TRIPLES = [a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if a != b != c]
-REPRESENTATIONS = ("quaternion", *(triple.upper() for triple in _TRIPLES), *_TRIPLES)
+REPRESENTATIONS = ("rpy", "quaternion", *(triple.upper() for triple in _TRIPLES), *_TRIPLES)
 
 
-@click.command(epilog="Example: urdfkin analytical-jacobian ur5 --q random --representation xyz")
+@click.command(epilog="Example: urdfkin analytical-jacobian ur5 --q random --representation rpy")
 @computing_options(
     ANALYTICAL_JACOBIAN.inputs,
     click.option(
@@ -26,8 +26,8 @@ REPRESENTATIONS = ("quaternion", *(triple.upper() for triple in _TRIPLES), *_TRI
         metavar="NAME",
         default="ZYZ",
         show_default=True,
-        help="Euler angles by their axes, or quaternion. Capitals are moving axes (ZYZ), small letters fixed"
-        " axes (xyz is rpy).",
+        help="rpy (roll, pitch, yaw as in a URDF), quaternion, or Euler angles by their axes: capitals are"
+        " moving axes (ZYZ), small letters fixed axes (xyz is rpy).",
     ),
     click.option(
         "--nearest",
@@ -58,5 +58,6 @@ def labels(representation: str) -> tuple[str, ...]:
     >>> labels("xyz"), labels("ZYZ")
     (('roll', 'pitch', 'yaw'), ('Z1', 'Y2', 'Z3'))
     """
-    known = {"xyz": ("roll", "pitch", "yaw"), "quaternion": ("qx", "qy", "qz", "qw")}
+    angles = ("roll", "pitch", "yaw")
+    known = {"rpy": angles, "xyz": angles, "quaternion": ("qx", "qy", "qz", "qw")}
     return known.get(representation) or tuple(f"{axis}{k}" for k, axis in enumerate(representation, 1))

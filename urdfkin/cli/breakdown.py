@@ -1,4 +1,4 @@
-"""`urdfkin acceleration --explain`: print or write the acceleration split by joint and term."""
+"""`urdfkin acceleration --breakdown`: print or write the acceleration split by joint and term."""
 
 from __future__ import annotations
 

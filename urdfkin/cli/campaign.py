@@ -1,4 +1,4 @@
-"""`urdfkin campaign`: progress of a resumable validation, and merging of stores from several machines."""
+"""`urdfkin report status` and `merge`: progress of a resumable validation, stores of several machines."""
 
 from __future__ import annotations
 
@@ -12,22 +12,16 @@ from urdfkin.cli.streams import say
 if TYPE_CHECKING:
     from urdfkin.validation.store import Store
 
-EXAMPLE = "urdfkin campaign status nightly"
+EXAMPLE = "urdfkin report status nightly"
 #: Maximum number of failed robots that are listed, and of chunks that are read for their times.
 _NAMED, _READ = 20, 200
 
 _FOLDER = click.Path(path_type=Path, file_okay=False)
 
 
-@click.group(epilog=f"Example: {EXAMPLE}")
-def command() -> None:
-    """Show the progress of a resumable validation; merge results of several machines.
-
-    The folder of results is made by `urdfkin validate ... --store DIR`.
-    """
-
-
-@command.command(epilog=f"Example: {EXAMPLE}")
+@click.command(
+    "status", short_help="Show the progress of a resumable validation.", epilog=f"Example: {EXAMPLE}"
+)
 @click.argument("folder", metavar="DIR", type=_FOLDER)
 @click.pass_context
 def status(context: click.Context, folder: Path) -> None:
@@ -104,7 +98,11 @@ def _seconds(store: Store, counts: dict[int, tuple[int, bool]]) -> float | None:
     return sum(found) / len(found) if found else None
 
 
-@command.command(epilog="Example: urdfkin campaign merge whole shard-1 shard-2 shard-3 shard-4")
+@click.command(
+    "merge",
+    short_help="Merge the stores of several machines.",
+    epilog="Example: urdfkin report merge whole shard-1 shard-2 shard-3 shard-4",
+)
 @click.argument("folder", metavar="DIR", type=_FOLDER)
 @click.argument("stores", metavar="STORE...", nargs=-1, required=True, type=_FOLDER)
 def merge(folder: Path, stores: tuple[Path, ...]) -> None:

@@ -1,4 +1,4 @@
-"""`urdfkin compare`: compare two validation reports."""
+"""`urdfkin report compare`: compare two validation reports."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from urdfkin.cli.options import NumberFrom
 from urdfkin.cli.output import console, write_file
 from urdfkin.cli.report_options import check_writable
 
-EXAMPLE = "urdfkin compare main.json branch.json --markdown comment.md"
+EXAMPLE = "urdfkin report compare main.json branch.json --markdown comment.md"
 
 
-@click.command(epilog=f"Example: {EXAMPLE}")
+@click.command("compare", short_help="Compare the reports of two validations.", epilog=f"Example: {EXAMPLE}")
 @click.argument("old", metavar="OLD.json", type=click.Path(path_type=Path))
 @click.argument("new", metavar="NEW.json", type=click.Path(path_type=Path))
 @click.option(

@@ -1,4 +1,4 @@
-"""`urdfkin manipulability`: singular values, condition number and manipulability, with guaranteed bounds."""
+"""`urdfkin singular-values`: singular values, condition number and manipulability, with guaranteed bounds."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _ENDINGS = {".json": ("json",), ".csv": ("csv",)}
 _SHOWN = 5
 
 
-@click.command(epilog="Example: urdfkin manipulability panda --q random --frame panda_hand --rows linear")
+@click.command(epilog="Example: urdfkin singular-values panda --q random --frame panda_hand --rows linear")
 @robot_argument
 @frame_option
 @click.option(

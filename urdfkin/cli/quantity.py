@@ -89,30 +89,30 @@ _ROBOT = (
     "ROBOT is a path, a name from `urdfkin robots`, or - for standard input. The path can also be a table"
     " of a robot: .toml, .json or .csv."
 )
-_explain = click.option(
-    "--explain", is_flag=True, help="Split the acceleration by joint and term; the parts add up to it."
+_breakdown = click.option(
+    "--breakdown", is_flag=True, help="Split the acceleration by joint and term; the parts add up to it."
 )
 
 
 def command_of(quantity: Quantity) -> click.Command:
     """Make the command that computes a quantity."""
-    has_breakdown = ACCELERATION_BREAKDOWN.command == f"{quantity.command} --explain"
+    has_breakdown = ACCELERATION_BREAKDOWN.command == f"{quantity.command} --breakdown"
 
     own = [reference_option] if quantity.referred else []
 
-    @computing_options(quantity.inputs, *own, last=(_explain,) if has_breakdown else ())
+    @computing_options(quantity.inputs, *own, last=(_breakdown,) if has_breakdown else ())
     def compute(
-        context: click.Context, /, reference: str = "local_world_aligned", explain: bool = False, **_: Any
+        context: click.Context, /, reference: str = "local_world_aligned", breakdown: bool = False, **_: Any
     ) -> None:
         run = Computing(context)
         x = run.inputs()
         with compiling():
-            if explain:
+            if breakdown:
                 parts = run.robot.acceleration_breakdown(x.q, x.v, x.a, x.frame, reference, base=x.base)
             else:
                 inputs = [getattr(x, letter) for letter in quantity.inputs]
                 result = run.robot.compute(quantity.name, inputs, x.frame, reference, base=x.base)
-        if explain:
+        if breakdown:
             emit_breakdown(x, reference, parts, run.format_, run.output)
             run.end()
         run.answer(x, quantity, result, reference if quantity.referred else None)

@@ -1,4 +1,4 @@
-"""`urdfkin report`: make a report from the JSON data of an earlier run, or from a campaign's store."""
+"""`urdfkin report`: show, convert and compare results of validations; progress and merging of stores."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from urdfkin.cli.campaign import merge, status
+from urdfkin.cli.compare import command as compare
 from urdfkin.cli.output import console
 from urdfkin.cli.report_options import check_writable, report_options, say_written, write_reports
 from urdfkin.system.files import is_folder
@@ -13,16 +15,40 @@ from urdfkin.system.files import is_folder
 EXAMPLE = "urdfkin report results.json --html report.html --junit report.xml"
 
 
-@click.command(epilog=f"Example: {EXAMPLE}")
+class _Results(click.Group):
+    """The subcommands; `report FILE` without one is `report show FILE`."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Insert `show` unless a subcommand or help is asked for."""
+        if not ctx.resilient_parsing and (not args or args[0] not in (*self.commands, "-h", "--help")):
+            args = ["show", *args]
+        return super().parse_args(ctx, args)
+
+
+@click.group(cls=_Results, epilog=f"Example: {EXAMPLE}")
+def command() -> None:
+    """Show, convert or compare the results of earlier validations.
+
+    Results are the JSON file of `urdfkin validate --json FILE`, or the folder of `--store DIR`. `urdfkin
+    report RESULTS` is short for `urdfkin report show RESULTS`.
+    """
+
+
+command.add_command(compare, "compare")
+command.add_command(status, "status")
+command.add_command(merge, "merge")
+
+
+@command.command("show", epilog=f"Example: {EXAMPLE}")
 @click.argument("results", metavar="RESULTS.json|DIR", type=click.Path(path_type=Path), required=False)
 @click.option("--json", "json_", type=click.Path(path_type=Path), help="Write the report of a store as JSON.")
 @report_options
 @click.option("--schema", is_flag=True, help="Print the JSON Schema of the data and exit.")
 @click.pass_context
-def command(
+def show(
     context: click.Context, /, results: Path | None, cases: bool, schema: bool, **files: Path | None
 ) -> None:
-    """Show or write the report of an earlier validation, from its JSON data or its store.
+    """Show a report or convert it to HTML, JUnit or Markdown.
 
     A store has a report at any time. An incomplete store is reported as an interrupted run.
 

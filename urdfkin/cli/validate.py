@@ -123,7 +123,7 @@ def command(
             "--scheduler cannot be combined with --jobs or --isolate, which start processes on this machine"
         )
     if shard and any(files.values()):
-        raise click.UsageError("a shard has no report; run `urdfkin campaign merge`, then `urdfkin report`")
+        raise click.UsageError("a shard has no report; run `urdfkin report merge`, then `urdfkin report`")
     from urdfkin.report.document import Document  # noqa: PLC0415  keeps --help fast
     from urdfkin.report.terminal import print_report  # noqa: PLC0415
     from urdfkin.urdf.sources import is_xacro  # noqa: PLC0415
@@ -186,4 +186,4 @@ def _say_shard(report: ValidationReport, shard: str, store: Path | None) -> None
         f"shard {shard} of {store}: {counted(len(report.robots), 'robot')}, {results:,} results compared, "
         f"{sum(robot.failed for robot in report.robots):,} outside their bound, {report.seconds:.1f} s"
     )
-    say("next: urdfkin campaign merge DIR STORE..., then urdfkin report DIR")
+    say("next: urdfkin report merge DIR STORE..., then urdfkin report DIR")

@@ -288,10 +288,10 @@ ACCELERATION = Quantity(
     command="acceleration",
     summary="classical acceleration of a frame",
     page="Second derivative of the position of the frame's origin, m/s^2, and angular acceleration, rad/s^2,"
-    " for joint velocities --v and joint accelerations --a. Gravity is not included. --explain lists the"
+    " for joint velocities --v and joint accelerations --a. Gravity is not included. --breakdown lists the"
     " transverse, centripetal, Coriolis and sliding contribution of each joint (eq. 7.125)."
     f" {Question.TWO_ACCELERATIONS}, {Question.GRAVITY}.",
-    example="urdfkin acceleration panda --q random --v random --a random --explain",
+    example="urdfkin acceleration panda --q random --v random --a random --breakdown",
 )
 ANALYTICAL_JACOBIAN = replace(
     JACOBIAN,
@@ -311,7 +311,7 @@ ACCELERATION_BREAKDOWN = replace(
     equations=("7.125", "7.130"),
     compute=lazy_import("urdfkin.compiled.breakdown:acceleration_breakdown"),
     walked=False,
-    command="acceleration --explain",
+    command="acceleration --breakdown",
 )
 IMU = replace(
     ACCELERATION,
