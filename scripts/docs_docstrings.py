@@ -1,12 +1,18 @@
-"""An extension of mkdocs that shows doctests in docstrings as blocks of code; mkdocs.yml refers to it."""
+"""An extension of mkdocs that shows doctests in docstrings as blocks of code; mkdocs.yml refers to it.
+
+A block is as wide as its column: a section `Example:` would be a box around it.
+"""
 
 from __future__ import annotations
 
 import re
+import textwrap
 from typing import Any
 
 import griffe
 
+#: A section `Example:` and its indented lines.
+_EXAMPLE = re.compile(r"^( *)Examples?:\n((?:\1 +\S.*\n?|\n)+)", re.MULTILINE)
 #: The lines from a prompt to the next blank line.
 _DOCTEST = re.compile(r"^( *)>>> .*(?:\n *\S.*)*", re.MULTILINE)
 
@@ -22,4 +28,5 @@ class Doctests(griffe.Extension):
 
 def fenced(docstring: str) -> str:
     """Return the docstring with each doctest in a code fence."""
-    return _DOCTEST.sub(r"\1```pycon\n\g<0>\n\1```", docstring)
+    flat = _EXAMPLE.sub(lambda found: textwrap.indent(textwrap.dedent(found[2]), found[1]), docstring)
+    return _DOCTEST.sub(r"\1```pycon\n\g<0>\n\1```", flat)

@@ -162,4 +162,7 @@ def test_a_doctest_in_a_docstring_is_a_block_of_code() -> None:
     assert fenced("It adds.\n\n>>> add(1,\n...     2)\n3\n\nAnd so on.") == (
         "It adds.\n\n```pycon\n>>> add(1,\n...     2)\n3\n```\n\nAnd so on."
     )
-    assert fenced("Example:\n    >>> 1\n    1\n") == "Example:\n    ```pycon\n    >>> 1\n    1\n    ```\n"
+    assert fenced("Example:\n    >>> 1\n    1\n") == "```pycon\n>>> 1\n1\n```\n"
+    assert fenced("One.\n\n    Example:\n        >>> 1\n        1\n    ") == (
+        "One.\n\n    ```pycon\n    >>> 1\n    1\n    ```\n    "
+    )

@@ -87,8 +87,8 @@ class ProductOfExponentials(Displayable):
             heads = ("joint", "w_x", "w_y", "w_z", "v_x", "v_y", "v_z")
             parts += [f"{words}, angular part first (1, m):", Table(heads, cells)]
         pose_rows = [(axis, *row) for axis, row in zip("xyz", self.M[:3].tolist(), strict=True)]
-        heads = (f"axis of {self.base_frame}", "x of tip", "y of tip", "z of tip", "position [m]")
-        parts += ["M, the pose of the tip in the zero configuration:", Table(heads, pose_rows)]
+        columns = (f"axis of {self.base_frame}", "x of tip", "y of tip", "z of tip", "position [m]")
+        parts += ["M, the pose of the tip in the zero configuration:", Table(columns, pose_rows)]
         title = f"{self.robot}: {self.base_frame} to {self.tip_frame}, product of exponentials"
         return TextDocument(title, parts)
 
