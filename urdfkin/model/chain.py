@@ -148,7 +148,13 @@ class FrameChain(Displayable):
 
     @cached_property
     def path(self) -> Path:
-        """The constants and motions A_0, M_1, A_1 ... M_n, A_n; the amounts are the joint values."""
+        """The constants and motions A_0, M_1, A_1 ... M_n, A_n; the amounts are the joint values.
+
+        >>> import urdfkin
+        >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
+        >>> path.path.poses(np.zeros(2))[:3, 3].tolist()
+        [0.9, 0.0, 0.0]
+        """
         moving = ((joint.T_previous_joint, Motion(2, joint.kind.turns)) for joint in self.joints)
         return Path((*(step for pair in moving for step in pair), self.T_last_tip))
 
