@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
 import urdfkin as library
 from tests.cli.running import process, urdfkin
-from urdfkin.compiled import compiling
+from urdfkin.compiled import compiling, preload
+from urdfkin.compiled import kernels as every_kernel
+from urdfkin.compiled.compiling import Kernel
 from urdfkin.validation import campaign
 
 
@@ -51,6 +54,23 @@ def test_warm_compiles_everything_and_then_nothing() -> None:
     assert (done.code, done.err) == (0, "")
     assert done.text.startswith("all ")
     assert "kernels are compiled: " in done.text
+
+
+def test_nothing_is_started_to_compile_kernels_that_are_on_disk(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object, **__: object) -> NoReturn:
+        pytest.fail("a process was started")
+
+    assert urdfkin("warm").code == 0
+    monkeypatch.setattr(preload, "_compile_elsewhere", fail)
+    preload.load_kernels()
+
+
+@pytest.mark.slow
+def test_warm_compiles_every_kernel_of_the_package(tmp_path: Path) -> None:
+    done = process("warm", XDG_CACHE_HOME=str(tmp_path))
+    assert done.code == 0, done.err
+    every = [name for name, value in vars(every_kernel).items() if isinstance(value, Kernel)]
+    assert {"hessians", "imus"} <= set(every) <= set(kernels(tmp_path))
 
 
 def test_programs_are_told_by_one_warning_of_a_logger(

@@ -20,6 +20,7 @@ def command() -> None:
     stored below XDG_CACHE_HOME. Kernels from another processor are compiled again. Exit 2: the kernels cannot
     be stored.
     """
+    from urdfkin.compiled import kernels  # noqa: PLC0415
     from urdfkin.compiled.compiling import cache_folder, listen_to_compile_events  # noqa: PLC0415
     from urdfkin.compiled.single import one_configuration  # noqa: PLC0415
     from urdfkin.verify.ahead import load_kernels  # noqa: PLC0415
@@ -37,7 +38,8 @@ def command() -> None:
 
     with listen_to_compile_events(report):
         load_kernels()
-        _ = one_configuration.compiled
+        for kernel in (kernels.hessians, kernels.imus, one_configuration):
+            _ = kernel.compiled
     stored = set(folder.glob("*.kernel"))
     if new := stored - before:
         say(f"{len(new)} of {len(stored)} kernels compiled in {time.perf_counter() - begin:.0f} s: {folder}")

@@ -37,7 +37,7 @@ def _compile(names: Sequence[str]) -> None:
 
 def _on_disk(name: str) -> bool:
     folder = cache_folder()
-    return folder is None or any(folder.glob(f"cores.{name}.*.kernel"))
+    return folder is None or any(folder.glob(f"kernels.{name}.*.kernel"))
 
 
 def _compile_elsewhere(names: Sequence[str]) -> subprocess.Popen[bytes]:
