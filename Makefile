@@ -1,6 +1,6 @@
 # The loop of whoever changes urdfkin; CONTRIBUTING.md says when to run what.
 PATH := $(CURDIR)/.venv/bin:$(PATH)
-.PHONY: help setup format check fast test search docs site bench
+.PHONY: help setup format check fast test long search docs site bench
 
 help:  ## this list
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | expand -t 10
@@ -21,9 +21,13 @@ check:  ## format, lint, types, changelog
 fast:  ## the quick tests: a minute on two quiet cores
 	pytest -q -n 2 -m "not slow and not browser"
 
-test: check  ## everything that must pass
+test: check  ## everything that must pass, but the long tests
 	urdfkin warm
-	pytest -q -n 2 --dist worksteal
+	pytest -q -n 2 --dist worksteal -m "not long"
+
+long:  ## the long tests: processes, mutants, fuzzing, packages, browsers
+	urdfkin warm
+	pytest -q -n 2 --dist worksteal -m long
 
 search:  ## the quick tests, their properties on examples that were never tried
 	pytest -q -n 2 -m "not slow and not browser" --hypothesis-profile=search

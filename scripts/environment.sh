@@ -1,4 +1,4 @@
-# Sourced by try.sh and test.sh: a virtual environment in .venv with urdfkin and the extras named in $1.
+# Sourced by try.sh, test.sh and test_long.sh: a virtual environment in .venv with urdfkin and the extras named in $1.
 # Needs a Python >= 3.11; installs Debian's python3-venv if the Python there cannot make environments.
 
 cd "$(dirname "$0")/.." || exit 2

@@ -47,6 +47,12 @@ def _collects_constants_of(path: str) -> bool:
 vars(providers)["is_local_module_file"] = _collects_constants_of
 
 
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """Let `-m "not slow"` leave out long tests too."""
+    if item.get_closest_marker("long"):
+        item.add_marker("slow")
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
     """Collect without looking for garbage, and leave what was collected out of every search."""

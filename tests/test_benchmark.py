@@ -30,7 +30,7 @@ from urdfkin.robot import Robot
 ROOT = Path(__file__).parent.parent
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_quick_benchmark_finds_equal_results_and_writes_every_section(tmp_path: Path) -> None:
     file, picture = tmp_path / "figures.json", tmp_path / "figures.svg"
     command = [sys.executable, str(ROOT / "scripts/benchmark.py"), "--quick", "--json", str(file)]
@@ -136,7 +136,7 @@ def test_the_path_written_out_for_one_robot_has_the_robots_jacobian_and_accelera
         np.testing.assert_allclose([*linear, *angular], acceleration, rtol=0, atol=1e-11)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.skipif(shutil.which(generated.COMPILER) is None, reason="no C compiler")
 @pytest.mark.parametrize("quantity", QUANTITIES)
 def test_code_generated_for_one_robot_computes_what_the_robot_does_and_writes_nothing_else(

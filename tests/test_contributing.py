@@ -36,6 +36,29 @@ def test_make_understands_its_file() -> None:
         subprocess.run(["make", "--dry-run", target], cwd=ROOT, check=True, capture_output=True)
 
 
+def test_ci_runs_two_commands_that_pass_every_test_between_them() -> None:
+    scripts = re.findall(r"^\./(scripts/\S+)$", (ROOT / ".ci/run").read_text("utf-8"), re.MULTILINE)
+    assert scripts == ["scripts/test.sh", "scripts/test_long.sh"]
+    chosen = [
+        re.findall(r'pytest .*-m ("[^"]+"|\w+) "\$@"', (ROOT / name).read_text("utf-8")) for name in scripts
+    ]
+    assert chosen == [['"not long"'], ["long"]]
+
+
+@pytest.mark.parametrize("broken", ["", "ruff", "python", "urdfkin", "mypy", "pytest"])
+def test_the_command_of_the_tests_fails_if_one_of_its_parts_does(broken: str, tmp_path: Path) -> None:
+    shutil.copy(ROOT / "scripts/test.sh", tmp_path)
+    (tmp_path / "environment.sh").write_text("make_environment() { :; }\n")
+    for name in ("ruff", "python", "urdfkin", "mypy", "pytest"):
+        program = tmp_path / name
+        program.write_text(f"#!/bin/sh\necho {name} was run\nexit {int(name == broken)}\n")
+        program.chmod(0o755)
+    path = {"PATH": f"{tmp_path}:/usr/bin:/bin"}
+    done = subprocess.run([tmp_path / "test.sh"], env=path, capture_output=True, text=True, check=False)
+    assert done.returncode == int(bool(broken)), done.stderr
+    assert f"{broken or 'mypy'} was run" in done.stdout
+
+
 def test_every_hook_runs_a_command_of_the_environment_and_needs_no_network() -> None:
     commands = re.findall(r"entry: \.venv/bin/(\S+)", HOOKS)
     assert {"ruff", "mypy", "urdfkin"} == set(commands)

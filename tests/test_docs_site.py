@@ -40,7 +40,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_every_page_is_built_and_in_the_menu(site: Path) -> None:
     built = {str(path.relative_to(site)) for path in site.rglob("*.html")} - {"404.html"}
     assert built == {page.removesuffix("md") + "html" for page in (*pages(), "cli.md", "api.md", *LIBRARY)}
@@ -48,7 +48,7 @@ def test_every_page_is_built_and_in_the_menu(site: Path) -> None:
     assert built - set(re.findall(r'href="([^"#]+)"', menu)) == set()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_every_equation_is_mathematics_and_no_formula_is_left_in_the_words_of_latex(site: Path) -> None:
     page = (site / "equations.html").read_text("utf-8")
     assert page.count("<math") == len(equations())
@@ -56,7 +56,7 @@ def test_every_equation_is_mathematics_and_no_formula_is_left_in_the_words_of_la
         assert "$<code>" not in path.read_text("utf-8"), path
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.browser
 def test_the_site_opens_from_a_disc_asks_no_network_and_can_be_searched(site: Path, desk: Browser) -> None:
     desk.requests()
@@ -72,7 +72,7 @@ def test_the_site_opens_from_a_disc_asks_no_network_and_can_be_searched(site: Pa
     assert desk.errors() == []
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.browser
 def test_no_page_is_wider_than_a_phone(site: Path, desk: Browser) -> None:
     desk.become(390, 844)
@@ -155,7 +155,7 @@ def test_a_lesson_is_a_notebook_with_what_it_prints(page: str) -> None:
     assert "`$" not in words
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_doctest_in_a_docstring_is_a_block_of_code() -> None:
     from scripts.docs_docstrings import fenced  # noqa: PLC0415  imports griffe, of the extra `docs`
 

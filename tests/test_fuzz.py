@@ -24,7 +24,7 @@ from urdfkin.system.processes import ask_python
 from urdfkin.urdf.records import FURTHER_LIMITS
 from urdfkin.verify import mjcf_check
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 
 def judge(text: str) -> Outcome:
@@ -82,7 +82,7 @@ def test_families_share_what_is_asked_for() -> None:
     assert fuzz.shares(["names", "roots"], 3, 3) == [("names", 0), ("roots", 0), ("names", 1)]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_every_mutator_is_used_and_nearly_all_change_something() -> None:
     files = [path for path in fuzz.files() if path.stat().st_size < 20_000]  # the large are no other
     originals = {path.stem: path.read_bytes() for path in files}
@@ -169,7 +169,7 @@ def test_a_worker_that_dies_or_hangs_is_an_outcome_and_is_replaced(then: str, wo
     worker.stop()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_short_run_of_mutants_finds_nothing(tmp_path: Path) -> None:
     counts = fuzz.fuzz(fuzz.shares(["mutants"], 40, 0), seed=20, jobs=1, timeout=60.0, keep=tmp_path)
     assert set(counts) <= set(GOOD), sorted(tmp_path.iterdir())
@@ -177,7 +177,7 @@ def test_a_short_run_of_mutants_finds_nothing(tmp_path: Path) -> None:
     assert counts["verified"] > 10
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("family", robots.FAMILIES)
 def test_a_short_run_of_whole_robots_finds_nothing(family: str) -> None:
     words = Counter(judge_case(robots.robot(20, family, number)).word for number in range(5))

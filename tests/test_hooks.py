@@ -138,7 +138,7 @@ def robots(source: Repository) -> Repository:
     return made
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_commit_with_a_finding_is_refused_until_it_is_mended(robots: Repository) -> None:
     arm = robots.folder / "arm.urdf"
     arm.write_text(LONG)
@@ -153,7 +153,7 @@ def test_a_commit_with_a_finding_is_refused_until_it_is_mended(robots: Repositor
     assert "check URDFs" in robots.commit()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_hook_obeys_the_settings_of_the_repository(robots: Repository) -> None:
     (robots.folder / "old.urdf").write_text(LONG.replace('"r"', '"old"'))
     assert "URDF503" in robots.commit(fails=True)
@@ -161,7 +161,7 @@ def test_the_hook_obeys_the_settings_of_the_repository(robots: Repository) -> No
     robots.commit()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_hooks_environment_holds_urdfkin_and_click_and_nothing_that_computes(robots: Repository) -> None:
     home = Path(robots.environ["PRE_COMMIT_HOME"])
     (packages,) = {path.parent for path in home.glob("*/*/lib/python*/site-packages/click")}
@@ -203,7 +203,7 @@ def act(runner: Repository, *, fails: bool, **inputs: str) -> tuple[str, str]:
     return step.run("bash", "-eo", "pipefail", "-c", steps()[1]["run"], fails=fails), summary.read_text()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_action_annotates_the_line_and_summarises(runner: Repository) -> None:
     told, summary = act(runner, fails=False)
     assert re.match(r"::warning file=arm\.urdf,line=2,col=\d+,endColumn=\d+,title=URDF503::", told)
@@ -215,7 +215,7 @@ def test_the_action_annotates_the_line_and_summarises(runner: Repository) -> Non
     assert (result["ruleId"], result["level"]) == ("URDF503", "error")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_action_tells_what_is_new_and_runs_no_input(runner: Repository) -> None:
     assert act(runner, fails=False, SINCE="HEAD", OPTIONS="--strict")[0] == ""
     mark = runner.folder / "RUN"

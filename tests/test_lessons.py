@@ -48,7 +48,7 @@ def executed(cells: list[Cell], home: Path) -> list[Cell]:
     return done
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore")  # the client's
 def test_the_lessons_run_in_a_kernel_and_objects_show_themselves_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -58,7 +58,7 @@ def test_a_slip_changes_one_place_and_each_changes_another() -> None:
         assert sum(old != new for old, new in pairs) == 1, text
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_every_slip_of_the_package_compiles_and_has_a_test_to_ask() -> None:
     for path in files([]):
         tree = ast.parse(path.read_text(encoding="utf-8"))
@@ -70,7 +70,7 @@ def test_every_slip_of_the_package_compiles_and_has_a_test_to_ask() -> None:
             assert near_tests(path), path
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("what", "word"), [("self.share <= 1.0  ->  self.share < 1.0", "survived"), ("1.0  ->  1.5", "noticed")]
 )
@@ -107,7 +107,7 @@ def drawn(count: int) -> list[Mutant]:
     return sorted(mutants(PARTS), key=rank)[:count]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("mutant", drawn(6), ids=lambda mutant: str(mutant.name))
 def test_a_slip_drawn_by_a_seed_is_noticed_or_argued(mutant: Mutant) -> None:
     if (mutant.place, mutant.what) not in argued():
@@ -115,7 +115,7 @@ def test_a_slip_drawn_by_a_seed_is_noticed_or_argued(mutant: Mutant) -> None:
         assert outcome.word != "survived", f"{mutant.place}: {mutant.what}"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_what_is_argued_can_still_be_made_and_stands_on_the_page_once() -> None:
     page = (ROOT / "docs" / "mutation.md").read_text(encoding="utf-8")
     lines = [line for line in page.splitlines() if line.startswith("- `urdfkin.")]

@@ -73,7 +73,7 @@ def dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_release_is_built_twice_checked_and_listed(dist: Path) -> None:
     name = f"urdfkin-{PROJECT['version']}"
     sums = (dist / "SHA256SUMS").read_text("utf-8").splitlines()
@@ -89,7 +89,7 @@ def test_a_release_is_built_twice_checked_and_listed(dist: Path) -> None:
     assert {"numpy", "pin", "numba", "click"} <= listed
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_build_that_differs_is_refused(dist: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     name = f"urdfkin-{PROJECT['version']}"
     files = (dist / f"{name}.tar.gz", dist / f"{name}-py3-none-any.whl")
@@ -130,7 +130,7 @@ def lent(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_every_line_that_installs_urdfkin_works_today(lent: Path) -> None:
     lines = installing()
     assert len(lines) >= 5

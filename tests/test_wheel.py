@@ -38,7 +38,7 @@ def elsewhere(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_wheel_is_what_is_imported(elsewhere: Path) -> None:
     printed = run(
         elsewhere / "env/bin/python", "-c", "import urdfkin; print(urdfkin.__file__)", cwd=elsewhere
@@ -46,19 +46,19 @@ def test_the_wheel_is_what_is_imported(elsewhere: Path) -> None:
     assert Path(printed.strip()).is_relative_to(elsewhere / "env")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_main_job_works(elsewhere: Path) -> None:
     printed = run(elsewhere / "env/bin/urdfkin", "validate", "panda", "--samples", "5", cwd=elsewhere)
     assert "0 outside their bound" in printed
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_robots_and_tables_of_the_project_travel_with_it(elsewhere: Path) -> None:
     assert "polar" in run(elsewhere / "env/bin/urdfkin", "robots", cwd=elsewhere)
     assert "polar" in run(elsewhere / "env/bin/urdfkin", "info", "polar", cwd=elsewhere)
     assert "7.130" in run(elsewhere / "env/bin/urdfkin", "explain", "7.130", cwd=elsewhere)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_types_travel_with_it(elsewhere: Path) -> None:
     assert list((elsewhere / "env").glob("lib/*/site-packages/urdfkin/py.typed"))

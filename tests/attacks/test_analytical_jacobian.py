@@ -303,7 +303,7 @@ def outcome(robot: Robot, q: FloatArray, representation: str) -> FloatArray | No
     return J if sum(line.unchecked for line in robot.certificate().lines) == before else None
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize("name", MODULES)
 def test_no_mutant_ends_verified_and_wrong(ur5: Robot, name: str) -> None:

@@ -21,7 +21,7 @@ from urdfkin.kinematics.rotation import exp_rotation
 from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.tree import KinematicTree
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 
 def ur5() -> FrameChain:

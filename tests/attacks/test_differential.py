@@ -282,13 +282,13 @@ def assert_same(tree: KinematicTree, model: pin.Model, data: bytes) -> None:
         assert read == (joint.limit.lower, joint.limit.upper), data
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_each_odd_piece_alone_is_read_by_both_or_told() -> None:
     for data in every_odd_piece():
         judged(data)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(4))
 def test_odd_pieces_together_are_read_by_both_or_told(seed: int) -> None:
     choose = random.Random(seed)

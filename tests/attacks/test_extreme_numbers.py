@@ -69,7 +69,7 @@ def everything(robot: Robot, q: FloatArray, v: FloatArray, a: FloatArray, base: 
 exponents = st.integers(-323, 300)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @settings(max_examples=150)
 @given(st.tuples(*[exponents] * 6), st.booleans(), st.integers(0, 2**32 - 1))
 def test_numbers_of_any_size_are_verified_or_leave_the_range(
@@ -91,7 +91,7 @@ def test_numbers_of_any_size_are_verified_or_leave_the_range(
         assert beyond == 0
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @settings(max_examples=60)
 @given(st.integers(-323, -140), st.integers(-2, 2), st.integers(0, 2**32 - 1))
 def test_small_rates_beside_coordinates_of_ordinary_size_are_verified(

@@ -107,7 +107,7 @@ CASES = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("case", CASES)
 def test_a_forked_child_computes(case: str) -> None:
     code = HARNESS + textwrap.dedent(CASES[case])

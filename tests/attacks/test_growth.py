@@ -56,14 +56,14 @@ def grows_like_its_size(work: Callable[[int], object], size: int) -> None:
     assert large < TIMES * small + MORE, (small, large)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_document_four_times_as_long_takes_about_four_times_the_time(kind: str) -> None:
     documents = {size: KINDS[kind](size) for size in (100_000, 400_000)}
     grows_like_its_size(lambda size: check_text(documents[size], fold=False), 100_000)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_document_four_times_as_long_takes_about_four_times_the_memory(kind: str) -> None:
     def megabytes(size: int) -> float:
@@ -79,7 +79,7 @@ def test_a_document_four_times_as_long_takes_about_four_times_the_memory(kind: s
         assert megabytes(50_000) < 6.0 * megabytes(12_500) + 0.5
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_chain_of_followers_is_read_in_linear_time_both_times() -> None:
     documents = {size: KINDS["a chain of followers"](size) for size in (100_000, 400_000)}
 
@@ -151,7 +151,7 @@ def told(findings: list[Finding], code: str) -> int:
     return sum(finding.count for finding in findings if finding.code == code)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_errors_of_one_kind_are_summed_up_and_none_is_lost() -> None:
     findings = urdfkin.check(DOUBLES, fold=True)
     assert len(findings) == ERRORS_SHOWN
@@ -161,7 +161,7 @@ def test_errors_of_one_kind_are_summed_up_and_none_is_lost() -> None:
     assert sum(len(str(finding)) for finding in findings) < 50_000
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_without_folding_findings_are_complete_up_to_the_stated_number_and_the_rest_by_line() -> None:
     findings = urdfkin.check(DOUBLES)
     assert len(findings) == WRITTEN_OUT
@@ -172,7 +172,7 @@ def test_without_folding_findings_are_complete_up_to_the_stated_number_and_the_r
     assert document["findings"][-1]["also"][-1] == MANY
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_message_of_a_refused_robot_stays_short_and_counts_everything() -> None:
     with pytest.raises(UrdfError) as refused:
         urdfkin.load(DOUBLES)
@@ -182,7 +182,7 @@ def test_the_message_of_a_refused_robot_stays_short_and_counts_everything() -> N
     assert len(message) < 2_000
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_errors_of_another_kind_are_not_hidden_by_many_of_one() -> None:
     findings = urdfkin.check(DOUBLES.replace("</robot>", "<joint name='j' type='x'/></robot>"), fold=True)
     assert {"URDF402", "URDF501", "URDF210"} <= {finding.code for finding in findings}
@@ -216,7 +216,7 @@ def test_who_is_nearest_is_found_without_comparing_for_ever() -> None:
     assert nearest("elbwo", ["shoulder", "elbow", "wrist"]) == ["elbow"]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("inside", "filling"),
     [

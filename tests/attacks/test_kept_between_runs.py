@@ -81,7 +81,7 @@ def test_a_kernel_is_compiled_once_and_read_afterwards(folder: Path) -> None:
     assert ask(again) == 7
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("damage", DAMAGE)
 def test_a_damaged_kernel_is_said_compiled_again_and_mended(damage: str, folder: Path) -> None:
     ask(fresh())
@@ -136,7 +136,7 @@ def no_room(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
     return code
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_where_nothing_can_be_written_everything_goes_on_and_it_is_said_once(
     folder: Path, no_room: int
 ) -> None:
@@ -171,7 +171,7 @@ def test_a_file_that_ends_in_the_middle_leaves_nothing_behind(
     assert get(tmp_path / "kept") == bytes(500)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_command_on_a_full_disc_gives_its_result_and_says_so(tmp_path: Path) -> None:
     """A disc of its own where the system lets one be mounted; else files may not grow."""
     cache, disc = tmp_path / "cache", ["mount", "-t", "tmpfs", "-o", "size=64k,mode=0700", "none"]
@@ -204,7 +204,7 @@ def limited(*words: str, **env: str) -> Done:
     return Done(done.returncode, done.stdout, done.stderr.decode())
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_command_with_a_damaged_cache_says_so_in_a_line_and_mends_it(tmp_path: Path) -> None:
     def placement() -> Done:
         return process("placement", "ur5", XDG_CACHE_HOME=str(tmp_path), NUMBA_CACHE_DIR="")

@@ -14,7 +14,7 @@ from scripts.leaks import PARTS
 ROBOTS = 300
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_three_hundred_robots_leave_no_object_no_descriptor_and_no_memory() -> None:
     """In a process of its own; `python -m scripts.leaks 10000` is the same for longer."""
     done = subprocess.run(

@@ -26,7 +26,7 @@ def test_every_slip_can_still_be_made_and_its_test_is_there() -> None:
         assert f"def {name}(" in Path(ROOT / file).read_text(encoding="utf-8"), slip.test
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("slip", SLIPS, ids=[slip.claim.replace(" ", "-") for slip in SLIPS])
 def test_its_test_fails(slip: Named) -> None:
     outcome = judge_named(slip, timeout=300.0)

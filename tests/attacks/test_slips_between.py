@@ -112,7 +112,7 @@ def replacing(before: str, after: str) -> Callable[[str], ast.Module]:
     return change
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(("module", "before", "after"), FRAGMENTS)
 def test_a_slip_on_the_way_is_caught(
     right: dict[str, FloatArray], module: str, before: str, after: str
@@ -120,7 +120,7 @@ def test_a_slip_on_the_way_is_caught(
     assert attempt(module, replacing(before, after), right) == "caught"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(3))
 def test_of_any_slips_none_is_verified_and_none_blinds_the_check(
     right: dict[str, FloatArray], seed: int

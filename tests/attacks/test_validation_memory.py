@@ -47,7 +47,7 @@ def test_blocks_cover_everything_once_and_keep_to_their_size(monkeypatch: pytest
         assert max(block.stop - block.start for block in found) == most
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("source", ["talos", "double_pendulum", "planar_two_link"])
 @pytest.mark.parametrize("root_joint", [None, "planar"])
 def test_comparing_in_blocks_changes_no_number(
@@ -61,7 +61,7 @@ def test_comparing_in_blocks_changes_no_number(
     assert list(parts.tallies) == list(whole.tallies)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_no_array_of_a_block_is_larger_than_a_block(monkeypatch: pytest.MonkeyPatch) -> None:
     sizes: list[int] = []
 
@@ -86,7 +86,7 @@ def test_no_array_of_a_block_is_larger_than_a_block(monkeypatch: pytest.MonkeyPa
     assert 50_000 < max(sizes) <= 100_000
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 def test_a_plan_of_all_frames_grows_with_the_links_not_with_their_square() -> None:
     peaks = []
@@ -141,7 +141,7 @@ def test_processes_share_what_is_free(monkeypatch: pytest.MonkeyPatch) -> None:
     assert memory.share() is None
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_what_a_robot_needs_grows_with_the_cube_of_its_rates_and_with_its_links() -> None:
     trees = [urdfkin.load(chain(n, "revolute")).tree for n in (100, 200)]
     needs = [memory.needed(tree, 28) for tree in trees]
@@ -200,7 +200,7 @@ def test_a_container_that_sees_its_own_group_as_the_topmost_counts(
     assert memory.share() == 1_000_000_000
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_limit_of_the_process_counts() -> None:
     """`ulimit -v`: what does not fit is told, and not found out by a MemoryError."""
     code = (
@@ -211,7 +211,7 @@ def test_a_limit_of_the_process_counts() -> None:
     assert 0 < int(done.stdout) < 1.5 * GB
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 def test_many_fixed_links_are_checked_in_little_memory() -> None:
     """In a process of its own, whose peak is its own."""

@@ -37,7 +37,7 @@ WAYS: dict[str, tuple[Callable[[], Any], Sequence[str]]] = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("way", "error"), [(way, error) for way, (_, errors) in WAYS.items() for error in errors]
 )
@@ -86,14 +86,14 @@ def test_an_executor_that_breaks_costs_what_it_did_not_do(when_asked: bool) -> N
     assert report.asked == 3
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_process_pool_of_someone_elses_can_run_the_chunks() -> None:
     with ProcessPoolExecutor(1, get_context("spawn")) as pool:
         report = validate(["ur5", "no such robot"], samples=30, executor=pool)
     assert [robot.verdict for robot in report.robots] == ["verified", "bad input"]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_an_executor_has_a_bounded_number_of_chunks_at_a_time_and_all_of_them_in_the_end(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -268,7 +268,7 @@ def _command(*words: str, **how: Any) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("descriptors", [6, 7, 8, 9, 12])
 def test_without_descriptors_a_robot_is_verified_or_said_not_to_be(descriptors: int, tmp_path: Path) -> None:
     done = _command(
@@ -280,7 +280,7 @@ def test_without_descriptors_a_robot_is_verified_or_said_not_to_be(descriptors: 
     assert done.returncode in (0, 2, 3, 70)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_robots_are_checked_from_a_folder_that_is_gone(tmp_path: Path) -> None:
     gone = tmp_path / "gone"
     gone.mkdir()
@@ -293,7 +293,7 @@ def test_robots_are_checked_from_a_folder_that_is_gone(tmp_path: Path) -> None:
     assert "1 robot, " in done.stdout
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("how", ["jobs=2", "isolate=True"])
 def test_a_script_needs_no_guard_and_nothing_of_the_current_folder_is_run(how: str, tmp_path: Path) -> None:
     for planted in ("urdfkin", "multiprocessing", "json", "pickle", "queue"):

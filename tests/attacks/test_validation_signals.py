@@ -16,7 +16,7 @@ import pytest
 
 from urdfkin.cli.exit import Stop, stoppable
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 #: The command, which says when a chunk of the second robot is done.
 _SCRIPT = """

@@ -21,7 +21,7 @@ from urdfkin.view.server import new_server
 from urdfkin.view.viewer import Viewer
 
 viser = pytest.importorskip("viser")
-pytestmark = [pytest.mark.slow, pytest.mark.browser]
+pytestmark = [pytest.mark.long, pytest.mark.browser]
 
 #: What a page somewhere else can try; it is told the whole address, key and all.
 ATTACK = """

@@ -37,7 +37,7 @@ def test_bad_input_is_told_before_anything_is_compiled(words: str, tmp_path: Pat
     assert kernels(tmp_path) == []
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_only_what_is_needed_is_compiled_and_it_is_said_once(tmp_path: Path) -> None:
     words = ("placement", "elbow", "--no-verify")
     first = process(*words, XDG_CACHE_HOME=str(tmp_path))
@@ -65,7 +65,7 @@ def test_nothing_is_started_to_compile_kernels_that_are_on_disk(monkeypatch: pyt
     preload.load_kernels()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_warm_compiles_every_kernel_of_the_package(tmp_path: Path) -> None:
     done = process("warm", XDG_CACHE_HOME=str(tmp_path))
     assert done.code == 0, done.err

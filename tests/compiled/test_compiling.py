@@ -17,7 +17,7 @@ print("scipy.linalg" in sys.modules)
 """
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_scipy_is_imported_for_compiled_code_that_calls_blas_and_for_none_of_ours() -> None:
     urdfkin.load("one_link", verify=False).placement(np.zeros(1))  # kept from here on: compiling imports more
     done = subprocess.run(own_python(_TRIED), check=True, capture_output=True, text=True)

@@ -23,7 +23,7 @@ def pattern(shown: str) -> re.Pattern[str]:
     return re.compile(".*?".join(map(re.escape, shown.strip("\n").split("..."))), re.DOTALL)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_every_example_prints_what_the_page_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from tests.cli.test_dh import run_any  # noqa: PLC0415  the page is read before the command line is
 

@@ -90,7 +90,7 @@ COUNTS: dict[str, tuple[Callable[[FloatArray], Matrix], float]] = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", COUNTS)
 def test_no_part_of_an_exports_joint_rounds_more_than_the_table_says_nor_much_less(name: str) -> None:
     part, counted = COUNTS[name]
@@ -99,7 +99,7 @@ def test_no_part_of_an_exports_joint_rounds_more_than_the_table_says_nor_much_le
     assert f" {counted} |" in table
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_an_exports_roundings_are_within_the_count_as_urdfkins_own_are() -> None:
     assert COUNTS["a constant of which something is left out"][1] < PARTS["Pinocchio's"][1]
     assert COUNTS["a joint"][1] + PARTS["a joint of Pinocchio's"][1] <= roundings.ROUNDINGS

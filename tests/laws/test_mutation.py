@@ -78,12 +78,12 @@ def robots() -> list[Robot]:
     return [urdfkin.load("panda"), urdfkin.load("polar"), robot_of("planar_and_floating_in_the_middle")]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_equations_as_they_are_agree_with_pinocchio(robots: list[Robot]) -> None:
     assert max(map(farthest, robots)) < 30.0
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(("equation", "term"), list(terms()))
 def test_a_term_of_an_equation_that_is_off_by_1e_10_is_caught(
     robots: list[Robot], equation: str, term: str, monkeypatch: pytest.MonkeyPatch

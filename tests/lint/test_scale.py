@@ -6,7 +6,7 @@ import pytest
 
 from urdfkin.lint import Finding, Limits, check_text
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 MANY = 50_000
 
@@ -29,7 +29,7 @@ def timed(data: bytes, seconds: float = 20.0) -> tuple[Finding, ...]:
     return findings
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_chain_of_50000_links_has_no_finding() -> None:
     assert timed(chain(MANY)) == ()
 
@@ -40,7 +40,7 @@ def test_a_loop_of_50000_links_is_one_error_on_its_line() -> None:
     assert (finding.code, finding.line) == ("URDF412", 2 * MANY + 3)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_chain_of_50000_mimics_is_resolved_in_linear_time() -> None:
     codes = {finding.code for finding in timed(chain(MANY, mimic=True))}
     assert codes == {"URDF524", "URDF525"}

@@ -16,7 +16,7 @@ from urdfkin.report import html
 from urdfkin.report.document import Document, Robot
 from urdfkin.report.html import as_html
 
-pytestmark = [pytest.mark.slow, pytest.mark.browser]
+pytestmark = [pytest.mark.long, pytest.mark.browser]
 
 PAGES = {"arms": arms, "failing": failing, "hostile": hostile}
 

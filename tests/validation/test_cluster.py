@@ -38,7 +38,7 @@ from urdfkin.validation.outcome import Verdict
 from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput, subject
 
-pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]  # Dask's own, on its way out
+pytestmark = [pytest.mark.long, pytest.mark.filterwarnings("ignore")]  # Dask's own, on its way out
 
 ROBOTS = ["planar_two_link", "no such robot", "double_pendulum"]
 SAMPLES = 150

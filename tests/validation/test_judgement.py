@@ -89,7 +89,7 @@ def test_the_rate_of_the_jacobian_is_its_difference_quotient_to_many_digits() ->
                 assert abs(x - (late - early) / (2 * step)) < 1e-25
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "root_joint"), [("ur3_gripper", None), ("anymal", "floating"), ("solo8", "planar")]
 )
@@ -100,7 +100,7 @@ def test_it_judges_followers_and_free_joints_too(name: str, root_joint: str | No
         assert line.pinocchio.worst < 40.0, line
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_an_error_of_sixteen_units_in_the_last_place_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     right = {line.quantity: line for line in judge(urdfkin.load("ur5"), samples=2).lines}
     original = evaluate.placements
@@ -116,7 +116,7 @@ def test_an_error_of_sixteen_units_in_the_last_place_is_found(monkeypatch: pytes
     assert found["placement"].pinocchio == right["placement"].pinocchio
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_same_seed_gives_the_same_judgement() -> None:
     first, again = (judge(urdfkin.load("polar"), samples=3, seed=4).as_dict() for _ in range(2))
     assert first == again
@@ -155,7 +155,7 @@ def test_the_worst_and_the_typical_error_are_each_held_against_their_own(
     assert line.ours_is_worse == worse
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", ROBOTS)
 def test_urdfkin_is_never_the_worse_of_the_two_by_more_than_a_factor_of_two(name: str) -> None:
     for line in judge(urdfkin.load(name), samples=5).lines:
@@ -198,7 +198,7 @@ def test_a_moving_base_is_a_floating_joint_that_moves_alike() -> None:
             assert abs(one - other[:, 6:]).max(initial=0) < 1e-40, (name, reference)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "root_joint"), [("ur3_gripper", None), ("polar", "planar")])
 def test_it_judges_a_moving_base_too(name: str, root_joint: str | None) -> None:
     robot = urdfkin.load(name, root_joint=root_joint)
@@ -213,7 +213,7 @@ def test_it_judges_a_moving_base_too(name: str, root_joint: str | None) -> None:
             assert line.pinocchio.worst < 40.0, line
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_base_that_one_side_takes_for_another_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     robot, base = urdfkin.load("ur5"), draw_base(2, np.random.default_rng(1))
     original = recursion_base.BaseMotion.state
@@ -243,7 +243,7 @@ def angles(name: str, R: object) -> list[object]:
     return [mp.atan2(z[1], z[2]), -mp.asin(z[0]), mp.atan2(y[0], x[0])]  # xyz: roll, pitch, yaw
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["ZYZ", "xyz", "quaternion"])
 def test_the_analytical_jacobian_at_fifty_digits_is_the_difference_quotient_of_its_numbers(name: str) -> None:
     robot = urdfkin.load("panda")
@@ -284,7 +284,7 @@ def test_about_fixed_axes_the_numbers_are_those_about_turning_ones_last_row_firs
     assert (fixed[:, 3:] == turning[:, :2:-1]).all()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_an_analytical_jacobian_is_judged_in_every_representation_and_an_error_of_its_own_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -393,7 +393,7 @@ def _run(folder: Path, *words: str, **how: Any) -> subprocess.CompletedProcess[s
     )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_client_killed_at_any_time_loses_nothing_that_was_kept(undisturbed: str, tmp_path: Path) -> None:
     """Killed by SIGKILL at random times, again and again, until one gets through."""
     rng, seen = np.random.default_rng(20), 0
@@ -415,7 +415,7 @@ def test_a_client_killed_at_any_time_loses_nothing_that_was_kept(undisturbed: st
     assert numbers(stored(tmp_path / "s")) == undisturbed
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_full_disc_is_said_and_what_was_kept_is_gone_on_with(undisturbed: str, tmp_path: Path) -> None:
     """No file may become longer than one that holds a failure, but not a result."""
 
@@ -431,7 +431,7 @@ def test_a_full_disc_is_said_and_what_was_kept_is_gone_on_with(undisturbed: str,
     assert numbers(validate(ROBOTS, samples=SAMPLES, store=tmp_path / "s")) == undisturbed
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_second_client_is_refused_and_told_who_is_at_work(tmp_path: Path) -> None:
     refused = list[str]()
 
@@ -443,7 +443,7 @@ def test_a_second_client_is_refused_and_told_who_is_at_work(tmp_path: Path) -> N
     assert "another process uses this store: found process " in refused[0]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_two_clients_that_begin_at_the_same_time_leave_what_one_would(
     undisturbed: str, tmp_path: Path
 ) -> None:

@@ -43,7 +43,7 @@ def numbers(report: Any) -> Any:
     ]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("how", HOW, ids=str)
 def test_processes_change_no_number(how: dict[str, Any]) -> None:
     with_them = validate(["ur5", "double_pendulum"], samples=60, **how)
@@ -52,7 +52,7 @@ def test_processes_change_no_number(how: dict[str, Any]) -> None:
     assert numbers(with_them) == numbers(without)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("how", "words"),
     [(HOW[0], "crashed twice, the second time alone"), (HOW[1], "crashed"), (HOW[2], "crashed")],
@@ -73,7 +73,7 @@ def test_a_death_is_that_robots_result_and_the_others_go_on(
     assert report.exit_code == 3
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_robot_over_which_one_worker_died_is_tried_again_and_verified_in_full(deaths: Path) -> None:
     deaths.write_text("1")
     report = validate(ROBOTS, samples=60, jobs=2)
@@ -82,7 +82,7 @@ def test_a_robot_over_which_one_worker_died_is_tried_again_and_verified_in_full(
     assert numbers(report) == numbers(validate(ROBOTS, samples=60))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_what_cannot_be_read_is_reported_as_without_processes() -> None:
     robots = ["<robot/>", "no such robot"]
     plain = validate(robots, samples=60)
@@ -92,7 +92,7 @@ def test_what_cannot_be_read_is_reported_as_without_processes() -> None:
         assert numbers(validate(robots, samples=60, **how)) == numbers(plain)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_worker_that_notices_nothing_is_killed_with_its_crew(monkeypatch: pytest.MonkeyPatch) -> None:
     """A library's process lives on after an interrupt; what hangs in compiled code must not."""
     monkeypatch.setattr(worker_processes, "WORKER", "tests.validation.sleeping_worker")
@@ -129,7 +129,7 @@ def test_a_robot_for_which_no_process_can_be_started_is_not_verified(monkeypatch
         assert not report.passed
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_what_does_not_start_any_more_is_done_by_those_that_are_there(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -171,7 +171,7 @@ def test_a_worker_runs_nothing_of_the_current_folder(
     assert "site-packages" in path
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_workers_killed_at_random_times_change_no_number(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
