@@ -1,13 +1,12 @@
 """The README is true: its example runs, its commands exist, its transcripts are the real output."""
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from tests.cli.running import urdfkin
 from urdfkin.cli import commands
 
 ROOT = Path(__file__).parent.parent
@@ -67,15 +66,14 @@ def test_the_front_page_names_a_command_for_each_of_its_four_people() -> None:
 
 
 @pytest.mark.slow
-def test_each_transcript_is_the_real_output(tmp_path: Path) -> None:
+def test_each_transcript_is_the_real_output(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
     for words, expected in transcripts():
         for option in ("-o", "--check"):
             if option in words:
                 words[words.index(option) + 1] = str(tmp_path / words[words.index(option) + 1])
-        run = subprocess.run(
-            [sys.executable, "-m", "urdfkin", *words], capture_output=True, text=True, check=False, cwd=ROOT
-        )
-        printed = [masked(line) for line in (run.stdout + run.stderr).splitlines()]
+        run = urdfkin(*words)
+        printed = [masked(line) for line in (run.text + run.err).splitlines()]
         wanted = [masked(line) for line in expected if line != "..."]
         assert printed[: len(wanted)] == wanted, words
         assert len(printed) == len(wanted) or expected[-1] == "...", words

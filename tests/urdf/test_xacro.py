@@ -1,14 +1,13 @@
 """xacro without ROS: arguments, packages by a documented search, and failures that say what to do."""
 
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import urdfkin
+from tests.cli.running import urdfkin as run
 from urdfkin.errors import InputError, SourceError
 from urdfkin.urdf import xacro
 from urdfkin.urdf.catalogue import find_package
@@ -125,17 +124,10 @@ def test_xacro_that_comes_as_text_says_what_to_do() -> None:
 
 
 def test_the_commands_take_xacro_arguments(arm: Path) -> None:
-    root = Path(__file__).parents[2]
     for command in (["check", str(arm)], ["placement", str(arm), "--frame", "tool", "--format", "csv"]):
-        done = subprocess.run(
-            [sys.executable, "-m", "urdfkin", *command, "--xacro-arg", "n:=6"],
-            capture_output=True,
-            text=True,
-            check=False,
-            env={**os.environ, "PYTHONPATH": str(root)},
-        )
-        assert done.returncode == 0, done.stderr
-    assert "1.5" in done.stdout
+        done = run(*command, "--xacro-arg", "n:=6")
+        assert done.code == 0, done.err
+    assert "1.5" in done.text
 
 
 def test_validate_expands_once_and_passes(arm: Path) -> None:
