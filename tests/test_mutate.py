@@ -139,6 +139,7 @@ def test_a_part_that_does_not_exist_is_an_error_and_named(
     assert f"{gone}: no file below urdfkin/" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [

@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[1]
 
 DRAWS = r"""
@@ -41,6 +43,7 @@ def draws(folder: Path, *imported: str) -> str:
     ).stdout
 
 
+@pytest.mark.slow
 def test_examples_do_not_depend_on_the_modules_that_are_imported(tmp_path: Path) -> None:
     alone = draws(tmp_path)
     assert len(alone.splitlines()) == 100

@@ -185,6 +185,7 @@ def test_a_stores_folder_for_writing_that_is_a_link_leaves_what_it_leads_to_as_i
     assert (mine / "all" / "file").read_text() == "precious"
 
 
+@pytest.mark.slow
 def test_arrays_that_unpack_to_more_than_the_limit_are_refused(tmp_path: Path) -> None:
     head = io.BytesIO()
     np.lib.format.write_array_header_1_0(head, {"descr": "<f8", "fortran_order": False, "shape": (2**29, 1)})

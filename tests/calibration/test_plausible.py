@@ -14,6 +14,8 @@ from urdfkin.calibration.parameters import table_model
 from urdfkin.dh.table import Convention
 from urdfkin.model.tree import FloatArray
 
+pytestmark = pytest.mark.slow  # a second each, forty of them
+
 ALL = ["base", "tool", "origins"]
 #: Text or name, tip, base.
 ARMS = {
@@ -23,12 +25,6 @@ ARMS = {
     "branched": (BRANCHED, "hand", "trunk"),
     "through the trunk": (BRANCHED, "hand", "b"),
 }
-
-
-SLOW = [
-    name if name in ("ur5", "through the trunk") else pytest.param(name, marks=pytest.mark.slow)
-    for name in ARMS
-]
 
 
 @cache
@@ -69,7 +65,7 @@ def reason(name: str, q: FloatArray, *, complete: bool = True, fit: list[str] | 
 
 @pytest.mark.parametrize("complete", [True, False])
 @pytest.mark.parametrize("fit", [ALL, ["origins"]], ids=["anywhere", "origins"])
-@pytest.mark.parametrize("name", SLOW)
+@pytest.mark.parametrize("name", ARMS)
 def test_joint_angles_in_degrees_are_named(name: str, fit: list[str], complete: bool) -> None:
     true = arm(name)
     slides = [joint == "two" for joint in true.robot.coordinate_names]
@@ -84,7 +80,7 @@ def test_all_values_multiplied_by_57_are_named_where_one_of_them_slides() -> Non
 
 @pytest.mark.parametrize("complete", [True, False])
 @pytest.mark.parametrize("by", [1, -1, 2])
-@pytest.mark.parametrize("name", SLOW)
+@pytest.mark.parametrize("name", ARMS)
 def test_rows_of_q_that_are_shifted_are_named(name: str, by: int, complete: bool) -> None:
     said = reason(name, np.roll(arm(name).q, by, axis=0), complete=complete)
     rows = "one row" if abs(by) == 1 else "2 rows"
@@ -92,7 +88,6 @@ def test_rows_of_q_that_are_shifted_are_named(name: str, by: int, complete: bool
     assert said.startswith(f"q is shifted by {rows} against the poses; the q of each pose is {rows} {way}")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("fit", [ALL, ["origins"]], ids=["anywhere", "origins"])
 @pytest.mark.parametrize("name", list(ARMS))
 def test_the_joint_whose_sign_is_wrong_is_named(name: str, fit: list[str]) -> None:
@@ -151,7 +146,6 @@ def test_a_tables_data_are_judged_as_a_robots() -> None:
         calibrate(drawn, q * [1.0, -1.0, 1.0, 1.0], T)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("complete", [True, False])
 @pytest.mark.parametrize("name", list(ARMS))
 def test_good_data_are_never_refused(name: str, complete: bool) -> None:

@@ -11,6 +11,7 @@ from urdfkin.lint.pages import OF_MJCF
 pytest.importorskip("mujoco")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_each_thing_alone_is_said_in_its_words_and_nothing_else(case: Mjcf) -> None:
     with warnings.catch_warnings(record=True) as caught:
