@@ -39,7 +39,7 @@ from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, Subject
 from scripts.benchmarking.tables import show
 from scripts.benchmarking.timing import DifferenceError, Row
 from scripts.benchmarking.where import parts_of_batches, parts_of_calls
-from urdfkin.validation.results import versions
+from urdfkin.verify.oracles import versions
 
 SECTIONS = ("batch", "single", "verified", "where", "first", "joints", "frames", "sizes", "memory")
 

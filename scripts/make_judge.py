@@ -9,6 +9,7 @@ import numpy as np
 
 import urdfkin
 from urdfkin.report.words import nearer_counts
+from urdfkin.system.documents import plain
 from urdfkin.validation.accuracy import Judgement, Line, judge
 from urdfkin.verify.exact.numbers import DIGITS
 from urdfkin.verify.pinocchio_module import version
@@ -52,7 +53,7 @@ def main() -> None:
 
 def page(judgements: dict[str, Judgement]) -> str:
     """Return the text of the page."""
-    lines = [line for judgement in judgements.values() for line in judgement.as_dict()["lines"]]
+    lines = [line for judgement in judgements.values() for line in plain(judgement)["lines"]]
     ratios = [line["urdfkin"]["typical"] / line["pinocchio"]["typical"] for line in lines]
     parts = [
         f"""# Accuracy study

@@ -9,7 +9,7 @@ import io
 import tempfile
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 
@@ -28,7 +28,7 @@ from urdfkin.view.server import new_server
 from urdfkin.view.viewer import Viewer
 
 if TYPE_CHECKING:
-    from urdfkin.report.document import Document
+    pass
 
 GREEN = "#3a8a4d"
 POSE = [0.0, -0.8, 0.0, -2.4, 0.0, 1.6, 0.8, 0.04]
@@ -84,7 +84,7 @@ def photograph_report(folder: Path) -> None:
     """Make a screenshot of a report about two robots, with the first one expanded."""
     page = folder / "report.html"
     found = urdfkin.validate(["panda", "ur5"], samples=1000)
-    text = as_html(cast("Document", found.as_dict()))
+    text = as_html(found.as_dict())
     installed = str(Path(urdfkin.load("panda").path or "").parents[2])  # leave out the name of the machine
     page.write_text(text.replace(installed, "example-robot-data"), encoding="utf-8")
     with opened(folder / "report", width=1000, height=1250) as browser:

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from urdfkin.report.document import schema
+from urdfkin.validation.document import VALIDATION
 
 PAGE = Path(__file__).parents[1] / "docs" / "reports.md"
 #: This script writes the text after this line.
@@ -23,11 +23,10 @@ def page() -> str:
 
 
 def _tables() -> Iterator[str]:
-    whole = schema()
+    whole = VALIDATION.schema()
     yield from _table("The document", whole)
     for name, part in whole["$defs"].items():
-        if "properties" in part:
-            yield from _table(f"`{name}`", part)
+        yield from _table(f"`{name}`", part)
 
 
 def _table(title: str, part: dict[str, Any]) -> Iterator[str]:
@@ -37,30 +36,25 @@ def _table(title: str, part: dict[str, Any]) -> Iterator[str]:
 
 
 def _type(entry: dict[str, Any]) -> str:
-    """Return a type as text: `number or null`, `list of check`, or the allowed values."""
+    """Return a type as text: `number or null`, `list of Check`, or the allowed values."""
     if "$ref" in entry:
-        return _named(entry["$ref"])
-    if "oneOf" in entry:
-        return " or ".join(_type(choice) for choice in reversed(entry["oneOf"]))
+        return f"`{entry['$ref'].rpartition('/')[2]}`"
+    if "anyOf" in entry:
+        return " or ".join(_type(choice) for choice in entry["anyOf"])
     if "const" in entry:
         return f"`{entry['const']}`"
     if "enum" in entry:
         return ", ".join("null" if word is None else f"`{word}`" for word in entry["enum"])
-    kinds = entry["type"] if isinstance(entry["type"], list) else [entry["type"]]
-    words = [f"list of {_type(entry['items'])}" if kind == "array" else kind for kind in kinds]
-    return " or ".join(words)
-
-
-def _named(reference: str) -> str:
-    name = reference.rpartition("/")[2]
-    return {"units": "number or null", "matrix": "4 lists of 4 numbers"}.get(name, f"`{name}`")
+    if entry["type"] == "array":
+        count = entry.get("minItems")
+        return f"{f'{count} ×' if count else 'list of'} {_type(entry['items'])}"
+    return str(entry["type"])
 
 
 def _meaning(entry: dict[str, Any]) -> str:
-    if "description" in entry:
-        return str(entry["description"])
-    target = schema()["$defs"][entry["$ref"].rpartition("/")[2]]
-    return str(target["description"])
+    """Return the description of an entry, or that of its type."""
+    name = entry.get("$ref", "").rpartition("/")[2]
+    return str(entry.get("description") or VALIDATION.schema()["$defs"][name]["description"])
 
 
 def _cell(text: str) -> str:

@@ -15,14 +15,13 @@ import time
 from itertools import cycle, islice
 from pathlib import Path
 from statistics import median
-from typing import cast
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 
 from tests.report.browser import Browser, opened
-from urdfkin.report.document import Document
 from urdfkin.report.html import as_files
 from urdfkin.validation.campaign import validate
+from urdfkin.validation.document import Document
 
 _ROBOTS = ("ur5", "panda", "z1", "kinova", "planar_two_link")
 _PAINTED = "return performance.getEntriesByName('first-contentful-paint')[0].startTime"
@@ -67,7 +66,7 @@ def fleet(robots: int) -> Document:
         for name, robot in zip(names, islice(cycle(document["robots"]), robots), strict=True)
     ]
     document["asked"] = robots
-    return cast("Document", document)
+    return document
 
 
 def _write(path: Path, text: str) -> int:

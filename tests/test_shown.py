@@ -8,7 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from html.parser import HTMLParser
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +18,6 @@ from tests.attacks.hostile import NAMES, urdf
 from urdfkin.dh.export import export
 from urdfkin.dh.units import units_of
 from urdfkin.errors.display import Table, TextDocument
-from urdfkin.report.document import Document
 from urdfkin.report.html import as_html
 from urdfkin.report.markdown import as_markdown
 from urdfkin.robot import Robot
@@ -97,7 +96,7 @@ def test_a_table_writes_itself_as_the_command_line_does(robot: Robot) -> None:
 @pytest.mark.slow
 def test_a_report_writes_itself_as_the_command_line_does() -> None:
     report = urdfkin.validate("planar_two_link", samples=3)
-    document = cast("Document", report.as_dict())
+    document = report.as_dict()
     assert report.to_html() == as_html(document)
     assert report.to_markdown() == as_markdown(document)
     for form in FORMS:

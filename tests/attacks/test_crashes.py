@@ -95,7 +95,7 @@ def test_when_one_form_fails_the_others_are_written_and_the_report_is_printed(
     assert done.code == {"write": 2, "render": 70}[broken]
     assert ("r.html: cannot be written" if broken == "write" else "RuntimeError: odd") in done.err
     assert {path.name for path in tmp_path.iterdir()} == {"r.json", "r.xml", "r.md"}
-    assert json.loads((tmp_path / "r.json").read_text())["passed"]
+    assert json.loads((tmp_path / "r.json").read_text())["verdict"] == "verified"
     assert "1 robot, " in done.text
 
 

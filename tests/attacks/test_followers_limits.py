@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 
 import urdfkin
 from urdfkin.model.ranges import narrowed_ranges
-from urdfkin.report.document import asset
 from urdfkin.report.html import as_html
 from urdfkin.robot import Robot
 from urdfkin.validation.campaign import validate
+from urdfkin.validation.document import VALIDATION
 from urdfkin.validation.robot_summary import describe
 from urdfkin.verify.sampling import draw
 
@@ -74,7 +74,7 @@ def test_info_and_the_data_say_what_mimic_joints_leave_of_a_range() -> None:
 def test_the_report_shows_what_mimic_joints_leave_of_a_range() -> None:
     robot = gripper("prismatic", (-0.005, 0.055), (-1.0, 0.0, -0.005, 0.055))
     document = json.loads(json.dumps(validate([robot], samples=8).as_dict()))
-    jsonschema.validate(document, json.loads(asset("validation-1.schema.json")))
+    jsonschema.validate(document, VALIDATION.schema())
     page = as_html(document)
     assert "leader: its mimic joints are within limits only from -0.005 to 0.005 m (f1)." in page
     assert "URDF527" in page

@@ -39,7 +39,7 @@ OTHERS = {
     "export/compiled_frame.py": "/proc, and what the compiler has just made in a folder of its own",
     "kinematics/registry/__init__.py": "urdfkin's own data",
     "lint/pages.py": "urdfkin's own pages",
-    "report/document.py": "urdfkin's own pages",
+    "report/html.py": "urdfkin's own pages",
     "system/files.py": "the reader",
     "system/processes.py": "the current folder, to return to it",
     "urdf/catalogue.py": "urdfkin's own catalogue",

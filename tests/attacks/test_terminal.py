@@ -105,7 +105,8 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
         "model": None,
     }
     report["robots"] += [refused | {"joints": [], "frames": [], "chains": [], "results": 0}]
-    report |= {"asked": 2, "passed": False, "reason": "1 of 2 robots bad input"}
+    report["sha256"].append(None)
+    report |= {"asked": 2, "verdict": "bad input", "reason": "1 of 2 robots bad input"}
     report["command"], report["started"] = NAMES["colours"], NAMES["erased"]
     Path(made["REPORT"]).write_text(json.dumps(report))
     return made | {"FRAME": NAMES["line"]}
@@ -304,8 +305,8 @@ def test_what_is_printed_goes_through_the_door() -> None:
             'click.echo(f"questions: ',
         ),
         "check.py": ("click.echo(as_json(", "click.echo(as_sarif("),
-        "report.py": ("click.echo(asset(",), "compare.py": ("click.echo(json.dumps(",),
-        "same.py": ("click.echo(schema_text()",),
+        "report.py": ("click.echo(VALIDATION.schema_text()",), "compare.py": ("click.echo(json.dumps(",),
+        "same.py": ("click.echo(SAME.schema_text()",),
         "dh_tables.py": ("click.echo(text, nl=False)",),
         "__init__.py": ('click.echo(f"urdfkin {own_version()}, Pinocchio {version()',),
         "exit.py": ('click.echo("urdfkin: interrupted', 'click.echo("".join(traceback.', "click.echo("),

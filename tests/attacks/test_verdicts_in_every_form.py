@@ -13,7 +13,6 @@ from rich.console import Console
 
 from tests.report.documents import arms, failing
 from tests.report.test_junit import read
-from urdfkin.report.document import Document, outcome_of
 from urdfkin.report.html import as_html
 from urdfkin.report.markdown import as_markdown
 from urdfkin.report.reading import contradictions
@@ -21,12 +20,13 @@ from urdfkin.report.terminal import print_report
 from urdfkin.validation import robot_summary as chains_module
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.collector import CampaignProgress
+from urdfkin.validation.document import Document, outcome_of
 from urdfkin.verify.tables import TableCheck
 
 
 def _outside(_: pytest.MonkeyPatch) -> Document:
     document = failing()
-    del document["robots"][1:]
+    del document["robots"][1:], document["sha256"][1:]
     document |= {"asked": 1, "reason": "1 of 1 robot disagrees"}
     return document
 
@@ -81,7 +81,7 @@ def _none(_: pytest.MonkeyPatch) -> Document:
 
 def _missing(_: pytest.MonkeyPatch) -> Document:
     document = arms()
-    document |= {"asked": 3, "passed": False, "reason": "1 of 3 robots without a report"}
+    document |= {"asked": 3, "verdict": "not verified", "reason": "1 of 3 robots without a report"}
     return document
 
 
@@ -146,7 +146,7 @@ def test_every_form_tells_the_verdict_and_its_reason(name: str, monkeypatch: pyt
     found = outcome_of(document)
     assert list(contradictions(document)) == []
     assert [robot["verdict"] for robot in document["robots"]] == verdicts
-    assert (found.exit_code, found.passed, document["passed"]) == (code, False, False)
+    assert (found.exit_code, found.passed, document["verdict"]) == (code, False, found.verdict)
     assert document["reason"] == found.reason
     assert found.reason
     root = read(document)
@@ -173,7 +173,7 @@ def test_every_form_tells_the_verdict_and_its_reason(name: str, monkeypatch: pyt
 @pytest.mark.slow
 def test_a_run_that_passed_says_nothing_else_in_any_form() -> None:
     document = arms()
-    assert (document["passed"], document["reason"], outcome_of(document).exit_code) == (True, None, 0)
+    assert (document["verdict"], document["reason"], outcome_of(document).exit_code) == ("verified", None, 0)
     assert [robot["reason"] for robot in document["robots"]] == [None, None]
     for text in (terminal(document), as_markdown(document), as_html(document)):
         assert "ot passed" not in text

@@ -49,7 +49,7 @@ def test_validate_writes_every_form_at_once(tmp_path: Path) -> None:
     assert (tmp_path / "a.html").read_text().startswith("<!doctype html>")
     assert (tmp_path / "a.xml").read_bytes().startswith(b"<?xml")
     assert (tmp_path / "a.md").read_text().startswith("## ✅")
-    assert json.loads((tmp_path / "a.json").read_text())["passed"]
+    assert json.loads((tmp_path / "a.json").read_text())["verdict"] == "verified"
     assert max(map(len, done.text.splitlines())) <= 80
 
 
@@ -107,7 +107,9 @@ def test_compare_exits_1_on_a_regression_and_0_the_other_way(good: Path, bad: Pa
     assert urdfkin("report", "compare", good, good).code == 0
     found = json.loads(urdfkin("report", "compare", good, bad, "--format", "json").text)
     assert found["schema"] == "urdfkin-comparison/1"
-    assert found["regressions"] == sum(change["regression"] for change in found["changes"]) > 0
+    assert found["verdict"] == "regression"
+    assert any(change["regression"] for change in found["changes"])
+    assert found["command"].startswith(f"urdfkin report compare {good} {bad}")
 
 
 def test_compare_lists_a_changed_axis_and_states_that_changes_alone_exit_with_0(

@@ -17,11 +17,10 @@ import urdfkin
 from tests.cli.running import urdfkin as run
 from tests.comparison import pairs
 from tests.comparison.pairs import changed, robot
-from urdfkin.comparison.certificate import certificate, recheck
+from urdfkin.comparison.certificate import SAME, certificate, recheck
 from urdfkin.comparison.result import Verdict
 from urdfkin.model.mechanisms.mechanism import JointTransform, Mechanism
 from urdfkin.model.tree import JointKind
-from urdfkin.report.same import read_certificate
 from urdfkin.robot import Robot
 from urdfkin.urdf.writer import to_urdf
 
@@ -38,7 +37,7 @@ def test_a_robot_is_itself_and_pinocchio_sees_no_distance() -> None:
     found = urdfkin.same("panda", "panda")
     assert found.verdict is Verdict.SAME
     assert (found.after, found.differences, found.remarks) == ((), (), ())
-    assert found.checked.endswith("finds at most 0 m at 8 configurations, within the bounds")
+    assert str(found.checked).endswith("finds at most 0 m at 8 configurations, within the bounds")
     assert found.worst is None
 
 
@@ -217,7 +216,7 @@ def test_a_robot_longer_than_a_double_can_square_is_refused(compared: Any) -> No
 
 
 @pytest.fixture(scope="module")
-def compared() -> tuple[Robot, Robot, dict[str, Any]]:
+def compared() -> tuple[Robot, Robot, Any]:
     a, b = robot("elbow"), other("elbow", "tilted by 0.001")
     return a, b, json.loads(json.dumps(certificate(urdfkin.same(a, b))))
 
@@ -227,16 +226,21 @@ def test_a_certificate_of_what_is_the_same_holds() -> None:
     assert recheck(json.loads(json.dumps(certificate(urdfkin.same(a, a)))), a, a) == []
 
 
-def test_a_certificate_holds(compared: tuple[Robot, Robot, dict[str, Any]], tmp_path: Path) -> None:
+def test_a_certificate_holds(compared: tuple[Robot, Robot, Any], tmp_path: Path) -> None:
     a, b, document = compared
     (tmp_path / "c.json").write_text(json.dumps(document))
-    assert recheck(read_certificate(tmp_path / "c.json"), a, b) == []
+    assert recheck(SAME.read(tmp_path / "c.json"), a, b) == []
 
 
 @pytest.mark.slow
 def test_a_certificate_of_what_was_turned_round_holds() -> None:
     a, b = robot("panda"), other("panda", "all of it")
     assert recheck(certificate(urdfkin.same(a, b)), a, b) == []
+
+
+def confirmed(**changed: Any) -> dict[str, Any]:
+    """A confirmation by Pinocchio of another distance than it finds."""
+    return {"by": "Pinocchio 4.1.0", "configurations": 8, "metres": 1e-19, "reason": ""} | changed
 
 
 FORGED: dict[str, Any] = {
@@ -246,32 +250,38 @@ FORGED: dict[str, Any] = {
     "leave the limits": lambda d: [d["frames"][-1][q].__setitem__(1, 50.0) for q in ("q_a", "q_b")],
     "the verdict is differs": lambda d: d.update(verdict="same"),
     "not listed as a difference": lambda d: d.update(differences=[]),
-    "no difference": lambda d: d["differences"].append({**d["differences"][0], "words": "joint x"}),
+    "no difference": lambda d: d["differences"].append({**d["differences"][0], "place": "joint x"}),
     "has no interval": lambda d: d["frames"].pop(),
     "a frame has two intervals": lambda d: d["frames"].append(d["frames"][-1]),
     "rad there, not": lambda d: d["frames"][-1].update(radians_seen=0.1),
     "remarks: not what the models give": lambda d: d["remarks"].append(d["differences"][0]),
-    "after: not what the models give": lambda d: d["after"].append("q[joint_1] = -q[joint_1]"),
+    "up_to: not what the models give": lambda d: d["up_to"].append("senses"),
+    "tools: not what the models give": lambda d: d["tools"].append(
+        {"a": "tool", "b": "tool", "pose": np.eye(4).tolist()}
+    ),
     "links: not what the models give": lambda d: d["links"].pop(),
     "joints: not what the models give": lambda d: d["joints"].pop(),
     "rounding: not what the models give": lambda d: d["rounding"].update(metres=1.0),
     "base_links: not what the models give": lambda d: d.update(base_links=["tool"] * 2),
     "base: not a rigid motion": lambda d: d["base"][2].__setitem__(2, -1.0),
     "model A: its name is": lambda d: d["a"].update(name="another"),
-    "differences: the size is wrong": lambda d: d["differences"][0].update(radians=1e-6),
-    "the size is wrong in": lambda d: d["differences"][0].update(metres=0.5),
+    "differences: the size or a value is wrong": lambda d: d["differences"][0].update(radians=1e-6),
+    "a value is wrong in": lambda d: d["differences"][0].update(metres=0.5),
+    "value is wrong in: joint": lambda d: d["differences"][0].update(a=0.5),
+    "or a value is wrong in: joint": lambda d: d["differences"][0].update(detail="alone"),
     "one is listed twice": lambda d: d["differences"].append(d["differences"][0]),
-    "not a confirmation": lambda d: d.update(checked="Pinocchio finds nothing"),
-    "checked: Pinocchio finds at most": lambda d: d.update(
-        checked="Pinocchio 4.1.0 finds at most 1e-19 m at 8 configurations, within the bounds"
-    ),
+    "not a confirmation": lambda d: d.update(checked=confirmed(configurations=7)),
+    "not a confirmation at": lambda d: d.update(checked=confirmed(reason="no need")),
+    "and no reason why": lambda d: d.update(checked=confirmed(reason="not asked of Pinocchio: I was lazy")),
+    "no reason why there is none": lambda d: d.update(checked=confirmed(by="")),
+    "checked: Pinocchio finds at most": lambda d: d.update(checked=confirmed()),
     "orders: the axes do not allow": lambda d: d["orders"].append(["joint_2", "joint_1"]),
 }
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("said", FORGED)
-def test_a_forged_certificate_does_not(compared: tuple[Robot, Robot, dict[str, Any]], said: str) -> None:
+def test_a_forged_certificate_does_not(compared: tuple[Robot, Robot, Any], said: str) -> None:
     a, b, document = compared
     forged = copy.deepcopy(document)
     FORGED[said](forged)
@@ -279,7 +289,7 @@ def test_a_forged_certificate_does_not(compared: tuple[Robot, Robot, dict[str, A
 
 
 def test_a_certificate_that_does_not_hold_costs_no_search_in_boxes(
-    compared: tuple[Robot, Robot, dict[str, Any]], monkeypatch: pytest.MonkeyPatch
+    compared: tuple[Robot, Robot, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     a, b, document = compared
     asked = list[str]()
@@ -295,7 +305,7 @@ def test_a_certificate_that_does_not_hold_costs_no_search_in_boxes(
 
 
 def test_a_certificate_that_names_what_is_not_there_is_refused(
-    compared: tuple[Robot, Robot, dict[str, Any]],
+    compared: tuple[Robot, Robot, Any],
 ) -> None:
     a, b, document = compared
     forged = copy.deepcopy(document)
@@ -324,7 +334,7 @@ def test_a_free_joint_goes_only_where_a_rigid_motion_takes_it(kind: str) -> None
     assert not JointTransform(mirror, mirror).holds_for(kinds)
 
 
-def test_a_certificate_of_other_texts_is_refused(compared: tuple[Robot, Robot, dict[str, Any]]) -> None:
+def test_a_certificate_of_other_texts_is_refused(compared: tuple[Robot, Robot, Any]) -> None:
     a, _, document = compared
     with pytest.raises(urdfkin.InputError, match=r"model B: the certificate is about another text"):
         recheck(document, a, a)

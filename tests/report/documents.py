@@ -8,8 +8,8 @@ import math
 from functools import cache
 from typing import cast
 
-from urdfkin.report.document import Check, Document
 from urdfkin.validation.campaign import validate
+from urdfkin.validation.document import Check, Document
 from urdfkin.validation.error_stats import HISTOGRAM_EDGES, percentile
 
 #: What must never become an element, an attribute or a line of code.
@@ -73,7 +73,9 @@ def failing() -> Document:
     broken |= {"reason": "broken.urdf: the URDF has an error\n  broken.urdf:3:1: URDF502", "checks": []}
     broken |= {"joints": [], "frames": [], "chains": [], "results": 0, "timings": None}
     document["robots"].append(broken)
-    document |= {"asked": 3, "passed": False, "reason": "1 of 3 robots disagrees, 1 of 3 robots bad input"}
+    document["sha256"].append(None)
+    document |= {"asked": 3, "verdict": "disagrees"}
+    document["reason"] = "1 of 3 robots disagrees, 1 of 3 robots bad input"
     return document
 
 

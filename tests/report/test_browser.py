@@ -13,8 +13,8 @@ import urdfkin
 from tests.report.browser import Browser, opened
 from tests.report.documents import arms, failing, hostile
 from urdfkin.report import html
-from urdfkin.report.document import Document, Robot
 from urdfkin.report.html import as_html
+from urdfkin.validation.document import Document, Robot
 
 pytestmark = [pytest.mark.long, pytest.mark.browser]
 

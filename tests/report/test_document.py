@@ -14,10 +14,10 @@ from jsonschema import Draft202012Validator
 from tests.report.documents import arms, failing, hostile
 from urdfkin.errors import InputError, SourceError
 from urdfkin.loading import load
-from urdfkin.report.document import Document, schema
 from urdfkin.report.reading import checked, read_document
 from urdfkin.validation.accuracy import judge
 from urdfkin.validation.campaign import validate
+from urdfkin.validation.document import VALIDATION, Document
 
 REFUSED = b'<?xml version="1.0"?><robot name="r"><link name="a"/><joint name="j" type="bent"/></robot>'
 
@@ -25,12 +25,12 @@ REFUSED = b'<?xml version="1.0"?><robot name="r"><link name="a"/><joint name="j"
 def errors(document: object) -> list[str]:
     return [
         f"{error.json_path}: {error.message}"
-        for error in Draft202012Validator(schema()).iter_errors(document)
+        for error in Draft202012Validator(VALIDATION.schema()).iter_errors(document)
     ]
 
 
 def test_the_schema_is_a_schema() -> None:
-    Draft202012Validator.check_schema(schema())
+    Draft202012Validator.check_schema(VALIDATION.schema())
 
 
 @pytest.mark.slow
@@ -52,14 +52,14 @@ def test_a_robot_that_cannot_be_read_keeps_to_the_schema_and_brings_its_findings
 def test_a_judged_run_keeps_to_the_schema() -> None:
     report = validate("panda", samples=0)
     judged = replace(report, judgements=(judge(load("panda"), samples=1),))
-    document = judged.as_dict()
+    document: Any = judged.as_dict()
     assert errors(document) == []
     assert len(document["robots"][0]["judge"]["lines"]) > 5
 
 
 @pytest.mark.slow
 def test_the_schema_describes_everything_that_is_written() -> None:
-    strict = copy.deepcopy(schema())
+    strict = copy.deepcopy(VALIDATION.schema())
     for part in [strict, *strict["$defs"].values()]:
         if part.get("properties") and "additionalProperties" not in part:
             part["additionalProperties"] = False
@@ -76,6 +76,13 @@ def test_the_schema_describes_everything_that_is_written() -> None:
         lambda d: d["robots"][0]["checks"][0].update(results="many"),
         lambda d: d["robots"][0].update(verdict="fine"),
         lambda d: d["robots"][0]["model"]["joints"][0].update(placement=[[1.0]]),
+        lambda d: d["robots"][0]["model"].update(sha256="0123"),
+        lambda d: d["robots"][0]["checks"][0].update(worst=10**400),
+        lambda d: d["robots"][0]["checks"][0].update(results=True),
+        lambda d: d["robots"][0]["checks"][0].update(worst=-1.0),
+        lambda d: d["robots"][0]["chains"][0]["standard"]["rows"][0].update(sense=2),
+        lambda d: d["versions"].update(urdfkin=1),
+        lambda d: d.update(verdict="fine"),
     ],
 )
 def test_a_spoiled_document_is_refused_with_its_place(spoil: Any) -> None:
@@ -85,10 +92,25 @@ def test_a_spoiled_document_is_refused_with_its_place(spoil: Any) -> None:
         checked(document, "results.json")
 
 
-@pytest.mark.parametrize("data", [{}, [], "text", {"schema": "urdfkin-validation/9"}])
+@pytest.mark.parametrize("data", [{}, [], "text", {"schema": "urdfkin-same/1"}, {"schema": ["a"]}])
 def test_another_layout_is_refused_by_name(data: object) -> None:
-    with pytest.raises(InputError, match="not a report with the layout urdfkin-validation/1"):
+    with pytest.raises(
+        InputError, match=r"not a file with the layout urdfkin-validation/1.*urdfkin validate"
+    ):
         checked(data, "results.json")
+
+
+def test_an_unknown_version_is_refused_as_one() -> None:
+    with pytest.raises(
+        InputError, match=r"unknown version of the layout urdfkin-validation: found .*/9'.*1:"
+    ):
+        checked({"schema": "urdfkin-validation/9"}, "results.json")
+
+
+def test_entries_of_a_later_version_are_ignored() -> None:
+    document: Any = arms()
+    document["robots"][0]["checks"][0]["later"] = document["later"] = {"a": 1}
+    assert checked(document, "results.json") == arms()
 
 
 def test_a_file_reads_back_as_it_was_written(tmp_path: Path) -> None:

@@ -9,14 +9,12 @@ import re
 from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
-from typing import cast
 
 import pytest
 
 from tests.report.documents import HOSTILE_JOINT, HOSTILE_LINK, HOSTILE_ROBOT, arms, failing, hostile
 from urdfkin.report import html as html_module
 from urdfkin.report import pages
-from urdfkin.report.document import Document
 from urdfkin.report.html import as_html
 from urdfkin.report.pages import angle
 from urdfkin.report.words import VERDICTS
@@ -165,7 +163,7 @@ def test_a_robot_costs_little_beside_what_every_page_carries() -> None:
 
 @pytest.mark.slow
 def test_the_page_of_all_68_robots_is_at_most_10_megabytes() -> None:
-    document = cast("Document", validate(examples(), samples=0).as_dict())
+    document = validate(examples(), samples=0).as_dict()
     assert len(document["robots"]) == 68
     text = as_html(document)
     assert 3_000_000 < len(text.encode()) <= 10_000_000

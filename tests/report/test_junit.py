@@ -9,8 +9,8 @@ import pytest
 from lxml import etree
 
 from tests.report.documents import HOSTILE_ROBOT, arms, failing, hostile
-from urdfkin.report.document import Document
 from urdfkin.report.junit import as_junit
+from urdfkin.validation.document import Document
 
 SCHEMA = etree.XMLSchema(etree.parse(Path(__file__).parents[1] / "fixtures" / "junit-10.xsd"))
 

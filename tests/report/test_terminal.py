@@ -10,8 +10,8 @@ from rich.console import Console
 
 from tests.report.documents import arms, failing, hostile
 from urdfkin.report.compare import compare, print_comparison
-from urdfkin.report.document import Document
 from urdfkin.report.terminal import print_report
+from urdfkin.validation.document import Document
 
 
 def printed(document: Document, width: int, **how: Any) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from urdfkin.verify.pinocchio import Oracle
 
 def test_the_chains_of_a_catalogues_robot_are_its_limbs_checked_in_both_conventions() -> None:
     robot = urdfkin.load("talos")
-    chains = chains_of(robot, robot.verifier.oracle())
+    chains: Any = chains_of(robot, robot.verifier.oracle())
     assert [chain["limb"] for chain in chains] == ["left_arm", "right_arm", "left_leg", "right_leg", "head"]
     for chain in chains:
         assert chain["samples"] >= 10
@@ -64,6 +65,7 @@ def test_of_both_conventions_the_worse_table_is_told(
     convention: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     robot, right = urdfkin.load("ur5"), dh_table
+    good: Any
     (good,) = chains_of(robot, robot.verifier.oracle())
 
     def wrong(*args: str) -> object:
@@ -73,6 +75,7 @@ def test_of_both_conventions_the_worse_table_is_told(
     shifted = np.eye(4)
     shifted[0, 3] = 1e-9
     monkeypatch.setattr(chains_module, "dh_table", wrong)
+    bad: Any
     (bad,) = chains_of(robot, robot.verifier.oracle())
     assert bad["metres"] == pytest.approx(1e-9, rel=1e-3)
     assert bad["worst"] > 1e4 * good["worst"]

@@ -23,7 +23,7 @@ from tests.attacks.test_validation_runs import Refusing
 from tests.cli.running import urdfkin as run
 from urdfkin.errors import InputError, SourceError
 from urdfkin.validation import answer, manifest, results
-from urdfkin.validation.answer import Answer, DamagedError, Failure, read, written
+from urdfkin.validation.answer import Answer, DamagedError, Failure, packed, read, unpacked, written
 from urdfkin.validation.campaign import StoreWarning, shares, stored, validate
 from urdfkin.validation.chunk import Chunk, ChunkResult, Cut, chunks, run_chunk
 from urdfkin.validation.collector import CampaignProgress, Progress, ResultCollector
@@ -208,6 +208,26 @@ def _plain(found: Answer) -> Any:
     return data
 
 
+@pytest.mark.parametrize(
+    "forge",
+    [
+        lambda body: body.pop("result"),
+        lambda body: body["result"].update(samples="many"),
+        lambda body: body["result"].update(clock=None),
+        lambda body: body["tallies"][0].pop(),
+        lambda body: body["tallies"][0][1].update(worst="small"),
+        lambda body: body["result"]["portrait"]["model"].pop("joints"),
+        lambda body: body["result"]["portrait"]["chains"][0].update(samples=-1),
+        lambda body: body.update(failure={"verdict": "fine", "reason": "none"}),
+    ],
+)
+def test_a_chunk_of_another_layout_is_damaged_though_its_checksum_is_right(forge: Any) -> None:
+    body = unpacked("k", written("k", result()))
+    forge(body)
+    with pytest.raises(DamagedError, match="not a chunk of urdfkin"):
+        read("k", packed("k", body))
+
+
 def test_no_byte_of_a_chunk_can_be_changed_or_cut_off_unnoticed() -> None:
     whole = written("k", Failure(Verdict.BAD_INPUT, "why"))
     for place in range(len(whole)):
@@ -262,14 +282,38 @@ def test_a_renamed_chunk_is_reported_and_put_aside(undisturbed: str, tmp_path: P
 
 
 @pytest.mark.parametrize(
-    "content", [b"", b"{}", b"[]", b"\xff", b'{"layout": "urdfkin-campaign/2"}', b"null"]
+    ("content", "said"),
+    [
+        (b"", "not a JSON file"),
+        (b"{}", "not a file with the layout urdfkin-campaign/1"),
+        (b"[]", "not a file with the layout urdfkin-campaign/1"),
+        (b"\xff", "not a JSON file"),
+        (b'{"schema": "urdfkin-campaign/2"}', "unknown version of the layout urdfkin-campaign"),
+        (b'{"schema": "urdfkin-campaign/1"}', r"does not conform to the layout .*: found \$: .*`robots`"),
+        (b"null", "not a file with the layout urdfkin-campaign/1"),
+    ],
 )
-def test_a_manifest_that_is_none_is_refused(content: bytes, tmp_path: Path) -> None:
+def test_a_manifest_that_is_none_is_refused(content: bytes, said: str, tmp_path: Path) -> None:
     (tmp_path / "manifest.json").write_bytes(content)
-    with pytest.raises(InputError, match="not the manifest of a campaign"):
+    with pytest.raises(InputError, match=said):
         stored(tmp_path)
-    with pytest.raises(InputError, match="not the manifest of a campaign"):
+    with pytest.raises(InputError, match=said):
         validate("ur5", samples=0, store=tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("entry", "value"),
+    [("samples", "10"), ("seed", 0.5), ("provenance", {"pin": 4}), ("robots", [["arm.urdf", "0" * 64]]),
+     ("robots", [[{"source": "arm.urdf", "mimic": 1}, ""]]), ("started", None)],
+)  # fmt: skip
+def test_a_tampered_manifest_is_refused_with_the_place(entry: str, value: object, tmp_path: Path) -> None:
+    validate("planar_two_link", samples=0, store=tmp_path)
+    place = tmp_path / "manifest.json"
+    place.write_text(json.dumps(json.loads(place.read_text()) | {entry: value}))
+    with pytest.raises(
+        InputError, match=rf"manifest.json: does not conform .* found \$\.{entry}.*write it again"
+    ):
+        stored(tmp_path)
 
 
 def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
@@ -475,3 +519,16 @@ def test_status_says_what_is_done_what_failed_and_what_is_left(tmp_path: Path) -
     assert "no process is running" in found.text
     validate(ROBOTS, samples=SAMPLES, store=tmp_path)
     assert "chunks: 6 done, 0 missing" in run("report", "status", str(tmp_path)).text
+
+
+def test_a_campaign_of_a_robot_from_another_format_is_resumed(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    arm = tmp_path / "arm.xml"
+    arm.write_text(
+        '<mujoco model="arm"><worldbody><body name="upper">'
+        '<joint name="shoulder" type="hinge" axis="0 0 1" range="-1 1"/>'
+        '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><body name="tip" pos="1 0 0"/>'
+        "</body></worldbody></mujoco>"
+    )
+    first, again = (validate(str(arm), samples=2, store=tmp_path / "store") for _ in range(2))
+    assert (first.passed, again.passed) == (True, True)

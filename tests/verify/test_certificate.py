@@ -164,7 +164,7 @@ def test_a_certificate_says_which_file_it_was_and_can_be_saved(tmp_path: Path) -
     certificate.save(tmp_path / "certificate.json")
     data = json.loads((tmp_path / "certificate.json").read_text())
     assert data == certificate.as_dict()
-    assert (data["verified"], data["sha256"], data["lines"][0]["checked"]) == (True, digest, 1)
+    assert (data["verdict"], data["sha256"], data["lines"][0]["checked"]) == ("verified", [digest], 1)
     assert urdfkin.load(file.read_text()).path is None
 
 

@@ -153,7 +153,7 @@ def test_a_file_that_yourdfpy_cannot_read_is_named_and_is_no_failure(monkeypatch
     monkeypatch.setattr(second_reader, "read", refuse)
     report = validate(ARM, samples=0)
     assert report.passed
-    assert report.as_dict()["robots"][0]["second_reader"]["unread"] == "KeyError: 'link'"
+    assert report.as_dict()["robots"][0]["second_reader"]["unread"] == "KeyError: 'link'"  # type: ignore[index]
 
 
 def test_a_document_type_is_not_given_to_yourdfpy() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from pathlib import Path
 
 import click
@@ -52,10 +53,11 @@ def command(
     before, after = read_document(old), read_document(new)
     check_writable(markdown)
     found = compare(before, after, factor)
+    words = ["urdfkin", "report", "compare", str(old), str(new), "--factor", str(factor), "--format", format_]
     if markdown is not None:
         write_file(markdown, markdown_of(before, after, found).encode())
     if format_ == "json":
-        click.echo(json.dumps(found.as_dict(), indent=2, allow_nan=False))
+        click.echo(json.dumps(found.as_dict(shlex.join(words)), indent=2, allow_nan=False))
     else:
         print_comparison(before, after, found, console())
     context.exit(found.exit_code)

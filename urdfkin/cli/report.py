@@ -55,11 +55,11 @@ def show(
     The exit status is that of the run. 0: everything verified. 1: a disagreement. 2: a robot could not be
     read, or the file cannot be used. 3: a robot was not verified. 130: interrupted.
     """
-    from urdfkin.report.document import asset, outcome_of  # noqa: PLC0415  keeps --help fast
     from urdfkin.report.reading import read_document, stored_document  # noqa: PLC0415
+    from urdfkin.validation.document import VALIDATION, outcome_of  # noqa: PLC0415  keeps --help fast
 
     if schema:
-        click.echo(asset("validation-1.schema.json"), nl=False)
+        click.echo(VALIDATION.schema_text(), nl=False)
         return
     if results is None:
         raise click.UsageError("give the file of `urdfkin validate --json FILE`, or the folder of --store")

@@ -17,7 +17,7 @@ from urdfkin.cli.streams import say
 from urdfkin.errors import SourceError, UrdfkinError
 
 if TYPE_CHECKING:
-    from urdfkin.report.document import Document
+    from urdfkin.validation.document import Document
 
 
 #: The files of a format, each with its path: one file, or a page with a folder of files.

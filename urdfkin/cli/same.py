@@ -85,10 +85,10 @@ def command(
     Exit 0: same, or equivalent up to the printed changes. 1: different; with --strict also if only
     equivalent. With --within: 0 if all frames stay within the distance as written, else 1. 2: bad input.
     """
-    from urdfkin.report.same import read_certificate, schema_text  # noqa: PLC0415  keeps --help fast
-
     if schema:
-        click.echo(schema_text(), nl=False)
+        from urdfkin.comparison.certificate import SAME  # noqa: PLC0415  keeps --help fast
+
+        click.echo(SAME.schema_text(), nl=False)
         return
     if a is None or b is None:
         raise click.UsageError("two models are needed: urdfkin same A B")
@@ -96,13 +96,14 @@ def command(
     robots = load_two(a, b)
     with compiling():
         if recheck is not None:
+            from urdfkin.comparison.certificate import SAME, words_of  # noqa: PLC0415
             from urdfkin.comparison.certificate import recheck as errors_of  # noqa: PLC0415
 
-            document = read_certificate(recheck)
+            document = SAME.read(recheck)
             errors = errors_of(document, *robots)
             for line in errors:
                 say(line, err=True)
-            first = [f"; first difference: {one['words']}" for one in document["differences"][:1]]
+            first = [f"; first difference: {words_of(one)}" for one in document["differences"][:1]]
             holds = f"the certificate holds: {document['verdict']}{''.join(first)}"
             say("the certificate does not hold" if errors else holds)
             context.exit(1 if errors or document["verdict"] == "differs" else 0)
@@ -131,9 +132,9 @@ def _write(
 ) -> None:
     """Write the result in every requested form; `words` are the command's other options."""
     from urdfkin.comparison.certificate import certificate  # noqa: PLC0415
-    from urdfkin.report.same import markdown_of, print_sameness  # noqa: PLC0415
+    from urdfkin.report.same import command_of, markdown_of, print_sameness  # noqa: PLC0415
 
-    data = json_text(certificate(found)) + "\n"
+    data = json_text(certificate(found, command_of(robots, question, words))) + "\n"
     if (path := paths["certificate"]) is not None:
         write_file(path, data.encode())
     if (path := paths["markdown"]) is not None:

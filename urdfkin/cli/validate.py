@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -124,7 +124,6 @@ def command(
         )
     if shard and any(files.values()):
         raise click.UsageError("a shard has no report; run `urdfkin report merge`, then `urdfkin report`")
-    from urdfkin.report.document import Document  # noqa: PLC0415  keeps --help fast
     from urdfkin.report.terminal import print_report  # noqa: PLC0415
     from urdfkin.urdf.sources import is_xacro  # noqa: PLC0415
     from urdfkin.validation.accuracy_store import Asked  # noqa: PLC0415
@@ -143,7 +142,7 @@ def command(
     if shard:
         _say_shard(report, shard, store)
         context.exit(stop.exit_code(report.exit_code))
-    document = cast("Document", report.as_dict())
+    document = report.as_dict()
     written = write_reports(document, files)
     print_report(document, console(), cases=cases)
     if not written:

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal, TypedDict, cast
 
 import numpy as np
 
 from urdfkin.comparison.bounds import Search, pinocchios, tightened, urdfkins
-from urdfkin.comparison.result import Difference, Interval, JointMap, Sameness
-from urdfkin.comparison.verdict import CONFIRMED, Comparator, digest
+from urdfkin.comparison.result import REASONS, Confirmation, Difference, Sameness, Verdict
+from urdfkin.comparison.verdict import CONFIRMED, Comparator
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.mechanisms.alignment import Alignment, FramePair, Gauge, Variables, variables_of
 from urdfkin.model.mechanisms.matcher import align
 from urdfkin.model.mechanisms.mechanism import JointTransform, apart, is_pose
 from urdfkin.model.mechanisms.upper_bound import COARSE, FINE, upper_bounds
-from urdfkin.model.tree import JointKind
+from urdfkin.model.tree import JointKind, Mimic
 from urdfkin.robot import Robot
+from urdfkin.system.documents import Count, Header, Layout, Matrix, Size, of_length, plain, says
+from urdfkin.verify.oracles import versions
 
 #: Largest number of boxes at a time when a claimed bound is proven.
 MOST_AGAIN = 2**22
@@ -27,69 +28,176 @@ MOST_AGAIN = 2**22
 _RELATIVE, _ZERO = 1e-9, 1e-15
 #: Tolerance of a bound that is proven again, in eps of the bound: sums round differently on other machines.
 _LAST_BITS = 64.0
-#: The line of Pinocchio's confirmation, and the relative tolerance of its two digits.
-_CONFIRMATION = (
-    r"Pinocchio \S+ finds at most (?P<metres>\d+(\.\d+)?(e[+-]?\d+)?) m at (?P<count>\d+) configurations, "
-    "within the bounds"
-)
-_TWO_DIGITS = 0.06
-#: The layout of the document, and its version.
-LAYOUT = "urdfkin-same-1"
 #: Parts that follow from the alignment of the models.
-DERIVED = ("after", "remarks", "joints", "orders", "links", "base", "base_links", "rounding")
+DERIVED = ("up_to", "remarks", "joints", "orders", "links", "base", "base_links", "rounding")
 
 
-def certificate(found: Sameness) -> dict[str, Any]:
+class Model(TypedDict):
+    """One of the two models."""
+
+    name: Annotated[str, says("The robot's name.")]
+    source: Annotated[str, says("Source: a path, a catalogue name, - for standard input, or <text>.")]
+
+
+class Rule(TypedDict):
+    """Mimic rule: the joint's value is multiplier * (value of `leader`) + offset."""
+
+    leader: Annotated[str, says("Name of the mimicked joint.")]
+    multiplier: Annotated[float, says("Factor.")]
+    offset: Annotated[float, says("rad or m")]
+
+
+#: Value of a parameter in one model.
+Value = str | float | list[str | float | None] | Rule | None
+
+
+class DifferenceEntry(TypedDict):
+    """A difference of the models at one place."""
+
+    place: Annotated[str, says("The joint or link of A.")]
+    what: Annotated[str, says("The parameter: axis, place, mimic rule, limits, ...")]
+    a: Annotated[Value, says("Its value in A; null: none.")]
+    b: Annotated[Value, says("Its value in B; null: none.")]
+    radians: Annotated[Size, says("Size as an angle; 0 if it has none.")]
+    metres: Annotated[Size, says("Size as a length; 0 if it has none.")]
+    detail: Annotated[
+        Literal["", "alone", "converted"],
+        says("alone: the links behind the axis agree. converted: limits of B are in A's coordinate."),
+    ]
+
+
+class Conversion(TypedDict):
+    """The pose of a planar or floating joint in B: before * (pose in A) * behind."""
+
+    before: Annotated[Matrix, says("(4, 4) M.")]
+    behind: Annotated[Matrix, says("(4, 4) N.")]
+    back: Annotated[bool, says("Whether the pose in A is inverted: one model's joint is reversed.")]
+
+
+class JointEntry(TypedDict):
+    """A joint of A and its joint of B."""
+
+    a: Annotated[str, says("Name in A.")]
+    b: Annotated[str, says("Name in B.")]
+    sense: Annotated[Literal[1, -1], says("B's value is sense * A's + offset.")]
+    offset: Annotated[float, says("rad or m")]
+    conversion: Annotated[
+        Conversion | None, says("Conversion of a planar or floating joint; null: its poses are equal.")
+    ]
+
+
+class ToolEntry(TypedDict):
+    """A matched frame that counts as a different tool."""
+
+    a: Annotated[str, says("Link of A.")]
+    b: Annotated[str, says("Link of B.")]
+    pose: Annotated[Matrix, says("Pose of B's link in A's link.")]
+
+
+class Rounding(TypedDict):
+    """Distance of frames that counts as rounding."""
+
+    metres: Size
+    radians: Size
+
+
+class FrameEntry(TypedDict):
+    """The interval that contains the largest distance of a frame."""
+
+    frame: Annotated[str, says("Link of A.")]
+    frame_b: Annotated[str, says("Link of B.")]
+    lower: Annotated[Size, says("Lower bound, metres: attained at q_a and q_b.")]
+    upper: Annotated[
+        Size | None, says("Upper bound, proven for all configurations within limits; null: no bound.")
+    ]
+    radians: Annotated[Size | None, says("Upper bound of the angle between the orientations, proven.")]
+    radians_seen: Annotated[Size, says("The angle between the orientations at q_a and q_b.")]
+    q_a: Annotated[list[float], says("Configuration of A; empty if the frame does not differ.")]
+    q_b: Annotated[list[float], says("The corresponding configuration of B.")]
+
+
+class Confirmed(TypedDict):
+    """Pinocchio's confirmation of the bounds."""
+
+    by: Annotated[str, says("Name and version of the oracle; empty without a confirmation.")]
+    configurations: Annotated[Count, says("Number of configurations at which it computed the distances.")]
+    metres: Annotated[Size, says("The largest of these distances.")]
+    reason: Annotated[str, says("Why it computed none; empty if it did.")]
+
+
+class Certificate(Header):
+    """Whether two models are the same robot, with the data of the proof. Metres, radians."""
+
+    a: Model
+    b: Model
+    up_to: Annotated[
+        list[Literal["base", "zeros", "senses", "free joints", "tools"]],
+        says("Kinds of changes of B after which the models agree best."),
+    ]
+    differences: Annotated[list[DifferenceEntry], says("The differences, from the base to the tips.")]
+    remarks: Annotated[
+        list[DifferenceEntry],
+        says("Differences that do not affect motion: limits, kinds, links of one model only."),
+    ]
+    joints: Annotated[list[JointEntry], says("The matched joints.")]
+    links: Annotated[list[Annotated[list[str], of_length(2)]], says("The matched links of A and B.")]
+    tools: Annotated[list[ToolEntry], says("The matched links that count as different tools.")]
+    orders: Annotated[
+        list[list[str]], says("Runs of joints of B that were taken in another order, which their axes allow.")
+    ]
+    base: Annotated[Matrix, says("Pose of B's root in A's root frame, in the zero configuration.")]
+    base_links: Annotated[
+        list[str], of_length(2), says("The link of A and the link of B relative to which poses are compared.")
+    ]
+    rounding: Rounding
+    frames: Annotated[list[FrameEntry], says("The interval of each matched link, after the changes of B.")]
+    as_written: Annotated[
+        FrameEntry | None, says("The interval of the farthest frame without changes; null: there are none.")
+    ]
+    checked: Confirmed
+
+
+#: The layout of the document.
+SAME = Layout(
+    "urdfkin-same/1", Certificate, tuple(v.value for v in Verdict), "urdfkin same A B --certificate FILE"
+)
+
+
+def certificate(found: Sameness, command: str | None = None) -> Certificate:
     """Return the document: map, verdict, differences and the interval of each frame; null is "no bound"."""
-    models = zip(found.names, found.sources, found.digests, strict=True)
-    return {
-        "schema": LAYOUT,
-        **{
-            k: dict(zip(("name", "source", "sha256"), model, strict=True))
-            for k, model in zip("ab", models, strict=True)
-        },
-        "verdict": found.verdict.value,
-        "after": list(found.after),
-        "differences": [_difference(one) for one in found.differences],
-        "remarks": [_difference(one) for one in found.remarks],
-        "joints": [_joint(one) for one in found.joints],
-        "orders": [list(names) for names in found.orders],
-        "links": [list(pair) for pair in found.links],
-        "base": found.base.tolist(),
-        "base_links": list(found.base_links),
-        "rounding": {"metres": found.rounding[0], "radians": found.rounding[1]},
-        "frames": [_interval(frame) for frame in found.frames],
-        "as_written": None if found.as_written is None else _interval(found.as_written),
-        "checked": found.checked,
+    a, b = ({"name": name, "source": source} for name, source in zip(found.names, found.sources, strict=True))
+    document = {
+        "schema": SAME.name,
+        "versions": versions(),
+        "sha256": found.digests,
+        "verdict": found.verdict,
+        "command": command,
+        "a": a,
+        "b": b,
+        **{name: getattr(found, name) for name in _TAKEN_OVER},
+        "rounding": dict(zip(("metres", "radians"), found.rounding, strict=True)),
     }
+    return cast("Certificate", plain(document))
 
 
-def _joint(one: JointMap) -> dict[str, Any]:
-    said = {"a": one.a, "b": one.b, "sense": one.sense, "offset": one.offset, "conversion": None}
-    if (made := one.conversion) is not None:
-        pair = {"before": made.before.tolist(), "behind": made.behind.tolist(), "back": made.back}
-        said["conversion"] = pair
-    return said
+#: Entries with the value of the attribute of `Sameness` with the same name.
+_TAKEN_OVER = (
+    "up_to", "differences", "remarks", "joints", "links", "tools", "orders", "base", "base_links", "frames",
+    "as_written", "checked",
+)  # fmt: skip
 
 
-def _difference(one: Difference) -> dict[str, Any]:
-    return {name: getattr(one, name) for name in ("place", "what", "words", "radians", "metres")}
+def words_of(entry: DifferenceEntry) -> str:
+    """Return a difference in one line."""
+    a, b = (
+        Mimic(**x) if isinstance(x, dict) else tuple(x) if isinstance(x, list) else x
+        for x in (entry["a"], entry["b"])
+    )
+    size = entry["radians"], entry["metres"]
+    return Difference(entry["place"], entry["what"], a, b, *size, entry["detail"]).words
 
 
-def _interval(frame: Interval) -> dict[str, Any]:
-    return {
-        "a": frame.frame,
-        "b": frame.frame_b,
-        "lower": frame.lower,
-        "upper": None if math.isinf(frame.upper) else frame.upper,
-        "radians": None if math.isinf(frame.radians) else frame.radians,
-        "radians_seen": frame.radians_seen,
-        "q_a": list(frame.q_a),
-        "q_b": list(frame.q_b),
-    }
-
-
-def recheck(document: Mapping[str, Any], a: Robot, b: Robot) -> list[str]:
+def recheck(document: Certificate, a: Robot, b: Robot) -> list[str]:
     """Return the statements of a certificate that are wrong for two models; empty if all are right.
 
     The models are aligned as the certificate states, so no search is needed. The stated alignment must be
@@ -98,19 +206,19 @@ def recheck(document: Mapping[str, Any], a: Robot, b: Robot) -> list[str]:
     configuration by urdfkin and by Pinocchio. Each upper bound is proven again.
 
     Args:
-        document: The result of `certificate`, checked against its schema.
+        document: The result of `certificate`, or of `SAME.read`.
         a: The first model.
         b: The second model.
 
     Raises:
         InputError: the certificate is about other texts, or names a joint or link that a model lacks.
     """
-    for which, robot in (("a", a), ("b", b)):
-        if document[which]["sha256"] != digest(robot):
+    for k, robot in enumerate((a, b)):
+        if (claimed := document["sha256"][k : k + 1]) != [robot.sha256]:
             raise InputError(
                 "the certificate is about another text",
-                where=f"model {which.upper()}",
-                found=f"SHA-256 {digest(robot)[:12]}..., not {document[which]['sha256'][:12]}...",
+                where=f"model {'AB'[k]}",
+                found=f"SHA-256 {robot.sha256[:12]}..., not {str(*claimed)[:12]}...",
                 remedy="compare the models again: urdfkin same A B",
             )
     try:
@@ -121,7 +229,7 @@ def recheck(document: Mapping[str, Any], a: Robot, b: Robot) -> list[str]:
         ) from error
 
 
-def _errors(document: Mapping[str, Any], comparator: Comparator) -> Iterator[str]:
+def _errors(document: Certificate, comparator: Comparator) -> Iterator[str]:
     gauge = _gauge(document)
     if (why := _not_a_gauge(document, gauge, comparator)) is not None:
         yield why
@@ -131,7 +239,7 @@ def _errors(document: Mapping[str, Any], comparator: Comparator) -> Iterator[str
     said = comparator.said(found, variables)
     wrong = list(_statement_errors(document, comparator, said))
     yield from wrong
-    claims = {(frame["a"], frame["b"]): frame for frame in document["frames"]}
+    claims = {(frame["frame"], frame["frame_b"]): frame for frame in document["frames"]}
     if len(claims) < len(document["frames"]):
         yield "a frame has two intervals"
     search = comparator.search(found, variables)
@@ -146,57 +254,65 @@ def _errors(document: Mapping[str, Any], comparator: Comparator) -> Iterator[str
     yield from _confirmation_errors(document["checked"], comparator, found, variables)
 
 
-def _statement_errors(document: Mapping[str, Any], comparator: Comparator, said: Sameness) -> Iterator[str]:
+def _statement_errors(document: Certificate, comparator: Comparator, said: Sameness) -> Iterator[str]:
     """Yield the wrong statements about names, verdict, differences and everything else without a proof."""
-    for which, robot in zip("ab", comparator.robots, strict=True):
-        if document[which]["name"] != robot.name:
-            yield f"model {which.upper()}: its name is {robot.name}, not {document[which]['name']}"
+    models = document["a"], document["b"]
+    for which, model, robot in zip("AB", models, comparator.robots, strict=True):
+        if model["name"] != robot.name:
+            yield f"model {which}: its name is {robot.name}, not {model['name']}"
     again = certificate(said)
-    wrong = {one["words"]: one for one in again["differences"]}
-    claimed = {one["words"]: one for one in document["differences"]}
-    yield from (f"not listed as a difference: {words}" for words in wrong if words not in claimed)
-    yield from (f"no difference: {words}" for words in claimed if words not in wrong)
+    wrong = {_place(one): one for one in again["differences"]}
+    claimed = {_place(one): one for one in document["differences"]}
+    yield from (f"not listed as a difference: {words_of(wrong[at])}" for at in wrong if at not in claimed)
+    yield from (f"no difference: {words_of(claimed[at])}" for at in claimed if at not in wrong)
     if len(claimed) < len(document["differences"]):
         yield "differences: one is listed twice"
-    for words, one in claimed.items():
-        if words in wrong and not _same_difference(one, wrong[words], said.rounding):
-            yield f"differences: the size is wrong in: {words}"
+    for at, one in claimed.items():
+        if at in wrong and not _same_difference(one, wrong[at], said.rounding):
+            yield f"differences: the size or a value is wrong in: {words_of(one)}"
+    if not _equal(document["tools"], again["tools"], max(said.rounding)):
+        yield "tools: not what the models give"
     if document["verdict"] != said.verdict.value:
         yield f"the verdict is {said.verdict.value}, not {document['verdict']}"
+    parts, right = dict(document), dict(again)
     yield from (
-        f"{part}: not what the models give" for part in DERIVED if not _equal(document[part], again[part])
+        f"{part}: not what the models give" for part in DERIVED if not _equal(parts[part], right[part])
     )
 
 
-def _same_difference(
-    claimed: Mapping[str, Any], said: Mapping[str, Any], rounding: tuple[float, float]
-) -> bool:
-    """Return whether place, parameter and sizes of a difference agree, sizes within rounding."""
-    sizes = zip(("metres", "radians"), rounding, strict=True)
-    return all(claimed[part] == said[part] for part in ("place", "what")) and all(
-        math.isclose(claimed[part], said[part], rel_tol=_RELATIVE, abs_tol=most) for part, most in sizes
+#: A confirmation of nothing, as data.
+_NOTHING = plain(Confirmation())
+
+
+def _place(one: DifferenceEntry) -> tuple[str, str]:
+    return one["place"], one["what"]
+
+
+def _same_difference(claimed: DifferenceEntry, said: DifferenceEntry, rounding: tuple[float, float]) -> bool:
+    """Return whether the values and the sizes of a difference agree, sizes within rounding."""
+    return (
+        all(_equal(claimed[part], said[part]) for part in ("a", "b", "detail"))
+        and math.isclose(claimed["metres"], said["metres"], rel_tol=_RELATIVE, abs_tol=rounding[0])
+        and math.isclose(claimed["radians"], said["radians"], rel_tol=_RELATIVE, abs_tol=rounding[1])
     )
 
 
 def _confirmation_errors(
-    claimed: str, comparator: Comparator, found: Alignment, variables: Variables
+    claimed: Confirmed, comparator: Comparator, found: Alignment, variables: Variables
 ) -> Iterator[str]:
     """Yield the wrong statements about Pinocchio's confirmation; a skipped check claims nothing."""
-    if claimed.startswith(("not asked of Pinocchio: ", "not verified by Pinocchio: ")):
+    if claimed["reason"].startswith(REASONS) and claimed == {**_NOTHING, "reason": claimed["reason"]}:
         return
-    said = re.fullmatch(_CONFIRMATION, claimed)
-    if said is None or int(said["count"]) != CONFIRMED:
-        yield "checked: not a confirmation in the form that urdfkin writes"
+    if claimed["reason"] or claimed["configurations"] != CONFIRMED or not claimed["by"]:
+        yield f"checked: not a confirmation at {CONFIRMED} configurations, and no reason why there is none"
         return
-    off, rounding = (
-        float(comparator.pinocchio_distances(found, variables).max(initial=0.0)),
-        comparator.rounding(found, variables)[0],
-    )
-    if not math.isclose(float(said["metres"]), off, rel_tol=_TWO_DIGITS, abs_tol=rounding):
-        yield f"checked: Pinocchio finds at most {off:.2g} m, not {said['metres']} m"
+    off = float(comparator.pinocchio_distances(found, variables).max(initial=0.0))
+    rounding = comparator.rounding(found, variables)[0]
+    if not math.isclose(claimed["metres"], off, rel_tol=_RELATIVE, abs_tol=rounding):
+        yield f"checked: Pinocchio finds at most {off:.2g} m, not {claimed['metres']:.2g} m"
 
 
-def _gauge(document: Mapping[str, Any]) -> Gauge:
+def _gauge(document: Certificate) -> Gauge:
     """Return the gauge that the document states: base, senses, zeros, conversions and orders."""
     joints, base = document["joints"], document["base_links"]
     return Gauge(
@@ -212,7 +328,7 @@ def _gauge(document: Mapping[str, Any]) -> Gauge:
     )
 
 
-def _not_a_gauge(document: Mapping[str, Any], gauge: Gauge, comparator: Comparator) -> str | None:
+def _not_a_gauge(document: Certificate, gauge: Gauge, comparator: Comparator) -> str | None:
     """Return why the stated gauge is not allowed; None if it is allowed."""
     a, b = comparator.mechanisms
     for joint in document["joints"]:
@@ -230,19 +346,27 @@ def _not_a_gauge(document: Mapping[str, Any], gauge: Gauge, comparator: Comparat
     return None
 
 
-def _equal(claimed: Any, said: Any) -> bool:
+def _equal(claimed: Any, said: Any, zero: float = _ZERO) -> bool:
     """Return whether two parts of a document are equal, numbers except for their last digits."""
     if isinstance(said, dict):
-        return claimed.keys() == said.keys() and all(_equal(claimed[key], said[key]) for key in said)
+        return (
+            isinstance(claimed, dict)
+            and claimed.keys() == said.keys()
+            and all(_equal(claimed[key], said[key], zero) for key in said)
+        )
     if isinstance(said, list):
-        return len(claimed) == len(said) and all(map(_equal, claimed, said))
+        return (
+            isinstance(claimed, list)
+            and len(claimed) == len(said)
+            and all(_equal(*pair, zero) for pair in zip(claimed, said, strict=True))
+        )
     if isinstance(said, float) and isinstance(claimed, float | int):
-        return math.isclose(claimed, said, rel_tol=_RELATIVE, abs_tol=_ZERO)
+        return math.isclose(claimed, said, rel_tol=_RELATIVE, abs_tol=zero)
     return bool(claimed == said)
 
 
 def _as_written_errors(
-    claim: Mapping[str, Any], comparator: Comparator, found: Alignment, *, sharply: bool
+    claim: FrameEntry, comparator: Comparator, found: Alignment, *, sharply: bool
 ) -> Iterator[str]:
     """Yield the wrong statements about the largest distance of a frame as written."""
     written = comparator.as_written(found)
@@ -250,10 +374,10 @@ def _as_written_errors(
     names = [
         (comparator.trees[0].links[frame.a], comparator.trees[1].links[frame.b]) for frame in written.frames
     ]
-    if (claim["a"], claim["b"]) not in names:
-        yield f"as written: frame {claim['a']} is not a common frame of the models"
+    if (claim["frame"], claim["frame_b"]) not in names:
+        yield f"as written: frame {claim['frame']} is not a common frame of the models"
         return
-    frame = written.frames[names.index((claim["a"], claim["b"]))]
+    frame = written.frames[names.index((claim["frame"], claim["frame_b"]))]
     search, rounding = comparator.search(written, variables), comparator.rounding(written, variables)
     problems = _interval_errors(search, frame, claim, rounding, sharply=sharply)
     yield from (f"as written: {line}" for line in problems)
@@ -262,7 +386,7 @@ def _as_written_errors(
 def _interval_errors(
     search: Search,
     frame: FramePair,
-    claim: Mapping[str, Any],
+    claim: FrameEntry,
     rounding: tuple[float, float],
     *,
     sharply: bool,
@@ -288,7 +412,7 @@ def _interval_errors(
             break
     if holds:
         return
-    place = f"frame {claim['a']}"
+    place = f"frame {claim['frame']}"
     if _within(proven[1], radians, rounding[1]):
         if problems or not sharply:
             return
@@ -304,10 +428,10 @@ def _interval_errors(
 
 
 def _not_attained(
-    search: Search, frame: FramePair, claim: Mapping[str, Any], rounding: tuple[float, float]
+    search: Search, frame: FramePair, claim: FrameEntry, rounding: tuple[float, float]
 ) -> Iterator[str]:
     """Yield why a lower bound is wrong: its configurations, or the distance that a library finds there."""
-    place = f"frame {claim['a']}"
+    place = f"frame {claim['frame']}"
     q_a, q_b = np.array([claim["q_a"]]), np.array([claim["q_b"]])
     if not search.belong_together(q_a, q_b):
         yield f"{place}: its configurations do not correspond to each other, or leave the limits"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -19,7 +19,7 @@ from urdfkin.kinematics.rotation.euler import rpy_of
 from urdfkin.model.configuration import checked, neutral
 from urdfkin.model.mechanisms.alignment import IDENTITY, Alignment, FramePair, Step, Variables, limits
 from urdfkin.model.mechanisms.mechanism import JointTransform, Mechanism, Tolerance, apart, tolerance_of
-from urdfkin.model.tree import FloatArray, Joint, KinematicTree
+from urdfkin.model.tree import FloatArray, Joint, KinematicTree, Mimic
 from urdfkin.system.lazy_import import hook
 
 #: Smallest number printed with a prefix (0.1 to four digits); the unit alone is used from 9 times it on.
@@ -79,23 +79,121 @@ class Interval:
     q_b: tuple[float, ...]
 
 
+#: Value of a parameter: a kind or a name, a number, the two ends of a range or several names, a mimic rule.
+Value = str | float | tuple[str | float | None, ...] | Mimic | None
+
+
 @dataclass(frozen=True, slots=True)
 class Difference:
     """One difference between two models.
 
     Attributes:
         place: The joint or link of A, for example "joint elbow".
-        what: The parameter in words, without the size: "axis", "origin", "mimic rule", "only in A", ...
-        words: The difference in one line.
+        what: The parameter: "axis", "place", "mimic rule", "only in A", ...
+        a: Its value in A; None where the parameter has no value, such as a limit that is not there.
+        b: Its value in B, likewise.
         radians: Size of the difference as an angle, 0 where it has none.
         metres: Size of the difference as a length, 0 where it has none.
+        detail: "alone" for an axis behind which the links agree; "converted" for limits of B in A's
+            coordinate; empty otherwise.
     """
 
     place: str
     what: str
-    words: str
+    a: Value = None
+    b: Value = None
     radians: float = 0.0
     metres: float = 0.0
+    detail: str = ""
+
+    @property
+    def words(self) -> str:  # noqa: PLR0911  a line for each parameter
+        """The difference in one line."""
+        place, what, a, b = self.place, self.what, self.a, self.b
+        off = [f"{length(self.metres)} off"] if self.metres else []
+        match what:
+            case "axis":
+                parts = " and ".join([*([f"tilted by {angle(self.radians)}"] if self.radians else []), *off])
+                alone = " (the links behind it are not)" if self.detail == "alone" else ""
+                return f"{place}: its axis is {parts}{alone}"
+            case "place":
+                parts = " and ".join([*off, *([f"turned by {angle(self.radians)}"] if self.radians else [])])
+                return f"{place} is {parts} on its body"
+            case "frame":
+                return f"{place}: its plane is tilted by {angle(self.radians)}"
+            case "fixed":
+                moves, fixed = ("A", "B") if b == "fixed" else ("B", "A")
+                return f"{place} moves in {moves} and is fixed in {fixed}"
+            case "mimic rule" if a is None and b is not None:
+                return f"{place} is free in A and a mimic joint in B: {_rule(b)}"
+            case "mimic rule" if a is not None and b is None:
+                return f"{place} is a mimic joint in A and free in B: {_rule(a)}"
+            case "mimic rule":
+                return f"{place} has another mimic rule: {_rule(a)} in A, {_rule(b)} in B"
+            case "limits":
+                converted = " (in A's coordinate)" if self.detail else ""
+                return f"{place}: limits {_range(a)} in A, {_range(b)} in B{converted}"
+            case "velocity" | "effort":
+                return f"{place}: {what} limit {_number(a):g} in A, {_number(b):g} in B"
+            case "carried by":
+                return f"{place} is carried by {a} in A, by {b} in B"
+            case "kind":
+                return f"{place} is {a} in A, {b} in B"
+        names = a or b
+        return (
+            f"links {what}: {', '.join(map(str, names))}"
+            if isinstance(names, Sequence)
+            else f"{place} is {what}"
+        )
+
+
+def _rule(rule: Value) -> str:
+    return f"{rule.multiplier!r} {rule.leader} {rule.offset:+.17g}" if isinstance(rule, Mimic) else "free"
+
+
+def _number(x: object, infinity: float = math.inf) -> float:
+    return x if isinstance(x, float) else infinity
+
+
+def _range(ends: Value) -> str:
+    lower, upper = ends if isinstance(ends, tuple) else (None, None)
+    return f"{_number(lower, -math.inf):.12g} to {_number(upper):.12g}"
+
+
+@dataclass(frozen=True, slots=True)
+class Tool:
+    """A frame that counts as another tool: link `b` of B is link `a` of A moved by `pose` (4, 4)."""
+
+    a: str
+    b: str
+    pose: FloatArray
+
+
+#: Beginnings of the reasons why there is no confirmation.
+REASONS = NOT_ASKED, NOT_VERIFIED = "not asked of Pinocchio: ", "not verified by Pinocchio: "
+
+
+@dataclass(frozen=True, slots=True)
+class Confirmation:
+    """Pinocchio's confirmation of the bounds, or the reason why there is none.
+
+    Attributes:
+        by: Name and version of the oracle: "Pinocchio 4.1.0".
+        configurations: Number of configurations at which it computed the distances.
+        metres: The largest of these distances.
+        reason: Why it computed none; empty if it did.
+    """
+
+    by: str = ""
+    configurations: int = 0
+    metres: float = 0.0
+    reason: str = ""
+
+    def __str__(self) -> str:
+        if self.reason:
+            return self.reason
+        at = f"at {self.configurations} configurations"
+        return f"{self.by} finds at most {self.metres:.2g} m {at}, within the bounds"
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,6 +227,7 @@ class Sameness(Displayable):
         remarks: Differences that do not affect motion: limits, kinds, links of one model only.
         joints: The matched joints of A and B.
         links: The matched links of A and B.
+        tools: The matched links that count as different tools.
         orders: Runs of joints of B that were taken in another order, which their axes allow.
         base: (4, 4) pose of B's root in A's root frame, in the zero configuration; the identity where they
             agree.
@@ -159,6 +258,7 @@ class Sameness(Displayable):
     remarks: tuple[Difference, ...]
     joints: tuple[JointMap, ...]
     links: tuple[tuple[str, str], ...]
+    tools: tuple[Tool, ...]
     orders: tuple[tuple[str, ...], ...]
     base: FloatArray
     base_links: tuple[str, str]
@@ -167,7 +267,7 @@ class Sameness(Displayable):
     as_written: Interval | None
     written: tuple[float, float]
     narrowed: tuple[str, ...]
-    checked: str
+    checked: Confirmation
     trees: tuple[KinematicTree, KinematicTree]
 
     def __bool__(self) -> bool:
@@ -475,13 +575,12 @@ def differences(found: Alignment, variables: Variables) -> tuple[Difference, ...
     ordered = [one for _, some in sorted(placed, key=lambda pair: pair[0]) for one in some]
     for tree, joints, which in ((tree_a, found.only_a, "A"), (tree_b, found.only_b, "B")):
         alone = [f"joint {tree.joints[j].name}" for j in sorted(joints) if tree.joints[j].kind.nv]
-        ordered += [Difference(place, f"only in {which}", f"{place} is only in {which}") for place in alone]
+        ordered += [Difference(place, f"only in {which}") for place in alone]
     have = {tree_a.links[frame.a] for frame in found.frames}
     for link in tree_a.links:
         if link in tree_b.links and link not in have and _of_the_pair(found, tree_a, tree_b, link):
             ours, theirs = (_carrier(tree, link) for tree in (tree_a, tree_b))
-            words = f"link {link} is carried by {ours} in A, by {theirs} in B"
-            ordered.append(Difference(f"link {link}", "carried by", words))
+            ordered.append(Difference(f"link {link}", "carried by", ours, theirs))
     return tuple(ordered)
 
 
@@ -502,50 +601,34 @@ def _carrier(tree: KinematicTree, link: str) -> str:
 
 
 def _of_step(found: Alignment, variables: Variables, i: int) -> list[Difference]:
+    tolerance = tolerance_of(found.a, found.b)
     step, tree_a, tree_b = found.steps[i], found.a.tree, found.b.tree
     joint, other = tree_a.joints[step.a], tree_b.joints[step.b]
     place = f"joint {joint.name}"
     if step.unlike == "kind":
-        return [Difference(place, "kind", f"{place} is {joint.kind.value} in A, {other.kind.value} in B")]
+        return [Difference(place, "kind", joint.kind.value, other.kind.value)]
     if step.unlike:
-        fixed, moves = ("A", "B") if step.unlike == "a" else ("B", "A")
-        return [Difference(place, "fixed", f"{place} moves in {moves} and is fixed in {fixed}")]
+        ends = ("fixed", "moves") if step.unlike == "a" else ("moves", "fixed")
+        return [Difference(place, "fixed", *ends)]
     some = []
-    if step.differs:
-        what, said = _axis_words(place, step, tolerance_of(found.a, found.b))
-        some.append(Difference(place, what, said, step.tilt, step.shift))
-    for steps, words in (
-        (variables.freer_a, "{0} is free in A and a mimic joint in B: {2}"),
-        (variables.freer_b, "{0} is a mimic joint in A and free in B: {1}"),
-        (variables.rules, "{0} has another mimic rule: {1} in A, {2} in B"),
-    ):
-        if i in steps:
-            some.append(Difference(place, "mimic rule", words.format(place, _rule(joint), _rule(other))))
+    if step.differs and step.kind in ("planar", "floating"):
+        some.append(Difference(place, "frame", radians=step.tilt, metres=step.shift))
+    elif step.differs:
+        detail = "alone" if step.other is not step.axis else ""
+        some.append(Difference(place, "axis", None, None, *_beyond(step, tolerance), detail))
+    if i in (*variables.freer_a, *variables.freer_b, *variables.rules):
+        some.append(Difference(place, "mimic rule", joint.mimic, other.mimic))
     return some
 
 
-def _rule(joint: Joint) -> str:
-    rule = joint.mimic
-    return f"{rule.multiplier!r} {rule.leader} {rule.offset:+.17g}" if rule else "free"
-
-
-def _axis_words(place: str, step: Step, rounding: Tolerance) -> tuple[str, str]:
-    """Return the parameter that differs by more than rounding, and a line about it."""
-    if step.kind in ("planar", "floating"):
-        return "frame", f"{place}: its plane is tilted by {angle(step.tilt)}"
-    parts = [f"tilted by {angle(step.tilt)}"] if step.tilt > rounding.angle else []
-    parts += [f"{length(step.shift)} off"] if step.shift > rounding.way else []
-    alone = " (the links behind it are not)" if step.other is not step.axis else ""
-    return "axis", f"{place}: its axis is {' and '.join(parts)}{alone}"
+def _beyond(one: Step | FramePair, rounding: Tolerance) -> tuple[float, float]:
+    """Return the tilt (rad) and the shift (m) of a joint or frame, each 0 where it is rounding."""
+    return one.tilt if one.tilt > rounding.angle else 0.0, one.shift if one.shift > rounding.way else 0.0
 
 
 def _of_frame(found: Alignment, frame: FramePair) -> Difference:
-    place, rounding = f"link {found.a.tree.links[frame.a]}", tolerance_of(found.a, found.b)
-    parts = [f"{length(frame.shift)} off"] if frame.shift > rounding.way else []
-    parts += [f"turned by {angle(frame.tilt)}"] if frame.tilt > rounding.angle else []
-    return Difference(
-        place, "place", f"{place} is {' and '.join(parts)} on its body", frame.tilt, frame.shift
-    )
+    sizes = _beyond(frame, tolerance_of(found.a, found.b))
+    return Difference(f"link {found.a.tree.links[frame.a]}", "place", None, None, *sizes)
 
 
 def remarks(found: Alignment, variables: Variables, tolerance: Tolerance) -> tuple[Difference, ...]:
@@ -558,30 +641,30 @@ def remarks(found: Alignment, variables: Variables, tolerance: Tolerance) -> tup
         paired = {tree.links[frame.a if which == "A" else frame.b] for frame in found.frames}
         lacking = [link for link in tree.links if link not in other.links and link not in paired]
         if lacking:
-            words = f"links only in {which}: {', '.join(lacking)}"
-            some.append(Difference(f"links of {which}", f"only in {which}", words))
+            names = (tuple(lacking), None) if which == "A" else (None, tuple(lacking))
+            some.append(Difference(f"links of {which}", f"only in {which}", *names))
     return tuple(some)
 
 
 def _of_limits(step: Step, a: Joint, b: Joint, tolerance: Tolerance) -> Iterator[Difference]:
     place = f"joint {a.name}"
     if a.kind is not b.kind:
-        yield Difference(place, "kind", f"{place} is {a.kind.value} in A, {b.kind.value} in B")
+        yield Difference(place, "kind", a.kind.value, b.kind.value)
     back = sorted(step.sense * (end - step.offset) for end in limits(b))
     ours = limits(a)
     if any(not _close(x, y, tolerance.angle) for x, y in zip(ours, back, strict=True)):
-        words = f"{place}: limits {_range(ours)} in A, {_range((back[0], back[1]))} in B"
-        converted = " (in A's coordinate)" if step.sense < 0 or step.offset else ""
-        yield Difference(place, "limits", words + converted)
+        detail = "converted" if step.sense < 0 or step.offset else ""
+        yield Difference(place, "limits", tuple(map(_finite, ours)), tuple(map(_finite, back)), detail=detail)
     for what in ("velocity", "effort"):
         x, y = (getattr(joint.limit, what, math.inf) for joint in (a, b))
         if not _close(x, y, tolerance.angle):
-            yield Difference(place, what, f"{place}: {what} limit {x:g} in A, {y:g} in B")
+            yield Difference(place, what, _finite(x), _finite(y))
 
 
 def _close(x: float, y: float, share: float) -> bool:
     return x == y or abs(x - y) <= share * max(1.0, abs(x), abs(y))
 
 
-def _range(ends: tuple[float, float]) -> str:
-    return f"{ends[0]:.12g} to {ends[1]:.12g}"
+def _finite(x: float) -> float | None:
+    """Return a limit; None if there is none."""
+    return x if math.isfinite(x) else None

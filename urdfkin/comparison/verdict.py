@@ -12,9 +12,13 @@ import numpy as np
 from urdfkin.comparison.bounds import MOST, Search, pinocchios, tightened
 from urdfkin.comparison.result import (
     FREE,
+    NOT_ASKED,
+    NOT_VERIFIED,
+    Confirmation,
     Interval,
     JointMap,
     Sameness,
+    Tool,
     Verdict,
     demand_joint_names,
     differences,
@@ -42,7 +46,7 @@ from urdfkin.model.ranges import WIDEST, narrowed_ranges
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.urdf.sources import Source
-from urdfkin.verify.pinocchio_module import version
+from urdfkin.verify.oracles import PINOCCHIO
 from urdfkin.verify.sampling import checked_choice
 
 #: Configurations at which Pinocchio checks the distances.
@@ -198,7 +202,7 @@ class Comparator:
         return Sameness(
             names=(self.robots[0].name, self.robots[1].name),
             sources=(self.robots[0].source, self.robots[1].source),
-            digests=(digest(self.robots[0]), digest(self.robots[1])),
+            digests=(self.robots[0].sha256, self.robots[1].sha256),
             verdict=Verdict.DIFFERS if wrong else Verdict.SAME_AFTER if after else Verdict.SAME,
             after=tuple(dict.fromkeys(words for _, words in after)),
             up_to=tuple(what for what in FREE if what in free),
@@ -208,6 +212,9 @@ class Comparator:
                 JointMap(names[0][s.a], names[1][s.b], s.sense, s.offset, s.conversion) for s in found.steps
             ),
             links=tuple((links[0][f.a], links[1][f.b]) for f in found.frames),
+            tools=tuple(
+                Tool(links[0][f.a], links[1][f.b], f.tool) for f in found.frames if f.tool is not IDENTITY
+            ),
             orders=found.b.orders,
             base=found.X,
             base_links=(links[0][found.base[0]], links[1][found.base[1]]),
@@ -220,7 +227,7 @@ class Comparator:
                 for which, tree in zip("AB", self.trees, strict=True)
                 for one in narrowed_ranges(tree)
             ),
-            checked="",
+            checked=Confirmation(),
             trees=self.trees,
         )
 
@@ -370,13 +377,13 @@ class Comparator:
         lower = max(0.0, metres - rounding[0])
         return Interval(*names, lower, *upper, turned, tuple(q_a[0].tolist()), tuple(q_b[0].tolist()))
 
-    def _confirm(self, found: Alignment, variables: Variables, frames: tuple[Interval, ...]) -> str:
+    def _confirm(self, found: Alignment, variables: Variables, frames: tuple[Interval, ...]) -> Confirmation:
         """Check the bounds with Pinocchio, which reads both texts itself, at some configurations."""
         if not all(checked_choice(robot.verifier.policy) for robot in self.robots):
-            return "not asked of Pinocchio: loaded with verify=False"
+            return Confirmation(reason=f"{NOT_ASKED}loaded with verify=False")
         for robot in self.robots:
             if (reason := robot.verifier.cannot()) is not None:
-                return f"not verified by Pinocchio: {reason}"
+                return Confirmation(reason=f"{NOT_VERIFIED}{reason}")
         off = self.pinocchio_distances(found, variables)
         for interval, metres in zip(frames, off, strict=False):
             if metres > interval.upper * (1.0 + EPS):
@@ -386,8 +393,7 @@ class Comparator:
                     found=f"{metres:.6g} m, bound {interval.upper:.6g} m",
                     remedy="please report this as an error of urdfkin, with both robots",
                 )
-        seen = f"{off.max(initial=0.0):.2g} m"
-        return f"Pinocchio {version()} finds at most {seen} at {CONFIRMED} configurations, within the bounds"
+        return Confirmation(PINOCCHIO.words, CONFIRMED, float(off.max(initial=0.0)))
 
     def pinocchio_distances(self, found: Alignment, variables: Variables) -> FloatArray:
         """Return each frame's largest distance (m) that Pinocchio finds at `CONFIRMED` configurations."""
@@ -425,11 +431,6 @@ def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
     if (root := b.tree.links[0]) in a.tree.links and not a.body_of[link := a.tree.link_index(root)]:
         return a.homes[link]
     return IDENTITY
-
-
-def digest(robot: Robot) -> str:
-    """Return the SHA-256 of the robot's file: a URDF's text, or MJCF."""
-    return robot.sha256
 
 
 def parse_map(words: tuple[str, ...]) -> dict[str, str]:

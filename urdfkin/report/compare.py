@@ -17,8 +17,8 @@ rules. Neither is another file name: the robot is recognized by the name in its 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict, cast
 
 import numpy as np
 
@@ -28,10 +28,12 @@ from urdfkin.errors.escape import log_line
 from urdfkin.errors.escape import markdown_text as text
 from urdfkin.model.mechanisms.mechanism import Tolerance
 from urdfkin.model.summary import axis_words, rule_words
-from urdfkin.report.document import Check, Document, Joint, Model, Robot, Units, outcome_of
 from urdfkin.report.listing import print_named
 from urdfkin.report.markdown import LIMIT, shortened
 from urdfkin.report.words import VERDICTS, check_name, counted, percent, quantity_name, summary, units, worst
+from urdfkin.system.documents import Header, Layout, plain, says
+from urdfkin.validation.document import Check, Document, Joint, Model, Robot, Units, outcome_of
+from urdfkin.verify.oracles import versions
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -200,9 +202,15 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """All changes between two reports."""
+    """All changes between two reports.
+
+    Attributes:
+        changes: The changes.
+        sha256: SHA-256 of the texts of the new report's robots.
+    """
 
     changes: tuple[Change, ...]
+    sha256: tuple[str | None, ...] = ()
 
     @property
     def regressions(self) -> tuple[Change, ...]:
@@ -214,13 +222,42 @@ class Comparison:
         """1 if there is a regression, else 0."""
         return 1 if self.regressions else 0
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain data for JSON."""
-        return {
-            "schema": "urdfkin-comparison/1",
-            "regressions": len(self.regressions),
-            "changes": [asdict(change) for change in self.changes],
+    def as_dict(self, command: str | None = None) -> ComparisonDocument:
+        """Return plain data for JSON; `command` made it."""
+        document = {
+            "schema": COMPARISON.name,
+            "versions": versions(),
+            "sha256": self.sha256,
+            "verdict": COMPARISON.verdicts[bool(self.regressions)],
+            "command": command,
+            "changes": self.changes,
         }
+        return cast("ComparisonDocument", plain(document))
+
+
+class ChangeEntry(TypedDict):
+    """One difference of two reports."""
+
+    robot: Annotated[str | None, says("The robot's source; null for the run as a whole.")]
+    what: Annotated[str, says("Name of the changed value.")]
+    old: Annotated[str, says("Old value; empty if it was missing.")]
+    new: Annotated[str, says("New value; empty if it is missing.")]
+    regression: Annotated[bool, says("Whether the change is a regression.")]
+
+
+class ComparisonDocument(Header):
+    """The output of `urdfkin compare --format json`; `sha256` is of the robots of the new report."""
+
+    changes: Annotated[list[ChangeEntry], says("All changes between the two reports.")]
+
+
+#: The layout of the document.
+COMPARISON = Layout(
+    "urdfkin-comparison/1",
+    ComparisonDocument,
+    ("no regression", "regression"),
+    "urdfkin report compare OLD.json NEW.json --format json",
+)
 
 
 def compare(old: Document, new: Document, factor: float = FACTOR) -> Comparison:
@@ -235,7 +272,7 @@ def compare(old: Document, new: Document, factor: float = FACTOR) -> Comparison:
         All changes, each marked if it is a regression.
     """
     changes = [*_run(old, new), *_robots(old, new, factor)]
-    return Comparison(tuple(changes))
+    return Comparison(tuple(changes), tuple(new["sha256"]))
 
 
 def _run(old: Document, new: Document) -> Iterator[Change]:

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from urdfkin.report.document import Chain, Check, Model, Robot, Table
 from urdfkin.report.words import of_quantity, quantities, quantity_name, units, worst
+from urdfkin.validation.document import Chain, Check, Model, Robot, Table
 from urdfkin.view.figure import FIRST, GRID, SECOND, TEXT, THIRD, inline_svg, label, new_figure, style
 
 if TYPE_CHECKING:

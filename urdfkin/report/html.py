@@ -12,10 +12,10 @@ import json
 from collections.abc import Iterator
 from datetime import datetime
 from functools import cache
+from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 from urdfkin.report import pages
-from urdfkin.report.document import Document, Robot, asset, outcome_of
 from urdfkin.report.figures import distributions, scene
 from urdfkin.report.words import (
     VERDICTS,
@@ -36,6 +36,7 @@ from urdfkin.report.words import (
     witness_title,
     worst,
 )
+from urdfkin.validation.document import Document, Robot, outcome_of
 from urdfkin.validation.robot_summary import chain_disagreement
 from urdfkin.verify.quantities import compared, not_compared
 from urdfkin.view.figure import installed
@@ -70,6 +71,11 @@ def environment() -> Environment:
     environment.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False}
     environment.filters["counted"] = counted
     return environment
+
+
+def asset(name: str) -> str:
+    """Return the text of a file in `urdfkin/report/assets`."""
+    return resources.files("urdfkin.report").joinpath("assets", name).read_text(encoding="utf-8")
 
 
 def as_is(text: str) -> Markup:

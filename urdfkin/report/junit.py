@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from xml.etree import ElementTree as ET
 
-from urdfkin.report.document import Case, Check, Document, Robot, outcome_of
 from urdfkin.report.words import (
     check_name,
     in_order,
@@ -19,6 +18,7 @@ from urdfkin.report.words import (
     witness_heads,
     witness_title,
 )
+from urdfkin.validation.document import Case, Check, Document, Robot, outcome_of
 
 #: Characters that XML 1.0 forbids, even escaped.
 _FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")

@@ -7,7 +7,6 @@ from collections.abc import Iterable
 
 from urdfkin.errors.escape import markdown_code, printable
 from urdfkin.errors.escape import markdown_text as text
-from urdfkin.report.document import Document, Robot, outcome_of
 from urdfkin.report.words import (
     VERDICTS,
     check_name,
@@ -22,6 +21,7 @@ from urdfkin.report.words import (
     witness_title,
     worst_of,
 )
+from urdfkin.validation.document import Document, Robot, outcome_of
 
 #: Maximum length. GitHub accepts comments of up to 65,536 characters.
 LIMIT = 60_000
@@ -52,7 +52,7 @@ def as_markdown(document: Document) -> str:
         f"<sub>urdfkin {text(document['versions'].get('urdfkin', '?'))}, {text(document['started'])}."
         " To repeat the run:</sub>",
         "",
-        fenced(shortened(document["command"], 2000)),
+        fenced(shortened(document["command"] or "", 2000)),
         "",
     ]
     robots = sorted(document["robots"], key=lambda robot: VERDICTS.index(robot["verdict"]))

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from html import escape
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 from urdfkin.errors.escape import log_line
-from urdfkin.report.document import Model, asset
 from urdfkin.report.figures import scene
-from urdfkin.report.html import as_is, environment
+from urdfkin.report.html import as_is, asset, environment
 from urdfkin.report.reading import moving_names
 from urdfkin.validation.robot_summary import describe
 
@@ -35,14 +34,13 @@ class Cell:
 
     def page(self) -> str:
         """Return the HTML page."""
-        model = cast("Model", self._description)
-        data: dict[str, Any] = {"source": self._name, "joints": moving_names(model), "chains": []}
+        data: dict[str, Any] = {"source": self._name, "joints": moving_names(self._description), "chains": []}
         return (
             environment()
             .get_template("cell.html.j2")
             .render(
                 data=data,
-                robot={"index": 0, "scene": scene(model, []) | {"start": self._q}},
+                robot={"index": 0, "scene": scene(self._description, []) | {"start": self._q}},
                 style=as_is(asset("report.css")),
                 three=as_is(asset("three.min.js")),
                 view_script=as_is(asset("view3d.js")),

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from urdfkin.dh.units import Units as DisplayUnits
 from urdfkin.model.ranges import range_words
 from urdfkin.model.summary import axis_words
-from urdfkin.report.document import Chain, Check, Joint, Judgement, Limit, Model, Robot, Row, Units
 from urdfkin.report.words import (
     SIDES,
     column,
@@ -25,6 +24,7 @@ from urdfkin.report.words import (
     worst,
     worst_of,
 )
+from urdfkin.validation.document import Chain, Check, Joint, Judgement, Limit, Model, Robot, Row, Units
 
 if TYPE_CHECKING:
     pass

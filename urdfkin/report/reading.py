@@ -1,4 +1,4 @@
-"""Reader of report documents. It checks the published schema and the consistency of all entries.
+"""Reader of report documents. It checks the layout and the consistency of all entries.
 
 A report is evidence, and may have been edited or truncated. Entries that follow from other entries are
 computed again and compared: the outcome, verdicts, sums, ratios and percentiles. The robot must be a tree of
@@ -7,21 +7,28 @@ links and joints with consistent indices of coordinates.
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import islice, pairwise
 from pathlib import Path
-from typing import cast
 
 from urdfkin.errors import InputError
-from urdfkin.report.document import Chain, Check, Document, Joint, Model, Robot, Units, outcome_of, schema
 from urdfkin.report.words import check_name, worst
-from urdfkin.system.files import MOST_DATA, read_bytes
+from urdfkin.system.documents import read_json
 from urdfkin.validation.chunk import SPECIAL
+from urdfkin.validation.document import (
+    VALIDATION,
+    Chain,
+    Check,
+    Document,
+    Joint,
+    Model,
+    Robot,
+    Units,
+    outcome_of,
+)
 from urdfkin.validation.error_stats import histogram_bin, percentile
 from urdfkin.validation.outcome import Verdict
-from urdfkin.validation.results import SCHEMA
 from urdfkin.validation.robot_summary import chain_disagreement, reader_disagreement
 
 #: nq and nv of each kind of joint.
@@ -124,13 +131,19 @@ def contradictions(document: Document) -> Iterator[str]:
     if not edges or any(a >= b for a, b in pairwise(edges)):
         yield "histogram_edges: not in ascending order"
         return
-    if document.get("asked", len(robots)) < len(robots):
-        yield f"asked: {document.get('asked')}, but {len(robots)} robots have a report"
+    if document["asked"] < len(robots):
+        yield f"asked: {document['asked']}, but {len(robots)} robots have a report"
     found = outcome_of(document)
-    if document["passed"] != found.passed:
-        yield f"passed: {document['passed']}, but {found.reason or 'every robot was verified'}"
-    if "reason" in document and (document["reason"] is None) != found.passed:
+    if document["verdict"] != found.verdict:
+        yield f"verdict: {document['verdict']}, but {found.reason or 'every robot was verified'}"
+    if (document["reason"] is None) != found.passed:
         yield f"reason: {document['reason']}, but {found.reason or 'the run has passed'}"
+    if missing := [name for name in ("urdfkin", "pin", "python") if name not in document["versions"]]:
+        yield f"versions: none of {missing[0]}"
+    if document["command"] is None:
+        yield "command: none"
+    if document["sha256"] != [robot["model"]["sha256"] if robot["model"] else None for robot in robots]:
+        yield "sha256: not those of the robots"
     for i, robot in enumerate(robots):
         for contradiction in _robot(robot, document):
             yield f"robots[{i}] ({robot['source']}): {contradiction}"
@@ -178,7 +191,7 @@ def _verdict(robot: Robot, samples: int) -> Iterator[str]:
     second_differs = any(
         check["witness"]["urdfkin"]["failed"] for check in robot["checks"] if "witness" in check
     )
-    reading = robot.get("second_reader")
+    reading = robot["second_reader"]
     outside = (
         robot["failed"] > 0
         or second_differs
@@ -297,16 +310,6 @@ def read_document(path: Path) -> Document:
     return checked(read_json(path), str(path))
 
 
-def read_json(path: Path) -> object:
-    """Read a JSON file. Raise SourceError, or InputError if it is not JSON."""
-    try:
-        return json.loads(
-            read_bytes(path, MOST_DATA, pipes=True), parse_constant=_number, parse_float=_number
-        )
-    except (ValueError, RecursionError) as error:
-        raise InputError("not a JSON file", where=str(path), found=str(error)) from error
-
-
 def stored_document(folder: Path) -> Document:
     """Read the document of a campaign's store and check it like a file.
 
@@ -316,58 +319,18 @@ def stored_document(folder: Path) -> Document:
     """
     from urdfkin.validation.campaign import stored  # noqa: PLC0415  needed for a store only
 
-    return checked(json.loads(json.dumps(stored(folder).as_dict(), allow_nan=False)), str(folder))
-
-
-def _number(word: str) -> float:
-    """Parse a number. Reject infinity, NaN and numbers too large for a double."""
-    number = float(word)
-    if not math.isfinite(number):
-        raise ValueError(f"{word[:20]} is not a finite number")
-    return number
+    return checked(stored(folder).as_dict(), str(folder))
 
 
 def checked(data: object, where: str) -> Document:
     """Return `data` as a checked document. Raise InputError as `read_document` does."""
-    keeps_to(schema(), data, SCHEMA, where, "urdfkin validate ROBOT --json FILE")
-    document = cast("Document", data)
+    document = VALIDATION.checked(data, where)
     if against := list(islice(contradictions(document), _SHOWN + 1)):
         more = " ..." if len(against) > _SHOWN else ""
         raise InputError(
             "the report contradicts itself",
             where=where,
             found="; ".join(against[:_SHOWN]) + more,
-            remedy="make it again: urdfkin validate ROBOT --json FILE",
+            remedy=f"make it again: {VALIDATION.made_by}",
         )
     return document
-
-
-def keeps_to(layout: Mapping[str, object], data: object, name: str, where: str, made_by: str) -> None:
-    """Raise InputError if data does not conform to a published schema.
-
-    Args:
-        layout: The schema.
-        data: The content of the file.
-        name: Name of the layout, the required value of the entry "schema".
-        where: The file.
-        made_by: The command that writes such a file.
-
-    Raises:
-        InputError: The data has another layout or violates this one.
-    """
-    found = data.get("schema") if isinstance(data, dict) else None
-    if found != name:
-        raise InputError(
-            f"not a report with the layout {name}",
-            where=where,
-            found=repr(found) if found else "no 'schema' entry",
-            remedy=f"write one with: {made_by}",
-        )
-    from jsonschema import Draft202012Validator  # noqa: PLC0415  needed for reading only
-    from jsonschema.exceptions import best_match  # noqa: PLC0415
-
-    error = best_match(Draft202012Validator(layout).iter_errors(data))
-    if error is not None:
-        raise InputError(
-            f"does not conform to the layout {name}", where=where, found=f"{error.json_path}: {error.message}"
-        )

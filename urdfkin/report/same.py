@@ -1,21 +1,18 @@
-"""Report the comparison of two models: on a terminal, as Markdown and as an HTML page; read certificates.
+"""Report the comparison of two models: on a terminal, as Markdown and as an HTML page.
 
 The page shows the verdict, the intervals and a picture of both models at the worst configuration.
 """
 
 from __future__ import annotations
 
-import json
 import math
 import shlex
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from urdfkin.comparison.certificate import LAYOUT
 from urdfkin.comparison.result import BOUNDED, Interval, Question, Sameness, Verdict, angle, length, up_to
 from urdfkin.comparison.verdict import base_as_written
 from urdfkin.errors.display import Table, TextDocument
@@ -24,13 +21,11 @@ from urdfkin.kinematics.roundings import NOT_ZERO
 from urdfkin.model.mechanisms.mechanism import Mechanism
 from urdfkin.model.pose import inverse
 from urdfkin.model.tree import FloatArray
-from urdfkin.report.document import asset
-from urdfkin.report.html import as_is, environment, when
-from urdfkin.report.reading import keeps_to, read_json
+from urdfkin.report.html import as_is, asset, environment, when
 from urdfkin.report.terminal import plain_table
 from urdfkin.report.words import counted
 from urdfkin.robot import Robot
-from urdfkin.validation.results import versions
+from urdfkin.verify.oracles import versions
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -189,7 +184,7 @@ def print_sameness(
     _print_lines(out, NARROWED, found.narrowed, some)
     _print_lines(out, "different names", renamed(found), some)
     _print_lines(out, "differences without effect on motion", [one.words for one in found.remarks], some)
-    out.print(found.checked, soft_wrap=True)
+    out.print(str(found.checked), soft_wrap=True)
 
 
 def as_document(found: Sameness) -> TextDocument:
@@ -210,7 +205,7 @@ def as_document(found: Sameness) -> TextDocument:
         parts += [f"... and {len(frames) - SHOWN} more"] if len(frames) > SHOWN else []
         if off := attained(frames[0]):
             parts.append(f"{frames[0].frame} is {off} off at: {where(found, frames[0])}")
-    return TextDocument(headline(found), [*parts, found.checked])
+    return TextDocument(headline(found), [*parts, str(found.checked)])
 
 
 def attained(frame: Interval) -> str:
@@ -261,7 +256,7 @@ def markdown_of(found: Sameness, question: Question = EQUIVALENT) -> str:
         lines += [f"| {' | '.join(HEADS)} |", "| --- | ---: | ---: | ---: |"]
         lines += [f"| {' | '.join(map(text, row))} |" for row in rows(frames[: 4 * SHOWN])]
         lines.append("")
-    return "\n".join([*lines, text(found.checked), ""])
+    return "\n".join([*lines, text(str(found.checked)), ""])
 
 
 #: Half the side of a picture, in its own units, and the share of it that the robots fill.
@@ -306,7 +301,7 @@ def as_html(
             started=moment.isoformat(timespec="seconds"),
             when=when(moment.isoformat(timespec="seconds")),
             versions=versions(),
-            command=_command(robots, question, options),
+            command=command_of(robots, question, options),
             heads=HEADS,
             frames=rows(frames),
             as_written=as_written(found),
@@ -321,7 +316,7 @@ def as_html(
     )
 
 
-def _command(robots: tuple[Robot, Robot], question: Question, options: Sequence[str]) -> str:
+def command_of(robots: tuple[Robot, Robot], question: Question, options: Sequence[str]) -> str:
     """Return the command line that repeats the comparison."""
     words = [robot.origin.words for robot in robots]
     words += [] if question.within is None else [f"--within {question.within!r}"]
@@ -409,20 +404,3 @@ def round_length(most: float) -> float:
     """
     exponent = math.floor(math.log10(most))
     return max(x for x in (float(f"{k}e{exponent}") for k in (1, 2, 5)) if x <= most)
-
-
-def schema_text() -> str:
-    """Return the JSON Schema (draft 2020-12) of a certificate."""
-    return asset("same-1.schema.json")
-
-
-def read_certificate(path: Path) -> dict[str, Any]:
-    """Read a certificate from a file.
-
-    Raises:
-        SourceError: the file cannot be read.
-        InputError: the file is not JSON, not a certificate, of another version, or violates the schema.
-    """
-    data = read_json(path)
-    keeps_to(json.loads(schema_text()), data, LAYOUT, str(path), "urdfkin same A B --certificate FILE")
-    return cast("dict[str, Any]", data)

@@ -9,7 +9,6 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from urdfkin.errors.escape import printable
-from urdfkin.report.document import Check, Document, Judgement, Robot, outcome_of
 from urdfkin.report.listing import print_named
 from urdfkin.report.words import (
     SIDES,
@@ -34,6 +33,7 @@ from urdfkin.report.words import (
     worst,
     worst_of,
 )
+from urdfkin.validation.document import Check, Document, Judgement, Robot, outcome_of
 
 if TYPE_CHECKING:
     from rich.console import Console

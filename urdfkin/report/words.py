@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Literal
 
-from urdfkin.report.document import Check, Document, Judged, Judgement, Robot, Units, Witness
+from urdfkin.validation.document import Check, Document, Judged, Judgement, Robot, Units, Witness
 from urdfkin.validation.outcome import Verdict
 from urdfkin.verify.oracles import WITNESSES
 from urdfkin.verify.quantities import QUANTITIES

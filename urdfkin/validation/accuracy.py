@@ -69,7 +69,7 @@ class Line:
 
     Attributes:
         quantity: Name of the quantity.
-        reference: Name of the reference frame, empty for placements. For analytical Jacobians: the
+        reference: Name of the reference frame, None for placements. For analytical Jacobians: the
             representation of the orientation.
         numbers: Number of compared values.
         urdfkin: The errors of urdfkin.
@@ -77,7 +77,7 @@ class Line:
     """
 
     quantity: str
-    reference: str
+    reference: str | None
     numbers: int
     urdfkin: Errors
     pinocchio: Errors
@@ -108,25 +108,6 @@ class Judgement:
     seed: int
     lines: tuple[Line, ...]
     moving_base: bool = False
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the result as plain data for JSON."""
-        return {
-            "robot": self.robot,
-            "samples": self.samples,
-            "seed": self.seed,
-            "moving_base": self.moving_base,
-            "lines": [
-                {
-                    "quantity": line.quantity,
-                    "reference": line.reference or None,
-                    "numbers": line.numbers,
-                    "urdfkin": {"worst": line.urdfkin.worst, "typical": line.urdfkin.typical},
-                    "pinocchio": {"worst": line.pinocchio.worst, "typical": line.pinocchio.typical},
-                }
-                for line in self.lines
-            ],
-        }
 
 
 def judge(robot: Robot, *, samples: int = 5, seed: int = 0, base: BaseMotion | None = None) -> Judgement:
@@ -198,7 +179,7 @@ class _Work:
         for reference in (None, *Reference):
             for row in validated():
                 if row.exact is not None and reference in row.references:
-                    name = "" if reference is None else reference.name.lower()
+                    name = None if reference is None else reference.name.lower()
                     yield _line(row.name, name, [self._compared(row, reference)])
         for name, representations in _REPRESENTATIONS.items():
             yield _line(ANALYTICAL_JACOBIAN.name, name, list(self._analytical(representations)))
@@ -269,7 +250,7 @@ def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.obj
     return unit
 
 
-def _line(quantity: str, reference: str, compared: Sequence[_Compared]) -> Line:
+def _line(quantity: str, reference: str | None, compared: Sequence[_Compared]) -> Line:
     """Return the errors of both libraries for one quantity."""
     sides: tuple[list[FloatArray], list[FloatArray]] = [], []
     for ours, theirs, true, scale in compared:

@@ -10,15 +10,15 @@ import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any
 
 from urdfkin.errors import InputError
+from urdfkin.system.documents import typed
 from urdfkin.system.files import read_if_there
-from urdfkin.validation.accuracy import Errors, Judgement, Line
+from urdfkin.validation.accuracy import Judgement
 from urdfkin.validation.answer import DamagedError, packed, unpacked
 from urdfkin.validation.manifest import LAYOUT
-from urdfkin.validation.results import version
 from urdfkin.validation.store import JUDGE, JUDGED, Store
+from urdfkin.verify.oracles import version
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,9 +82,8 @@ class AccuracyResult:
         try:
             if (content := read_if_there(store.folder / JUDGE)) is None:
                 return None
-            data = json.loads(content)
-            asked = Asked(int(data["samples"]), int(data["seed"]), bool(data["moving_base"]))
-        except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+            asked = typed(json.loads(content), Asked)
+        except (OSError, ValueError, RecursionError) as error:
             store.tell(f"{store.folder / JUDGE} cannot be read ({type(error).__name__}): no accuracy results")
             return None
         return cls(store, asked)
@@ -104,7 +103,7 @@ class AccuracyResult:
     def keep(self, robot: int, found: Judgement | NotJudged) -> None:
         """Write the result of a robot into the store."""
         key = self._key(robot)
-        self._store.keep_part(key, JUDGED, packed(key, {"judge": asdict(found)}))
+        self._store.keep_part(key, JUDGED, packed(key, {"judge": found}))
 
     def stamp(self, robot: int) -> str:
         """Return the sha256 of the robot's text that was compared."""
@@ -133,14 +132,10 @@ class AccuracyResult:
 
 
 def _read(key: str, content: bytes) -> Judgement | NotJudged:
-    data: dict[str, Any] = unpacked(key, content)["judge"]
+    data = unpacked(key, content).get("judge")
     try:
-        if "reason" in data:
-            return NotJudged(str(data["reason"]))
-        lines = (
-            Line(**line | {side: Errors(**line[side]) for side in ("urdfkin", "pinocchio")})
-            for line in data["lines"]
-        )
-        return Judgement(**data | {"lines": tuple(lines)})
-    except (KeyError, TypeError, AttributeError) as error:
-        raise DamagedError(f"not an accuracy result of urdfkin ({type(error).__name__})") from error
+        if isinstance(data, dict) and "reason" in data:
+            return typed(data, NotJudged)
+        return typed(data, Judgement)
+    except ValueError as error:
+        raise DamagedError(f"not an accuracy result of urdfkin ({error})") from error

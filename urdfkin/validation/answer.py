@@ -14,17 +14,17 @@ import hashlib
 import json
 import traceback
 import zlib
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from urdfkin.errors import UrdfkinError
 from urdfkin.lint import UrdfError
+from urdfkin.system.documents import as_data, typed
 from urdfkin.validation.chunk import Chunk, ChunkResult, run_chunk
-from urdfkin.validation.error_stats import HISTOGRAM_EDGES, Key, Pair, Tally, ThreeSides, WorstCase
+from urdfkin.validation.error_stats import Key, Tally
 from urdfkin.validation.outcome import Verdict
 from urdfkin.validation.robot_input import RobotInput
-from urdfkin.validation.robot_summary import NO_PORTRAIT, RobotSummary, as_data
-from urdfkin.validation.timings import Clock
+from urdfkin.validation.robot_summary import NO_PORTRAIT, RobotSummary, entries_of
 from urdfkin.verify.pinocchio import OracleError
 
 
@@ -63,7 +63,7 @@ def answer(chunk: Chunk) -> Answer:
 def failure(subject: RobotInput, error: Exception) -> Failure:
     """Return the answer for a robot that raised an exception."""
     if isinstance(error, UrdfError):
-        return Failure(Verdict.BAD_INPUT, str(error), RobotSummary(findings=as_data(error.findings)))
+        return Failure(Verdict.BAD_INPUT, str(error), RobotSummary(findings=entries_of(error.findings)))
     if isinstance(error, OracleError):
         return Failure(Verdict.NOT_VERIFIED, str(error), _portrait(subject))
     if isinstance(error, UrdfkinError):
@@ -102,7 +102,10 @@ class DamagedError(Exception):
 
 def written(key: str, found: Answer) -> bytes:
     """Return an answer as the bytes of its file."""
-    return packed(key, _failure(found) if isinstance(found, Failure) else _result(found))
+    if isinstance(found, Failure):
+        return packed(key, {"failure": found})
+    rows = list(found.tallies.items())  # JSON has no pairs as keys
+    return packed(key, {"tallies": rows, "result": replace(found, tallies={})})
 
 
 def read(key: str, content: bytes) -> Answer:
@@ -113,14 +116,20 @@ def read(key: str, content: bytes) -> Answer:
     """
     body = unpacked(key, content)
     try:
-        return _read_failure(body["failure"]) if "failure" in body else _read_result(body["result"])
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise DamagedError(f"not a chunk of urdfkin ({type(error).__name__})") from error
+        if "failure" in body:
+            return typed(body["failure"], Failure)
+        tallies = dict(typed(body["tallies"], list[tuple[Key, Tally]]))
+        return replace(typed(body["result"], ChunkResult), tallies=tallies)
+    except (ValueError, KeyError) as error:
+        raise DamagedError(f"not a chunk of urdfkin ({error})") from error
 
 
 def packed(key: str, body: dict[str, Any]) -> bytes:
-    """Return data as the bytes of a file, with its key and a checksum."""
-    data = zlib.compress(json.dumps({"key": key} | body, separators=(",", ":")).encode(), 1)
+    """Return results as the bytes of a file, with their key and a checksum.
+
+    JSON keeps a double exactly (shortest round-trip decimals), and infinity as Python's own word.
+    """
+    data = zlib.compress(json.dumps(as_data({"key": key} | body), separators=(",", ":")).encode(), 1)
     return _MAGIC + hashlib.sha256(data).digest() + data
 
 
@@ -142,93 +151,3 @@ def unpacked(key: str, content: bytes) -> dict[str, Any]:
     except (ValueError, KeyError, TypeError, zlib.error, RecursionError) as error:
         raise DamagedError(f"not a chunk of urdfkin ({type(error).__name__})") from error
     return body
-
-
-def _failure(found: Failure) -> dict[str, Any]:
-    return {
-        "failure": {
-            "verdict": found.verdict.value,
-            "reason": found.reason,
-            "portrait": asdict(found.portrait),
-            "error": found.error,
-        }
-    }
-
-
-def _read_failure(data: dict[str, Any]) -> Failure:
-    return Failure(Verdict(data["verdict"]), data["reason"], _portrait_from(data["portrait"]), data["error"])
-
-
-def _result(found: ChunkResult) -> dict[str, Any]:
-    return {
-        "result": {
-            "name": found.name,
-            "joints": found.joints,
-            "frames": found.frames,
-            "tallies": [[*key, _tally(tally)] for key, tally in found.tallies.items()],
-            "samples": found.samples,
-            "seconds": found.seconds,
-            "clock": asdict(found.clock),
-            "portrait": asdict(found.portrait) if found.portrait else None,
-        }
-    }
-
-
-def _read_result(data: dict[str, Any]) -> ChunkResult:
-    tallies: dict[Key, Tally] = {(row[0], row[1]): _read_tally(row[2]) for row in data["tallies"]}
-    return ChunkResult(
-        name=data["name"],
-        joints=tuple(data["joints"]),
-        frames=tuple(data["frames"]),
-        tallies=tallies,
-        samples=data["samples"],
-        seconds=data["seconds"],
-        clock=Clock(**data["clock"]),
-        portrait=_portrait_from(data["portrait"]) if data["portrait"] else None,
-    )
-
-
-def _portrait_from(data: dict[str, Any]) -> RobotSummary:
-    return RobotSummary(
-        data["model"], tuple(data["findings"]), tuple(data["chains"]), data.get("second_reader")
-    )
-
-
-def _tally(tally: Tally) -> list[Any]:
-    """Return the numbers in their order. JSON keeps a double exactly (shortest round-trip decimals)."""
-    case = tally.case
-    return [
-        tally.results,
-        tally.failed,
-        tally.worst,
-        tally.share,
-        [[index, count] for index, count in enumerate(tally.histogram) if count],
-        tally.by_frame,
-        None if case is None else [case.share, case.units, case.sample, case.frame, case.q, case.v, case.a],
-        tally.bounds,
-        asdict(tally.three_sides) if tally.three_sides else None,
-    ]
-
-
-def _read_tally(data: list[Any]) -> Tally:
-    results, failed, worst, share, counts, by_frame, case, bounds, witness = data
-    histogram = [0] * (len(HISTOGRAM_EDGES) + 1)
-    for index, count in counts:
-        histogram[index] = count
-    return Tally(
-        results,
-        failed,
-        worst,
-        share,
-        tuple(histogram),
-        tuple(by_frame),
-        None if case is None else WorstCase(*case[:4], *map(tuple, case[4:])),
-        (bounds[0], bounds[1]),
-        None if witness is None else _three_sides(witness),
-    )
-
-
-def _three_sides(data: dict[str, Any]) -> ThreeSides:
-    first, second, third = data["alone"]
-    pairs = Pair(**data["urdfkin"]), Pair(**data["pinocchio"])
-    return ThreeSides(data["by"], *pairs, (first, second, third), data["undecided"])

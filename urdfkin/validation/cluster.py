@@ -26,8 +26,9 @@ from urdfkin.urdf.sources import Origin
 from urdfkin.validation import remote
 from urdfkin.validation.answer import Answer, Failure, failure
 from urdfkin.validation.engines import DIED_TWICE, Enter, Task, Work, died, lost
-from urdfkin.validation.results import provenance, version
+from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
+from urdfkin.verify.oracles import version
 
 #: Chunks in flight: this number for each thread of the workers, so that no thread waits, and this many
 #: more.

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -34,15 +34,19 @@ class Pair:
     Attributes:
         failed: Number of results outside their bound.
         worst: The largest disagreement, in eps * scale of the second oracle's bound.
-        share: The largest ratio of a disagreement to its bound.
+        share_of_bound: The largest ratio of a disagreement to its bound.
     """
 
     failed: int = 0
     worst: float = 0.0
-    share: float = 0.0
+    share_of_bound: float = 0.0
 
     def __add__(self, other: Pair) -> Pair:
-        return Pair(self.failed + other.failed, max(self.worst, other.worst), max(self.share, other.share))
+        return Pair(
+            self.failed + other.failed,
+            max(self.worst, other.worst),
+            max(self.share_of_bound, other.share_of_bound),
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,17 +79,8 @@ class ThreeSides:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """Return plain data for JSON, with None for infinity."""
-        pairs = {
-            name: {
-                "failed": pair.failed,
-                "worst": pair.worst if np.isfinite(pair.worst) else None,
-                "share_of_bound": pair.share if np.isfinite(pair.share) else None,
-            }
-            for name, pair in (("urdfkin", self.urdfkin), ("pinocchio", self.pinocchio))
-        }
-        alone = dict(zip(SIDES, self.alone, strict=True))
-        return {"by": self.by, **pairs, "alone": alone, "undecided": self.undecided}
+        """Return the entry of a report."""
+        return asdict(self) | {"alone": dict(zip(SIDES, self.alone, strict=True))}
 
 
 def plus(first: ThreeSides | None, second: ThreeSides | None) -> ThreeSides | None:

@@ -12,13 +12,13 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
-from urdfkin.errors import InputError
+from urdfkin.system.documents import Layout, as_data, parse_json
 from urdfkin.urdf.sources import Origin
 from urdfkin.validation.chunk import Cut
-from urdfkin.validation.results import provenance, versions
+from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
+from urdfkin.verify.oracles import versions
 
 #: Name and version of the layout of a store.
 LAYOUT = "urdfkin-campaign/1"
@@ -70,49 +70,23 @@ class Manifest:
         """The key of each robot, with all settings."""
         settings = json.dumps([LAYOUT, self.samples, self.seed, self.provenance], sort_keys=True)
         return [
-            hashlib.sha256(f"{settings}\n{json.dumps(_robot(*robot))}".encode()).hexdigest()
+            hashlib.sha256(f"{settings}\n{json.dumps(as_data(robot))}".encode()).hexdigest()
             for robot in self.robots
         ]
 
     def as_json(self) -> bytes:
         """Return the bytes of the file."""
-        data = {
-            "layout": LAYOUT,
-            "started": self.started,
-            "samples": self.samples,
-            "seed": self.seed,
-            "provenance": self.provenance,
-            "versions": self.versions,
-            "robots": [_robot(*robot) for robot in self.robots],
-        }
-        return (json.dumps(data, indent=1) + "\n").encode()
+        return (json.dumps({"schema": LAYOUT} | as_data(self), indent=1) + "\n").encode()
 
     @classmethod
     def from_json(cls, content: bytes, where: str) -> Manifest:
         """Read a manifest from the bytes of a file.
 
         Raises:
-            InputError: The file is not a manifest, or has another layout.
+            InputError: The file is not JSON or not a manifest, or has another layout.
         """
-        try:
-            data = json.loads(content)
-            if data["layout"] != LAYOUT:
-                raise ValueError(f"the layout {data['layout']!r}")
-            return cls(
-                tuple(_read_robot(robot) for robot in data["robots"]),
-                int(data["samples"]),
-                int(data["seed"]),
-                {str(name): str(value) for name, value in data["provenance"].items()},
-                {str(name): str(value) for name, value in data["versions"].items()},
-                str(data["started"]),
-            )
-        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-            raise InputError(
-                f"not the manifest of a campaign ({LAYOUT})",
-                where=where,
-                found=f"{type(error).__name__}: {error}",
-                remedy="give a folder that `urdfkin validate ... --store DIR` made",
-            ) from error
+        layout = Layout(LAYOUT, cls, (), "urdfkin validate ROBOT --store DIR", is_open=True)
+        return layout.checked(parse_json(content, where), where)
 
     def differences(self, other: Manifest) -> list[str]:
         """Return the differences from another manifest with both values; empty if the chunks are the same."""
@@ -135,24 +109,6 @@ class Manifest:
 
 def _versions(subjects: Sequence[RobotInput]) -> dict[str, str]:
     return versions(subject.origin.oracle for subject in subjects)
-
-
-def _robot(origin: Origin, stamp: str) -> dict[str, Any]:
-    return {
-        "source": origin.source,
-        "mimic": origin.mimic,
-        "root_joint": origin.root_joint,
-        "xacro_args": [list(pair) for pair in origin.xacro_args],
-        "oracle": origin.oracle,
-        "sha256": stamp,
-    }
-
-
-def _read_robot(data: dict[str, Any]) -> tuple[Origin, str]:
-    arguments = tuple((str(name), str(value)) for name, value in data["xacro_args"])
-    return Origin(str(data["source"]), data["mimic"], data["root_joint"], arguments, data["oracle"]), str(
-        data["sha256"]
-    )
 
 
 def _short(value: object) -> str:

@@ -24,6 +24,14 @@ class Verdict(StrEnum):
 DISAGREEMENT, INPUT, UNCHECKED = 1, 2, 3
 #: Exit code of an interrupted run: 128 + SIGINT, as in shells.
 INTERRUPTED = 130
+#: The verdict of a run with each exit code.
+OUTCOMES = {
+    0: Verdict.VERIFIED.value,
+    DISAGREEMENT: Verdict.DISAGREES.value,
+    INTERRUPTED: "interrupted",
+    INPUT: Verdict.BAD_INPUT.value,
+    UNCHECKED: Verdict.NOT_VERIFIED.value,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +46,11 @@ class Outcome:
 
     exit_code: int
     reason: str | None
+
+    @property
+    def verdict(self) -> str:
+        """The verdict of the run: that of its worst robot, or "interrupted"."""
+        return OUTCOMES[self.exit_code]
 
     @property
     def passed(self) -> bool:

@@ -1,33 +1,31 @@
 """Report of a validation as data, and the versions that its numbers depend on.
 
-`ValidationReport.as_dict` returns the JSON document. Its layout is `SCHEMA`; a changed layout has another
-version number.
+`ValidationReport.as_dict` returns the JSON document, whose layout `urdfkin.validation.document` defines.
 """
 
 from __future__ import annotations
 
 import hashlib
-import math
-import platform
 import shlex
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from urdfkin.errors.display import Displayable, Table, TextDocument
+from urdfkin.system.documents import plain
 from urdfkin.system.files import read_bytes
-from urdfkin.system.lazy_import import hook, installed_version
+from urdfkin.system.lazy_import import hook
 from urdfkin.urdf.catalogue import examples
 from urdfkin.urdf.sources import Origin
+from urdfkin.validation.document import VALIDATION, Document
 from urdfkin.validation.error_stats import HISTOGRAM_EDGES, Key, Tally, WorstCase
 from urdfkin.validation.outcome import Outcome, Verdict, outcome
 from urdfkin.validation.robot_summary import NO_PORTRAIT, RobotSummary
 from urdfkin.validation.timings import Clock
-from urdfkin.verify.oracles import WITNESSES
-from urdfkin.verify.pinocchio_module import version as pinocchio_version
+from urdfkin.verify.oracles import version, versions
 from urdfkin.verify.quantities import QUANTITIES
 from urdfkin.verify.replay import replay_line
 
@@ -49,11 +47,6 @@ def provenance() -> dict[str, str]:
     return {name: version(name) for name in LIBRARIES} | {"code": _code(), "equations": equations}
 
 
-def version(package: str) -> str:
-    """Return the version of an installed package, or a text if it has none."""
-    return installed_version(package) or ("a checkout" if package == "urdfkin" else "not installed")
-
-
 def _code() -> str:
     digest = hashlib.sha256()
     for path in sorted(_PACKAGE.rglob("*")):
@@ -62,10 +55,6 @@ def _code() -> str:
             content = read_bytes(path)
             digest.update(f"{relative.as_posix()}\0{len(content)}\0".encode() + content)
     return digest.hexdigest()
-
-
-#: Name and version of the JSON layout: urdfkin/report/assets/validation-1.schema.json, docs/reports.md.
-SCHEMA = "urdfkin-validation/1"
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,26 +118,27 @@ class RobotReport:
         case = self.tallies[key].case
         return None if case is None else replay(self.origin, quantity, reference, case)
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self, judgement: Judgement | None = None) -> dict[str, Any]:
         """Return the robot's part of the JSON document."""
         return {
             "source": self.source,
             "name": self.name,
-            "verdict": self.verdict.value,
+            "verdict": self.verdict,
             "reason": self.reason,
             "error": self.error,
-            "joints": list(self.joints),
-            "frames": list(self.frames),
+            "joints": self.joints,
+            "frames": self.frames,
             "samples": self.samples,
             "results": self.results,
             "failed": self.failed,
             "seconds": round(self.seconds, 3),
             "timings": self.clock.as_dict() if self.clock else None,
             "model": self.portrait.model,
-            "findings": list(self.portrait.findings),
-            "chains": list(self.portrait.chains),
+            "findings": self.portrait.findings,
+            "chains": self.portrait.chains,
             "second_reader": self.portrait.second_reader,
             "checks": [self._check(key) for key in self.tallies],
+            "judge": judgement,
         }
 
     def _check(self, key: Key) -> dict[str, Any]:
@@ -160,34 +150,26 @@ class RobotReport:
             "reference": reference or None,
             "results": tally.results,
             "failed": tally.failed,
-            "median": _finite(tally.percentile(50.0)),
-            "p99": _finite(tally.percentile(99.0)),
-            "worst": _finite(tally.worst),
-            "share_of_bound": _finite(tally.share),
-            "bound": [_finite(k) for k in tally.bounds],
-            "histogram": list(tally.histogram),
+            "median": tally.percentile(50.0),
+            "p99": tally.percentile(99.0),
+            "worst": tally.worst,
+            "share_of_bound": tally.share,
+            "bound": tally.bounds,
+            "histogram": tally.histogram,
             "subjects": QUANTITIES[quantity].of,
-            "worst_by_subject": [_finite(units) for units in tally.by_frame],
+            "worst_by_subject": tally.by_frame,
             "worst_case": None
             if case is None
             else {
                 "sample": case.sample,
                 "frame": case.frame,
-                "disagreement": _finite(case.units),
-                "q": list(case.q),
-                "v": list(case.v),
-                "a": list(case.a),
+                "disagreement": case.units,
+                "q": case.q,
+                "v": case.v,
+                "a": case.a,
                 "replay": self.replay(key),
             },
         } | ({"witness": tally.three_sides.as_dict()} if tally.three_sides else {})
-
-
-def _finite(units: float) -> float | None:
-    """Return None for infinity, which JSON lacks.
-
-    Infinity stands for NaN, and for a difference of two values that must be equal.
-    """
-    return units if math.isfinite(units) else None
 
 
 def replay(origin: Origin, quantity: str, reference: str, case: WorstCase) -> str:
@@ -277,32 +259,28 @@ class ValidationReport(Displayable):
         """0: verified. 1: a disagreement. 130: interrupted. 2: bad input. 3: a robot was not verified."""
         return self.outcome.exit_code
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the JSON document."""
-        return {
-            "schema": SCHEMA,
+    def as_dict(self) -> Document:
+        """Return the JSON document. Infinity in a disagreement stands for NaN; it becomes None."""
+        judgements = iter(self.judgements)  # only compared robots have one
+        document = {
+            "schema": VALIDATION.name,
             "versions": self.made_by or versions(robot.origin.oracle for robot in self.robots),
+            "sha256": [robot.portrait.model and robot.portrait.model["sha256"] for robot in self.robots],
+            "verdict": self.outcome.verdict,
+            "command": self.command,
             "started": self.started,
             "seconds": round(self.seconds, 3),
             "seed": self.seed,
             "samples": self.samples,
-            "histogram_edges": HISTOGRAM_EDGES.tolist(),
+            "histogram_edges": HISTOGRAM_EDGES,
             "asked": self.asked,
             "interrupted": self.interrupted,
-            "passed": self.passed,
             "reason": self.outcome.reason,
-            "command": self.command,
-            "robots": self._robots(),
+            "robots": [
+                robot.as_dict(next(judgements, None) if robot.tallies else None) for robot in self.robots
+            ],
         }
-
-    def _robots(self) -> list[dict[str, Any]]:
-        """Return the data of each robot with its accuracy result. Only compared robots have one."""
-        judgements = iter(self.judgements)
-        entries = []
-        for robot in self.robots:
-            found = next(judgements, None) if robot.tallies else None
-            entries.append(robot.as_dict() | {"judge": found.as_dict() if found else None})
-        return entries
+        return cast("Document", plain(document))
 
 
 def _group_by_command(origins: Sequence[Origin]) -> list[list[Origin]]:
@@ -320,11 +298,3 @@ def _source_words(origins: Sequence[Origin]) -> str:
     if tuple(origin.source for origin in origins) == examples():
         return "--all"
     return shlex.join(origin.again for origin in origins)
-
-
-def versions(witnesses: Iterable[str | None] = ()) -> dict[str, str]:
-    """Return the versions of urdfkin, its libraries and all oracles."""
-    packages = ["urdfkin", "numpy", "numba", "yourdfpy", "example-robot-data"]
-    packages += sorted({WITNESSES[name].package for name in witnesses if name in WITNESSES})
-    found = {package: version(package) for package in packages}
-    return {"python": platform.python_version(), "pin": pinocchio_version()} | found

@@ -9,10 +9,9 @@ one for each set of moving joints. The tables are exact, in both conventions, an
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 
@@ -22,17 +21,17 @@ from urdfkin.errors import InputError
 from urdfkin.lint import Finding
 from urdfkin.model.ranges import NarrowedRange, narrowed_ranges
 from urdfkin.robot import Robot
+from urdfkin.system.documents import plain
 from urdfkin.urdf.catalogue import catalogue
+from urdfkin.validation.document import Chain, Model, Row, SecondReading
+from urdfkin.validation.document import Finding as FindingEntry
 from urdfkin.verify.pinocchio import Oracle
 from urdfkin.verify.sampling import draw
 from urdfkin.verify.second_reader import second_reading
 from urdfkin.verify.tables import check_table
 
-if TYPE_CHECKING:
-    from urdfkin.model.tree import Joint
 
-
-def describe(robot: Robot) -> dict[str, Any]:
+def describe(robot: Robot) -> Model:
     """Return plain data for JSON: coordinates, frames, and every joint with its placement, axis and limits.
 
     >>> import urdfkin
@@ -42,7 +41,7 @@ def describe(robot: Robot) -> dict[str, Any]:
     """
     tree = robot.tree
     narrowed = {one.joint: one for one in narrowed_ranges(tree)}
-    return {
+    data = {
         "name": robot.name,
         "source": robot.source,
         "path": robot.path,
@@ -53,12 +52,13 @@ def describe(robot: Robot) -> dict[str, Any]:
         "nv": robot.nv,
         "base": robot.base_frame,
         "tip": robot.tip_frame,
-        "coordinates": list(robot.coordinate_names),
-        "rates": list(robot.rate_names),
-        "frames": list(robot.frame_names),
-        "links": list(robot.link_names),
+        "coordinates": robot.coordinate_names,
+        "rates": robot.rate_names,
+        "frames": robot.frame_names,
+        "links": robot.link_names,
         "joints": [_joint(robot, i, narrowed) for i in range(len(tree.joints))],
     }
+    return cast("Model", plain(data))
 
 
 def _joint(robot: Robot, i: int, narrowed: dict[str, NarrowedRange]) -> dict[str, Any]:
@@ -66,15 +66,15 @@ def _joint(robot: Robot, i: int, narrowed: dict[str, NarrowedRange]) -> dict[str
     joint = tree.joints[i]
     return {
         "name": joint.name,
-        "kind": joint.kind.value,
+        "kind": joint.kind,
         "parent": tree.links[joint.parent],
         "child": tree.links[i + 1],
-        "placement": joint.T_parent_joint.tolist(),
-        "axis": joint.axis.tolist() if joint.kind.has_axis else None,
+        "placement": joint.T_parent_joint,
+        "axis": joint.axis if joint.kind.has_axis else None,
         "q": tree.q_index[i] if joint.kind.nq else None,
         "v": tree.v_index[i] if joint.kind.nv else None,
-        "limit": _limit(joint),
-        "mimic": asdict(joint.mimic) if joint.mimic else None,
+        "limit": joint.limit,
+        "mimic": joint.mimic,
         "kept": _remaining_range(narrowed.get(joint.name)),
     }
 
@@ -87,16 +87,7 @@ def _remaining_range(narrowed: NarrowedRange | None) -> dict[str, Any] | None:
     if narrowed is None:
         return None
     lower, upper = narrowed.kept or (None, None)
-    return {"lower": lower, "upper": upper, "by": list(narrowed.by)}
-
-
-def _limit(joint: Joint) -> dict[str, float | None] | None:
-    """Return the limits of a joint, with None for infinity, which JSON lacks."""
-    limit = joint.limit
-    if limit is None:
-        return None
-    named = {"lower": limit.lower, "upper": limit.upper, "velocity": limit.velocity, "effort": limit.effort}
-    return {name: value if math.isfinite(value) else None for name, value in named.items()}
+    return {"lower": lower, "upper": upper, "by": narrowed.by}
 
 
 #: Maximum number of chains in a summary; `urdfkin dh --all` lists all.
@@ -105,7 +96,7 @@ _SAMPLES = 10
 _CONVENTIONS = ("standard", "modified")
 
 
-def chains_of(robot: Robot, oracle: Oracle | None) -> tuple[dict[str, Any], ...]:
+def chains_of(robot: Robot, oracle: Oracle | None) -> tuple[Chain, ...]:
     """Return each chain as plain data for JSON: frames, both tables, and their disagreement with Pinocchio.
 
     Args:
@@ -120,7 +111,7 @@ def chains_of(robot: Robot, oracle: Oracle | None) -> tuple[dict[str, Any], ...]
             continue  # a planar or floating joint on the path has no row
         if any(table.rows for table in tables.values()):
             found.append({"limb": limb, "base": base, "tip": tip} | _with_check(robot, oracle, tables))
-    return tuple(found)
+    return tuple(plain(found))
 
 
 def _chains(robot: Robot) -> Iterator[tuple[str | None, str, str]]:
@@ -137,7 +128,10 @@ def _chains(robot: Robot) -> Iterator[tuple[str | None, str, str]]:
 
 
 def _with_check(robot: Robot, oracle: Oracle | None, tables: dict[str, DHTable]) -> dict[str, Any]:
-    data: dict[str, Any] = {name: _table(table) for name, table in tables.items()}
+    data: dict[str, Any] = {
+        name: {"rows": [_row(row) for row in table.rows], "base": table.base, "tool": table.tool}
+        for name, table in tables.items()
+    }
     if oracle is None:
         return data | {"samples": 0, "metres": None, "worst": None, "share_of_bound": None}
     drawn = draw(robot.tree, _SAMPLES, np.random.default_rng(0), with_special=True)
@@ -150,25 +144,8 @@ def _with_check(robot: Robot, oracle: Oracle | None, tables: dict[str, DHTable])
     }
 
 
-def _table(table: DHTable) -> dict[str, Any]:
-    return {
-        "rows": [_row(row) for row in table.rows],
-        "base": table.base.tolist(),
-        "tool": table.tool.tolist(),
-    }
-
-
 def _row(row: DHRow) -> dict[str, Any]:
-    return {
-        "joint": row.joint,
-        "kind": row.kind.value,
-        "a": row.a,
-        "alpha": row.alpha,
-        "beta": row.beta,
-        "d": row.d,
-        "theta": row.theta,
-        "sense": row.sense,
-    }
+    return {name: getattr(row, name) for name in Row.__annotations__}
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,17 +159,17 @@ class RobotSummary:
         second_reader: The comparison with yourdfpy's tree of the same text; None: not compared.
     """
 
-    model: dict[str, Any] | None = None
-    findings: tuple[dict[str, Any], ...] = ()
-    chains: tuple[dict[str, Any], ...] = ()
-    second_reader: dict[str, Any] | None = None
+    model: Model | None = None
+    findings: tuple[FindingEntry, ...] = ()
+    chains: tuple[Chain, ...] = ()
+    second_reader: SecondReading | None = None
 
     @classmethod
     def of(cls, robot: Robot, oracle: Oracle | None) -> RobotSummary:
         """Return the summary of a loaded robot. The tables are checked if Pinocchio accepts the robot."""
         mimic, added = robot.verifier.mimic, robot.root_joint is not None
-        reading = second_reading(robot.urdf, robot.tree, mimic=mimic, root_joint=added)
-        return cls(describe(robot), as_data(robot.findings), chains_of(robot, oracle), reading.as_dict())
+        reading = plain(second_reading(robot.urdf, robot.tree, mimic=mimic, root_joint=added).as_dict())
+        return cls(describe(robot), entries_of(robot.findings), chains_of(robot, oracle), reading)
 
     @property
     def disagreements(self) -> tuple[str, ...]:
@@ -203,7 +180,7 @@ class RobotSummary:
         return tuple(found)
 
 
-def chain_disagreement(chain: Mapping[str, Any]) -> str | None:
+def chain_disagreement(chain: Chain) -> str | None:
     """Return how the tables of a chain disagree with Pinocchio; None if they agree or were not compared."""
     share = chain["share_of_bound"]
     if not chain["samples"] or (share is not None and share <= 1.0):
@@ -213,7 +190,7 @@ def chain_disagreement(chain: Mapping[str, Any]) -> str | None:
     return f"the Denavit-Hartenberg tables from {chain['base']} to {chain['tip']} disagree: {how}{off}"
 
 
-def reader_disagreement(reading: Mapping[str, Any]) -> str | None:
+def reader_disagreement(reading: SecondReading) -> str | None:
     """Return how yourdfpy's tree differs from ours; None if it does not or was not compared."""
     if not reading["differences"]:
         return None
@@ -224,6 +201,6 @@ def reader_disagreement(reading: Mapping[str, Any]) -> str | None:
 NO_PORTRAIT = RobotSummary()
 
 
-def as_data(findings: Iterable[Finding]) -> tuple[dict[str, Any], ...]:
+def entries_of(findings: Iterable[Finding]) -> tuple[FindingEntry, ...]:
     """Return findings as plain data for JSON."""
-    return tuple(finding.as_dict() for finding in findings)
+    return tuple(cast("FindingEntry", finding.as_dict()) for finding in findings)

@@ -5,10 +5,9 @@ Also the comparison of results within a bound, its error, and the command that r
 
 from __future__ import annotations
 
-import math
 import os
-from dataclasses import asdict, dataclass, field
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Annotated, TypedDict, cast
 
 import numpy as np
 
@@ -17,10 +16,12 @@ from urdfkin.errors import UrdfkinError
 from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.errors.escape import json_text, log_line
 from urdfkin.model.tree import FloatArray
+from urdfkin.system.documents import Count, Header, Layout, Size, plain, says
 from urdfkin.system.files import at_home, write_file
 from urdfkin.system.locks import lock_over_forks
 from urdfkin.verify.bounds import Bound, result_k
 from urdfkin.verify.comparison import worst_of_each
+from urdfkin.verify.oracles import versions
 from urdfkin.verify.quantities import QUANTITIES
 
 #: Reason in certificates for results of calls with verify=False.
@@ -149,8 +150,34 @@ class Line:
     unchecked: int
 
 
-#: First keys of the JSON form.
-_HEAD = ("robot", "source", "reading", "sha256", "urdfkin", "oracle")
+class LineEntry(TypedDict):
+    """The results of one quantity."""
+
+    quantity: Annotated[str, says("Name of the quantity.")]
+    checked: Annotated[Count, says("Number of results that the oracle confirmed.")]
+    worst: Annotated[Size | None, says("Largest difference among them, in eps * scale; null: not finite.")]
+    share: Annotated[Size | None, says("Largest ratio of a difference to its bound; null: it is not finite.")]
+    unchecked: Annotated[Count, says("Number of results that were returned without a check.")]
+
+
+class CertificateDocument(Header):
+    """The checked results of a robot, their agreement with the oracle, and the unchecked results."""
+
+    robot: Annotated[str, says("The robot's name.")]
+    source: Annotated[str, says("Source: a path, a catalogue name, or <text>.")]
+    reading: Annotated[str, says("Result of the check of a conversion to URDF; empty for a URDF.")]
+    oracle: Annotated[str, says("Name and version of the oracle.")]
+    lines: Annotated[list[LineEntry], says("One line for each computed quantity.")]
+    not_verified: Annotated[list[str], says("Reasons for unchecked results; empty if all were checked.")]
+
+
+#: The layout of a saved certificate.
+CERTIFICATE = Layout(
+    "urdfkin-certificate/1",
+    CertificateDocument,
+    ("verified", "not verified"),
+    "robot.certificate().save(FILE)",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,7 +224,7 @@ class Certificate(Displayable):
             line.unchecked or not line.share <= 1.0 for line in self.lines
         )
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> CertificateDocument:
         """Return plain data for JSON; a value that is not finite becomes null.
 
         >>> import urdfkin
@@ -206,16 +233,17 @@ class Certificate(Displayable):
         >>> arm.certificate().as_dict()["lines"][0]["quantity"]
         'jacobian'
         """
-        lines = [asdict(line) for line in self.lines]
-        for line in lines:
-            line |= {key: None for key in ("worst", "share") if not math.isfinite(line[key])}
-        return {
-            "schema": "urdfkin-certificate/1",
-            **{name: getattr(self, name) for name in _HEAD},
-            "verified": self.verified,
-            "lines": lines,
-            "not_verified": list(self.not_verified),
+        document = {
+            "schema": CERTIFICATE.name,
+            "versions": versions() | ({"urdfkin": self.urdfkin} if self.urdfkin else {}),
+            "sha256": [self.sha256 or None],
+            "verdict": CERTIFICATE.verdicts[not self.verified],
+            "command": None,
+            **{name: getattr(self, name) for name in ("robot", "source", "reading", "oracle")},
+            "lines": self.lines,
+            "not_verified": self.not_verified,
         }
+        return cast("CertificateDocument", plain(document))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the certificate as JSON; after an error no partial file remains.

@@ -6,13 +6,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import platform
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from urdfkin.errors import UnknownNameError
 from urdfkin.errors.validators import as_str
-from urdfkin.system.lazy_import import lazy_import
+from urdfkin.system.lazy_import import installed_version, lazy_import
 
 #: Name of an oracle in arguments.
 WitnessName = Literal["pinocchio", "mujoco"]
@@ -84,3 +85,16 @@ def witness_of(name: object) -> Witness:
     if oracle is not PINOCCHIO:
         oracle.version()  # raises now, not at the first check
     return oracle
+
+
+def version(package: str) -> str:
+    """Return the version of an installed package, or a text if it has none."""
+    return installed_version(package) or ("a checkout" if package == "urdfkin" else "not installed")
+
+
+def versions(witnesses: Iterable[str | None] = ()) -> dict[str, str]:
+    """Return the versions of urdfkin, its libraries and all oracles."""
+    packages = ["urdfkin", "numpy", "numba", "yourdfpy", "example-robot-data"]
+    packages += sorted({WITNESSES[name].package for name in witnesses if name in WITNESSES})
+    found = {package: version(package) for package in packages}
+    return {"python": platform.python_version(), "pin": PINOCCHIO.version()} | found

@@ -1,0 +1,140 @@
+"""All documents share one header; their schemas are generated from types, which also judge what is read."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+from jsonschema import Draft202012Validator
+
+import urdfkin
+from tests.report.documents import arms
+from urdfkin.comparison.certificate import SAME, certificate
+from urdfkin.errors import InputError
+from urdfkin.report.compare import COMPARISON, compare
+from urdfkin.system.documents import Header, Layout, as_data, plain
+from urdfkin.validation.document import VALIDATION
+from urdfkin.verify.certificate import CERTIFICATE
+
+LAYOUTS: list[Layout[Any]] = [VALIDATION, COMPARISON, SAME, CERTIFICATE]
+
+
+@cache
+def _made(name: str) -> str:
+    if name == SAME.name:
+        return json.dumps(certificate(urdfkin.same("ur5", "ur5_limited", bounds=False), "urdfkin same"))
+    if name == CERTIFICATE.name:
+        robot = urdfkin.load("planar_two_link")
+        robot.placement(robot.neutral(), "tip")
+        robot.jacobian(robot.neutral(), "tip", verify=False)
+        return json.dumps(robot.certificate().as_dict())
+    if name == COMPARISON.name:
+        new = arms()
+        new["samples"] = 3
+        return json.dumps(compare(arms(), new).as_dict("urdfkin compare"))
+    return json.dumps(arms())
+
+
+def made(layout: Layout[Any]) -> Any:
+    """A document of a layout; a fresh copy each time."""
+    return json.loads(_made(layout.name))
+
+
+def ids(layout: Layout[Any]) -> str:
+    return layout.name
+
+
+@pytest.mark.parametrize("layout", LAYOUTS, ids=ids)
+def test_each_document_conforms_to_its_generated_schema_and_is_read_as_it_was_written(
+    layout: Layout[Any], tmp_path: Path
+) -> None:
+    schema = json.loads(layout.schema_text())
+    Draft202012Validator.check_schema(schema)
+    assert [e.message for e in Draft202012Validator(schema).iter_errors(made(layout))] == []
+    (tmp_path / "document.json").write_text(json.dumps(made(layout)))
+    assert layout.read(tmp_path / "document.json") == made(layout)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS, ids=ids)
+def test_each_document_begins_with_the_same_header(layout: Layout[Any]) -> None:
+    header = ["schema", "versions", "sha256", "verdict", "command"]
+    assert list(Header.__annotations__) == header
+    assert list(made(layout))[:5] == list(layout.schema()["properties"])[:5] == header
+    assert {"urdfkin", "pin", "python"} <= made(layout)["versions"].keys()
+    assert all(len(digest) == 64 for digest in made(layout)["sha256"])
+
+
+@pytest.mark.parametrize("layout", LAYOUTS, ids=ids)
+def test_every_entry_of_a_schema_is_described(layout: Layout[Any]) -> None:
+    schema = layout.schema()
+    for part in (schema, *schema["$defs"].values()):
+        assert part["description"]
+        for name, entry in part["properties"].items():
+            assert "description" in entry or "$ref" in entry or name in ("metres", "radians"), name
+
+
+@pytest.mark.parametrize("layout", LAYOUTS, ids=ids)
+@pytest.mark.parametrize(
+    ("entry", "value", "said"),
+    [
+        ("versions", {"pin": 4}, "$.versions"),
+        ("sha256", ["0"], "$.sha256[0]"),
+        ("sha256", None, "$.sha256"),
+        ("verdict", "fine", "$.verdict: 'fine' is none of"),
+        ("command", 1, "$.command"),
+    ],
+)
+def test_a_wrong_header_is_refused_with_the_place_and_what_to_do(
+    layout: Layout[Any], entry: str, value: object, said: str
+) -> None:
+    with pytest.raises(InputError) as error:
+        layout.checked(made(layout) | {entry: value}, "a.json")
+    assert str(error.value).startswith(f"a.json: does not conform to the layout {layout.name}: found $")
+    assert said in str(error.value)
+    assert error.value.remedy == f"write it again with: {layout.made_by}"
+    schema = Draft202012Validator(layout.schema())
+    assert not schema.is_valid(made(layout) | {entry: value})
+
+
+@pytest.mark.parametrize("layout", LAYOUTS, ids=ids)
+def test_another_layout_and_an_unknown_version_are_two_errors(layout: Layout[Any]) -> None:
+    family, _, version = layout.name.rpartition("/")
+    with pytest.raises(InputError, match=f"unknown version of the layout {family}.*reads version {version}:"):
+        layout.checked({"schema": f"{family}/99"}, "a.json")
+    others: list[Any] = [None, [], "text", {}, {"schema": None}, {"schema": "other/1"}, {"schema": {"a": 1}}]
+    for data in others:
+        with pytest.raises(InputError, match=f"not a file with the layout {layout.name}.*write one with: "):
+            layout.checked(data, "a.json")
+
+
+@pytest.mark.parametrize("layout", [COMPARISON, SAME, CERTIFICATE], ids=ids)
+def test_an_unknown_entry_of_a_certificate_is_refused_with_its_place(layout: Layout[Any]) -> None:
+    with pytest.raises(InputError, match=r"found \$: unknown entry 'more'"):
+        layout.checked(made(layout) | {"more": 1}, "a.json")
+
+
+def test_an_unknown_entry_is_refused_however_deep_it_is() -> None:
+    document = made(SAME)
+    document["remarks"][1]["words"] = "a sentence"
+    with pytest.raises(InputError, match=r"found \$\.remarks\[1\]: unknown entry 'words'"):
+        SAME.checked(document, "a.json")
+    assert not Draft202012Validator(SAME.schema()).is_valid(document)
+
+
+@pytest.mark.parametrize(
+    "text", ["NaN", "-Infinity", "1e999", "[" * 100_000, "1" + "0" * 5000, "{", "", "\udc80", '"\x00']
+)
+@pytest.mark.parametrize("layout", LAYOUTS, ids=ids)
+def test_no_file_that_is_no_json_is_read(layout: Layout[Any], text: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.json"
+    path.write_bytes(text.encode("utf-8", "surrogateescape"))
+    with pytest.raises(InputError, match="not a JSON file"):
+        layout.read(path)
+
+
+def test_data_has_no_infinity_and_keeps_names_that_are_not_text() -> None:
+    assert plain({"a": (float("inf"), float("nan"), -0.0, "\udc80")}) == {"a": [None, None, -0.0, "\udc80"]}
+    assert as_data({"a": float("inf")}) == {"a": float("inf")}

@@ -1,0 +1,229 @@
+"""JSON documents as types: the header that all share, their schemas, and one way to write and read them.
+
+A `Layout` is a kind of document. Its type (a `TypedDict`) defines the entries; the JSON Schema is generated
+from it, and a document from a file is checked against it. `plain` turns results into documents.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Generic, TypedDict, TypeVar, cast
+
+import msgspec
+from msgspec import Meta
+
+from urdfkin.errors import InputError
+from urdfkin.system.files import MOST_DATA, read_bytes
+
+_T = TypeVar("_T")
+
+
+def says(text: str) -> Meta:
+    """Return the description of an entry for the schema."""
+    return Meta(description=text)
+
+
+def of_length(n: int) -> Meta:
+    """Return the constraint that a list has n entries."""
+    return Meta(min_length=n, max_length=n)
+
+
+#: A number of things.
+Count = Annotated[int, Meta(ge=0)]
+#: A number that is 0 or larger.
+Size = Annotated[float, Meta(ge=0)]
+#: 4 x 4 homogeneous transform as a list of rows, metres.
+Matrix = Annotated[
+    list[Annotated[list[float], of_length(4)]],
+    of_length(4),
+    says("4 x 4 homogeneous transform as a list of rows, metres."),
+]
+#: The SHA-256 of a text.
+Sha256 = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
+
+
+class Header(TypedDict):
+    """The first entries of every certificate and report: its layout, its verdict and the basis of both."""
+
+    schema: Annotated[str, says("Name and version of this layout.")]
+    versions: Annotated[
+        dict[str, str], says("Versions of urdfkin, its libraries and the oracles: package to version.")
+    ]
+    sha256: Annotated[
+        list[Sha256 | None],
+        says(
+            "SHA-256 of each robot's text as UTF-8, or of its MJCF file, in the document's order; "
+            "null: unknown."
+        ),
+    ]
+    verdict: Annotated[str, says("The verdict.")]
+    command: Annotated[
+        str | None,
+        says(
+            "The command that makes the document again; null: unknown. Each set of options has its own line, "
+            "and so has each robot that was given as text (`-`: standard input)."
+        ),
+    ]
+
+
+@dataclass(frozen=True, slots=True)
+class Layout(Generic[_T]):
+    """A kind of document.
+
+    Attributes:
+        name: Name and version, the value of the entry "schema".
+        type: The type of the document.
+        verdicts: The possible verdicts; empty for a document without a header.
+        made_by: The command that writes such a document.
+        is_open: Whether a document may have entries that the type lacks, from a later version of urdfkin.
+    """
+
+    name: str
+    type: type[_T]
+    verdicts: tuple[str, ...]
+    made_by: str
+    is_open: bool = False
+
+    def schema(self) -> dict[str, Any]:
+        """Return the JSON Schema (draft 2020-12), with the entries in the order of the types."""
+        parts: dict[str, Any] = msgspec.json.schema(self.type)["$defs"]
+        for name, part in parts.items():
+            entries = getattr(sys.modules[self.type.__module__], name).__annotations__
+            part["properties"] = {entry: part["properties"][entry] for entry in entries}
+            part["description"] = " ".join(part["description"].split())
+            if not self.is_open:
+                part["additionalProperties"] = False
+        whole: dict[str, Any] = parts.pop(self.type.__name__)
+        whole["properties"]["schema"]["const"] = self.name
+        whole["properties"]["verdict"]["enum"] = list(self.verdicts)
+        head = {
+            "$schema": "https://json-schema.org/draft/2020-12/schema",
+            "$id": f"urn:{self.name.replace('-', ':').replace('/', ':')}",
+        }
+        return head | whole | {"title": self.name, "$defs": parts}
+
+    def schema_text(self) -> str:
+        """Return the JSON Schema as the text of a file."""
+        return json.dumps(self.schema(), indent=2) + "\n"
+
+    def read(self, path: Path) -> _T:
+        """Read a document from a file.
+
+        Raises:
+            SourceError: The file cannot be read.
+            InputError: The file is not JSON, or its content is refused by `checked`.
+        """
+        return self.checked(read_json(path), str(path))
+
+    def checked(self, data: object, where: str) -> _T:
+        """Return plain data as a document of this layout.
+
+        Args:
+            data: The content of the file.
+            where: The file.
+
+        Raises:
+            InputError: The data has another layout or version, or does not conform to this one.
+        """
+        self._demand_name(data, where)
+        try:
+            document = typed(data, self.type)
+        except ValueError as error:
+            claim, _, place = str(error).partition(" - at ")
+            raise self._refusal(where, place.strip("`") or "$", claim) from None
+        if not self.is_open and (entry := _unknown_entry(data, document)) is not None:
+            raise self._refusal(where, *entry)
+        if self.verdicts and (verdict := cast("Header", document)["verdict"]) not in self.verdicts:
+            raise self._refusal(where, "$.verdict", f"{verdict!r} is none of {', '.join(self.verdicts)}")
+        return document
+
+    def _demand_name(self, data: object, where: str) -> None:
+        """Raise InputError if data has another layout, or another version of this one."""
+        found = data.get("schema") if isinstance(data, dict) else None
+        if found == self.name:
+            return
+        family, _, version = self.name.rpartition("/")
+        if isinstance(found, str) and found.startswith(f"{family}/"):
+            raise InputError(
+                f"unknown version of the layout {family}",
+                where=where,
+                found=repr(found),
+                remedy=f"this urdfkin reads version {version}: write the file again with: {self.made_by}",
+            )
+        raise InputError(
+            f"not a file with the layout {self.name}",
+            where=where,
+            found=repr(found) if found else "no 'schema' entry",
+            remedy=f"write one with: {self.made_by}",
+        )
+
+    def _refusal(self, where: str, place: str, claim: str) -> InputError:
+        return InputError(
+            f"does not conform to the layout {self.name}",
+            where=where,
+            found=f"{place}: {claim}",
+            remedy=f"write it again with: {self.made_by}",
+        )
+
+
+def _unknown_entry(data: Any, document: Any, place: str = "$") -> tuple[str, str] | None:
+    """Return the place of an entry that a type lacks; None if there is none."""
+    if isinstance(data, dict):
+        if unknown := [name for name in data if name not in document]:
+            return place, f"unknown entry {unknown[0]!r}"
+        pairs = [(data[name], document[name], f"{place}.{name}") for name in data]
+    elif isinstance(data, list):
+        pairs = [(*both, f"{place}[{i}]") for i, both in enumerate(zip(data, document, strict=True))]
+    else:
+        return None
+    return next((found for pair in pairs if (found := _unknown_entry(*pair)) is not None), None)
+
+
+def as_data(value: Any) -> Any:
+    """Return a result as objects, lists and numbers: `typed` reads it back. Infinity stays infinity."""
+    return msgspec.to_builtins(value, enc_hook=lambda x: str(x) if isinstance(x, str) else x.tolist())
+
+
+def typed(data: object, type_: type[_T]) -> _T:
+    """Return data as an object of a type; raise ValueError with the place of an entry that does not fit."""
+    try:
+        return msgspec.convert(data, type_)
+    except msgspec.ValidationError as error:
+        raise ValueError(str(error)) from error
+
+
+def plain(value: Any) -> Any:
+    """Return a result as plain data for JSON.
+
+    Data classes become objects, enums their values, arrays and tuples lists; infinity and NaN, which JSON
+    lacks, become None.
+
+    >>> plain({"worst": math.inf, "frames": ("a", "b")})
+    {'worst': None, 'frames': ['a', 'b']}
+    """
+    return json.loads(json.dumps(as_data(value)), parse_constant=lambda _: None)
+
+
+def read_json(path: Path) -> object:
+    """Read a JSON file. Raise SourceError, or InputError if it is not JSON."""
+    return parse_json(read_bytes(path, MOST_DATA, pipes=True), str(path))
+
+
+def parse_json(content: bytes, where: str) -> object:
+    """Parse the content of a file. Raise InputError if it is not JSON, or has a number beyond a double."""
+    try:
+        return json.loads(content, parse_constant=_number, parse_float=_number)
+    except (ValueError, RecursionError) as error:
+        raise InputError("not a JSON file", where=where, found=str(error)) from error
+
+
+def _number(word: str) -> float:
+    """Parse a number. Reject infinity, NaN and numbers too large for a double."""
+    number = float(word)
+    if not math.isfinite(number):
+        raise ValueError(f"{word[:20]} is not a finite number")
+    return number
