@@ -177,9 +177,9 @@ def picture() -> str:
         )
         lines += [
             f'<rect x="6" y="{y}" width="{own + _CELL - 8}" height="{_ROW - 4}" rx="5" fill="#eef2f7"/>',
-            f'<rect x="6" y="{y}" width="{_LEFT - 16}" height="{_ROW - 4}" rx="5" fill="#2f5d8a"/>',
+            f'<rect x="6" y="{y}" width="{_LEFT - 16}" height="{_ROW - 4}" rx="5" fill="#0072B2"/>',
             f'<text x="14" y="{y + 18}" fill="#ffffff" font-weight="bold">{package.name}</text>',
-            f'<rect x="{own + 4}" y="{y + 5}" width="16" height="16" rx="3" fill="#2f5d8a"/>',
+            f'<rect x="{own + 4}" y="{y + 5}" width="16" height="16" rx="3" fill="#0072B2"/>',
             f'<text x="{own + _CELL + 8}" y="{y + 18}" fill="#222222">{purpose}</text>',
             f'<text transform="translate({own + 16} {_TOP - 8}) rotate(-90)" fill="#666">'
             f"{package.name}</text>",
@@ -187,7 +187,7 @@ def picture() -> str:
     for below, above in sorted((place[one], place[other]) for one, other in arrows()):
         x, y = _LEFT + _CELL * above + _CELL // 2, _TOP + _ROW * below + 13
         said = f"{PACKAGES[below].name} imports {PACKAGES[above].name}"
-        lines.append(f'<circle cx="{x}" cy="{y}" r="5" fill="#c8553d"><title>{said}</title></circle>')
+        lines.append(f'<circle cx="{x}" cy="{y}" r="5" fill="#D55E00"><title>{said}</title></circle>')
     return "\n".join((*lines, "</svg>", ""))
 
 

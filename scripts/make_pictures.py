@@ -20,23 +20,23 @@ import numpy as np
 from PIL import Image
 
 import urdfkin
-from scripts.make_tour import IMAGES, INK, QUIET, RED, STYLE, arrow
+from scripts.make_tour import IMAGES, INK, QUIET, STYLE, arrow
 from tests.report.browser import Browser, opened
 from urdfkin.kinematics.inputs import FloatArray
 from urdfkin.report.html import as_html
+from urdfkin.view.figure import GREEN, VERMILION
 from urdfkin.view.server import new_server
 from urdfkin.view.viewer import Viewer
 
 if TYPE_CHECKING:
     pass
 
-GREEN = "#3a8a4d"
 POSE = [0.0, -0.8, 0.0, -2.4, 0.0, 1.6, 0.8, 0.04]
 
 
 def _axes(axes: Any, at: FloatArray, R: FloatArray) -> None:
     """Draw two axes in red and green."""
-    for k, color in enumerate((RED, GREEN)):
+    for k, color in enumerate((VERMILION, GREEN)):
         arrow(axes, at, 0.17 * R[:, k], color)
         axes.text(
             *(at + 0.2 * R[:, k] + 0.045 * R[:, 1 - k]),
@@ -68,7 +68,7 @@ def reference_frames() -> Any:
         _axes(axes, at, R)
         numbers = arm.velocity(q, v, "tip", reference)[:2]
         arrow(axes, at, 0.6 * R @ numbers, INK)
-        for k, color in enumerate((RED, GREEN)):  # the two components of the arrow, along the axes
+        for k, color in enumerate((VERMILION, GREEN)):  # the two components of the arrow, along the axes
             begin = at + (0.6 * R[:, 0] * numbers[0] if k else 0)
             axes.plot(
                 *np.array([begin, begin + 0.6 * R[:, k] * numbers[k]]).T, color=color, linewidth=1.2, ls="--"

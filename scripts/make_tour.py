@@ -28,11 +28,11 @@ from urdfkin.kinematics.rotation import (
     rotation_of,
     turning_vector_rate,
 )
+from urdfkin.view.figure import BLUE, GREEN, ORANGE, PURPLE, VERMILION
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
 INK, QUIET = "#1b2a3a", "#8a97a6"
-RED, GREEN, BLUE, ORANGE, VIOLET = "#c1443c", "#3a8a4d", "#2f6fb3", "#d08a1d", "#7a55a8"
-AXES = (RED, GREEN, BLUE)
+AXES = (VERMILION, GREEN, BLUE)
 
 STYLE: Any = {
     "font.size": 10,
@@ -86,10 +86,10 @@ def one_link(figure: Any) -> None:
     for theta, ink in ((0.3, "#c3ccd6"), (1.1, "#8fa0b3"), (2.0, INK)):
         tip = link_endpoint(theta, a1)
         axes.plot([0, tip[0]], [0, tip[1]], color=ink, linewidth=5, solid_capstyle="round")
-        arrow(axes, tip, 0.4 * link_endpoint_velocity(theta, rate, a1), RED)
+        arrow(axes, tip, 0.4 * link_endpoint_velocity(theta, rate, a1), VERMILION)
     axes.plot(0, 0, "o", color=INK, markersize=8)
     axes.set(xlim=(-1.1, 1.15), ylim=(-0.95, 1.3))
-    plane(axes, "7.2: the endpoint's velocity is along y1: a1 times the joint velocity")
+    plane(axes, "7.2: the endpoint's velocity is along y1:\na1 times the joint velocity")
 
 
 def velocity_field(figure: Any) -> None:
@@ -111,8 +111,9 @@ def velocity_field(figure: Any) -> None:
     axes.quiver(*(-k), *(2 * k), color=INK, arrow_length_ratio=0.06, linewidth=2)
     axes.text(*(1.08 * k), "w")
     circle = rotation_about(k, np.linspace(0, 2 * np.pi, 100)) @ np.array([0.9, -0.5, 0.0])
-    axes.plot(*circle.T, color=RED, linewidth=1.2)
-    axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1), xlabel="x0", ylabel="y0", zlabel="z0")
+    axes.plot(*circle.T, color=VERMILION, linewidth=1.2)
+    axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1), xlabel="x0 [m]", ylabel="y0 [m]", zlabel="z0 [m]")
+    axes.set(xticks=(-1, 0, 1), yticks=(-1, 0, 1), zticks=(-1, 0, 1))
     axes.set_box_aspect((1, 1, 1))
     axes.view_init(elev=24, azim=-58)
     axes.set_title("7.21: the velocity of every point is w x p")
@@ -155,13 +156,16 @@ def euler_singularity(figure: Any) -> None:
     """Draw the condition number of Omega over the middle angle, for ZYZ and roll-pitch-yaw."""
     axes = figure.subplots()
     middle = np.linspace(0.0, np.pi, 1801)[1:-1]
-    for name, color, label in (("ZYZ", BLUE, "ZYZ"), ("xyz", ORANGE, "roll, pitch, yaw")):
+    for name, color, dashes, label in (
+        ("ZYZ", BLUE, "-", "ZYZ"), ("xyz", ORANGE, "--", "roll, pitch, yaw"),
+    ):  # fmt: skip
         turns = np.stack((np.zeros_like(middle), middle, np.zeros_like(middle)), axis=-1)
         good = np.abs(np.cos(middle) if name == "xyz" else np.sin(middle)) > 1e-9
         axes.semilogy(
             np.degrees(middle[good]),
             euler_condition(name, turns[good]),
             color=color,
+            linestyle=dashes,
             label=label,
             linewidth=2,
         )
@@ -213,18 +217,26 @@ def acceleration_parts(figure: Any) -> None:
     tip = arm.R_0_1 @ p_1
     reach = arm.R_0_1 @ [1.35, 0, 0]
     axes.plot([0, reach[0]], [0, reach[1]], color="#c3ccd6", linewidth=7, solid_capstyle="round", zorder=1)
-    names = (("transverse", BLUE), ("centripetal", RED), ("coriolis", ORANGE), ("relative", GREEN))
+    names = (("transverse", BLUE), ("centripetal", VERMILION), ("coriolis", ORANGE), ("relative", GREEN))
     at = tip
     for name, color in names:
         vector = 0.35 * getattr(parts, name)
         arrow(axes, at[:2], vector[:2], color, name)
+        _named(axes, at + 0.5 * vector, vector if name in ("transverse", "relative") else -vector, name)
         at = at + vector
     arrow(axes, tip[:2], 0.35 * parts.total[:2], INK, "the sum")
+    _named(axes, tip + 0.09 * parts.total, -parts.total, "the sum")
     axes.plot(*tip[:2], "o", color=INK, markersize=8, zorder=5)
     axes.plot(0, 0, "o", color=INK, markersize=8)
-    axes.set(xlim=(-0.45, 1.45), ylim=(-0.2, 1.75))
-    axes.legend(loc="lower right")
+    axes.set(xlim=(-0.75, 1.45), ylim=(-0.2, 1.75))
     plane(axes, "7.125: the terms of a slider's acceleration, and their sum")
+
+
+def _named(axes: Any, at: FloatArray, along: FloatArray, name: str) -> None:
+    """Write a name to the right of an arrow, so that its colour is not the only key."""
+    side = np.array([along[1], -along[0]]) / np.linalg.norm(along)
+    place = at[:2] + 0.04 * side
+    axes.text(*place, name, ha="left" if side[0] > 0.0 else "right", va="center", fontsize=9)
 
 
 def two_link(figure: Any) -> None:
@@ -237,9 +249,9 @@ def two_link(figure: Any) -> None:
         joints = robot.placement(q, ["link_1", "link_2", "tip"])[:, :2, 3]
         axes.plot(*joints.T, "-o", color=ink, linewidth=4, markersize=6, solid_capstyle="round", zorder=2)
         ellipse = joints[-1][:, np.newaxis] + 0.22 * robot.jacobian(q, "tip")[:2] @ circle
-        axes.plot(*ellipse, color=VIOLET, linewidth=1.4, zorder=3)
+        axes.plot(*ellipse, color=PURPLE, linewidth=1.4, zorder=3)
         velocity = 0.22 * robot.velocity(q, [0.6, 0.8], "tip")[:2]
-        arrow(axes, joints[-1], velocity, RED)
+        arrow(axes, joints[-1], velocity, VERMILION)
     axes.set(xlim=(-0.25, 1.1), ylim=(-0.1, 0.95))
     plane(axes, "7.90: the tip's velocities for joint velocities of norm 1")
 
@@ -254,14 +266,17 @@ def breakdown(figure: Any) -> None:
     )
     parts = robot.acceleration_breakdown(q, v, a, "tool")
     axes = figure.subplots(1, 3, sharey=True)
-    colors = (BLUE, RED, ORANGE, GREEN)
+    colors, hatches = (BLUE, VERMILION, ORANGE, GREEN), ("", "////", "--", "\\\\\\\\")
     for component, panel in enumerate(axes):
         for j in range(len(parts.joints)):
             above = below = 0.0
             for k, color in enumerate(colors):
                 value = float(parts.terms[j, k, component])
                 base = above if value >= 0 else below
-                panel.bar(j, value, bottom=base, color=color, width=0.7, label=KINDS[k] if j == 0 else None)
+                panel.bar(
+                    j, value, bottom=base, color=color, width=0.7, hatch=hatches[k], edgecolor="white",
+                    linewidth=0, label=KINDS[k] if j == 0 else None,
+                )  # fmt: skip
                 above, below = (above + value, below) if value >= 0 else (above, below + value)
         panel.axhline(0, color=QUIET, linewidth=0.8)
         total = float(parts.total[component])
@@ -269,7 +284,7 @@ def breakdown(figure: Any) -> None:
         panel.set_title(f"{'xyz'[component]}0: sum {total:+.2f}")
         panel.set_xticks(range(6), [str(j + 1) for j in range(6)])
         panel.set_xlabel("joint")
-    axes[0].set_ylabel("linear acceleration [m/s^2]")
+    axes[0].set_ylabel("linear acceleration [m/s²]")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
     figure.suptitle("7.130: the tool's acceleration by joint and term", fontsize=11)
 

@@ -7,11 +7,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from urdfkin.view.figure import new_figure, save, style
+from urdfkin.view.figure import BLUE, GREEN, VERMILION, new_figure, save, style
 
-#: Okabe and Ito's colours, distinguishable with every colour vision deficiency; greys for others and the
-#: floor.
-OURS, THEIRS, CEILING, OTHERS, FLOOR = "#0072B2", "#D55E00", "#009E73", "#999999", "#CCCCCC"
+#: The start of a contender's name -> its colour, its hatch and its name in the key; the last is for others.
+KINDS = {
+    "urdfkin": (BLUE, "", "urdfkin"),
+    "Pinocchio": (VERMILION, "////", "Pinocchio"),
+    "generated": (GREEN, "--", "generated code"),
+    "output": ("#CCCCCC", "", "writing the output only"),
+    "": ("#999999", "\\\\\\\\", "others"),
+}
 MARKS = {"jacobian": ("o", "-"), "acceleration": ("s", "--")}
 TITLES = {"jacobian": "Jacobian", "acceleration": "acceleration"}
 
@@ -26,13 +31,16 @@ def draw(figures: Mapping[str, Any], path: Path) -> bytes:
         InputError: no matplotlib, or a suffix other than svg, png, pdf.
     """
     rows = figures["rows"]
-    with style(font_size=8, svg_fonttype="none"):
-        figure = new_figure(11.0, 7.0)  # as wide as the longest name and title beside it
-        axes = figure.subplots(2, 2, height_ratios=[1.35, 1.0])
-        for panel, quantity in zip(axes[0], MARKS, strict=True):
-            _bars(panel, _chosen(rows, "batch", quantity), quantity)
-        _growth(axes[1][0], rows, "joints", "joints of a chain", "ns for one joint")
-        _growth(axes[1][1], rows, "sizes", "configurations in a batch", "ns for one configuration")
+    with style(font_size=11, svg_fonttype="none", hatch_linewidth=0.8):
+        figure = new_figure(11.0, 12.0)  # as wide as the longest name and title beside it
+        grid = figure.add_gridspec(3, 2, height_ratios=[1.2, 1.2, 1.0])
+        for row, quantity in enumerate(MARKS):
+            bars = figure.add_subplot(grid[row, :])
+            _bars(bars, _chosen(rows, "batch", quantity), quantity)
+        if rows:
+            bars.legend(frameon=False, loc="upper right")
+        _growth(figure.add_subplot(grid[2, 0]), rows, "joints", "joints of a chain", "joint")
+        _growth(figure.add_subplot(grid[2, 1]), rows, "sizes", "configurations in a batch", "configuration")
         return _light(save(figure, path)) if path.suffix == ".svg" else save(figure, path)
 
 
@@ -49,39 +57,44 @@ def _chosen(rows: Sequence[Entry], section: str, quantity: str) -> list[Entry]:
     return [row for row in found if section == "joints" or row["robot"] == found[0]["robot"]]
 
 
-def _colour(who: str) -> str:
-    kinds = {"urdfkin": OURS, "Pinocchio": THEIRS, "generated": CEILING, "output": FLOOR}
-    return next((colour for word, colour in kinds.items() if who.startswith(word)), OTHERS)
-
-
 def _bars(axes: Any, rows: Sequence[Entry], quantity: str) -> None:
     """Draw the fastest on top, on a logarithmic scale: the slowest takes two hundred times as long."""
     ordered = sorted(rows, key=lambda row: -float(row["median_ns"]))
     costs = [row["median_ns"] for row in ordered]
     names = [row["who"] for row in ordered]
-    axes.barh(names, costs, color=[_colour(name) for name in names], height=0.7)
+    kinds = [next(word for word in KINDS if name.startswith(word)) for name in names]
+    for word, (colour, hatch, name) in KINDS.items():
+        places = [i for i, kind in enumerate(kinds) if kind == word]
+        if places:
+            axes.barh(
+                places, [costs[i] for i in places], color=colour, hatch=hatch, edgecolor="white", linewidth=0,
+                height=0.7, label=name,
+            )  # fmt: skip
+    axes.set_yticks(range(len(names)), names)
     for i, cost in enumerate(costs):
-        axes.text(cost * 1.1, i, f"{cost:,.0f}" if cost >= 10 else f"{cost:.1f}", va="center", fontsize=7)
+        axes.text(cost * 1.1, i, f"{cost:,.0f}" if cost >= 10 else f"{cost:.1f}", va="center")
+    axes.set_xlabel("time [ns]")
     axes.set_xscale("log")
     axes.set_xlim(0.5 * min(costs, default=1.0), 6 * max(costs, default=1.0))
     _plain_powers(axes)
     robot = rows[0]["robot"] if rows else ""
-    axes.set_title(f"{robot}, {TITLES[quantity]}: ns for one configuration", loc="left", fontsize=9)
+    axes.set_title(f"{robot}, {TITLES[quantity]}: time for one configuration", loc="left", fontsize=12)
 
 
-def _growth(axes: Any, rows: Sequence[Entry], section: str, label: str, cost: str) -> None:
+def _growth(axes: Any, rows: Sequence[Entry], section: str, label: str, one: str) -> None:
     for quantity, (mark, line) in MARKS.items():
         chosen = [row for row in _chosen(rows, section, quantity) if row["who"].startswith("urdfkin")]
         sizes = [row["size"] for row in chosen]
         costs = [row["median_ns"] / (row["size"] if section == "joints" else 1) for row in chosen]
-        axes.plot(sizes, costs, color=OURS, marker=mark, linestyle=line, label=TITLES[quantity])
+        axes.plot(sizes, costs, color=BLUE, marker=mark, linestyle=line, label=TITLES[quantity])
     axes.set_xscale("log")
     _plain_powers(axes)
     if sizes := sorted({row["size"] for row in rows if row["section"] == section}):
         axes.set_xticks(sizes, [f"{size:,}" for size in sizes])
-    axes.set_ylim(bottom=0.0)
+    axes.set_ylim(0.0, 1.1 * max(float(axes.dataLim.y1), 1.0) if rows else None)
     axes.set_xlabel(label)
-    axes.set_title(f"urdfkin, 1 thread: {cost}", loc="left", fontsize=9)
+    axes.set_ylabel("time [ns]")
+    axes.set_title(f"urdfkin, 1 thread: time for one {one}", loc="left", fontsize=12)
     axes.legend(frameon=False)
 
 

@@ -19,9 +19,9 @@ from numpy.typing import ArrayLike
 from urdfkin.dh.table import Convention, DHTable
 from urdfkin.errors import InputError
 from urdfkin.model.tree import FloatArray
-from urdfkin.view.figure import label, new_figure, style
+from urdfkin.view.figure import BLUE, ORANGE, VERMILION, label, new_figure, style
 
-_X, _Z, _D, _A, _AXIS, _TEXT = "#c0392b", "#2456a6", "#6b7280", "#d97904", "#9aa7b5", "#222222"
+_X, _Z, _D, _A, _AXIS, _TEXT = VERMILION, BLUE, "#6b7280", ORANGE, "#9aa7b5", "#222222"
 
 #: View direction in degrees: elevation above the base's x-y plane, and azimuth about its z axis.
 _ELEVATION, _AZIMUTH = 20.0, -55.0

@@ -35,6 +35,14 @@ PAGE_COLOURS = {
 TEXT, GRID, FIRST, SECOND, THIRD = PAGE_COLOURS
 FORMATS = ("svg", "png", "pdf")
 
+#: Okabe and Ito's colours, distinguishable with every colour vision deficiency. A sign, a dash or a place
+#: says the same, because some readers see no colour.
+BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK = COLOURS = (
+    "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000",
+)  # fmt: skip
+#: Colour of a number that is wrong or outside its limits; it always comes with a cross.
+BAD = "#B00020"
+
 _STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "urdfkin",

@@ -8,7 +8,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from urdfkin.motion.frame_motion import FrameMotion
 from urdfkin.motion.trajectory import Trajectory
 from urdfkin.robot import Robot
 from urdfkin.verify.pinocchio_module import version
-from urdfkin.view.figure import label, new_figure, style
+from urdfkin.view.figure import BAD, COLOURS, label, new_figure, style
 
 if TYPE_CHECKING:
     from urdfkin.view.figure import Axes, Figure
@@ -32,19 +32,23 @@ if TYPE_CHECKING:
 #: A function that draws a motion over time, in seconds, into axes.
 Panel = Callable[["Axes", FrameMotion, FloatArray], None]
 
-#: Okabe and Ito's colours, distinguishable with every colour vision deficiency; line styles differ as well.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+#: Line styles, because a colour alone is no key.
 STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), "-")
 
 
 _LINEAR, _ANGULAR = slice(0, 3), slice(3, 6)
-#: Largest number of lines with a legend; more lines are not distinguishable.
-_MOST_NAMES = 14
+#: Largest number of names in a legend; more lines are not distinguishable. Colour of the other lines.
+_MOST_NAMES, _UNNAMED = 14, "#9AA7B5"
 
 
 def _lines(axes: Axes, t: FloatArray, rows: FloatArray, names: Sequence[str]) -> None:
     for k, name in enumerate(names):
-        axes.plot(t, rows[:, k], color=COLOURS[k % 7], linestyle=STYLES[k % 7], label=name)
+        axes.plot(t, rows[:, k], label=name, **_look(k))
+
+
+def _look(k: int) -> dict[str, Any]:
+    """Return colour and dashes of a line; the pairs of the first 49 lines differ."""
+    return {"color": COLOURS[k % 7], "linestyle": STYLES[(k + 2 * (k // 7)) % 7]}
 
 
 def position(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
@@ -69,7 +73,7 @@ def velocity(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
 def angular_velocity(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
     """Draw the angular velocity, rad/s."""
     _lines(axes, t, x.velocity[:, 3:], ("x", "y", "z"))
-    axes.set_ylabel("angular velocity [rad/s]")
+    axes.set_ylabel("angular velocity\n[rad/s]")
 
 
 def acceleration(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
@@ -81,7 +85,7 @@ def acceleration(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
 def angular_acceleration(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
     """Draw the angular acceleration, rad/s^2."""
     _lines(axes, t, x.acceleration[:, 3:], ("x", "y", "z"))
-    axes.set_ylabel("ang. acceleration [rad/s²]")
+    axes.set_ylabel("ang. acceleration\n[rad/s²]")
 
 
 def parts(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
@@ -101,17 +105,19 @@ def singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit
     shown = np.where(values > EPS * largest, values, np.nan)
     _lines(axes, t, shown, [f"σ{k + 1}" for k in range(values.shape[1])])
     axes.set_yscale("log")
-    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.minorticks_off()
     lower, upper = axes.get_ylim()
-    axes.yaxis.set_minor_formatter(lambda value, _: f"{value:g}" if upper < 10.0 * lower else "")
-    axes.set_ylabel(f"singular values, {unit}\nper unit joint velocity")
+    if np.floor(np.log10(upper)) < np.ceil(np.log10(lower)) + 1.0:  # fewer than two powers of ten
+        axes.set_yticks([float(f"{lower * (upper / lower) ** share:.2g}") for share in (0.1, 0.5, 0.9)])
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.set_ylabel(f"singular values\n[{unit}] at |v| = 1")
 
 
 def manipulability(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit: str) -> None:
     """Draw Yoshikawa's manipulability: the product of the singular values of the linear or angular rows."""
     _lines(axes, t, x.manipulability(rows)[:, np.newaxis], ("",))
     axes.set_ylabel(f"manipulability\n[{unit}]")
-    axes.set_ylim(bottom=0.0)
+    axes.set_ylim(0.0, 1.08 * float(axes.dataLim.y1) or 1.0)
 
 
 def disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
@@ -124,11 +130,11 @@ def disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
         axes.text(0.5, 0.5, "not verified", transform=axes.transAxes, ha="center", va="center")
         return
     for k, (quantity, check) in enumerate(x.checks.items()):
-        axes.plot(t, check.units, color=COLOURS[k % 7], linestyle=STYLES[k % 7], label=quantity)
-        axes.plot(t, check.bound, color=COLOURS[k % 7], linewidth=0.6, linestyle=STYLES[k % 7])
+        axes.plot(t, check.units, label=quantity, **_look(k))
+        axes.plot(t, check.bound, linewidth=0.6, **_look(k))
         outside = check.share > 1.0
         if outside.any():
-            axes.plot(t[outside], check.units[outside], "x", color="#B00020", label="outside the bound")
+            axes.plot(t[outside], check.units[outside], "x", color=BAD, label="outside the bound")
     # Bounds are about a hundred times the usual disagreement. Below 1 (one rounding), the scale is linear.
     axes.set_yscale("symlog", linthresh=1.0)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
@@ -179,30 +185,43 @@ def _coordinates(
 ) -> None:
     """Draw the coordinates that change, or all if none does.
 
-    Thin lines are the limits. A cross marks a sample outside its limits.
+    Thin lines are the limits. A cross marks a sample outside its limits. Of more lines than a legend can
+    tell apart, only those that leave their limits are coloured and named.
     """
     del x
     values: FloatArray = getattr(trajectory, what)
     names = robot.coordinate_names if what == "q" else robot.rate_names
     moves = [i for i in indices if (values[:, i] != values[0, i]).any()] or list(indices)
+    outside = {i: mask for i in moves if (mask := _outside(robot, what, i, values[:, i])).any()}
+    named = moves if len(moves) <= _MOST_NAMES else [i for i in moves if i in outside]
+    others = [i for i in moves if i not in named]
+    for i in others:
+        count = f"{len(others)} {'others' if named else 'joints'}" if i == others[0] else ""
+        axes.plot(t, values[:, i], color=_UNNAMED, linewidth=0.7, label=count)
     _lines(
-        axes,
-        t,
-        values[:, moves],
-        [names[i] for i in moves] if len(moves) <= _MOST_NAMES else [""] * len(moves),
-    )
-    bounded, crosses = False, "outside the limits"
-    for k, (i, lower, upper) in enumerate((i, *_limits(robot, what, i)) for i in moves):
-        for bound in filter(np.isfinite, (lower, upper)):
-            axes.axhline(bound, color=COLOURS[k % 7], linestyle=STYLES[k % 7], linewidth=0.6)
-            bounded = True
-        # A deviation of one unit in the last place is no violation, since limits are printed in decimal.
-        outside = (values[:, i] < np.nextafter(lower, -np.inf)) | (values[:, i] > np.nextafter(upper, np.inf))
-        if outside.any():
-            axes.plot(t[outside], values[outside, i], "x", color="#B00020", markersize=3.0, label=crosses)
-            crosses = ""
+        axes, t, values[:, named],
+        [names[i] if k < _MOST_NAMES else "" for k, i in enumerate(named)],
+    )  # fmt: skip
+    bounds = {i: [x for x in _limits(robot, what, i) if np.isfinite(x)] for i in named}
+    for k, i in enumerate(named):
+        for bound in bounds[i]:
+            axes.axhline(bound, linewidth=0.6, **_look(k))
+    crosses = "outside the limits"
+    for i, mask in outside.items():
+        axes.plot(t[mask], values[mask, i], "x", color=BAD, markersize=3.0, label=crosses)
+        crosses = ""
+    bounded = any(bounds.values())
     name = f"{unit}{_PER[what]}" if unit else "quaternion"
     axes.set_ylabel(f"{what} [{name}]" + ("\nthin: limits" if bounded else ""))
+
+
+def _outside(robot: Robot, what: str, i: int, values: FloatArray) -> np.ndarray:
+    """Return whether each sample is outside the limits by more than one unit in the last place.
+
+    Such a deviation is no violation, since limits are printed in decimal.
+    """
+    lower, upper = _limits(robot, what, i)
+    return np.asarray((values < np.nextafter(lower, -np.inf)) | (values > np.nextafter(upper, np.inf)))
 
 
 def _limits(robot: Robot, what: str, i: int) -> tuple[float, float]:
@@ -212,11 +231,12 @@ def _limits(robot: Robot, what: str, i: int) -> tuple[float, float]:
     return -largest, largest
 
 
-_PANEL = (5.2, 2.3)
-#: Letters of the footer that fit into an inch.
-_LETTERS = 15
-#: Letters that fit into the width of a legend, and the width of a line's marker in letters.
-_LETTERS_OF_LEGEND, _HANDLE = 80, 8
+#: Largest size of a figure in inches: a page of A4 or US Letter with a margin.
+_PAGE = (7.6, 10.4)
+#: Height of a panel, and of title and footer together, in inches.
+_HEIGHT, _WORDS = 2.1, 0.9
+#: Letters of a footer and of a legend that fit into an inch, and the width of a line's marker in letters.
+_LETTERS, _LETTERS_OF_LEGEND, _HANDLE = 16, 22, 8
 #: Limit of the check when v and a were not computed exactly from q.
 _RATES_UNCHECKED = (
     "Pinocchio checks the formulas at these q, v and a, not whether v and a are the derivatives of q"
@@ -237,10 +257,12 @@ def sheet(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Sequence
         InputError: matplotlib is not installed.
     """
     drawn = _panels(robot, trajectory, list(panels) or [*COORDINATES, *PANELS])
-    columns = min(2, len(drawn))
+    columns = min(3 if len(drawn) > 8 else 2, len(drawn))
     rows = -(-len(drawn) // columns)
-    with style(font_size=9):
-        figure = new_figure(_PANEL[0] * columns, _PANEL[1] * rows + 0.9)
+    height = max(2.0 * _HEIGHT, _HEIGHT * rows) + _WORDS
+    width, small = _PAGE[0], 6 if columns == 3 else 7
+    with style(font_size=small + 1, axes_ymargin=0.08, lines_linewidth=1.2):
+        figure = new_figure(width, min(height, _PAGE[1]))
         grid = figure.subplots(rows, columns, squeeze=False, sharex=True)
         for axes in grid.flat[len(drawn) :]:
             axes.set_axis_off()
@@ -248,18 +270,25 @@ def sheet(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Sequence
             panel(axes, x, trajectory.t)
             axes.grid(color="#dddddd", linewidth=0.5)
             if names := axes.get_legend_handles_labels()[1]:
-                across = max(1, min(7, _LETTERS_OF_LEGEND // (max(map(len, names)) + _HANDLE)))
+                letters = _LETTERS_OF_LEGEND * width / columns * 6 / small
+                across = max(1, min(7, int(letters) // (max(map(len, names)) + _HANDLE)))
                 axes.legend(
-                    fontsize=7, frameon=False, ncols=across, loc="lower left", bbox_to_anchor=(-0.02, 0.98)
+                    fontsize=small,
+                    frameon=False,
+                    ncols=across,
+                    handlelength=1.8,
+                    columnspacing=1.0,
+                    loc="lower left",
+                    bbox_to_anchor=(-0.03, 0.98),
                 )
             axes.tick_params(labelbottom=True)
         for axes in grid[-1]:
             axes.set_xlabel("time [s]")
         figure.suptitle(
-            f"{label(f'{robot.name}: {x.frame}, {x.reference.name}')}\n{way(x, trajectory)}", fontsize=11
+            f"{label(f'{robot.name}: {x.frame}, {x.reference.name}')}\n{way(x, trajectory)}", fontsize=10
         )
-        words = textwrap.wrap(label(foot(x, trajectory)), width=int(_LETTERS * _PANEL[0] * columns))
-        figure.supxlabel("\n".join(words), fontsize=8, color="#444444")
+        words = textwrap.wrap(label(foot(x, trajectory)), width=int(_LETTERS * width))
+        figure.supxlabel("\n".join(words), fontsize=7, color="#444444")
     return figure
 
 

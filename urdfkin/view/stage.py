@@ -131,14 +131,14 @@ def scalar_first(R: FloatArray) -> FloatArray:
     return np.asarray(np.roll(quaternion_of(R), 1, axis=-1), dtype=np.float64)
 
 
-_BONE, _TURN, _SLIDE = (142, 153, 168), (47, 111, 208), (208, 122, 28)
+_BONE, _TURN, _SLIDE = (142, 153, 168), (0, 114, 178), (230, 159, 0)
 #: Display modes of the shapes, and names that can be shown beside the frames.
 SOLID, SEE_THROUGH = "solid", "see-through"
 SHAPES = (SOLID, SEE_THROUGH, "hidden")
 NAMES = ("none", "links", "joints")
 #: Opacity of transparent shapes.
 _OPACITY = 0.3
-_NORMAL, _OFFSET = (194, 52, 139), (22, 128, 138)
+_NORMAL, _OFFSET = (230, 159, 0), (86, 180, 233)
 
 
 class Stage:

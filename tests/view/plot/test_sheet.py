@@ -74,11 +74,41 @@ def test_panels_are_as_wide_as_the_sheet_lets_them_be_whatever_their_legends_say
     x = line(robot, robot.poses["ready"], robot.sample(1, 3)[0], 1.0, 11)
     figure = sheet(robot, frame_motion(robot, x.q, x.v, x.a, "FL_foot"), x)
     figure.draw_without_rendering()
-    assert min(axes.get_position().width for axes in figure.axes) > 0.36
+    assert min(axes.get_position().width for axes in figure.axes) > 0.72 / 3
     for axes in figure.axes:
         if (legend := axes.get_legend()) is not None:
             box = legend.get_window_extent().transformed(figure.transFigure.inverted())
             assert box.x1 < axes.get_position().x1 + 0.03
+
+
+def test_of_many_joints_those_outside_their_limits_are_named_and_the_others_counted() -> None:
+    robot = urdfkin.load("romeo", root_joint=None)
+    end = np.clip(robot.sample(1, 3)[0], *robot.limits)
+    far = [robot.coordinate_names.index(name) for name in ("LElbowYaw", "RWristPitch")]
+    end[far] = robot.limits[1, far] + 0.5
+    x = line(robot, robot.neutral(), end, 1.0, 11)
+    (axes, *_) = sheet(robot, frame_motion(robot, x.q, x.v, x.a, robot.tip_frame), x, ["q"]).axes
+    words = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert words == [f"{robot.nq - 2} others", "LElbowYaw", "RWristPitch", "outside the limits"]
+
+
+def test_fourteen_lines_differ_in_colour_or_dashes() -> None:
+    from urdfkin.view.plot import _look  # noqa: PLC0415
+
+    assert len({tuple(_look(k).values()) for k in range(14)}) == 14
+
+
+@pytest.mark.parametrize("panels", [[], ["q"], ["position", "velocity", "disagreement"]])
+def test_a_sheet_fits_a_page_and_no_curve_touches_the_top(panels: list[str], case: Case) -> None:
+    figure = sheet(*case, panels)
+    width, height = figure.get_size_inches()
+    assert width <= 7.6  # A4 is 8.27 by 11.69 inches, US Letter 8.5 by 11
+    assert height <= 10.4
+    for axes in figure.axes:
+        if axes.lines and axes.get_yscale() == "linear":
+            largest = max(float(np.max(np.asarray(drawn.get_ydata()))) for drawn in axes.lines)
+            lower, upper = axes.get_ylim()
+            assert upper - largest > 0.03 * (upper - lower), axes.get_ylabel()
 
 
 def test_where_a_limit_is_left_a_cross_stands(case: Case) -> None:
