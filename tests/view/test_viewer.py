@@ -18,9 +18,19 @@ import pytest
 import urdfkin
 from tests.report.browser import Browser, opened, require_chromium
 from urdfkin.errors import InputError
+from urdfkin.errors.escape import markdown_text
 from urdfkin.model.configuration import checked
+from urdfkin.urdf.findings import UrdfWarning
+from urdfkin.view.scene import Shape
 from urdfkin.view.server import new_server, opened_page
-from urdfkin.view.viewer import Viewer, coordinate_rows, within_limits
+from urdfkin.view.stage import camera
+from urdfkin.view.viewer import (
+    Viewer,
+    coordinate_rows,
+    fixed_coordinates,
+    missing_words,
+    within_limits,
+)
 
 viser = pytest.importorskip("viser")
 
@@ -54,8 +64,8 @@ def test_it_answers_on_loopback_and_nowhere_else(viewer: Viewer) -> None:
 def test_a_slider_moves_its_own_joint_and_the_numbers_are_checked(viewer: Viewer) -> None:
     viewer.set_q(viewer.robot.sample(1, 5)[0])
     before = viewer.q
-    viewer.sliders.handles[1].value = -0.7
-    assert viewer.q[1] == -0.7
+    viewer.sliders.handles[1].value = -40.0
+    assert viewer.q[1] == pytest.approx(np.deg2rad(-40.0), rel=1e-15)
     np.testing.assert_array_equal(np.delete(viewer.q, 1), np.delete(before, 1))
     expected = viewer.robot.placement(viewer.q, viewer.frame.value)
     np.testing.assert_array_equal(viewer.motion.placement[0], expected)
@@ -80,13 +90,13 @@ def test_every_slider_equals_q_however_q_was_set(viewer: Viewer, units: str) -> 
         viewer.set_q(q)
         np.testing.assert_array_equal(viewer.q, q)
         np.testing.assert_allclose(shown(viewer), q, rtol=1e-15)
-        viewer.sliders.handles[seed].value = 0.25
+        viewer.sliders.handles[seed].value = 0.25  # in either unit
         np.testing.assert_allclose(shown(viewer), viewer.q, rtol=1e-15)
         assert checked(viewer.robot.tree, viewer.words_of_q.value, "q").tolist() == viewer.q.tolist()
     far = np.full(viewer.robot.nq, 7.0)  # beyond every limit of a UR5
     viewer.set_q(far)
     np.testing.assert_allclose(shown(viewer), far, rtol=1e-15)
-    viewer.units.value = "radians"
+    viewer.units.value = "degrees"
 
 
 def test_a_slider_ends_where_its_joint_does() -> None:
@@ -101,10 +111,67 @@ def test_a_slider_ends_where_its_joint_does() -> None:
     ]  # fmt: skip
 
 
+def test_angles_are_in_degrees_at_first_and_a_step_is_one_degree(viewer: Viewer) -> None:
+    assert viewer.units.value == "degrees"
+    assert {handle.step for handle in viewer.sliders.handles} == {1.0}
+
+
+def test_the_limits_stand_at_both_ends_of_a_slider(viewer: Viewer) -> None:
+    viewer.set_q(np.zeros(6))
+    for row, handle in zip(viewer.sliders.rows, viewer.sliders.handles, strict=True):
+        ends = np.rad2deg([row.lower, row.upper])
+        assert [mark.value for mark in handle._marks] == pytest.approx(ends)
+        assert [float(mark.label) for mark in handle._marks] == pytest.approx(ends, abs=0.05)
+
+
+_FIXED = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
+<joint name="turns" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0 0 1"/>
+<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+<joint name="stays" type="revolute"><parent link="b"/><child link="c"/><origin xyz="0 0 1"/>
+<axis xyz="0 1 0"/><limit lower="0.5" upper="0.5" effort="1" velocity="1"/></joint></robot>"""
+
+
+def test_a_joint_without_a_range_has_no_slider_and_is_named() -> None:
+    with pytest.warns(UrdfWarning, match="its limits are equal"):
+        robot = urdfkin.load(_FIXED)
+    assert [row.name for row in coordinate_rows(robot)] == ["turns"]
+    assert fixed_coordinates(robot) == ["stays"]
+    assert within_limits(robot, robot.neutral()).tolist() == [0.0, 0.5]
+
+
+def test_missing_meshes_are_named_with_the_remedy() -> None:
+    addresses = [f"package://arm/m{i}.stl" for i in range(7)]
+    missing = [Shape("l", "mesh", (1.0, 1.0, 1.0), np.eye(4), None, None, name) for name in addresses]
+    words = missing_words(missing)
+    assert "7 meshes not shown" in words
+    assert "Set `ROS_PACKAGE_PATH`" in words
+    assert [markdown_text(name) in words for name in addresses] == [True] * 5 + [False] * 2
+    assert "and 2 more" in words
+    alone = [Shape("l", "mesh", (1.0, 1.0, 1.0), np.eye(4), None, None, "meshes/a.stl")]
+    assert "Put the files where the URDF says" in missing_words(alone)
+
+
+@pytest.mark.parametrize("aspect", [0.5, 1.0, 2.0])
+def test_the_robot_fills_the_view_and_nothing_of_it_is_cut_off(aspect: float) -> None:
+    points = np.random.default_rng(0).uniform([-1.0, -0.2, 0.0], [0.5, 0.2, 2.0], (500, 3))
+    fov = 1.0
+    position, middle = camera(points, aspect=aspect, fov=fov)
+    back = (position - middle) / np.linalg.norm(position - middle)
+    right = np.cross([0.0, 0.0, 1.0], back)
+    right /= np.linalg.norm(right)
+    seen = points - position
+    depth = -seen @ back
+    x, y = (seen @ axis / depth / np.tan(fov / 2) for axis in (right, np.cross(back, right)))
+    share = max(np.abs(x).max() / aspect, np.abs(y).max())
+    assert share == pytest.approx(0.85, abs=1e-9)
+
+
 def test_each_joint_has_a_rate_of_its_own(viewer: Viewer) -> None:
     viewer.set_rates(np.zeros(6), np.zeros(6))
+    viewer.units.value = "radians"
     viewer.rates.handles[2].value = 0.5
     viewer.second_rates.handles[0].value = -1.0
+    viewer.units.value = "degrees"
     assert viewer.v.tolist() == [0.0, 0.0, 0.5, 0.0, 0.0, 0.0]
     assert viewer.a.tolist() == [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     expected = viewer.robot.acceleration(viewer.q, viewer.v, viewer.a, viewer.frame.value)
@@ -207,8 +274,63 @@ def test_a_browser_draws_it_without_errors_and_without_asking_elsewhere(
         asked = browser.requests()
         elsewhere = [url for url in asked if not url.startswith((address, "data:", "blob:", "chrome"))]
         assert [url for url in elsewhere if not url.startswith("ws://127.0.0.1")] == []
-        # Viser's sorter of splats, which are not drawn here, makes functions of strings: the policy refuses.
-        assert [error for error in browser.errors() if "EvalError" not in error] == []
+        assert browser.errors() == []
+        assert browser.js(_UNNAMED) == []
+
+
+#: Controls in sight that a screen reader cannot name.
+_UNNAMED = """return [...document.querySelectorAll("[role=slider], [role=button], input, button")]
+  .filter((e) => e.offsetParent !== null && !e.ariaLabel && !e.textContent.trim())
+  .map((e) => e.outerHTML.slice(0, 300))"""
+
+
+@pytest.mark.slow
+@pytest.mark.browser
+@pytest.mark.parametrize("dark", [False, True])
+def test_the_page_follows_the_theme_of_the_browser_and_its_words_stand_out(
+    viewer: Viewer, tmp_path: Path, dark: bool
+) -> None:
+    require_chromium()
+    with opened(tmp_path, width=900, height=700, dark=dark, draws=False) as browser:
+        browser.chrome.get(viewer.server.address)
+        assert _until(lambda: "verified" in browser.js("return document.body.innerText"))
+        scheme = "return document.documentElement.dataset.mantineColorScheme"
+        assert browser.js(scheme) == ("dark" if dark else "light")
+        for words, behind in browser.js(_COLOURS):
+            assert _contrast(words, behind) >= 4.5, (words, behind)
+
+
+#: The colour of each label and button, and the first colour behind it that is not transparent.
+_COLOURS = """return [...document.querySelectorAll("label, button, .mantine-Slider-markLabel")]
+  .filter((e) => e.offsetParent !== null && e.textContent.trim()).map((e) => {
+    let behind = e;
+    const colour = (x) => getComputedStyle(x).backgroundColor;
+    while (behind.parentElement && colour(behind) === "rgba(0, 0, 0, 0)") behind = behind.parentElement;
+    return [getComputedStyle(e).color, colour(behind)].map((c) => c.match(/[0-9.]+/g).map(Number));
+  })"""
+
+
+def _contrast(*colours: list[float]) -> float:
+    """The contrast of WCAG 2.2 of two opaque colours."""
+    light = []
+    for colour in colours:
+        parts = np.array(colour[:3]) / 255.0
+        linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
+        light.append(float(linear @ [0.2126, 0.7152, 0.0722]) + 0.05)
+    return max(light) / min(light)
+
+
+@pytest.mark.slow
+@pytest.mark.browser
+def test_folders_open_by_the_keyboard(viewer: Viewer, tmp_path: Path) -> None:
+    require_chromium()
+    with opened(tmp_path, width=900, height=700, draws=False) as browser:
+        browser.chrome.get(viewer.server.address)
+        bar = "return [...document.querySelectorAll('[role=button]')].find((b) => b.innerText === 'Show')"
+        assert _until(lambda: browser.js(bar) is not None)
+        for expanded in ("false", "true"):
+            browser.js(bar).send_keys("\ue007")
+            assert _until(lambda e=expanded: browser.js(bar).get_attribute("aria-expanded") == e)  # type: ignore[misc]
 
 
 _PRESS = "[...document.querySelectorAll('button')].find((b) => b.innerText == arguments[0]).click()"
@@ -221,7 +343,12 @@ _EDGES = """return [...document.querySelectorAll('[role=slider]')].map((thumb) =
 def _sliders(browser: Browser, count: int) -> list[float]:
     code = "return [...document.querySelectorAll('[role=slider]')].map((s) => +s.ariaValueNow)"
     values: list[float] = browser.js(code)
-    return values[:count]
+    return [float(np.deg2rad(value)) if k < 7 else value for k, value in enumerate(values[:count])]
+
+
+def _sliders_in_sight(browser: Browser) -> int:
+    code = "[...document.querySelectorAll('[role=slider]')].filter((s) => s.offsetParent !== null).length"
+    return int(browser.js(f"return {code}"))
 
 
 def _until(holds: Callable[[], bool]) -> bool:
@@ -250,6 +377,11 @@ def test_in_a_browser_every_slider_equals_q_and_none_speaks_for_another(tmp_path
 
         with opened(tmp_path, width=width, height=844, draws=False) as browser:
             browser.chrome.get(server.address)
+            if width < 600:
+                assert _until(lambda: "show the controls" in browser.js("return document.body.innerText"))
+                assert _sliders_in_sight(browser) == 0, "on a phone the panel is folded at first"
+                browser.js(_PRESS, "show the controls")
+                assert _until(lambda: _sliders_in_sight(browser) == n)
             assert _until(equal)
             viewer.set_q(viewer.robot.sample(1, 3)[0])
             assert _until(equal)
@@ -263,6 +395,7 @@ def test_in_a_browser_every_slider_equals_q_and_none_speaks_for_another(tmp_path
             thumb.send_keys("\ue014")  # one step to the right
             assert _until(lambda: viewer.q[4] != before[4])
             assert (np.delete(viewer.q, 4) == np.delete(before, 4)).all(), "the others stay, to the bit"
+            assert abs(np.rad2deg(viewer.q[4] - before[4]) - 1.0) < 0.01, "one key moves one degree"
             assert _until(equal)
             # On a telephone, too, nothing lies beyond the edge.
             assert all(0 <= left < right <= width for left, right in browser.js(_EDGES)[:n])

@@ -4,10 +4,18 @@ from __future__ import annotations
 
 import sys
 from contextlib import nullcontext
+from pathlib import Path
 
 import click
 
-from urdfkin.cli.arguments import load_robot, q_option, read_inputs, robot_argument, seed_option
+from urdfkin.cli.arguments import (
+    TRAJECTORY_HELP,
+    load_robot,
+    q_option,
+    read_inputs,
+    robot_argument,
+    seed_option,
+)
 from urdfkin.cli.options import Whole
 from urdfkin.cli.output import compiling
 from urdfkin.cli.streams import say
@@ -29,17 +37,29 @@ EXAMPLE = "urdfkin view panda --q 0,-0.8,0,-2.4,0,1.6,0.8,0.04"
 @click.option(
     "--browser/--no-browser", default=None, help="Open the browser.  [default: if there is a screen]"
 )
+@click.option("--trajectory", type=click.Path(path_type=Path), help=TRAJECTORY_HELP)
 @click.option("--port", type=Whole(1, 65535), default=8080, show_default=True, help="Port to listen on.")
-def command(robot: str, q: str, seed: int, host: str, port: int, browser: bool | None) -> None:
+def command(
+    robot: str,
+    q: str,
+    seed: int,
+    host: str,
+    port: int,
+    trajectory: Path | None,
+    browser: bool | None,
+) -> None:
     """Show a robot in a browser tab, with sliders, shapes, frames, DH frames and arrows.
 
     The viewer starts at --q, or in the neutral configuration moved to within the limits. Pinocchio checks the
     numbers of the chosen frame as the robot moves. The viewer needs the extra `urdfkin[view]`. Ctrl-C stops
     it.
 
+    With --trajectory, a CSV or .npz file as in `urdfkin plot`, the viewer plays the samples of the file.
+
     The printed address contains a key. Open the whole address, and show it only to people who may see and
     move the robot. Other web pages and other users of this machine are refused.
     """
+    from urdfkin.motion.trajectory import read_trajectory  # noqa: PLC0415
     from urdfkin.view.server import (  # noqa: PLC0415
         has_screen,
         new_server,
@@ -53,9 +73,16 @@ def command(robot: str, q: str, seed: int, host: str, port: int, browser: bool |
         raise InputError(
             "the viewer needs exactly one start configuration", where="--q", found=str(len(begin))
         )
+    played = None
+    if trajectory is not None:
+        if begin is not None:
+            raise click.UsageError("--q and --trajectory exclude each other: a trajectory has its own start")
+        played = read_trajectory(loaded, trajectory)
+        for note in (*played.notes, *loaded.limit_violations(played.q)):
+            say(f"warning: {note}", err=True)
     server = new_server(host, port)
     with compiling():
-        Viewer(server, loaded, None if begin is None else begin[0])
+        Viewer(server, loaded, None if begin is None else begin[0], played)
     try:
         say(f"{loaded.name}: {server.address}")
         sys.stdout.flush()  # the reader of a pipe needs the address now

@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import product
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
@@ -68,6 +69,20 @@ def mesh(shape: Shape) -> Any | None:
     return whole
 
 
+def corners(shape: Shape) -> FloatArray:
+    """Return (8, 3): the corners of a box around a shape, in the link's axes; a mesh must be readable."""
+    signs = np.array(list(product((-1.0, 1.0), repeat=3)))
+    if shape.kind == "mesh":
+        lower, upper = mesh(shape).bounds  # type: ignore[union-attr]
+        return np.asarray(0.5 * (lower + upper) + 0.5 * signs * (upper - lower))
+    half = {
+        "box": lambda x, y, z: (x / 2, y / 2, z / 2),
+        "cylinder": lambda r, length: (r, r, length / 2),
+        "sphere": lambda r: (r, r, r),
+    }[shape.kind](*shape.size)
+    return np.asarray(signs * half @ shape.T_link_shape[:3, :3].T + shape.T_link_shape[:3, 3])
+
+
 #: Default colour: that of metal.
 GREY = (0.72, 0.74, 0.78, 1.0)
 
@@ -83,6 +98,7 @@ class Shape:
         T_link_shape: (4, 4) pose of the shape in the link's frame.
         colour: Red, green, blue, opacity in 0 to 1; None: the colours of the mesh file.
         file: The mesh's file; None for other kinds, and for a file that is not found.
+        address: The mesh's address in the URDF; "" for other kinds.
     """
 
     link: str
@@ -91,6 +107,7 @@ class Shape:
     T_link_shape: FloatArray
     colour: tuple[float, float, float, float] | None
     file: Path | None = None
+    address: str = ""
 
     @property
     def missing(self) -> bool:
@@ -141,8 +158,9 @@ def _shape(
     size = _size(element)
     if T is None or size is None:
         return None
-    file = mesh_file(element.get("filename", ""), urdf_file) if element.tag == "mesh" else None
-    return Shape(link, element.tag, size, T, colour, file)
+    address = element.get("filename", "") if element.tag == "mesh" else ""
+    file = mesh_file(address, urdf_file) if address else None
+    return Shape(link, element.tag, size, T, colour, file, address)
 
 
 def _size(element: Element) -> tuple[float, ...] | None:

@@ -180,6 +180,8 @@ _SCRIPTS = (
     ("<script data-p=", '<script nonce="{nonce}" data-p='),
     ('e.type="module";', 'e.type="module";e.nonce="{nonce}";'),
 )
+#: The start of the page's head, where this package's own script is added.
+_HEAD = '<meta charset="utf-8" />'
 _swapping = lock_over_forks()
 
 
@@ -281,9 +283,13 @@ def _page() -> Callable[[str], bytes]:
         raise UnguardedError("its page is not at the expected path") from error
     if text.count("<script") != 1 or any(text.count(plain) != 1 for plain, _ in _SCRIPTS):
         raise UnguardedError("its page has unexpected scripts")
+    if text.count(_HEAD) != 1:
+        raise UnguardedError("its page has no head to add to")
+    # Ours comes first: it names the controls, follows the browser's theme, and runs before viser's script.
+    ours = (Path(__file__).parent / "page.html").read_text(encoding="utf-8")
 
     def page(nonce: str) -> bytes:
-        marked = text
+        marked = text.replace(_HEAD, _HEAD + ours.replace("{nonce}", nonce))
         for plain, guarded in _SCRIPTS:
             marked = marked.replace(plain, guarded.format(nonce=nonce))
         return marked.encode()

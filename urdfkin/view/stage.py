@@ -20,7 +20,7 @@ from urdfkin.kinematics.rotation import quaternion_of
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.motion.frame_motion import FrameMotion
 from urdfkin.robot import Robot
-from urdfkin.view.scene import GREY, Shape, mesh, shapes
+from urdfkin.view.scene import GREY, Shape, corners, mesh, shapes
 
 #: The colour of each part of the acceleration, 0 to 255, and of their sum.
 PART_COLOURS = {
@@ -131,6 +131,28 @@ def scalar_first(R: FloatArray) -> FloatArray:
     return np.asarray(np.roll(quaternion_of(R), 1, axis=-1), dtype=np.float64)
 
 
+#: Direction from the robot to the camera, share of the view that the robot fills, and viser's field of view.
+_FROM, _FILLED, _FOV = np.array([1.1, -1.3, 0.6]), 0.85, np.deg2rad(75.0)
+
+
+def camera(points: FloatArray, *, aspect: float, fov: float) -> tuple[FloatArray, FloatArray]:
+    """Return the position of the camera and the point it looks at, so that points (n, 3) fill the view.
+
+    Args:
+        points: Points of the robot in the world, metres.
+        aspect: Width of the view divided by its height.
+        fov: Vertical field of view, rad.
+    """
+    middle = 0.5 * (points.max(axis=0) + points.min(axis=0))
+    back = _FROM / np.linalg.norm(_FROM)
+    right = np.cross([0.0, 0.0, 1.0], back) / np.linalg.norm(np.cross([0.0, 0.0, 1.0], back))
+    up = np.cross(back, right)
+    height = _FILLED * np.tan(0.5 * fov)
+    x, y, z = np.abs((points - middle) @ right), np.abs((points - middle) @ up), (points - middle) @ back
+    distance = float(np.max(z + np.maximum(x / (height * aspect), y / height)))
+    return middle + max(distance, 0.1) * back, middle
+
+
 _BONE, _TURN, _SLIDE = (142, 153, 168), (0, 114, 178), (230, 159, 0)
 #: Display modes of the shapes, and names that can be shown beside the frames.
 SOLID, SEE_THROUGH = "solid", "see-through"
@@ -159,10 +181,6 @@ class Stage:
             "/floor", width=3 * self.reach, height=3 * self.reach, cell_size=self.reach / 5,
             position=(0.0, 0.0, min(0.0, float(Ts[:, 2, 3].min()))),
         )  # fmt: skip
-        self._middle = 0.5 * (Ts[:, :3, 3].max(axis=0) + Ts[:, :3, 3].min(axis=0))
-        self._camera = self._middle + self.reach * np.array([1.1, -1.3, 0.6])
-        server.initial_camera.position, server.initial_camera.look_at = self._camera, self._middle
-        server.on_client_connect(self._look)
         self._links = [self._scene.add_frame(f"/robot/{i}", show_axes=False) for i in range(len(tree.links))]
         self._axes = self._scene.add_batched_axes(
             "/axes",
@@ -176,10 +194,23 @@ class Stage:
         self._skeleton: list[Any] = []
         self._shapes: list[tuple[Shape, Any]] = []
         self._transparent: list[Any] = []
+        self._corners: list[tuple[int, FloatArray]] = []
         bare = self._add_shapes(tree)
         self._add_skeleton(tree, Ts)
         self.show(shapes=SOLID, skeleton=bare, axes=False, names=NAMES[0])
         self._dh: list[Any] = []
+        self.fill(Ts[np.newaxis])
+        server.on_client_connect(self._look)
+
+    def fill(self, Ts: FloatArray) -> None:
+        """Let the robot fill the view in the placements (n, links, 4, 4); `look` and new clients use it."""
+        points = [Ts[:, :, :3, 3].reshape(-1, 3)]
+        for link, box in self._corners:
+            R, p = Ts[:, link, :3, :3], Ts[:, link, np.newaxis, :3, 3]
+            points.append((box @ R.swapaxes(-1, -2) + p).reshape(-1, 3))
+        self._filling = np.concatenate(points)
+        initial = self._server.initial_camera
+        initial.position, initial.look_at = camera(self._filling, aspect=1.2, fov=_FOV)
 
     def _add_shapes(self, tree: KinematicTree) -> bool:
         """Add the shapes; return whether some are missing, so that the skeleton is needed."""
@@ -190,6 +221,7 @@ class Stage:
                 self.missing.append(shape)
             else:
                 self._shapes.append((shape, handle))
+                self._corners.append((tree.link_index(shape.link), corners(shape)))
         return not self._shapes or bool(self.missing)
 
     def _add_shape(self, name: str, shape: Shape) -> Any | None:
@@ -266,13 +298,11 @@ class Stage:
             self._look(client)
 
     def _look(self, client: Any) -> None:
-        """Set the camera of a client; on a phone, shift the robot above the panel in the lower half."""
-        down = np.zeros(3)
-        if client.camera.aspect < 1.0:
-            down[2] = -0.35 * float(np.linalg.norm(self._camera - self._middle))
+        """Set the camera of a client so that the robot fills its view."""
+        position, middle = camera(self._filling, aspect=client.camera.aspect, fov=client.camera.fov)
         with client.atomic():
             client.camera.up_direction = (0.0, 0.0, 1.0)
-            client.camera.position, client.camera.look_at = self._camera + down, self._middle + down
+            client.camera.position, client.camera.look_at = position, middle
 
     def show(self, *, shapes: str, skeleton: bool, axes: bool, names: str) -> None:
         """Show or hide parts: `shapes` is one of `SHAPES`, `names` one of `NAMES`."""

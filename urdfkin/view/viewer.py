@@ -7,23 +7,27 @@ program sets, but do not report them.
 from __future__ import annotations
 
 import math
+import re
 import threading
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import UrdfkinError
-from urdfkin.errors.escape import markdown_text
+from urdfkin.errors.escape import markdown_text, printable
 from urdfkin.model.configuration import checked
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, Joint
 from urdfkin.motion.frame_motion import FrameMotion, frame_motion
+from urdfkin.motion.trajectory import Trajectory
 from urdfkin.robot import Robot
 from urdfkin.verify.pinocchio_module import version
+from urdfkin.view.player import Player, as_png
+from urdfkin.view.scene import Shape
 from urdfkin.view.stage import (
     NAMES,
     PART_COLOURS,
@@ -38,11 +42,13 @@ from urdfkin.view.stage import (
 
 #: A joint with a larger range than this counts as unlimited, like a wheel.
 _FAR = 100.0
-#: Step of a slider: in radians or metres, and in degrees.
-_STEP, _DEGREES = 0.001, 0.1
+#: Step of a slider, and of an arrow key: in degrees, and in radians. A length moves by a 50th of its range.
+_DEGREES, _RADIANS, _STEPS = 1.0, 0.01, 50.0
 _DIGITS, _DIGITS_OF_DEGREES = 4, 2
 #: Default ranges: joint velocity in rad/s or m/s, and joint acceleration in rad/s^2 or m/s^2.
 _RATE, _SECOND_RATE = 3.0, 5.0
+#: Most missing meshes that are named.
+_MOST_MISSING = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,8 +107,9 @@ class Sliders:
             f"{row.name} [{unit}{self._rate}]",
             min=scale * lower,
             max=scale * upper,
-            step=_DEGREES if row.turns and self._degrees else min(_STEP, (upper - lower) / 100),
+            step=self._step(row, upper - lower),
             initial_value=scale * value,
+            marks=_marks(scale * lower, scale * upper),
             order=order,
         )
         handle.precision = _DIGITS_OF_DEGREES if row.turns and self._degrees else _DIGITS
@@ -122,6 +129,10 @@ class Sliders:
                 lower, upper = (scale * end for end in self._range(row, value))
                 if (handle.min, handle.max) != (lower, upper):
                     handle.min, handle.max = lower, upper
+                    handle._marks = tuple(
+                        replace(mark, value=end, label=label)
+                        for mark, (end, label) in zip(handle._marks, _marks(lower, upper), strict=True)
+                    )
                 # A slider that the user has just moved keeps its exact value.
                 if float(handle.value) / scale != value:
                     handle.value = scale * value
@@ -131,21 +142,40 @@ class Sliders:
     def _scale(self, row: Row) -> float:
         return math.degrees(1.0) if row.turns and self._degrees else 1.0
 
+    def _step(self, row: Row, width: float) -> float:
+        if row.turns:
+            return _DEGREES if self._degrees else _RADIANS
+        size = width / _STEPS
+        power = 10.0 ** math.floor(math.log10(size))
+        return next(power * digit for digit in (5.0, 2.0, 1.0) if power * digit <= size * (1.0 + 1e-9))
+
     @staticmethod
     def _range(row: Row, value: float) -> tuple[float, float]:
-        lower, upper = min(row.lower, value), max(row.upper, value)
-        return lower, upper if upper > lower else lower + _STEP
+        return min(row.lower, value), max(row.upper, value)
+
+
+def _marks(lower: float, upper: float) -> tuple[tuple[float, str], tuple[float, str]]:
+    """Return the limits as marks at both ends of a slider."""
+    first, last = (f"{round(x, 1):g}" if abs(x) >= 1.0 else f"{x:.2g}" for x in (lower, upper))
+    return (lower, first), (upper, last)
 
 
 def coordinate_rows(robot: Robot) -> list[Row]:
-    """Return a row for each coordinate, with its joint's limits; quaternions have none."""
+    """Return a row for each coordinate with a range, within its joint's limits; quaternions have none."""
     rows = []
     for joint, at in zip(robot.tree.joints, robot.tree.q_index, strict=True):
         for k in range(min(joint.nq, 3)):
             turns = _turns(joint, k)
             lower, upper = _limits(joint, math.pi if turns else 1.0)
-            rows.append(Row(at + k, robot.coordinate_names[at + k], turns, lower, upper))
+            if upper > lower:
+                rows.append(Row(at + k, robot.coordinate_names[at + k], turns, lower, upper))
     return rows
+
+
+def fixed_coordinates(robot: Robot) -> list[str]:
+    """Return the names of the coordinates whose limits are equal: they have no slider."""
+    lower, upper = robot.limits
+    return [robot.coordinate_names[i] for i in np.flatnonzero(lower == upper)]
 
 
 def rate_rows(robot: Robot, *, second: bool) -> list[Row]:
@@ -175,8 +205,10 @@ def _limits(joint: Joint, otherwise: float) -> tuple[float, float]:
 def within_limits(robot: Robot, q: FloatArray) -> FloatArray:
     """Return the configuration nearest to `q` within all joint limits; quaternions are unchanged."""
     out = np.array(q, dtype=np.float64)
-    for row in coordinate_rows(robot):
-        out[row.at] = min(max(out[row.at], row.lower), row.upper)
+    for joint, at in zip(robot.tree.joints, robot.tree.q_index, strict=True):
+        for k in range(min(joint.nq, 3)):
+            lower, upper = _limits(joint, math.pi if _turns(joint, k) else 1.0)
+            out[at + k] = min(max(out[at + k], lower), upper)
     return out
 
 
@@ -222,6 +254,21 @@ def check_line(x: FrameMotion) -> str:
     return f"{mark} Pinocchio {version()}, eps·scale: {figures}"
 
 
+def missing_words(missing: Iterable[Shape]) -> str:
+    """Return the names of the meshes that cannot be shown, and the remedy."""
+    names = list(dict.fromkeys(shape.address or shape.link for shape in missing))
+    shown = "".join(f"\n- {markdown_text(name)}" for name in names[:_MOST_MISSING])
+    more = f"\n- and {len(names) - _MOST_MISSING} more" if len(names) > _MOST_MISSING else ""
+    packages = any(name.startswith(("package://", "model://")) for name in names)
+    remedy = (
+        "Set `ROS_PACKAGE_PATH` to the folder that contains their packages."
+        if packages
+        else "Put the files where the URDF says."
+    )
+    what = f"{len(names)} mesh{'es' if len(names) > 1 else ''} not shown"
+    return f"**! {what}**, so the skeleton is shown. {remedy}\n{shown}{more}"
+
+
 def legend() -> str:
     """Return the legend of the acceleration's parts, with their colours."""
     return " ".join(
@@ -244,15 +291,19 @@ class Viewer:
         server: The server from `urdfkin.view.server.new_server`.
         robot: The robot to show.
         q: (nq,) start configuration; None: the neutral configuration, moved to within the limits.
+        trajectory: A trajectory to play; it starts at its first sample.
 
     Attributes:
         q: (nq,) configuration of the sliders, rad and m.
         v: (nv,) joint velocities.
         a: (nv,) joint accelerations.
         motion: The chosen frame's motion in the chosen reference, checked.
+        player: The controls of the trajectory; None without one.
     """
 
-    def __init__(self, server: Any, robot: Robot, q: Given | None = None) -> None:
+    def __init__(
+        self, server: Any, robot: Robot, q: Given | None = None, trajectory: Trajectory | None = None
+    ) -> None:
         self.server, self.robot = server, robot
         self.stage = Stage(server, robot)
         self._start = within_limits(robot, robot.neutral())
@@ -261,21 +312,58 @@ class Viewer:
         self._rng = np.random.default_rng(0)
         self._table: DHTable | None = None
         self._lock = threading.RLock()
-        self._build()
+        self.player: Player | None = None
+        self._build(trajectory)
+        self._fill()
         self._write_q()
         self.update()
+        if self.player is not None:
+            self.player.check()
+            self.player.show(0)
+
+    def _fill(self) -> None:
+        """Let the robot fill the view: at its configuration, or along the whole trajectory."""
+        q = self.q[np.newaxis]
+        if self.player is not None:
+            samples = self.player.trajectory.q
+            q = np.concatenate([q, samples[np.linspace(0, len(samples) - 1, 50).astype(int)]])
+        self.stage.fill(self.robot.placement(q, self.robot.link_frames, verify=False))
+
+    def _reset_camera(self) -> None:
+        with self._lock:
+            self._fill()
+            self.stage.look()
+
+    @property
+    def file_name(self) -> str:
+        """The name of a saved file, without its suffix: the robot's, in letters that every system allows."""
+        return re.sub(r"[^A-Za-z0-9_-]+", "-", self.robot.name).strip("-") or "robot"
 
     # -- controls ------------------------------------------------------------------------------------
 
-    def _build(self) -> None:
+    def _build(self, trajectory: Trajectory | None) -> None:
         gui, robot = self.server.gui, self.robot
-        gui.configure_theme(show_share_button=False, control_width="large")
+        gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
+        gui.main_panel.dock_right()  # beside the picture, not over it
+        gui.set_panel_label(printable(robot.name))
+        if self.stage.missing:
+            gui.add_markdown(missing_words(self.stage.missing))
+        if trajectory is not None:
+            self.player = Player(self, trajectory)
+        with gui.add_folder("Show"):
+            self.shapes = gui.add_dropdown("shapes", SHAPES)
+            self.axes = gui.add_checkbox("link frames", initial_value=False)
+            self.dh = gui.add_dropdown("DH frames", ("none", "standard", "modified"))
+            self.dh_words = gui.add_markdown("")
+            camera, picture = gui.add_button("reset camera"), gui.add_button("save a picture (PNG)")
         joints = gui.add_folder("Joints")
         with joints:
-            self.units = gui.add_dropdown("angles", ("radians", "degrees"))
+            self.units = gui.add_dropdown("angles", ("degrees", "radians"))
         self.sliders = Sliders(gui, joints, coordinate_rows(robot), "", self._move)
-        self.sliders.build(self.q, degrees=False)
+        self.sliders.build(self.q, degrees=True)
         with joints:
+            if fixed := fixed_coordinates(robot):
+                gui.add_markdown(f"fixed by equal limits: {markdown_text(', '.join(fixed))}")
             self.words_of_q = gui.add_text(
                 "q, to copy or type", "", hint="The forms of --q: 0.5, 30deg, ready, ready,elbow=30deg."
             )
@@ -285,24 +373,14 @@ class Viewer:
             self.frame = gui.add_dropdown("frame", robot.frame_names, initial_value=self._tip())
             self.reference = gui.add_dropdown("reference", _REFERENCES, initial_value="local_world_aligned")
             self.words = gui.add_markdown("")
-        with gui.add_folder("Show"):
-            self.shapes = gui.add_dropdown("shapes", SHAPES)
+        with gui.add_folder("Show more"):
             self.skeleton = gui.add_checkbox("skeleton", initial_value=self.stage.skeleton_shown)
-            self.axes = gui.add_checkbox("link frames", initial_value=False)
             self.names = gui.add_dropdown("names", NAMES)
             self.columns = gui.add_dropdown("Jacobian's columns", ("none", "linear", "angular"))
             self.ellipsoid = gui.add_dropdown("velocity ellipsoid", ("none", "linear", "angular"))
             self.parts = gui.add_checkbox("acceleration's parts", initial_value=False)
             gui.add_markdown(legend())
-            self.dh = gui.add_dropdown("DH frames", ("none", "standard", "modified"))
-            self.dh_words = gui.add_markdown("")
-            camera = gui.add_button("reset camera")
         self._build_rates()
-        if self.stage.missing:
-            count = len(self.stage.missing)
-            gui.add_markdown(
-                f"{count} mesh{'es' if count > 1 else ''} cannot be shown; the skeleton is shown."
-            )
         for handle in (self.frame, self.reference):
             handle.on_update(lambda _: self._choose())
         self.dh.on_update(lambda _: self._choose_convention())
@@ -314,7 +392,8 @@ class Viewer:
         self.words_of_q.on_update(self._typed)
         neutral.on_click(lambda _: self.set_q(self._start))
         random.on_click(lambda _: self.set_q(robot.sample(1, int(self._rng.integers(2**31)))[0]))
-        camera.on_click(lambda _: self.stage.look())
+        camera.on_click(lambda _: self._reset_camera())
+        picture.on_click(lambda event: self._save(event.client))
 
     def _build_rates(self) -> None:
         gui, robot = self.server.gui, self.robot
@@ -325,7 +404,7 @@ class Viewer:
         self.rates = Sliders(gui, first, rate_rows(robot, second=False), "/s", self._rate)
         self.second_rates = Sliders(gui, second, rate_rows(robot, second=True), "/s²", self._second_rate)
         for sliders, values in ((self.rates, self.v), (self.second_rates, self.a)):
-            sliders.build(values, degrees=False)
+            sliders.build(values, degrees=True)
         rest.on_click(lambda _: self.set_rates(np.zeros(robot.nv), np.zeros(robot.nv)))
         random.on_click(lambda _: self.set_rates(*self._rng.uniform(-1.0, 1.0, (2, robot.nv))))
 
@@ -363,6 +442,22 @@ class Viewer:
             self.sliders.show(self.q)
             self._write_q()
             self.update()
+
+    def set_state(self, q: FloatArray, v: FloatArray, a: FloatArray) -> None:
+        """Set the configuration, the joint velocities and the joint accelerations in one step."""
+        with self._lock:
+            self.q, self.v, self.a = q.copy(), v.copy(), a.copy()
+            for sliders, values in ((self.sliders, q), (self.rates, v), (self.second_rates, a)):
+                sliders.show(values)
+            self._write_q()
+            self.update()
+
+    def _save(self, client: Any) -> None:
+        """Send a client a picture of its view, in the size of its window."""
+        if client is not None:
+            height, width = client.camera.image_height, client.camera.image_width
+            picture = as_png(client.get_render(height=height, width=width, timeout=60.0))
+            client.send_file_download(f"{self.file_name}.png", picture, save_immediately=True)
 
     def set_rates(self, v: FloatArray, a: FloatArray) -> None:
         """Set the joint velocities and accelerations, and their sliders."""
@@ -419,6 +514,8 @@ class Viewer:
                 except UrdfkinError as error:
                     self.dh_words.content = markdown_text(str(error))
             self.update()
+            if self.player is not None:
+                self.player.check()
 
     # -- drawing -------------------------------------------------------------------------------------
 

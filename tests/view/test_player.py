@@ -1,0 +1,127 @@
+"""The viewer plays a trajectory sample by sample, checks each, and saves pictures and motions."""
+
+from __future__ import annotations
+
+import io
+import re
+import struct
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import urdfkin
+from tests.report.browser import opened, require_chromium
+from tests.view.test_viewer import _PRESS, _until, free_port
+from urdfkin.motion.trajectory import line
+from urdfkin.view.player import Player, as_gif, as_png
+from urdfkin.view.server import new_server
+from urdfkin.view.viewer import Viewer
+
+viser = pytest.importorskip("viser")
+
+
+@pytest.fixture(scope="module")
+def viewer() -> Iterator[Viewer]:
+    bare = re.sub(r"<visual>.*?</visual>", "", urdfkin.load("ur5").urdf, flags=re.DOTALL)
+    robot = urdfkin.load(bare)
+    server = new_server(port=free_port())
+    yield Viewer(server, robot, None, line(robot, np.zeros(6), np.full(6, 0.8), 0.4, 9))
+    server.stop()
+
+
+def player(viewer: Viewer) -> Player:
+    assert viewer.player is not None
+    return viewer.player
+
+
+def test_the_time_slider_shows_the_nearest_sample_and_its_checked_numbers(viewer: Viewer) -> None:
+    x = player(viewer).trajectory
+    player(viewer).time.value = float(x.t[5]) + 0.01
+    assert player(viewer).sample == 5
+    for shown, given in ((viewer.q, x.q[5]), (viewer.v, x.v[5]), (viewer.a, x.a[5])):
+        np.testing.assert_array_equal(shown, given)
+    expected = viewer.robot.acceleration(x.q[5], x.v[5], x.a[5], viewer.frame.value)
+    np.testing.assert_array_equal(viewer.motion.acceleration[0], expected)
+    assert "verified" in viewer.words.content
+    assert "sample 6 of 9" in player(viewer).words.content
+    np.testing.assert_allclose(viewer.sliders.handles[0].value, np.rad2deg(x.q[5, 0]), rtol=1e-14)
+
+
+def test_it_plays_to_the_end_at_the_chosen_speed_and_stops(viewer: Viewer) -> None:
+    player(viewer).show(0)
+    player(viewer).speed.value = "0.5"
+    begin = time.perf_counter()
+    player(viewer).play()
+    assert player(viewer).button.label == "pause"
+    assert _until(lambda: player(viewer).button.label == "play")
+    assert player(viewer).sample == 8
+    assert time.perf_counter() - begin > 0.7, "0.4 s at half the speed"
+    player(viewer).speed.value = "1"
+
+
+def test_a_pause_keeps_the_sample(viewer: Viewer) -> None:
+    player(viewer).show(0)
+    player(viewer).speed.value = "0.1"
+    player(viewer).play()
+    assert _until(lambda: player(viewer).sample > 0)
+    player(viewer).pause()
+    time.sleep(0.2)
+    kept = player(viewer).sample
+    time.sleep(0.6)
+    assert player(viewer).sample == kept < 8
+    player(viewer).speed.value = "1"
+
+
+def test_the_whole_trajectory_is_checked_for_each_frame(viewer: Viewer) -> None:
+    assert "9 samples, verified by Pinocchio" in player(viewer).words.content
+    viewer.frame.value = "forearm_link"
+    assert "9 samples, verified by Pinocchio" in player(viewer).words.content
+
+
+def test_a_saved_motion_has_all_frames_and_takes_as_long_as_the_motion() -> None:
+    frames = [np.full((8, 10, 3), 40 * k, dtype=np.uint8) for k in range(5)]
+    image = Image.open(io.BytesIO(as_gif(frames, 0.08)))
+    assert image.size == (10, 8)
+    assert image.n_frames == 5  # type: ignore[attr-defined]
+    assert image.info["duration"] == 80
+    assert image.info["loop"] == 0
+
+
+def test_a_saved_picture_is_opaque() -> None:
+    clear = np.zeros((4, 4, 4), dtype=np.uint8)
+    assert np.asarray(Image.open(io.BytesIO(as_png(clear)))).tolist() == [[[255, 255, 255]] * 4] * 4
+
+
+@pytest.mark.slow
+@pytest.mark.browser
+def test_in_a_browser_the_picture_and_the_motion_are_saved(viewer: Viewer, tmp_path: Path) -> None:
+    require_chromium()
+    saved = tmp_path / "saved"
+    saved.mkdir()
+    with opened(tmp_path / "profile", width=700, height=500) as browser:
+        behaviour = {"behavior": "allow", "downloadPath": str(saved)}
+        browser.chrome.execute_cdp_cmd("Page.setDownloadBehavior", behaviour)
+        browser.chrome.get(viewer.server.address)
+        assert _until(lambda: "verified" in browser.js("return document.body.innerText"))
+        for label, ending, head in (
+            ("save a picture (PNG)", "png", b"\x89PNG"),
+            ("save the motion (GIF)", "gif", b"GIF89a"),
+        ):
+            browser.js(_PRESS, label)
+            file = saved / f"{viewer.file_name}.{ending}"
+            deadline = time.monotonic() + 120.0
+            while not file.exists() and time.monotonic() < deadline:
+                time.sleep(0.25)
+            content = file.read_bytes()
+            assert content.startswith(head), label
+        assert struct.unpack("<HH", content[6:10]) == (640, 480)
+        image = Image.open(io.BytesIO(content))
+        assert image.n_frames == 6  # type: ignore[attr-defined]
+        first = np.asarray(image.convert("RGB"), dtype=float)
+        image.seek(5)
+        assert np.abs(np.asarray(image.convert("RGB"), dtype=float) - first).max() > 50.0, "the robot moves"
+        assert browser.errors() == []

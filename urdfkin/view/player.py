@@ -1,0 +1,164 @@
+"""Play a trajectory in the viewer, and save pictures and motions.
+
+The viewer shows samples of the trajectory and interpolates nothing, so each number on the screen is one that
+was checked. A saved motion is a GIF: it plays in browsers, slides and chats without a further program.
+"""
+
+from __future__ import annotations
+
+import io
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from urdfkin.errors.escape import markdown_text
+from urdfkin.motion.frame_motion import frame_motion
+from urdfkin.motion.trajectory import Trajectory
+from urdfkin.view.plot import foot
+
+if TYPE_CHECKING:
+    from urdfkin.view.viewer import Viewer
+
+_SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
+#: Most updates per second while playing; frames per second and most frames of a saved motion, and its size.
+_RATE, _FRAME_RATE, _MOST_FRAMES, _SIZE = 20.0, 12.5, 250, (640, 480)
+
+
+class Player:
+    """The controls of a trajectory: time, play and pause, speed, and the file of the motion.
+
+    Args:
+        viewer: The viewer, which shows one sample at a time.
+        trajectory: The trajectory.
+
+    Attributes:
+        sample: Index of the sample that is shown.
+    """
+
+    def __init__(self, viewer: Viewer, trajectory: Trajectory) -> None:
+        self._viewer, self.trajectory, self.sample = viewer, trajectory, 0
+        self._playing, self._setting = threading.Event(), False
+        gui, t = viewer.server.gui, trajectory.t
+        with gui.add_folder("Trajectory"):
+            self.time = gui.add_slider(
+                "time [s]", float(t[0]), float(t[-1]), float(np.diff(t).min()), float(t[0]),
+                marks=((float(t[0]), f"{t[0]:g}"), (float(t[-1]), f"{t[-1]:g}")),
+            )  # fmt: skip
+            self.time.precision = 4
+            self.button = gui.add_button("play")
+            self.speed = gui.add_dropdown("speed", _SPEEDS, initial_value="1")
+            self.words = gui.add_markdown("")
+            save = gui.add_button("save the motion (GIF)")
+        self.time.on_update(lambda _: self._moved())
+        self.button.on_click(lambda _: self.pause() if self._playing.is_set() else self.play())
+        save.on_click(lambda event: self._save(event.client))
+
+    def check(self) -> None:
+        """Check the chosen frame along the whole trajectory, and write the result."""
+        viewer, x = self._viewer, self.trajectory
+        motion = frame_motion(viewer.robot, x.q, x.v, x.a, viewer.frame.value, viewer.reference.value)
+        mark = "! " if motion.not_verified is not None else "✓ " if motion.agrees else "✗ "
+        self._whole = mark + foot(motion, x)
+        self._write()
+
+    def show(self, sample: int) -> None:
+        """Show one sample: the sliders, the robot and the numbers follow."""
+        self.sample, x = sample, self.trajectory
+        self._setting = True
+        try:
+            self.time.value = float(x.t[sample])
+        finally:
+            self._setting = False
+        self._viewer.set_state(x.q[sample], x.v[sample], x.a[sample])
+        self._write()
+
+    def _write(self) -> None:
+        x = self.trajectory
+        now = f"sample {self.sample + 1} of {len(x.t)}, t = {x.t[self.sample]:.4g} s"
+        self.words.content = f"**{now}**\n\n{markdown_text(self._whole)}"
+
+    def _nearest(self, seconds: float) -> int:
+        return int(np.abs(self.trajectory.t - seconds).argmin())
+
+    def _moved(self) -> None:
+        if not self._setting:
+            self.pause()
+            self.show(self._nearest(float(self.time.value)))
+
+    def play(self) -> None:
+        """Play from the current sample to the end, or from the start if the end is shown."""
+        if not self._playing.is_set():
+            self._playing.set()
+            self.button.label = "pause"
+            threading.Thread(target=self._run, daemon=True).start()
+
+    def pause(self) -> None:
+        """Stop at the current sample."""
+        self._playing.clear()
+        self.button.label = "play"
+
+    def _run(self) -> None:
+        t = self.trajectory.t
+        now = float(t[0] if self.sample == len(t) - 1 else t[self.sample])
+        last = time.perf_counter()
+        while self._playing.is_set():
+            self.show(self._nearest(now))
+            if now >= t[-1]:
+                self.pause()
+                return
+            time.sleep(max(0.0, 1.0 / _RATE - (time.perf_counter() - last)))
+            this = time.perf_counter()
+            now, last = min(float(t[-1]), now + (this - last) * float(self.speed.value)), this
+
+    def _save(self, client: Any) -> None:
+        """Draw the samples one after the other in the browser, and send it the file."""
+        if client is None:
+            return
+        self.pause()
+        kept, t, speed = self.sample, self.trajectory.t, float(self.speed.value)
+        seconds = float(t[-1] - t[0]) / speed
+        count = int(np.clip(round(seconds * _FRAME_RATE), 1, _MOST_FRAMES)) + 1
+        note = client.add_notification("Saving the motion", f"0 of {count} pictures", loading=True)
+        frames: list[np.ndarray] = []
+        try:
+            for k, moment in enumerate(np.linspace(t[0], t[-1], count)):
+                self.show(self._nearest(float(moment)))
+                frames.append(client.get_render(height=_SIZE[1], width=_SIZE[0], timeout=60.0))
+                note.body = f"{k + 1} of {count} pictures"
+        except (
+            RuntimeError,
+            TimeoutError,
+        ):  # the page was closed, or lies in the background and draws nothing
+            return
+        finally:
+            note.remove()
+            self.show(kept)
+        name = f"{self._viewer.file_name}.gif"
+        client.send_file_download(name, as_gif(frames, seconds / (count - 1)), save_immediately=True)
+
+
+def as_gif(frames: list[np.ndarray], seconds: float) -> bytes:
+    """Return an endless animation of frames (height, width, 3 or 4), each shown for some seconds."""
+    images = [_on_white(frame).quantize(128) for frame in frames]
+    stream = io.BytesIO()
+    shown = max(
+        20, 10 * round(100 * seconds)
+    )  # ms; a GIF counts hundredths, and browsers slow a picture of one
+    images[0].save(stream, "gif", save_all=True, append_images=images[1:], duration=shown, loop=0)
+    return stream.getvalue()
+
+
+def as_png(frame: np.ndarray) -> bytes:
+    """Return a picture (height, width, 3 or 4) as the bytes of a PNG file."""
+    stream = io.BytesIO()
+    _on_white(frame).save(stream, "png", optimize=True)
+    return stream.getvalue()
+
+
+def _on_white(frame: np.ndarray) -> Any:
+    from PIL import Image  # noqa: PLC0415
+
+    image = Image.fromarray(frame).convert("RGBA")
+    return Image.alpha_composite(Image.new("RGBA", image.size, "white"), image).convert("RGB")
