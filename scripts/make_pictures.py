@@ -104,10 +104,13 @@ def photograph_viewer(folder: Path) -> None:
             with opened(folder / name, width=width, height=height) as browser:
                 browser.chrome.get(server.address)
                 browser.wait("return document.querySelector('canvas') !== null")
-                time.sleep(60)  # shapes fade in, and a software renderer is slow
+                time.sleep(30)  # shapes fade in, and a software renderer is slow
                 browser.js(
                     "document.querySelectorAll('[class*=Notification] button').forEach(b => b.click())"
                 )
+                if width < 600:
+                    browser.wait("return document.getElementById('fold') !== null")
+                    browser.js("document.getElementById('fold').click()")
                 time.sleep(5)
                 keep(browser, name)
     finally:
