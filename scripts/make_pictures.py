@@ -100,7 +100,7 @@ def photograph_viewer(folder: Path) -> None:
     try:
         viewer = Viewer(server, urdfkin.load("panda"), POSE)
         viewer.dh.value = "standard"
-        for name, width, height in (("viewer", 1100, 800), ("viewer-phone", 400, 800)):
+        for name, width, height in (("viewer", 1100, 1240), ("viewer-phone", 400, 800)):
             with opened(folder / name, width=width, height=height) as browser:
                 browser.chrome.get(server.address)
                 browser.wait("return document.querySelector('canvas') !== null")

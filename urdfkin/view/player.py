@@ -9,21 +9,36 @@ from __future__ import annotations
 import io
 import threading
 import time
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from urdfkin.errors.escape import markdown_text
+from urdfkin.model.tree import FloatArray
 from urdfkin.motion.frame_motion import frame_motion
 from urdfkin.motion.trajectory import Trajectory
+from urdfkin.robot import Robot
 from urdfkin.view.plot import foot
-
-if TYPE_CHECKING:
-    from urdfkin.view.viewer import Viewer
 
 _SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
 #: Most updates per second while playing; frames per second and most frames of a saved motion, and its size.
 _RATE, _FRAME_RATE, _MOST_FRAMES, _SIZE = 20.0, 12.5, 250, (640, 480)
+
+
+class Screen(Protocol):
+    """The part of a viewer that a player needs."""
+
+    server: Any
+    robot: Robot
+    frame: Any
+    reference: Any
+
+    @property
+    def file_name(self) -> str:
+        """The name of a saved file, without its suffix."""
+
+    def set_state(self, q: FloatArray, v: FloatArray, a: FloatArray) -> None:
+        """Show a configuration with its joint velocities and accelerations."""
 
 
 class Player:
@@ -37,7 +52,7 @@ class Player:
         sample: Index of the sample that is shown.
     """
 
-    def __init__(self, viewer: Viewer, trajectory: Trajectory) -> None:
+    def __init__(self, viewer: Screen, trajectory: Trajectory) -> None:
         self._viewer, self.trajectory, self.sample = viewer, trajectory, 0
         self._playing, self._setting = threading.Event(), False
         gui, t = viewer.server.gui, trajectory.t

@@ -8,6 +8,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -131,6 +132,8 @@ def scalar_first(R: FloatArray) -> FloatArray:
     return np.asarray(np.roll(quaternion_of(R), 1, axis=-1), dtype=np.float64)
 
 
+#: Seconds in which a page takes its layout.
+_OPENING = 15.0
 #: Direction from the robot to the camera, share of the view that the robot fills, and viser's field of view.
 _FROM, _FILLED, _FOV = np.array([1.1, -1.3, 0.6]), 0.85, np.deg2rad(75.0)
 
@@ -200,7 +203,7 @@ class Stage:
         self.show(shapes=SOLID, skeleton=bare, axes=False, names=NAMES[0])
         self._dh: list[Any] = []
         self.fill(Ts[np.newaxis])
-        server.on_client_connect(self._look)
+        server.on_client_connect(self._welcome)
 
     def fill(self, Ts: FloatArray) -> None:
         """Let the robot fill the view in the placements (n, links, 4, 4); `look` and new clients use it."""
@@ -296,6 +299,19 @@ class Stage:
         """Reset the camera of every client."""
         for client in self._server.get_clients().values():
             self._look(client)
+
+    def _welcome(self, client: Any) -> None:
+        """Set the camera of a new client, and again when its panel has taken its part of the window."""
+        begin, aspects = time.monotonic(), [0.0]
+
+        def fit(_: Any) -> None:
+            aspect = client.camera.aspect
+            if aspect != aspects[0] and time.monotonic() - begin < _OPENING:
+                aspects[0] = aspect
+                self._look(client)
+
+        client.camera.on_update(fit)
+        fit(None)
 
     def _look(self, client: Any) -> None:
         """Set the camera of a client so that the robot fills its view."""

@@ -16,7 +16,7 @@ from urdfkin.motion.frame_motion import FrameMotion, frame_motion
 from urdfkin.motion.trajectory import Trajectory, line
 from urdfkin.robot import Robot
 from urdfkin.view.figure import save
-from urdfkin.view.plot import COORDINATES, PANELS, foot, sheet
+from urdfkin.view.plot import COORDINATES, PANELS, _look, foot, sheet
 
 pytest.importorskip("matplotlib")
 Case = tuple[Robot, FrameMotion, Trajectory]
@@ -88,13 +88,13 @@ def test_of_many_joints_those_outside_their_limits_are_named_and_the_others_coun
     end[far] = robot.limits[1, far] + 0.5
     x = line(robot, robot.neutral(), end, 1.0, 11)
     (axes, *_) = sheet(robot, frame_motion(robot, x.q, x.v, x.a, robot.tip_frame), x, ["q"]).axes
-    words = [text.get_text() for text in axes.get_legend().get_texts()]
+    legend = axes.get_legend()
+    assert legend is not None
+    words = [text.get_text() for text in legend.get_texts()]
     assert words == [f"{robot.nq - 2} others", "LElbowYaw", "RWristPitch", "outside the limits"]
 
 
 def test_fourteen_lines_differ_in_colour_or_dashes() -> None:
-    from urdfkin.view.plot import _look  # noqa: PLC0415
-
     assert len({tuple(_look(k).values()) for k in range(14)}) == 14
 
 
