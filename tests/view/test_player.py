@@ -86,7 +86,7 @@ def test_a_saved_motion_has_all_frames_and_takes_as_long_as_the_motion() -> None
     frames = [np.full((8, 10, 3), 40 * k, dtype=np.uint8) for k in range(5)]
     image = Image.open(io.BytesIO(as_gif(frames, 0.08)))
     assert image.size == (10, 8)
-    assert image.n_frames == 5  # type: ignore[attr-defined]
+    assert image.n_frames == 5
     assert image.info["duration"] == 80
     assert image.info["loop"] == 0
 
@@ -120,7 +120,7 @@ def test_in_a_browser_the_picture_and_the_motion_are_saved(viewer: Viewer, tmp_p
             assert content.startswith(head), label
         assert struct.unpack("<HH", content[6:10]) == (640, 480)
         image = Image.open(io.BytesIO(content))
-        assert image.n_frames == 6  # type: ignore[attr-defined]
+        assert image.n_frames == 6
         first = np.asarray(image.convert("RGB"), dtype=float)
         image.seek(5)
         assert np.abs(np.asarray(image.convert("RGB"), dtype=float) - first).max() > 50.0, "the robot moves"

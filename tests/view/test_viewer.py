@@ -14,9 +14,11 @@ from urllib.request import urlopen
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import urdfkin
 from tests.report.browser import Browser, opened, require_chromium
+from urdfkin.cli.view import command
 from urdfkin.errors import InputError
 from urdfkin.errors.escape import markdown_text
 from urdfkin.model.configuration import checked
@@ -404,10 +406,23 @@ def test_in_a_browser_every_slider_equals_q_and_none_speaks_for_another(tmp_path
         server.stop()
 
 
+def test_a_start_and_a_trajectory_exclude_each_other(tmp_path: Path) -> None:
+    file = tmp_path / "motion.csv"
+    words = ["planar_two_link", "--q", "0,0", "--trajectory", str(file), "--no-browser"]
+    found = CliRunner().invoke(command, words)
+    assert found.exit_code == 2
+    assert "--q and --trajectory exclude each other" in found.output
+
+
 @pytest.mark.slow
-def test_the_command_serves_until_it_is_interrupted(tmp_path: Path) -> None:
+@pytest.mark.parametrize("plays", [False, True])
+def test_the_command_serves_until_it_is_interrupted(tmp_path: Path, plays: bool) -> None:
     port = free_port()
     words = [sys.executable, "-m", "urdfkin", "view", "planar_two_link", "--port", str(port)]
+    if plays:
+        file = tmp_path / "motion.csv"
+        file.write_text("t,joint_1,joint_2\n0,0,0\n0.1,0.1,0\n0.2,0.3,0.1\n")
+        words += ["--trajectory", str(file)]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout is not None

@@ -75,11 +75,10 @@ def corners(shape: Shape) -> FloatArray:
     if shape.kind == "mesh":
         lower, upper = mesh(shape).bounds  # type: ignore[union-attr]
         return np.asarray(0.5 * (lower + upper) + 0.5 * signs * (upper - lower))
-    half = {
-        "box": lambda x, y, z: (x / 2, y / 2, z / 2),
-        "cylinder": lambda r, length: (r, r, length / 2),
-        "sphere": lambda r: (r, r, r),
-    }[shape.kind](*shape.size)
+    size = np.array(shape.size)
+    half = size / 2.0 if shape.kind == "box" else np.array([size[0], size[0], size[-1]])
+    if shape.kind == "cylinder":
+        half[2] /= 2.0
     return np.asarray(signs * half @ shape.T_link_shape[:3, :3].T + shape.T_link_shape[:3, 3])
 
 
