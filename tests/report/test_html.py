@@ -15,11 +15,13 @@ import pytest
 from tests.report.documents import HOSTILE_JOINT, HOSTILE_LINK, HOSTILE_ROBOT, arms, failing, hostile
 from urdfkin.report import html as html_module
 from urdfkin.report import pages
+from urdfkin.report.figures import distributions
 from urdfkin.report.html import as_html
 from urdfkin.report.pages import angle
 from urdfkin.report.words import VERDICTS
 from urdfkin.urdf.catalogue import examples
 from urdfkin.validation.campaign import validate
+from urdfkin.validation.document import Document
 
 pytestmark = pytest.mark.slow
 
@@ -104,7 +106,8 @@ def test_it_says_what_was_checked_by_which_versions_and_how_to_repeat_it() -> No
 def test_what_failed_is_said_in_words_and_not_by_colour_alone() -> None:
     text = page("failing").text
     assert "Not verified against Pinocchio" in text
-    assert "1 robot bad input, 1 robot disagrees, 1 robot verified." in text
+    assert "1 of 3 robots disagrees, 1 of 3 robots bad input." in text
+    assert "1 robot verified." in text
     assert "✗ 3" in text
     assert "URDF502" in text
 
@@ -230,3 +233,57 @@ def test_the_heat_maps_colour_is_the_share_of_the_bound() -> None:
         check["share_of_bound"] = 0.5
     _, rows = pages.heat_map(robot, model)
     assert {cell.step for _, cells in rows for cell in cells if cell.text} == {sum(e < 0.5 for e in edges)}
+
+
+def banner(document: Document) -> list[str]:
+    """Return the two answers of the banner: of the computation and of the model."""
+    sections = re.findall(r'<section class="verdict .*?</section>', as_html(document), re.DOTALL)
+    return [" ".join(re.sub("<[^>]+>", " ", section).split()) for section in sections]
+
+
+def test_the_banner_answers_for_the_computation_and_for_the_model() -> None:
+    document = arms()
+    computation, model = banner(document)
+    assert computation.startswith("Does urdfkin compute right? Verified against Pinocchio")
+    assert model.startswith("Is the model right? No")
+    (note, *_) = document["robots"][0]["findings"]
+    document["robots"][0]["findings"] = []
+    document["robots"][1]["findings"] = [note | {"severity": "warning"}] * 2
+    assert "Warnings in 1 of 2 files 2 warnings" in banner(document)[1]
+    document["robots"][0]["findings"] = [note | {"severity": "error"}]
+    assert "Errors in 1 of 2 files 1 error, 2 warnings. Show the first" in banner(document)[1]
+
+
+def test_a_file_that_cannot_be_read_is_no_right_model_and_its_reason_comes_first() -> None:
+    computation, model = banner(failing())
+    assert "1 of 3 files unusable" in model
+    assert computation.index("bad input") < computation.index("results lie outside")
+
+
+def test_a_failure_comes_first_with_the_line_that_computes_it_again() -> None:
+    text = as_html(failing())
+    panda = text[text.index('data-verdict="disagrees"') :]
+    failures = panda.index("Results outside their bound")
+    assert failures < panda.index("Distributions against the bound")
+    assert failures < panda.index("urdfkin velocity panda --frame") < panda.index("<h3>Checks</h3>")
+
+
+def test_a_value_that_is_not_finite_has_a_mark_in_the_figure_and_colours_its_own_cell() -> None:
+    document = failing()
+    robot = next(robot for robot in document["robots"] if robot["verdict"] == "disagrees")
+    assert "not finite" in distributions(robot, document["histogram_edges"], "p0-")
+    assert robot["model"] is not None
+    heads, rows = pages.heat_map(robot, robot["model"])
+    red = {
+        (joint, head)
+        for joint, cells in rows
+        for head, cell in zip(heads, cells, strict=True)
+        if cell.step > len(pages.HEAT_STEPS)
+    }
+    assert red == {
+        (joint, head)
+        for joint, cells in rows
+        for head, cell in zip(heads, cells, strict=True)
+        if cell.text == "not finite"
+    }
+    assert len(red) < len(rows)

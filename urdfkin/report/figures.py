@@ -91,7 +91,19 @@ def _row(axes: Axes, base: int, checks: Sequence[Check], edges: np.ndarray) -> N
     )
     _bound(axes, base, checks)
     largest = worst(check["worst"] for check in checks)
-    if largest:
+    if largest is None:  # not a number or infinite: a mark of its own, at the right end
+        axes.annotate(
+            "✗ not finite",
+            (1.0, base + 0.13),
+            xycoords=("axes fraction", "data"),
+            ha="right",
+            va="center",
+            fontsize=8,
+            weight="bold",
+            color=THIRD,
+            zorder=6,
+        )
+    elif largest:
         failed = any(check["failed"] for check in checks)
         axes.plot(
             [largest], [base + 0.13], marker="v", markersize=5, color=THIRD if failed else TEXT, zorder=5

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Iterator
 from datetime import datetime
 from functools import cache
@@ -70,6 +71,7 @@ def environment() -> Environment:
     )
     environment.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False}
     environment.filters["counted"] = counted
+    environment.filters["sentence"] = _sentence
     return environment
 
 
@@ -147,6 +149,7 @@ def _page(document: Document, robots: list[dict[str, Any]], token: str = "", fol
             compared=compared(),
             not_compared=not_compared(),
             totals=_totals(document),
+            model=_model_verdict(document),
             verdicts=verdict_counts(document),
             quantities=list(quantities),
             overview=[pages.overview(robot, list(quantities.values())) for robot in document["robots"]],
@@ -184,6 +187,41 @@ def _totals(document: Document) -> dict[str, Any]:
     }
 
 
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}."
+
+
+def _model_verdict(document: Document) -> dict[str, Any]:
+    """Return the banner's answer on the files: colour, title, counts, and the first robot to read."""
+    severities = ("error", "warning", "note")
+    found = [
+        Counter[str](finding["severity"] for finding in robot["findings"]) for robot in document["robots"]
+    ]
+    unread = [robot["verdict"] == "bad input" for robot in document["robots"]]
+    worst_of_file = [
+        "error" if bad else next((word for word in severities if counts[word]), "")
+        for counts, bad in zip(found, unread, strict=True)
+    ]
+    worst_word = next((word for word in severities if word in worst_of_file), "")
+    affected, files = worst_of_file.count(worst_word), counted(len(found), "file")
+    total = Counter[str]()
+    for counts in found:
+        total.update(counts)
+    words = ", ".join(counted(total[word], word) for word in severities if total[word])
+    return {
+        "verdict": {"error": "bad", "warning": "warn"}.get(worst_word, "good"),
+        "title": {
+            "error": f"{sum(unread)} of {files} unusable"
+            if any(unread)
+            else f"Errors in {affected} of {files}",
+            "warning": f"Warnings in {affected} of {files}",
+            "note": "No errors and no warnings",
+        }.get(worst_word, "No findings"),
+        "counts": f"{words}." if words else "No findings of the linter.",
+        "first": worst_of_file.index(worst_word) if worst_word else None,
+    }
+
+
 def _robot(robot: Robot, index: int, document: Document) -> dict[str, Any]:
     model = robot["model"]
     heads, heat = pages.heat_map(robot, model) if model and robot["checks"] else ([], [])
@@ -206,6 +244,8 @@ def _robot(robot: Robot, index: int, document: Document) -> dict[str, Any]:
             for chain in robot["chains"]
         ],
         "checks": pages.check_rows(robot),
+        "failures": pages.failures(robot),
+        "has_problems": any(finding["severity"] != "note" for finding in robot["findings"]),
         "second_reader": second_reader_words(robot),
         "witness": (title := witness_title([robot])),
         "witness_heads": witness_heads(title) if title else [],

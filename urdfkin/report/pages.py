@@ -168,7 +168,7 @@ def _cell(checks: Sequence[Check], where: dict[str, list[int]]) -> Cell:
         return Cell("", 0)
     largest = worst(found)
     if largest is None:
-        return Cell("inf", len(HEAT_STEPS) + 1)
+        return Cell("not finite", len(HEAT_STEPS) + 1)
     share = max(_share(check, i) for check in checks for i in where[check["subjects"]])
     return Cell(units(largest), sum(share > edge for edge in HEAT_STEPS) + (share > 0.0))
 
@@ -179,9 +179,11 @@ def _share(check: Check, subject: int) -> float:
     It uses the tightest bound, and is at most the largest ratio of the check.
     """
     value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["share_of_bound"]
-    if value is None or most is None or not tightest:
+    if not value:  # equal results lie within every bound
+        return math.inf if value is None else 0.0
+    if not tightest:
         return math.inf
-    return min(value / tightest, most)
+    return value / tightest if most is None else min(value / tightest, most)
 
 
 def chain_rows(chain: Chain, convention: str) -> list[list[str]]:
@@ -266,3 +268,13 @@ def check_rows(robot: Robot) -> list[dict[str, Any]]:
         }
         for check in in_order(robot)
     ]
+
+
+def failures(robot: Robot) -> list[dict[str, Any]]:
+    """Return the rows of the failing checks, the largest ratio to its bound first."""
+    failing = sorted(
+        (check for check in robot["checks"] if check["failed"]),
+        key=lambda check: -_sortable(check["share_of_bound"]),
+    )
+    rows = {(row["quantity"], row["reference"]): row for row in check_rows(robot)}
+    return [rows[quantity_name(check["quantity"]), check["reference"] or ""] for check in failing]
