@@ -19,6 +19,7 @@ from urdfkin.compiled.batch import in_parts
 from urdfkin.compiled.breakdown import KINDS, AccelerationBreakdown, moving_joints
 from urdfkin.compiled.plan import CompiledTree, compile_tree
 from urdfkin.compiled.prepared import PreparedFrame
+from urdfkin.conventions import Convention, ConventionRobot, Conversion, find_convention
 from urdfkin.dh.make import dh_table
 from urdfkin.dh.screws import ProductOfExponentials, screws_of
 from urdfkin.dh.table import DHTable
@@ -603,6 +604,42 @@ class Robot(Displayable):
         [0.5, -1.0]
         """
         return configuration.from_pinocchio(self.tree, scalars(q, "q"), mimic=as_bool(mimic, "mimic"))
+
+    def convention(self, name: str | Path | Convention, joints: Sequence[str] | None = None) -> Conversion:
+        """Return the conversion of q, v, a, Jacobians and six-vectors to the convention of a tool, and back.
+
+        Args:
+            name: A built-in convention, such as "mujoco", "drake" or "isaaclab" (docs/conventions.md), or the
+                path of a TOML file.
+            joints: The order of the joints, if the tool or your policy has another one.
+
+        Raises:
+            UnknownNameError: there is no such convention, file or joint.
+            InputError: an invalid file, a joint without a column, or two columns of one name.
+
+        >>> import urdfkin
+        >>> a1 = urdfkin.load("a1")
+        >>> isaaclab = a1.convention("isaaclab")
+        >>> isaaclab.joint_names[:4]
+        ('FL_hip_joint', 'FR_hip_joint', 'RL_hip_joint', 'RR_hip_joint')
+        >>> isaaclab.to(a1.neutral()).shape
+        (12,)
+        """
+        return Conversion(self.tree, self.urdf, find_convention(name), joints)
+
+    def with_convention(
+        self, name: str | Path | Convention, joints: Sequence[str] | None = None
+    ) -> ConventionRobot:
+        """Return this robot with methods that take and return the convention of a tool.
+
+        The arguments are those of `convention`.
+
+        >>> import urdfkin
+        >>> arm = urdfkin.load("planar_two_link").with_convention("drake")
+        >>> arm.velocity([0.0, 0.0], [1.0, 0.0], "tip").tolist()  # angular first
+        [0.0, 0.0, 1.0, 0.0, 0.9, 0.0]
+        """
+        return ConventionRobot(self, self.convention(name, joints))
 
     # -- computation --------------------------------------------------------------------------------
 

@@ -1,0 +1,247 @@
+"""Conversions of q, v, a, Jacobians and their derivatives: laws, files of a user, and errors."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.conventions.libraries import LIBRARIES
+from urdfkin.conventions import BUILT_IN, Convention, find_convention
+from urdfkin.conventions import convention as module
+from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.model.tree import FloatArray
+from urdfkin.robot import Robot
+
+FLOATING = tuple(name for name in BUILT_IN if name != "idyntree")
+#: Every combination of axes, orders and points, also those that no tool has.
+ODD = [
+    Convention(
+        name=f"odd {k}", linear=linear, angular=angular, base_v=order, point=point, six=order, quaternion=quat
+    )
+    for k, (linear, angular, order, point, quat) in enumerate(
+        itertools.product(
+            ("body", "parent"),
+            ("body", "parent"),
+            ("linear first", "angular first"),
+            ("origin", "centre of mass"),
+            ("xyzw", "wxyz"),
+        )
+    )
+]
+PLANAR = """<robot name="cart"><link name="world"/><link name="cart"/><link name="arm"/>
+<joint name="plane" type="planar"><parent link="world"/><child link="cart"/><axis xyz="0 0 1"/>
+<origin xyz="0.1 0.2 0.3" rpy="0.4 0.5 0.6"/></joint>
+<joint name="turn" type="continuous"><parent link="cart"/><child link="arm"/><axis xyz="0 1 0"/>
+<origin xyz="0.5 0 0"/></joint></robot>"""
+
+
+@pytest.fixture(scope="module")
+def dog() -> Robot:
+    return urdfkin.load("a1", root_joint="floating", verify=False)
+
+
+@pytest.fixture(scope="module")
+def cart() -> Robot:
+    return urdfkin.load(PLANAR, verify=False)
+
+
+def _values(robot: Robot, n: int = 4) -> tuple[FloatArray, FloatArray, FloatArray]:
+    rng = np.random.default_rng(1)
+    return robot.sample(n, 1), rng.standard_normal((n, robot.nv)), rng.standard_normal((n, robot.nv))
+
+
+def test_the_list_of_names_is_that_of_the_data_and_each_has_evidence() -> None:
+    assert tuple(module._built_in()) == BUILT_IN
+    for name in BUILT_IN:
+        found = find_convention(name)
+        assert found.note or name == "urdfkin"
+        assert found.evidence == "measured" or (found.evidence == "sources" and found.sources)
+    own = {"urdfkin", "urdf", "alphabetical"}  # nothing to run: the file itself, and Python's sort
+    measured = {name for name in BUILT_IN if find_convention(name).evidence == "measured"}
+    assert measured == own | set(LIBRARIES)
+
+
+@pytest.mark.parametrize("convention", [*map(find_convention, FLOATING), *ODD], ids=lambda c: c.name)
+def test_from_undoes_to(dog: Robot, cart: Robot, convention: Convention) -> None:
+    for robot in (dog, cart):
+        conversion = robot.convention(convention)
+        ours = _values(robot)
+        back = conversion.from_(*conversion.to(*ours))
+        for name, x, y in zip("qva", ours, back, strict=True):
+            if name == "q" and convention.continuous == 2:  # an angle comes back in [-pi, pi]
+                x, y = np.cos(x), np.cos(y)  # noqa: PLW2901
+            assert np.allclose(x, y, 0, 1e-13), name
+
+
+@pytest.mark.parametrize("convention", [*map(find_convention, FLOATING), *ODD], ids=lambda c: c.name)
+def test_the_derivative_of_the_converted_velocity_is_the_converted_acceleration(
+    dog: Robot, cart: Robot, convention: Convention
+) -> None:
+    h = 1e-4
+    for robot in (dog, cart):
+        conversion = robot.convention(convention)
+        q, v, a = (x[0] for x in _values(robot))
+        at = [conversion.to(robot.integrate(q, v * t + a * t * t / 2), v + a * t)[1] for t in (-h, h)]
+        expected = (at[1] - at[0]) / (2 * h)
+        assert np.abs(conversion.to(q, v, a)[2] - expected).max() < 1e-5
+
+
+@pytest.mark.parametrize("convention", [*map(find_convention, FLOATING), *ODD], ids=lambda c: c.name)
+def test_a_robot_in_a_convention_keeps_the_identities(
+    dog: Robot, cart: Robot, convention: Convention
+) -> None:
+    for robot, frame in ((dog, "FL_foot"), (cart, "arm")):
+        other = robot.with_convention(convention)
+        ours = _values(robot)
+        q, v, a = other.conversion.to(*ours)
+        J = other.jacobian(q, frame)
+        assert np.allclose(other.velocity(q, v, frame), (J @ v[..., None])[..., 0], 0, 1e-12)
+        rate = other.jacobian_rate(q, v, frame)
+        expected = (J @ a[..., None] + rate @ v[..., None])[..., 0]
+        assert np.allclose(other.acceleration(q, v, a, frame), expected, 0, 1e-11)
+        H = other.hessian(q, frame)
+        assert np.allclose(np.einsum("nrij,nj->nri", H, v), rate, 0, 1e-11)
+        assert np.array_equal(other.placement(q, frame), robot.placement(ours[0], frame)) or np.allclose(
+            other.placement(q, frame), robot.placement(ours[0], frame), 0, 1e-13
+        )
+
+
+def test_several_frames_at_once_are_each_as_alone(dog: Robot) -> None:
+    other = dog.with_convention("drake")
+    q, v, _ = other.conversion.to(*_values(dog))
+    frames = ["FL_foot", "trunk"]
+    for method, inputs in ((other.jacobian, (q,)), (other.jacobian_rate, (q, v)), (other.hessian, (q,))):
+        together = method(*inputs, frames)
+        for k, frame in enumerate(frames):
+            assert np.array_equal(together[:, k], method(*inputs, frame))
+
+
+def test_nothing_is_copied_where_nothing_differs() -> None:
+    arm = urdfkin.load("ur5", verify=False)
+    q = arm.sample(10)
+    conversion = arm.convention("mujoco")
+    assert conversion.to(q) is q
+    assert conversion.to(q, q)[1] is q
+    assert conversion.permutation is not None
+    assert conversion.permutation.tolist() == list(range(6))
+
+
+@pytest.mark.parametrize("name", ["kinova", "panda", "tiago"])
+def test_the_convention_of_pinocchio_is_to_pinocchio(name: str) -> None:
+    robot = urdfkin.load(name, root_joint="floating", verify=False)
+    q = robot.sample(5)
+    assert np.allclose(robot.convention("pinocchio").to(q), robot.to_pinocchio(q), 0, 1e-15)
+
+
+def test_a_users_file_has_order_names_signs_units_and_motor_zeros(tmp_path: Path) -> None:
+    file = tmp_path / "motors.toml"
+    file.write_text(
+        'joints = ["2", "joint_1"]\nangle = "deg"\n'
+        '[joint.joint_1]\nzero = 10\n[joint.joint_2]\nname = "2"\nsign = -1\nzero = 2048\nunit = 4096\n'
+    )
+    arm = urdfkin.load("planar_two_link", verify=False)
+    motors = arm.convention(file)
+    assert motors.joint_names == ("2", "joint_1")
+    assert np.allclose(motors.to([np.pi / 2, np.pi / 4]), [2048 - 512, 100])
+    assert np.allclose(motors.from_([2048 - 512, 100]), [np.pi / 2, np.pi / 4])
+    q, v = motors.to([0.1, 0.2], [1.0, 2.0])
+    assert np.allclose(v, [-2 * 4096 / (2 * np.pi), 180 / np.pi])
+    other = arm.with_convention(file)
+    assert np.allclose(other.velocity(q, v, "tip"), arm.velocity([0.1, 0.2], [1.0, 2.0], "tip"))
+    assert np.allclose(other.jacobian(q, "tip") @ v, arm.velocity([0.1, 0.2], [1.0, 2.0], "tip"))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('joints = ["joint_1"]', "a joint has no column: found joint_2"),
+        ('joints = ["joint_1", "joint_1"]', "two columns have the same name: found 'joint_1'"),
+        (
+            '[joint.joint_1]\nname = "m"\n[joint.joint_2]\nname = "m"',
+            "two columns have the same name: found 'm'",
+        ),
+        ('[joint.joint_1]\nname = "joint_2"', "two columns have the same name: found 'joint_2'"),
+        ("[joint.joint_1]\nsign = 2", "joint joint_1: sign must be 1 or -1: found 2"),
+        ("[joint.joint_1]\nunit = 'mm'", "joint joint_1: the unit is for a joint with a length"),
+        ("[joint.joint_1]\nunit = -1", "unit must be positive"),
+        ("[joint.joint_1]\nzero = nan", "zero must be a finite number"),
+        ('joints = ["joint_1", "end"]', "a fixed joint has no column: found end"),
+        ('quaternion = "wxzy"', "quaternion must be one of: xyzw, wxyz: found 'wxzy'"),
+        ("joints = 3", "joints must be a list of names"),
+        ("joint = 3", "joint must hold tables"),
+        ("=", "not a TOML file"),
+    ],
+)
+def test_a_wrong_file_is_one_error_with_its_place(text: str, words: str, tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(text)
+    arm = urdfkin.load("planar_two_link", verify=False)
+    with pytest.raises(InputError) as caught:
+        arm.convention(file)
+    assert words in str(caught.value)
+    assert "mine" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[joint.elbow]", "elbow"),
+        ('joints = ["joint_1", "joint_3"]', "joint_3"),
+        ('like = "mujocco"', "mujoco, "),
+        ("quaternoin = 1", "did you mean quaternion"),
+        ("[joint.joint_1]\nsing = 1", "did you mean sign"),
+    ],
+)
+def test_an_unknown_name_in_a_file_is_an_error_with_the_nearest(
+    text: str, words: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(text)
+    with pytest.raises(UnknownNameError) as caught:
+        urdfkin.load("planar_two_link", verify=False).convention(file)
+    assert words in str(caught.value)
+
+
+def test_an_unknown_convention_is_an_error_with_the_nearest() -> None:
+    with pytest.raises(UnknownNameError, match="did you mean mujoco"):
+        urdfkin.load("planar_two_link", verify=False).convention("mujocco")
+
+
+def test_a_tool_without_an_order_asks_for_one() -> None:
+    arm = urdfkin.load("planar_two_link", verify=False)
+    with pytest.raises(InputError, match="no order of its own"):
+        arm.convention("idyntree")
+    assert arm.convention("idyntree", ["joint_2", "joint_1"]).to([1.0, 2.0]).tolist() == [2.0, 1.0]
+
+
+def test_a_mimic_joint_has_a_column_that_must_follow_its_rule() -> None:
+    panda = urdfkin.load("panda", verify=False)
+    mujoco = panda.convention("mujoco")
+    q = mujoco.to("ready")
+    assert (mujoco.nq, panda.nq) == (9, 8)
+    assert q[7] == q[8]
+    q[8] += 0.01
+    with pytest.raises(InputError, match="does not follow its rule"):
+        mujoco.from_(q)
+    with pytest.raises(InputError, match="mimic=False"):
+        panda.with_convention("mujoco").jacobian(mujoco.to("ready"))
+    free = urdfkin.load("panda", verify=False, mimic=False).with_convention("mujoco")
+    assert free.jacobian(q).shape == (6, 9)
+
+
+def test_names_in_usd_are_identifiers() -> None:
+    so101 = urdfkin.load("so101", verify=False)
+    names = so101.convention("usd").joint_names
+    assert all(name.isidentifier() for name in names)
+
+
+def test_usd_names_are_those_of_the_library() -> None:
+    tf = pytest.importorskip("pxr.Tf")
+    from urdfkin.conventions.conversion import usd_name  # noqa: PLC0415
+
+    for name in ("1", "12a", "a-b", "joint.1", "a b", "é", "-", "_x", "", "a/b-c", "ok_2"):
+        assert usd_name(name) == tf.MakeValidIdentifier(name)

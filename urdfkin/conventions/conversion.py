@@ -1,0 +1,685 @@
+"""Convert q, v, a, Jacobians and six-vectors of one robot to the convention of a tool, and back.
+
+With M of `Conversion.matrix`, joint velocities convert as v_tool = M(q) v, accelerations as
+a_tool = M a + M' v, and Jacobians as J_tool = S J M^-1. S exchanges the linear and the angular rows if the
+tool has the angular ones first. M is constant unless the tool and urdfkin use different axes for the velocity
+of a floating or planar joint.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from urdfkin.conventions.convention import Convention, JointRule
+from urdfkin.errors import InputError, Question
+from urdfkin.kinematics.inputs import scalars
+from urdfkin.kinematics.rotation.quaternion import NORM_TOLERANCE, rotation_of
+from urdfkin.model import configuration
+from urdfkin.model.configuration_like import CoordinateLayout, Given
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
+from urdfkin.urdf.plain_xml import plain_xml
+
+#: Largest difference (rad or m) between a mimic joint's value and its rule.
+_MIMIC_TOLERANCE = 1e-9
+_SWAPPED = [3, 4, 5, 0, 1, 2]
+
+
+@dataclass(frozen=True, slots=True)
+class _Column:
+    """A number of q in the tool: `factor * value + zero`, of the number `at` of our q.
+
+    `part` is "cos" or "sin" for a continuous joint with two numbers. `copy` marks a mimic joint.
+    """
+
+    name: str
+    at: int
+    factor: float = 1.0
+    zero: float = 0.0
+    part: str = ""
+    unit: str = ""
+    copy: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class _Block:
+    """A planar or floating joint whose velocity has other axes, or another point, in the tool."""
+
+    joint: Joint
+    q: int
+    v: int
+    rows: slice
+    point: FloatArray
+
+
+class Conversion:
+    """The convention of one robot: names and conversions; `robot.convention("mujoco")` returns it.
+
+    Args:
+        tree: The robot.
+        urdf: Its text, for the order of the file and for centres of mass.
+        convention: The convention.
+        joints: Order of the joints, for a convention without an order of its own, or in place of it.
+
+    Raises:
+        InputError: a joint is missing or appears twice, two columns have the same name, or the tool lacks
+            an order.
+        UnknownNameError: the robot has no such joint.
+
+    >>> import urdfkin
+    >>> robot = urdfkin.load("a1", root_joint="floating", verify=False)
+    >>> mujoco = robot.convention("mujoco")
+    >>> mujoco.joint_names[:3]  # the file begins with the right front leg
+    ('root_joint', 'FR_hip_joint', 'FR_thigh_joint')
+    >>> mujoco.to(robot.neutral())[:7].tolist()  # w first
+    [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+    """
+
+    def __init__(
+        self, tree: KinematicTree, urdf: str, convention: Convention, joints: Sequence[str] | None = None
+    ) -> None:
+        if joints is not None:
+            convention = replace(convention, order="given", joints=tuple(joints))
+        self.tree, self.convention = tree, convention
+        self._urdf = urdf
+        for name in convention.rules:
+            tree.joint_index(name)
+        self._order = self._ordered()
+        self._columns, self._units = list[_Column](), list[str]()
+        self._v_names, self._v_units = list[str](), list[str]()
+        self._v_index, self._v_factor = list[int](), list[float]()
+        self._v_copies, self._blocks, names = set[int](), list[_Block](), list[str]()
+        for i in self._order:
+            names.append(self._add(i))
+        self.joint_names = tuple(names)
+        if len(set(names)) != len(names):
+            double = next(name for k, name in enumerate(names) if name in names[:k])
+            raise InputError("two columns have the same name", where=convention.name, found=repr(double))
+        self._prepare()
+
+    def __repr__(self) -> str:
+        return f"<Conversion of {self.tree.name} to {self.convention.name}: nq {self.nq}, nv {self.nv}>"
+
+    # -- layout --------------------------------------------------------------------------------------
+
+    def _ordered(self) -> list[int]:
+        """Return the indices of the joints that have columns, in the tool's order."""
+        tree, how = self.tree, self.convention
+        moving = {i for i, joint in enumerate(tree.joints) if joint.kind.nv}
+        if how.order == "given":
+            return self._given(moving)
+        if how.mimic == "none":
+            moving -= {i for i in moving if tree.joints[i].mimic}
+        return [i for i in self._all_in_order() if i in moving]
+
+    def _given(self, moving: set[int]) -> list[int]:
+        how = self.convention
+        if not how.joints:
+            raise InputError(
+                f"{how.title} has no order of its own",
+                where=how.name,
+                remedy="pass the names in its order: joints=[...], or joints in a TOML file",
+            )
+        own = {rule.name: joint for joint, rule in how.rules.items() if rule.name is not None}
+        order = [self.tree.joint_index(own.get(name, name)) for name in how.joints]
+        for name, i in zip(how.joints, order, strict=True):
+            if i not in moving:
+                raise InputError("a fixed joint has no column", where=how.name, found=name)
+        if len(set(order)) != len(order):
+            raise InputError("two columns have the same name", where=how.name, found=", ".join(how.joints))
+        missing = [self.tree.joints[i].name for i in sorted(moving - set(order))]
+        missing = [name for name in missing if not self.tree.joints[self.tree.joint_index(name)].mimic]
+        if missing:
+            raise InputError("a joint has no column", where=how.name, found=", ".join(missing[:8]))
+        return order
+
+    def _all_in_order(self) -> list[int]:
+        tree, order = self.tree, self.convention.order
+        every = range(len(tree.joints))
+        if order == "depth first, by name":
+            return list(every)
+        if order == "name":
+            return sorted(every, key=lambda i: tree.joints[i].name)
+        tag = "link" if order.endswith("link") else "joint"
+        written = {e.get("name", ""): k for k, e in enumerate(plain_xml(self._urdf).iterfind(tag))}
+        names = tree.links[1:] if tag == "link" else [joint.name for joint in tree.joints]
+        place = [written.get(name, -1) for name in names]  # a root joint is not in the file: first
+        if order == "file":
+            return sorted(every, key=place.__getitem__)
+        children: dict[int, list[int]] = {}
+        for i, joint in enumerate(tree.joints):
+            children.setdefault(joint.parent, []).append(i)
+        if order == "breadth first, by name":
+            found = list(children.get(0, []))
+            for i in found:  # grows while it is read
+                found += children.get(i + 1, [])
+            return found
+        found, stack = [], sorted(children.get(0, []), key=place.__getitem__, reverse=True)
+        while stack:
+            found.append(i := stack.pop())
+            stack += sorted(children.get(i + 1, []), key=place.__getitem__, reverse=True)
+        return found
+
+    def _add(self, i: int) -> str:
+        """Add the columns of a joint; return its name in the tool."""
+        how, joint = self.convention, self.tree.joints[i]
+        rule = how.rules.get(joint.name, JointRule())
+        name = rule.name or (usd_name(joint.name) if how.names == "usd" else joint.name)
+        q, v = self.tree.q_index[i], self.tree.v_index[i]
+        if joint.kind is JointKind.FLOATING:
+            self._refuse_rule(joint)
+            self._add_floating(i, name, q, v)
+        elif joint.kind is JointKind.PLANAR:
+            self._refuse_rule(joint)
+            self._add_planar(i, name, q, v)
+        else:
+            self._add_axis(joint, rule, name, q, v)
+        return name
+
+    def _refuse_rule(self, joint: Joint) -> None:
+        rule = self.convention.rules.get(joint.name)
+        if rule is not None and (rule.factor is not None or rule.zero or rule.sign != 1.0):
+            raise InputError(
+                "sign, zero and unit need a joint with one coordinate",
+                where=f"{self.convention.name}: joint {joint.name}",
+                found=joint.kind.value,
+            )
+
+    def _add_axis(self, joint: Joint, rule: JointRule, name: str, q: int, v: int) -> None:
+        how, turns = self.convention, joint.kind.turns
+        if rule.of and (rule.of == "angle") != turns:
+            raise InputError(
+                f"the unit is for a joint with {'an angle' if rule.of == 'angle' else 'a length'}",
+                where=f"{how.name}: joint {joint.name}",
+                found=joint.kind.value,
+            )
+        factor = rule.factor
+        if factor is None:
+            factor = rule.sign * (how.angle_factor if turns else 1.0)
+        multiplier, offset = (joint.mimic.multiplier, joint.mimic.offset) if joint.mimic else (1.0, 0.0)
+        unit = ("rad" if turns else "m") if abs(factor) == 1.0 else ""
+        copy, zero, factor = bool(joint.mimic), factor * offset + rule.zero, factor * multiplier
+        if joint.kind is JointKind.CONTINUOUS and how.continuous == 2:
+            both = [_Column(f"{name}.{part}", q, factor, zero, part, copy=copy) for part in ("cos", "sin")]
+            self._columns += both
+        else:
+            self._columns.append(_Column(name, q, factor, zero, "", unit, copy))
+        if joint.mimic:
+            self._v_copies.add(len(self._v_index))
+        self._add_rates([name], [unit], [v], [factor])
+
+    def _add_rates(self, names: list[str], units: list[str], at: list[int], factors: list[float]) -> None:
+        self._v_names += names
+        self._v_units += units
+        self._v_index += at
+        self._v_factor += factors
+
+    def _add_floating(self, i: int, name: str, q: int, v: int) -> None:
+        how, joint = self.convention, self.tree.joints[i]
+        position = [_Column(f"{name}.{x}", q + k, unit="m") for k, x in enumerate("xyz")]
+        turn = [_Column(f"{name}.q{x}", q + 3 + "xyzw".index(x)) for x in how.quaternion]
+        self._columns += position + turn if how.base_q == "position first" else turn + position
+        point = np.zeros(3) if how.point == "origin" else self._centre_of_mass(self.tree.links[i + 1])
+        rates = [*range(6)] if how.base_v == "linear first" else _SWAPPED
+        names = [f"{name}.{x}" for x in ("vx", "vy", "vz", "wx", "wy", "wz")]
+        units, factors = ["m"] * 3 + ["rad"] * 3, [1.0] * 3 + [how.angle_factor] * 3
+        first = len(self._v_index)
+        self._add_rates(
+            [names[k] for k in rates],
+            [units[k] for k in rates],
+            [v + k for k in rates],
+            [factors[k] for k in rates],
+        )
+        if "parent" in (how.linear, how.angular) or point.any():
+            self._blocks.append(_Block(joint, q, v, slice(first, first + 6), point))
+
+    def _add_planar(self, i: int, name: str, q: int, v: int) -> None:
+        how, joint = self.convention, self.tree.joints[i]
+        self._columns += [_Column(f"{name}.{x}", q + k, unit="m") for k, x in enumerate("xy")]
+        if how.continuous == 2:
+            self._columns += [_Column(f"{name}.{part}", q + 2, part=part) for part in ("cos", "sin")]
+        else:
+            self._columns.append(_Column(f"{name}.angle", q + 2, how.angle_factor, unit="rad"))
+        first = len(self._v_index)
+        names = [f"{name}.{x}" for x in ("vx", "vy", "wz")]
+        self._add_rates(names, ["m", "m", "rad"], [v, v + 1, v + 2], [1.0, 1.0, how.angle_factor])
+        if how.planar == "parent":
+            self._blocks.append(_Block(joint, q, v, slice(first, first + 3), np.zeros(3)))
+
+    def _centre_of_mass(self, link: str) -> FloatArray:
+        """Return the centre of mass (3,) of a link in its frame, from the text."""
+        for element in plain_xml(self._urdf).iterfind("link"):
+            if element.get("name") == link and (origin := element.find("inertial/origin")) is not None:
+                return np.array([float(x) for x in origin.get("xyz", "0 0 0").split()])
+        return np.zeros(3)
+
+    def _prepare(self) -> None:
+        columns, how = self._columns, self.convention
+        self.nq, self.nv = len(columns), len(self._v_index)
+        self._q_index = np.array([c.at for c in columns], dtype=np.intp)
+        self._q_factor = np.array([1.0 if c.part else c.factor for c in columns])
+        self._q_zero = np.array([0.0 if c.part else c.zero for c in columns])
+        self._plain_q = bool((self._q_factor == 1.0).all() and not self._q_zero.any())
+        self._plain_q &= not any(c.part for c in columns)
+        self._same_q = self._plain_q and np.array_equal(self._q_index, np.arange(self.tree.nq))
+        # For each of our numbers, the first of the tool's columns that has it itself.
+        self._q_source = [
+            next(k for k, c in enumerate(columns) if c.at == at and not c.copy) for at in range(self.tree.nq)
+        ]
+        self._v_at = np.array(self._v_index, dtype=np.intp)
+        self._v_scale = np.array(self._v_factor)
+        self._plain_v = bool((self._v_scale == 1.0).all()) and not self._blocks
+        self._same_v = self._plain_v and np.array_equal(self._v_at, np.arange(self.tree.nv))
+        self._v_source = [
+            next(k for k, x in enumerate(self._v_index) if x == at and k not in self._v_copies)
+            for at in range(self.tree.nv)
+        ]
+        self.angular_first = how.six == "angular first"
+
+    @property
+    def coordinate_names(self) -> tuple[str, ...]:
+        """A name for each number of the tool's q."""
+        return tuple(column.name for column in self._columns)
+
+    @property
+    def rate_names(self) -> tuple[str, ...]:
+        """A name for each number of the tool's v and a, and for each column of its Jacobian."""
+        return tuple(self._v_names)
+
+    def layout(self, what: str) -> CoordinateLayout:
+        """Return the names and units of "q", "v" or "a" in the tool, to parse values by name."""
+        if what != "q":
+            rest = {"neutral": np.zeros(self.nv)}
+            return CoordinateLayout(what, self.rate_names, tuple(self._v_units), poses=lambda: rest)
+
+        def named() -> dict[str, FloatArray]:
+            return {name: self.to(q) for name, q in configuration.poses(self.tree).items()}
+
+        units = tuple(column.unit for column in self._columns)
+        return CoordinateLayout(what, self.coordinate_names, units, poses=named)
+
+    @property
+    def permutation(self) -> NDArray[np.intp] | None:
+        """Indices with `q_tool = q[..., permutation]`; None if the conversion is more than that.
+
+        >>> import urdfkin
+        >>> urdfkin.load("a1").convention("mujoco").permutation.tolist()
+        [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]
+        """
+        return self._q_index.copy() if self._plain_q else None
+
+    @property
+    def rate_permutation(self) -> NDArray[np.intp] | None:
+        """Indices with `v_tool = v[..., rate_permutation]`; None if the conversion is more than that."""
+        return self._v_at.copy() if self._plain_v else None
+
+    @cached_property
+    def q_and_v_indices(self) -> dict[str, tuple[list[int], list[int]]]:
+        """The indices of each joint in the tool's q and v, by its name in the URDF."""
+        names = [self.tree.joints[i].name for i in self._order]
+        found, q, v = {}, 0, 0
+        for i, name in zip(self._order, names, strict=True):
+            kind = self.tree.joints[i].kind
+            nq = kind.nq_pinocchio if self.convention.continuous == 2 else kind.nq
+            found[name] = list(range(q, q + nq)), list(range(v, v + kind.nv))
+            q, v = q + nq, v + kind.nv
+        return found
+
+    # -- vectors -------------------------------------------------------------------------------------
+
+    @overload
+    def to(self, q: Given) -> FloatArray: ...
+    @overload
+    def to(self, q: Given, v: Given, a: Given | None = None) -> tuple[FloatArray, ...]: ...
+    def to(
+        self, q: Given, v: Given | None = None, a: Given | None = None
+    ) -> FloatArray | tuple[FloatArray, ...]:
+        """Convert q, (q, v) or (q, v, a) of this robot to the tool's.
+
+        Args:
+            q: (..., nq) rad, m; the array itself is returned if nothing differs.
+            v: (..., nv); for a floating base, its conversion depends on q.
+            a: (..., nv); its conversion depends on q and v.
+
+        Returns:
+            (..., nq) of the tool, or a tuple with v and a.
+
+        Raises:
+            InputError: a wrong length, or a number that is not finite.
+
+        >>> import urdfkin
+        >>> robot = urdfkin.load("a1", root_joint="floating", verify=False)
+        >>> q, v = robot.sample(1)[0], [1.0, *[0.0] * 17]  # forwards, in the axes of the base
+        >>> _, qvel = robot.convention("mujoco").to(q, v)
+        >>> bool(abs(qvel[:3] - robot.placement(q, "trunk")[:3, 0]).max() < 1e-15)  # in world axes
+        True
+        """
+        ours = self._ours(q, v, a)
+        found = [self._to_q(ours[0])]
+        if len(ours) > 1:
+            found.append(self._to_rates(ours[0], ours[1]))
+        if len(ours) > 2:
+            found.append(self._to_rates(ours[0], ours[2], ours[1]))
+        return found[0] if len(found) == 1 else tuple(found)
+
+    @overload
+    def from_(self, q: ArrayLike) -> FloatArray: ...
+    @overload
+    def from_(self, q: ArrayLike, v: ArrayLike, a: ArrayLike | None = None) -> tuple[FloatArray, ...]: ...
+    def from_(
+        self, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None
+    ) -> FloatArray | tuple[FloatArray, ...]:
+        """Convert the tool's q, (q, v) or (q, v, a) to this robot's, the inverse of `to`.
+
+        Raises:
+            InputError: a wrong length, a number that is not finite, or a mimic joint that breaks its rule.
+
+        >>> import urdfkin
+        >>> arm = urdfkin.load("planar_two_link")
+        >>> arm.convention("drake").from_([0.5, -1.0]).tolist()
+        [0.5, -1.0]
+        """
+        if a is not None and v is None:
+            raise InputError("a needs v")
+        ours = [self._from_q(self._theirs(q, "q"))]
+        if v is not None:
+            ours.append(self._from_rates(ours[0], self._theirs(v, "v")))
+        if a is not None:
+            ours.append(self._from_rates(ours[0], self._theirs(a, "a"), ours[1]))
+        return ours[0] if len(ours) == 1 else tuple(ours)
+
+    def _ours(self, *given: Given | None) -> list[FloatArray]:
+        if given[1] is None and given[2] is not None:
+            raise InputError("a needs v")
+        letters = zip("qva", given, strict=True)
+        return [configuration.checked(self.tree, x, letter) for letter, x in letters if x is not None]
+
+    def _theirs(self, value: ArrayLike, what: str) -> FloatArray:
+        array, width = scalars(value, what), self.nq if what == "q" else self.nv
+        if array.shape[-1:] != (width,):
+            names = self.coordinate_names if what == "q" else self.rate_names
+            raise InputError(
+                f"{what} needs {width} numbers in the convention {self.convention.name}: {', '.join(names)}",
+                found=f"shape {array.shape}",
+                question=Question.JOINT_ORDER,
+            )
+        return array
+
+    def _to_q(self, q: FloatArray) -> FloatArray:
+        if self._same_q:
+            return q
+        found: FloatArray = q[..., self._q_index]
+        if self._plain_q:
+            return found
+        found = found * self._q_factor + self._q_zero
+        for k, column in enumerate(self._columns):
+            if column.part:
+                value = q[..., column.at] * column.factor + column.zero
+                found[..., k] = np.cos(value) if column.part == "cos" else np.sin(value)
+        return found
+
+    def _from_q(self, theirs: FloatArray) -> FloatArray:
+        if self._same_q:
+            return theirs
+        source = self._q_source
+        found: FloatArray = theirs[..., source]
+        if not self._plain_q:
+            found = (found - self._q_zero[source]) / self._q_factor[source]
+        for at, k in enumerate(source):
+            column = self._columns[k]
+            if column.part:
+                pair = theirs[..., k : k + 2]
+                norm = np.linalg.norm(pair, axis=-1)
+                if (np.abs(norm - 1.0) > NORM_TOLERANCE).any():
+                    raise InputError(
+                        "cosine and sine must have norm 1", where=column.name, found=f"{norm.max():.6g}"
+                    )
+                angle = np.arctan2(pair[..., 1], pair[..., 0])
+                found[..., at] = (angle - column.zero) / column.factor
+        if any(column.copy for column in self._columns):
+            self._check_copies(theirs, self._to_q(found))
+        return found
+
+    def _check_copies(self, theirs: FloatArray, expected: FloatArray) -> None:
+        for k, column in enumerate(self._columns):
+            if not column.copy:
+                continue
+            apart = float(np.abs(theirs[..., k] - expected[..., k]).max(initial=0.0))
+            if apart > _MIMIC_TOLERANCE * max(1.0, abs(column.factor)):
+                raise InputError(
+                    "a mimic joint does not follow its rule",
+                    where=column.name,
+                    found=f"{apart:.3g} apart",
+                    remedy="correct the value, or load with mimic=False (--no-mimic)",
+                    question=Question.MIMIC_JOINTS,
+                )
+
+    def _to_rates(self, q: FloatArray, x: FloatArray, v: FloatArray | None = None) -> FloatArray:
+        """Return M x, or M x + M' v."""
+        if self._same_v:
+            return x
+        found: FloatArray = x[..., self._v_at]
+        if self._plain_v:
+            return found
+        found = found * self._v_scale
+        for block in self._blocks:
+            own = slice(block.v, block.v + block.joint.kind.nv)
+            B = self._block(block, q)
+            part = _times(B, x[..., own])
+            if v is not None:
+                part = part + _times(self._block_rate(block, q, v[..., own]), v[..., own])
+            found = _with(found, block.rows, part)
+        return found
+
+    def _from_rates(self, q: FloatArray, x: FloatArray, v: FloatArray | None = None) -> FloatArray:
+        """Return M^-1 x, or M^-1 (x - M' v)."""
+        if self._same_v:
+            return x
+        found: FloatArray = x[..., self._v_source]
+        if self._plain_v:
+            return found
+        found = found / self._v_scale[self._v_source]
+        for block in self._blocks:
+            own = slice(block.v, block.v + block.joint.kind.nv)
+            part = x[..., block.rows]
+            if v is not None:
+                part = part - _times(self._block_rate(block, q, v[..., own]), v[..., own])
+            found = _with(found, own, _times(_inverse(self._block(block, q)), part))
+        return found
+
+    # -- matrices ------------------------------------------------------------------------------------
+
+    def matrix(self, q: Given | None = None) -> FloatArray:
+        """Return M with v_tool = M v: (tool's nv, nv), or (..., tool's nv, nv) if it depends on q.
+
+        Raises:
+            InputError: q is missing, although M depends on it.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").convention("alphabetical").matrix().tolist()
+        [[1.0, 0.0], [0.0, 1.0]]
+        """
+        M = np.zeros((self.nv, self.tree.nv))
+        M[np.arange(self.nv), self._v_at] = self._v_scale
+        if not self._blocks:
+            return M
+        if q is None:
+            raise InputError(
+                "the matrix of a floating or planar joint depends on q", where=self.convention.name
+            )
+        ours = configuration.checked(self.tree, q, "q")
+        M = np.tile(M, (*ours.shape[:-1], 1, 1))
+        for block in self._blocks:
+            M[..., block.rows, block.v : block.v + block.joint.kind.nv] = self._block(block, ours)
+        return M
+
+    def matrix_rate(self, q: Given, v: Given) -> FloatArray:
+        """Return M' (..., tool's nv, nv), the time derivative of `matrix`."""
+        ours, rates = self._ours(q, v, None)
+        shape = np.broadcast_shapes(ours.shape[:-1], rates.shape[:-1])
+        found = np.zeros((*shape, self.nv, self.tree.nv))
+        for block in self._blocks:
+            own = slice(block.v, block.v + block.joint.kind.nv)
+            found[..., block.rows, own] = self._block_rate(block, ours, rates[..., own])
+        return found
+
+    def inverse_matrix(self, q: Given | None = None) -> FloatArray:
+        """Return M^-1 with v = M^-1 v_tool; a mimic joint's column is 0, because its rule determines it."""
+        if not self._blocks:
+            found = np.zeros((self.tree.nv, self.nv))
+            found[np.arange(self.tree.nv), self._v_source] = 1.0 / self._v_scale[self._v_source]
+            return found
+        M = self.matrix(q)
+        found = np.zeros((*M.shape[:-2], self.tree.nv, self.nv))
+        found[..., self._v_source] = _inverse(M[..., self._v_source, :])
+        return found
+
+    def _block(self, block: _Block, q: FloatArray) -> FloatArray:
+        """Return the part of M of a planar joint (..., 3, 3) or a floating joint (..., 6, 6)."""
+        how, unit = self.convention, self.convention.angle_factor
+        if block.joint.kind is JointKind.PLANAR:
+            angle = q[..., block.q + 2]
+            B = np.zeros((*angle.shape, 3, 3))
+            B[..., 0, 0] = B[..., 1, 1] = np.cos(angle)
+            B[..., 1, 0], B[..., 0, 1] = np.sin(angle), -np.sin(angle)
+            B[..., 2, 2] = unit
+            return B
+        R = rotation_of(q[..., block.q + 3 : block.q + 7])
+        A = R if how.linear == "parent" else np.broadcast_to(np.eye(3), R.shape)
+        turn = R if how.angular == "parent" else np.eye(3)
+        return self._rows(A, -A @ _cross(block.point), unit * turn)
+
+    def _block_rate(self, block: _Block, q: FloatArray, v: FloatArray) -> FloatArray:
+        """Return the time derivative of `_block`, for the joint's own velocity v."""
+        how, unit = self.convention, self.convention.angle_factor
+        if block.joint.kind is JointKind.PLANAR:
+            angle, w = np.broadcast_arrays(q[..., block.q + 2], v[..., 2])
+            B = np.zeros((*angle.shape, 3, 3))
+            B[..., 0, 0] = B[..., 1, 1] = -np.sin(angle) * w
+            B[..., 1, 0], B[..., 0, 1] = np.cos(angle) * w, -np.cos(angle) * w
+            return B
+        R = rotation_of(q[..., block.q + 3 : block.q + 7]) @ _cross(v[..., 3:])
+        A = R if how.linear == "parent" else np.zeros_like(R)
+        turn = R if how.angular == "parent" else np.zeros_like(R)
+        return self._rows(A, -A @ _cross(block.point), unit * turn)
+
+    def _rows(self, A: FloatArray, arm: FloatArray, turn: FloatArray) -> FloatArray:
+        """Return [[A, arm], [0, turn]], with the angular rows first if the tool has them first."""
+        B = np.zeros((*A.shape[:-2], 6, 6))
+        B[..., :3, :3], B[..., :3, 3:], B[..., 3:, 3:] = A, arm, turn
+        return B if self.convention.base_v == "linear first" else B[..., _SWAPPED, :]
+
+    # -- results -------------------------------------------------------------------------------------
+
+    def six(self, x: ArrayLike, axis: int = -1) -> FloatArray:
+        """Exchange the halves of six-vectors if the tool has the angular part first; its own inverse.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").convention("drake").six([1, 2, 3, 4, 5, 6]).tolist()
+        [4.0, 5.0, 6.0, 1.0, 2.0, 3.0]
+        """
+        array = np.asarray(x, dtype=np.float64)
+        if array.ndim < 1 or array.shape[axis] != 6:
+            raise InputError("a six-vector has six numbers", found=f"shape {array.shape}")
+        return np.take(array, _SWAPPED, axis) if self.angular_first else array
+
+    def jacobian(self, q: Given, J: ArrayLike) -> FloatArray:
+        """Convert a Jacobian (..., 6, nv) to the tool's rows and columns: S J M^-1.
+
+        Raises:
+            InputError: a column of J belongs to several joints of the tool, because one mimics the other.
+        """
+        self._demand_own_columns()
+        array = self.six(J, -2)
+        if self._plain_v:
+            return array if self._same_v else array[..., self._v_at]
+        return array @ _for_frames(self.inverse_matrix(q), array.ndim)
+
+    def from_jacobian(self, q: Given, J: ArrayLike) -> FloatArray:
+        """Convert the tool's Jacobian (..., 6, tool's nv) to (..., 6, nv): S J M; mimic columns are added."""
+        array = self.six(J, -2)
+        return array @ _for_frames(self.matrix(q), array.ndim)
+
+    def jacobian_rate(self, q: Given, v: Given, J: ArrayLike, rate: ArrayLike) -> FloatArray:
+        """Convert the time derivative of a Jacobian: S (J' M^-1 + J (M^-1)')."""
+        found = self.jacobian(q, rate)
+        if not self._blocks:
+            return found
+        inverse = self.inverse_matrix(q)
+        change = -inverse @ self.matrix_rate(q, v) @ inverse
+        array = self.six(J, -2)
+        return found + array @ _for_frames(change, array.ndim)
+
+    def hessian(self, q: Given, J: ArrayLike, H: ArrayLike) -> FloatArray:
+        """Convert the derivatives (..., 6, nv, nv) of a Jacobian by the joint coordinates."""
+        self._demand_own_columns()
+        inverse, tensor, columns = self.inverse_matrix(q), self.six(H, -3), self.six(J, -2)
+        W = _for_frames(inverse, columns.ndim)
+        found: FloatArray = np.einsum("...rkl,...ki,...lj->...rij", tensor, W, W)
+        if self._blocks:
+            change = np.zeros((*inverse.shape, self.nv))
+            for j in range(self.nv):
+                along = self.matrix_rate(q, inverse[..., j])
+                change[..., j] = -inverse @ along @ inverse
+            lifted = change if columns.ndim == change.ndim - 1 else change[..., None, :, :, :]
+            found += np.asarray(np.einsum("...rk,...kij->...rij", columns, lifted), dtype=np.float64)
+        return found
+
+    def _demand_own_columns(self) -> None:
+        if self._v_copies:
+            name = self._v_names[min(self._v_copies)]
+            raise InputError(
+                f"{self.convention.title or self.convention.name} has a column for each mimic joint, and ours"
+                " are added up",
+                where=f"joint {name}",
+                remedy="load with mimic=False (--no-mimic)",
+                question=Question.MIMIC_JOINTS,
+            )
+
+
+def _times(B: FloatArray, x: FloatArray) -> FloatArray:
+    found: FloatArray = (B @ x[..., np.newaxis])[..., 0]
+    return found
+
+
+def _inverse(B: FloatArray) -> FloatArray:
+    found: FloatArray = np.linalg.inv(B)
+    return found
+
+
+def _with(array: FloatArray, where: slice, part: FloatArray) -> FloatArray:
+    """Return `array` with `part` in some of its last axis; the batch shapes broadcast."""
+    shape = np.broadcast_shapes(array.shape[:-1], part.shape[:-1])
+    if array.shape[:-1] != shape:
+        array = np.broadcast_to(array, (*shape, array.shape[-1])).copy()
+    array[..., where] = part
+    return array
+
+
+def _for_frames(M: FloatArray, ndim: int) -> FloatArray:
+    """Return (..., k, l) matrices with an axis for the frames, if the Jacobian has one more axis."""
+    return M[..., np.newaxis, :, :] if M.ndim > 2 and ndim == M.ndim + 1 else M
+
+
+def _cross(x: FloatArray) -> FloatArray:
+    """Return [x] (..., 3, 3) with [x] y = x x y."""
+    found = np.zeros((*x.shape, 3))
+    found[..., 0, 1], found[..., 0, 2], found[..., 1, 2] = -x[..., 2], x[..., 1], -x[..., 0]
+    found -= np.swapaxes(found.copy(), -1, -2)
+    return found
+
+
+def usd_name(name: str) -> str:
+    """Return a name as a USD identifier, as `TfMakeValidIdentifier` makes it.
+
+    >>> usd_name("1"), usd_name("arm-2")
+    ('_', 'arm_2')
+    """
+    octets = name.encode().decode("latin-1")  # the function replaces each byte
+    return re.sub(r"^[^A-Za-z_]|[^A-Za-z0-9_]", "_", octets) or "_"

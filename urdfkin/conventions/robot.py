@@ -1,0 +1,130 @@
+"""A robot whose methods take and return the convention of a tool."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import ArrayLike
+
+from urdfkin.conventions.conversion import Conversion
+from urdfkin.errors.escape import log_line
+from urdfkin.model.tree import FloatArray
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from urdfkin.verify.certificate import Certificate
+
+
+class ConventionRobot:
+    """A robot in the convention of a tool; `robot.with_convention("mujoco")` returns it.
+
+    Its methods are those of `Robot` with the same arguments. q, v and a are the tool's numbers; Jacobians
+    have its columns, and six-vectors its order of rows. The frame and `reference` mean the same as in
+    `Robot`. Each result is checked as usual, before it is converted.
+
+    Attributes:
+        robot: The robot itself.
+        conversion: Names and conversions, the result of `robot.convention(...)`.
+
+    >>> import urdfkin
+    >>> robot = urdfkin.load("a1", root_joint="floating").with_convention("drake")
+    >>> q, v = robot.neutral(), [0.0] * 5 + [1.0] + [0.0] * 12
+    >>> robot.velocity(q, v, "trunk").tolist()  # angular first
+    [0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
+    """
+
+    def __init__(self, robot: Any, conversion: Conversion) -> None:
+        self.robot, self.conversion = robot, conversion
+
+    def __repr__(self) -> str:
+        name = self.conversion.convention.name
+        return log_line(f"<Robot {self.robot.name} in the convention {name}: nq {self.nq}, nv {self.nv}>")
+
+    @property
+    def nq(self) -> int:
+        """Length of q in the tool."""
+        return self.conversion.nq
+
+    @property
+    def nv(self) -> int:
+        """Length of v and a in the tool."""
+        return self.conversion.nv
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints in the tool, in its order."""
+        return self.conversion.joint_names
+
+    @property
+    def coordinate_names(self) -> tuple[str, ...]:
+        """A name for each number of q in the tool."""
+        return self.conversion.coordinate_names
+
+    @property
+    def rate_names(self) -> tuple[str, ...]:
+        """A name for each number of v and a in the tool."""
+        return self.conversion.rate_names
+
+    def neutral(self) -> FloatArray:
+        """Return the zero configuration of the URDF in the tool's numbers."""
+        return self.conversion.to(self.robot.neutral())
+
+    def sample(self, n: int, seed: int = 0) -> FloatArray:
+        """Return random configurations (n, nq), those of `Robot.sample`."""
+        return self.conversion.to(self.robot.sample(n, seed))
+
+    def certificate(self) -> Certificate:
+        """Return the certificate of the robot's results."""
+        found: Certificate = self.robot.certificate()
+        return found
+
+    def placement(self, q: ArrayLike, frame: Any = None, **options: Any) -> FloatArray:
+        """Return T_world_frame (..., 4, 4); see `Robot.placement`."""
+        return self._call(self.robot.placement, (q,), frame, **options)[1]
+
+    def relative_placement(self, q: ArrayLike, frame: Any, other: Any, **options: Any) -> FloatArray:
+        """Return the pose of a frame in another one (..., 4, 4); see `Robot.relative_placement`."""
+        return self._call(self.robot.relative_placement, (q,), frame, other, **options)[1]
+
+    def velocity(
+        self, q: ArrayLike, v: ArrayLike, frame: Any = None, *more: Any, **options: Any
+    ) -> FloatArray:
+        """Return the velocity (..., 6) of a frame, rows as in the tool; see `Robot.velocity`."""
+        return self.conversion.six(self._call(self.robot.velocity, (q, v), frame, *more, **options)[1])
+
+    def acceleration(
+        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, frame: Any = None, *more: Any, **options: Any
+    ) -> FloatArray:
+        """Return the classical acceleration (..., 6), rows as in the tool; see `Robot.acceleration`."""
+        return self.conversion.six(self._call(self.robot.acceleration, (q, v, a), frame, *more, **options)[1])
+
+    def jacobian(self, q: ArrayLike, frame: Any = None, *more: Any, **options: Any) -> FloatArray:
+        """Return the Jacobian (..., 6, nv), rows and columns as in the tool; see `Robot.jacobian`."""
+        ours, J = self._call(self.robot.jacobian, (q,), frame, *more, **options)
+        return self.conversion.jacobian(ours[0], J)
+
+    def jacobian_rate(
+        self, q: ArrayLike, v: ArrayLike, frame: Any = None, *more: Any, **options: Any
+    ) -> FloatArray:
+        """Return the time derivative of the tool's Jacobian; see `Robot.jacobian_rate`."""
+        ours, rate = self._call(self.robot.jacobian_rate, (q, v), frame, *more, **options)
+        J = self.robot.jacobian(ours[0], frame, *more, **options)
+        return self.conversion.jacobian_rate(ours[0], ours[1], J, rate)
+
+    def hessian(self, q: ArrayLike, frame: Any = None, *more: Any, **options: Any) -> FloatArray:
+        """Return the derivatives (..., 6, nv, nv) of the tool's Jacobian; see `Robot.hessian`."""
+        ours, H = self._call(self.robot.hessian, (q,), frame, *more, **options)
+        return self.conversion.hessian(ours[0], self.robot.jacobian(ours[0], frame, *more, **options), H)
+
+    def _call(
+        self, method: Callable[..., FloatArray], given: tuple[Any, ...], *more: Any, **options: Any
+    ) -> tuple[tuple[FloatArray, ...], FloatArray]:
+        """Return our inputs and the method's result for the tool's inputs."""
+        read: list[ArrayLike] = [
+            self.conversion.layout(letter).read(x) if isinstance(x, str | dict) else x
+            for letter, x in zip("qva", given, strict=False)
+        ]
+        found = self.conversion.from_(*read)
+        ours: tuple[FloatArray, ...] = found if isinstance(found, tuple) else (found,)
+        return ours, method(*ours, *more, **options)
