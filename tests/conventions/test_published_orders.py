@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import urdfkin
+from urdfkin.conventions import find_convention
 
 LEGS = ("LF", "LH", "RF", "RH")
 SIDES = ("left", "right")
@@ -128,3 +131,17 @@ def test_the_g1_has_the_published_permutation_from_mujoco_to_isaac_lab() -> None
     assert [mujoco.joint_names.index(name) for name in isaaclab.joint_names] == G1
     q = g1.sample(3)
     assert np.array_equal(mujoco.to(q)[:, G1], isaaclab.to(q))
+
+
+def test_a_fixed_joint_counts_as_a_level_only_if_the_importer_keeps_it() -> None:
+    text = """<robot name="r"><link name="base"/><link name="flange"/>
+    <link name="x"/><link name="y"/><link name="z"/>
+    <joint name="mount" type="fixed"><parent link="base"/><child link="flange"/></joint>
+    <joint name="a" type="continuous"><parent link="flange"/><child link="x"/><axis xyz="0 0 1"/></joint>
+    <joint name="b" type="continuous"><parent link="base"/><child link="y"/><axis xyz="0 0 1"/></joint>
+    <joint name="c" type="continuous"><parent link="y"/><child link="z"/><axis xyz="0 0 1"/></joint>
+    </robot>"""
+    robot = urdfkin.load(text, verify=False)
+    kept = replace(find_convention("isaaclab"), order="breadth first, with fixed joints")
+    assert robot.convention("isaaclab").joint_names == ("a", "b", "c")
+    assert robot.convention(kept).joint_names == ("b", "c", "a")

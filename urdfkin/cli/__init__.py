@@ -30,6 +30,7 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {
         "robots": ("urdfkin.cli.robots", "List the robots that have a short name."),
         "info": ("urdfkin.cli.info", "Show the whole robot: links, joints, limits, frames and coordinates."),
+        "order": ("urdfkin.cli.order", "Show the order of the joints in MuJoCo, Drake, Isaac Lab and more."),
         "view": ("urdfkin.cli.view", "Show a robot in a browser tab, with sliders and checked numbers."),
         "plot": ("urdfkin.cli.plot", "Plot a frame's motion along a trajectory."),
     },

@@ -1,7 +1,16 @@
 """Conventions of other tools: joint order, quaternions, row order, axes of base velocities, units, zeros."""
 
 from urdfkin.conventions.convention import BUILT_IN, Convention, JointRule, find_convention
-from urdfkin.conventions.conversion import Conversion
+from urdfkin.conventions.conversion import Conversion, Reordering, reordering
 from urdfkin.conventions.robot import ConventionRobot
 
-__all__ = ["BUILT_IN", "Convention", "ConventionRobot", "Conversion", "JointRule", "find_convention"]
+__all__ = [
+    "BUILT_IN",
+    "Convention",
+    "ConventionRobot",
+    "Conversion",
+    "JointRule",
+    "Reordering",
+    "find_convention",
+    "reordering",
+]

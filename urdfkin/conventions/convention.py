@@ -38,6 +38,7 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
         "depth first, by file",
         "depth first, by link",
         "breadth first, by name",
+        "breadth first, with fixed joints",
         "file",
         "name",
         "given",

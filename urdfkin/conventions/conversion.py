@@ -9,7 +9,7 @@ of a floating or planar joint.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import overload
@@ -144,27 +144,42 @@ class Conversion:
         every = range(len(tree.joints))
         if order == "depth first, by name":
             return list(every)
-        if order == "name":
-            return sorted(every, key=lambda i: tree.joints[i].name)
         tag = "link" if order.endswith("link") else "joint"
         written = {e.get("name", ""): k for k, e in enumerate(plain_xml(self._urdf).iterfind(tag))}
         names = tree.links[1:] if tag == "link" else [joint.name for joint in tree.joints]
         place = [written.get(name, -1) for name in names]  # a root joint is not in the file: first
+        if order == "name":
+            return sorted(every, key=lambda i: (place[i] >= 0, tree.joints[i].name))
         if order == "file":
             return sorted(every, key=place.__getitem__)
         children: dict[int, list[int]] = {}
         for i, joint in enumerate(tree.joints):
             children.setdefault(joint.parent, []).append(i)
-        if order == "breadth first, by name":
-            found = list(children.get(0, []))
-            for i in found:  # grows while it is read
-                found += children.get(i + 1, [])
-            return found
+        if order.startswith("breadth first"):
+            return self._breadth_first(children, merged=order.endswith("by name"))
         found, stack = [], sorted(children.get(0, []), key=place.__getitem__, reverse=True)
         while stack:
             found.append(i := stack.pop())
             stack += sorted(children.get(i + 1, []), key=place.__getitem__, reverse=True)
         return found
+
+    def _breadth_first(self, children: Mapping[int, list[int]], *, merged: bool) -> list[int]:
+        """Return the joints by depth; if `merged`, links that a fixed joint connects are one link."""
+
+        def below(link: int) -> list[int]:
+            found, fixed = list[int](), [link]
+            for one in fixed:  # grows while it is read
+                for i in children.get(one, []):
+                    if self.tree.joints[i].kind.nv or not merged:
+                        found.append(i)
+                    else:
+                        fixed.append(i + 1)
+            return sorted(found, key=lambda i: self.tree.joints[i].name)
+
+        order = below(0)
+        for i in order:
+            order += below(i + 1)
+        return order
 
     def _add(self, i: int) -> str:
         """Add the columns of a joint; return its name in the tool."""
@@ -281,6 +296,11 @@ class Conversion:
             for at in range(self.tree.nv)
         ]
         self.angular_first = how.six == "angular first"
+
+    @property
+    def has_pairs(self) -> bool:
+        """Whether q has the cosine and sine of an angle."""
+        return any(column.part for column in self._columns)
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
@@ -643,14 +663,74 @@ class Conversion:
             )
 
 
+@dataclass(frozen=True, slots=True)
+class Reordering:
+    """Numbers of one tool from those of another: `x[..., index] * factor + zero`."""
+
+    index: tuple[int, ...]
+    factor: tuple[float, ...]
+    zero: tuple[float, ...]
+
+    def code(self, to: str, of: str) -> str:
+        """Return one line of Python with NumPy that assigns the numbers.
+
+        >>> Reordering((1, 0), (1.0, 1.0), (0.0, 0.0)).code("q_b", "q_a")
+        'q_b = q_a[..., [1, 0]]'
+        """
+        same = self.index == tuple(range(len(self.index)))
+        line = of if same else f"{of}[..., {list(self.index)}]"
+        if any(factor != 1.0 for factor in self.factor):
+            line += f" * np.array({list(self.factor)})"
+        if any(self.zero):
+            line += f" + np.array({list(self.zero)})"
+        return f"{to} = {line}"
+
+
+def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | None:
+    """Return the numbers of "q" or "v" of the tool `end` from those of `start`; None if it is more than that.
+
+    It is more if one of the two stores cosine and sine, or if the axes of a base velocity differ.
+
+    >>> import urdfkin
+    >>> robot = urdfkin.load("a1", verify=False)
+    >>> reordering("q", robot.convention("isaaclab"), robot.convention("mujoco")).index
+    (1, 5, 9, 0, 4, 8, 3, 7, 11, 2, 6, 10)
+    """
+    if what == "q":
+        if start.convention.continuous != end.convention.continuous and (start.has_pairs or end.has_pairs):
+            return None
+        own, other = start._columns, end._columns
+        index = tuple(
+            next(k for k, c in enumerate(own) if (c.at, c.part) == (x.at, x.part) and not c.copy)
+            for x in other
+        )
+        if any(
+            x.part and (x.factor, x.zero) != (own[k].factor, own[k].zero)
+            for k, x in zip(index, other, strict=True)
+        ):
+            return None
+        factor = [1.0 if x.part else x.factor / own[k].factor for k, x in zip(index, other, strict=True)]
+        zero = [
+            0.0 if x.part else x.zero - own[k].zero * f for k, x, f in zip(index, other, factor, strict=True)
+        ]
+        return Reordering(index, tuple(factor), tuple(zero))
+    axes = ("linear", "angular", "point", "planar")
+    if any(getattr(start.convention, axis) != getattr(end.convention, axis) for axis in axes) and (
+        start._blocks or end._blocks
+    ):
+        return None
+    index = tuple(start._v_source[at] for at in end._v_index)
+    pairs = zip(end._v_factor, index, strict=True)
+    return Reordering(index, tuple(f / start._v_factor[k] for f, k in pairs), (0.0,) * len(index))
+
+
 def _times(B: FloatArray, x: FloatArray) -> FloatArray:
     found: FloatArray = (B @ x[..., np.newaxis])[..., 0]
     return found
 
 
 def _inverse(B: FloatArray) -> FloatArray:
-    found: FloatArray = np.linalg.inv(B)
-    return found
+    return np.asarray(np.linalg.inv(B), dtype=np.float64)
 
 
 def _with(array: FloatArray, where: slice, part: FloatArray) -> FloatArray:
