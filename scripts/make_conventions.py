@@ -135,6 +135,9 @@ print(qpos.shape, qvel.shape, J.shape)
 (19,) (18,) (6, 18)
 ```
 
+`placement`, `velocity`, `jacobian`, `jacobian-rate`, `hessian` and `acceleration` have `--convention NAME`:
+--q, --v, --a and the result are the tool's numbers.
+
 """
 _TOOL_HEADS = (
     "order of joints", "q of a continuous joint", "mimic joint", "q of a free body", "v of a free body",

@@ -35,6 +35,7 @@ PACKAGE = Path(urdfkin.__file__).parent
 #: Who opens files besides the reader, and which: no stranger can put another in their place.
 OTHERS = {
     "cli/streams.py": "/dev/null",
+    "conventions/convention.py": "urdfkin's own data; a user's file by the reader",
     "export/c.py": "urdfkin's own frames of code",
     "export/compiled_frame.py": "/proc, and what the compiler has just made in a folder of its own",
     "kinematics/registry/__init__.py": "urdfkin's own data",

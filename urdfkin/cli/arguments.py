@@ -19,6 +19,7 @@ from urdfkin.model.reference import Reference
 from urdfkin.system.files import MOST_DATA, read_standard_input, read_text
 
 if TYPE_CHECKING:
+    from urdfkin.conventions import Conversion
     from urdfkin.model.base_motion import BaseMotion
     from urdfkin.model.tree import FloatArray
     from urdfkin.robot import Robot
@@ -166,6 +167,12 @@ a_option = click.option(
     help="Joint accelerations, in the same forms; neutral is zero.",
 )
 
+convention_option = click.option(
+    "--convention",
+    metavar="NAME|FILE",
+    help="Convention of --q, --v, --a and of the result: a tool of `urdfkin order`, or a TOML file.",
+)
+
 TRAJECTORY_HELP = "File: CSV with t, coordinates, v:NAME, a:NAME; or .npz with t, q, v, a."
 
 
@@ -182,6 +189,7 @@ class Inputs:
         t: (n,) times of a trajectory in s, or None.
         base: Motion of the root link, or None.
         said: More settings that the result depends on, for titles and JSON.
+        conversion: The convention of q, v and a, if it is not urdfkin's.
     """
 
     robot: Robot
@@ -192,6 +200,24 @@ class Inputs:
     t: FloatArray | None = None
     base: BaseMotion | None = None
     said: Mapping[str, Any] = field(default_factory=dict)
+    conversion: Conversion | None = None
+
+    @property
+    def coordinate_names(self) -> tuple[str, ...]:
+        """A name for each number of q."""
+        return (self.conversion or self.robot).coordinate_names
+
+    @property
+    def rate_names(self) -> tuple[str, ...]:
+        """A name for each number of v and a."""
+        return (self.conversion or self.robot).rate_names
+
+    def converted(self) -> Inputs:
+        """Return a copy with q, v and a in the convention."""
+        if self.conversion is None:
+            return self
+        q, v, a = self.conversion.to(self.q, self.v, self.a)
+        return replace(self, q=q, v=v, a=a).saying(convention=self.conversion.convention.name)
 
     def saying(self, **more: Any) -> Inputs:
         """Return a copy with additional settings, which titles and JSON output list."""
@@ -236,10 +262,12 @@ def read_inputs(
     a: str = "neutral",
     *,
     option: str = "--q",
+    conversion: Conversion | None = None,
 ) -> Inputs:
     """Read the values of q, v and a from the command line.
 
-    Batches must have the same length; a single row is repeated. `option` is the name of the option of q.
+    Batches must have the same length; a single row is repeated. `option` is the name of the option of q. The
+    values are in the given convention; the result is in urdfkin's.
 
     Raises:
         InputError: an invalid number, a wrong count, batches of different lengths, or a --seed that has no
@@ -252,7 +280,7 @@ def read_inputs(
         reject_unused_options(click.get_current_context(), ("seed",), "without a random --q, --v or --a")
     rng = np.random.default_rng(seed)
     given = (("q", q, option), ("v", v, "--v"), ("a", a, "--a"))
-    rows = [_values(robot, letter, text, where, rng) for letter, text, where in given]
+    rows = [_values(robot, letter, text, where, rng, conversion) for letter, text, where in given]
     lengths = {len(part) for part in rows if len(part) != 1}
     if len(lengths) > 1:
         raise InputError(
@@ -261,24 +289,34 @@ def read_inputs(
         )
     n = lengths.pop() if lengths else 1
     q_, v_, a_ = (np.ascontiguousarray(np.broadcast_to(part, (n, part.shape[1]))) for part in rows)
+    if conversion is not None:
+        q_, v_, a_ = conversion.from_(q_, v_, a_)
     for line in robot.limit_violations(q_):
         say(f"warning: {line}", err=True)
-    return Inputs(robot, frame or robot.tip_frame, q_, v_, a_)
+    return Inputs(robot, frame or robot.tip_frame, q_, v_, a_, conversion=conversion)
 
 
-def _values(robot: Robot, letter: str, text: str, where: str, rng: Any) -> FloatArray:
-    """Return the (n, width) values of one option."""
+def _values(
+    robot: Robot, letter: str, text: str, where: str, rng: Any, conversion: Conversion | None
+) -> FloatArray:
+    """Return the (n, width) values of one option, in the given convention."""
     from urdfkin.model.configuration import places  # noqa: PLC0415  keeps --help fast
     from urdfkin.verify.sampling import sample  # noqa: PLC0415
 
-    names = robot.coordinate_names if letter == "q" else robot.rate_names
+    known = conversion or robot
+    names = known.coordinate_names if letter == "q" else known.rate_names
     word, _, count = text.partition(":")
     if word == "random":
         n = _count(where, count) if count else _RANDOM_SAMPLES
-        return sample(robot.tree, n, rng) if letter == "q" else rng.standard_normal((n, len(names)))
+        if letter != "q":
+            found: FloatArray = rng.standard_normal((n, len(names)))
+            return found
+        drawn = sample(robot.tree, n, rng)
+        return conversion.to(drawn) if conversion else drawn
     if text.startswith("@"):
         return read_batch(Path(text[1:]), where, (names,))[0]
-    return places(robot.tree, letter).read(text, where)[None]
+    layout = conversion.layout(letter) if conversion else places(robot.tree, letter)
+    return layout.read(text, where)[None]
 
 
 def _count(where: str, text: str) -> int:

@@ -174,8 +174,8 @@ def _as_json(
         "frame": inputs.frame,
         "reference": reference,
         "rows": list(quantity.labels) or None,
-        "coordinates": list(inputs.robot.coordinate_names),
-        "rates": list(inputs.robot.rate_names),
+        "coordinates": list(inputs.coordinate_names),
+        "rates": list(inputs.rate_names),
     }
     if inputs.t is not None:
         document["t"] = inputs.t.tolist()
@@ -192,7 +192,7 @@ def _as_csv(
 ) -> bytes:
     rows: list[list[object]]
     if quantity.columns:
-        rates = [csv_cell(name) for name in inputs.robot.rate_names]
+        rates = [csv_cell(name) for name in inputs.rate_names]
         # A Hessian's line is for one column of the Jacobian; its columns are for the joint velocities.
         keys = [[row] for row in quantity.labels]
         for _ in range(2, quantity.axes):
@@ -230,7 +230,7 @@ def _print_table(
         if len(result) > 1:
             out.print(f"sample {k}" if inputs.t is None else f"t = {inputs.t[k]:.6g} s")
         if quantity.columns:
-            _print_columns(out, quantity, inputs.robot.rate_names, value)
+            _print_columns(out, quantity, inputs.rate_names, value)
         else:
             out.print(_table(inputs, quantity, value))
     if len(result) > _SHOWN:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from urdfkin.cli.arguments import Inputs, frame_name
+from urdfkin.cli.arguments import Inputs, convention_option, frame_name
 from urdfkin.cli.options import reject_unused_options
 from urdfkin.cli.output import compiling
 from urdfkin.cli.quantity import Computing, computing_options
@@ -28,6 +28,12 @@ _FORMS = {
         labels=(*_POSITION, "roll", "pitch", "yaw"),
         units={"x, y, z": "m", "roll, pitch, yaw": "rad"},
     ),
+    "wxyz": replace(
+        PLACEMENT,
+        shape=(7,),
+        labels=(*_POSITION, "qw", "qx", "qy", "qz"),
+        units={"x, y, z": "m", "qw, qx, qy, qz": "1"},
+    ),
     "quaternion": replace(
         PLACEMENT,
         shape=(7,),
@@ -40,6 +46,7 @@ _FORMS = {
 @click.command("placement", epilog=f"Example: {PLACEMENT.example}")
 @computing_options(
     PLACEMENT.inputs,
+    convention_option,
     frame_name("--relative-to", "Link or joint relative to which the pose is given. Default: the world."),
     click.option(
         "--as",
@@ -48,7 +55,7 @@ _FORMS = {
         default="matrix",
         show_default=True,
         help="Form of the pose. rpy: x, y, z, roll, pitch, yaw as in a URDF's <origin>."
-        " quaternion: x, y, z, qx, qy, qz, qw.",
+        " quaternion: x, y, z, qx, qy, qz, qw. wxyz: x, y, z, qw, qx, qy, qz.",
     ),
 )
 def command(context: click.Context, relative_to: str | None, written: str, verify: bool, **_: Any) -> None:
@@ -88,6 +95,8 @@ def _numbers(x: Inputs, T: FloatArray, written: str, *, verify: bool) -> FloatAr
         from urdfkin.verify.orientation import check_orientations  # noqa: PLC0415
 
         check_orientations(orientation, R, x.frame, lambda k: _again(x, k, written))
+    if written == "wxyz":
+        orientation = np.roll(orientation, 1, axis=-1)
     return np.hstack((T[:, :3, 3], orientation))
 
 

@@ -6,6 +6,7 @@ Each row of the table of quantities gives one command. All share their options, 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 import click
@@ -13,6 +14,7 @@ import click
 from urdfkin.cli.arguments import (
     Inputs,
     a_option,
+    convention_option,
     frame_option,
     load_robot,
     oracle_option,
@@ -27,12 +29,13 @@ from urdfkin.cli.arguments import (
 )
 from urdfkin.cli.base import base_options, with_base
 from urdfkin.cli.breakdown import emit_breakdown
-from urdfkin.cli.options import format_from_suffix
+from urdfkin.cli.options import format_from_suffix, reject_unused_options
 from urdfkin.cli.output import ENDINGS, compiling, emit, exit_code, format_option, output_option
 from urdfkin.cli.report_options import check_writable
-from urdfkin.verify.quantities import ACCELERATION_BREAKDOWN, Quantity
+from urdfkin.verify.quantities import ACCELERATION_BREAKDOWN, SIX, Quantity
 
 if TYPE_CHECKING:
+    from urdfkin.conventions import Conversion
     from urdfkin.model.tree import FloatArray
 
 
@@ -68,7 +71,9 @@ class Computing:
     def inputs(self) -> Inputs:
         """Read the values of q, v, a and the base."""
         options, base = self._options, ("base_placement", "base_velocity", "base_acceleration")
-        values = {letter: options[letter] for letter in "qva" if letter in options}
+        values: dict[str, Any] = {letter: options[letter] for letter in "qva" if letter in options}
+        name = options.get("convention")
+        values["conversion"] = None if name is None else self.robot.convention(name)
         return with_base(
             read_inputs(self.robot, options["frame"], options["seed"], **values), *map(options.get, base)
         )
@@ -77,6 +82,10 @@ class Computing:
         self, x: Inputs, quantity: Quantity, result: FloatArray, reference: str | None = None
     ) -> NoReturn:
         """Print or write the result, and exit."""
+        x = x.converted()
+        if x.conversion and x.conversion.angular_first and quantity.labels == SIX:
+            units = dict(reversed(list(quantity.units.items())))
+            quantity = replace(quantity, labels=(*SIX[3:], *SIX[:3]), units=units)
         emit(x, quantity, reference, result, self.format_, self.output)
         self.end()
 
@@ -94,16 +103,32 @@ _breakdown = click.option(
 )
 
 
+def _converted(
+    x: Inputs, conversion: Conversion, quantity: Quantity, reference: str, result: FloatArray
+) -> FloatArray:
+    """Return a result with the rows and columns of a convention."""
+    if quantity.axes == 1:
+        return conversion.six(result)
+    if quantity.name == "jacobian":
+        return conversion.jacobian(x.q, result)
+    J = x.robot.jacobian(x.q, x.frame, reference, base=x.base)
+    if quantity.name == "hessian":
+        return conversion.hessian(x.q, J, result)
+    return conversion.jacobian_rate(x.q, x.v, J, result)
+
+
 def command_of(quantity: Quantity) -> click.Command:
     """Make the command that computes a quantity."""
     has_breakdown = ACCELERATION_BREAKDOWN.command == f"{quantity.command} --breakdown"
 
-    own = [reference_option] if quantity.referred else []
+    own = [*([reference_option] if quantity.referred else []), convention_option]
 
     @computing_options(quantity.inputs, *own, last=(_breakdown,) if has_breakdown else ())
     def compute(
         context: click.Context, /, reference: str = "local_world_aligned", breakdown: bool = False, **_: Any
     ) -> None:
+        if breakdown:
+            reject_unused_options(context, ("convention",), "with --breakdown")
         run = Computing(context)
         x = run.inputs()
         with compiling():
@@ -112,6 +137,8 @@ def command_of(quantity: Quantity) -> click.Command:
             else:
                 inputs = [getattr(x, letter) for letter in quantity.inputs]
                 result = run.robot.compute(quantity.name, inputs, x.frame, reference, base=x.base)
+                if x.conversion is not None:
+                    result = _converted(x, x.conversion, quantity, reference, result)
         if breakdown:
             emit_breakdown(x, reference, parts, run.format_, run.output)
             run.end()

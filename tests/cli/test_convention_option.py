@@ -1,0 +1,81 @@
+"""`--convention NAME`: q, v, a and the results of commands in the numbers of a tool."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.cli.running import urdfkin as run
+from urdfkin.verify.quantities import by_command
+
+OF_FRAMES = [name for name, row in by_command().items() if row.referred]
+DOG = ("a1", "--root-joint", "floating", "--frame", "FL_foot", "--convention")
+
+
+def _text(values: np.ndarray) -> str:
+    return ",".join(map(repr, values.tolist()))
+
+
+@pytest.mark.parametrize("name", ["mujoco", "drake", "isaaclab", "pinocchio"])
+@pytest.mark.parametrize("command", OF_FRAMES)
+def test_a_result_is_that_of_the_robot_in_the_convention(command: str, name: str) -> None:
+    robot = urdfkin.load("a1", root_joint="floating", verify=False)
+    other = robot.with_convention(name)
+    row, rng = by_command()[command], np.random.default_rng(3)
+    ours = robot.sample(1, 3)[0], rng.standard_normal(robot.nv), rng.standard_normal(robot.nv)
+    values = dict(zip("qva", other.conversion.to(*ours), strict=True))
+    given = [word for letter in row.inputs for word in (f"--{letter}={_text(values[letter])}",)]
+    done = run(command, *DOG, name, *given, "--format", "json")
+    assert done.code == 0, done.err
+    expected = getattr(other, row.method)(*(values[letter] for letter in row.inputs), "FL_foot")
+    assert np.allclose(done.data["result"][0], expected, 0, 1e-12)
+    assert np.allclose(done.data["q"][0], values["q"], 0, 1e-15)
+    assert done.data["convention"] == name
+    assert tuple(done.data["rates"]) == other.rate_names
+    assert done.data["rows"][0] == ("wx" if name == "drake" else "vx")
+
+
+def test_a_placement_reads_q_of_the_convention_and_says_so() -> None:
+    robot = urdfkin.load("a1", root_joint="floating", verify=False)
+    q = robot.sample(1, 3)[0]
+    text = _text(robot.convention("mujoco").to(q))
+    done = run("placement", *DOG, "mujoco", "--q", text, "--format", "json")
+    assert np.allclose(done.data["result"][0], robot.placement(q, "FL_foot"), 0, 1e-14)
+    assert "convention mujoco" in run("placement", *DOG, "mujoco", "--q", text).text
+
+
+def test_the_table_names_the_angular_part_first_where_the_tool_does() -> None:
+    lines = run("velocity", "ur5", "--convention", "drake", "--v", "random").text.splitlines()
+    assert "convention drake" in lines[0]
+    named = [line.split()[0] for line in lines if line.startswith(("linear", "angular"))]
+    assert named == ["angular", "linear"]
+
+
+def test_a_users_file_and_names_are_read(tmp_path: Path) -> None:
+    file = tmp_path / "motors.toml"
+    file.write_text('joints = ["elbow", "joint_1"]\nangle = "deg"\n[joint.joint_2]\nname = "elbow"\n')
+    for q in ("90,0", "elbow=90, joint_1=0"):
+        done = run("placement", "planar_two_link", "--convention", str(file), "--q", q, "--format", "json")
+        assert np.allclose(np.array(done.data["result"])[0, :3, 3], [0.5, 0.4, 0.0])
+
+
+def test_a_wrong_convention_is_one_line(tmp_path: Path) -> None:
+    done = run("jacobian", "ur5", "--convention", "mujocco")
+    assert (done.code, done.err.count("\n")) == (2, 1)
+    done = run("jacobian", "panda", "--convention", "mujoco")
+    assert done.code == 2
+    assert "--no-mimic" in done.err
+    assert run("jacobian", "panda", "--convention", "mujoco", "--no-mimic").code == 0
+    done = run("acceleration", "ur5", "--convention", "mujoco", "--breakdown")
+    assert done.code == 2
+
+
+def test_wxyz_is_the_quaternion_with_its_scalar_first() -> None:
+    x, w = (
+        run("placement", "ur5", "--q", "random", "--as", form, "--format", "json").data["result"][0]
+        for form in ("quaternion", "wxyz")
+    )
+    assert w == [*x[:3], x[6], *x[3:6]]
