@@ -35,9 +35,9 @@ LIBRARY: dict[str, tuple[str, str, str]] = {
     ),
     "api/configurations.md": (
         "Configurations",
-        "Joint values `q`: named poses, samples, limits, integration, and the conversion to Pinocchio's.",
+        "Joint values `q`: named poses, samples, limits, integration, and the conversion to other tools.",
         "neutral poses sample limit_violations integrate difference to_pinocchio from_pinocchio "
-        "pinocchio_model",
+        "pinocchio_model convention with_convention",
     ),
     "api/kinematics.md": (
         "Kinematics",

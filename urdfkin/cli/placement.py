@@ -28,17 +28,17 @@ _FORMS = {
         labels=(*_POSITION, "roll", "pitch", "yaw"),
         units={"x, y, z": "m", "roll, pitch, yaw": "rad"},
     ),
-    "wxyz": replace(
-        PLACEMENT,
-        shape=(7,),
-        labels=(*_POSITION, "qw", "qx", "qy", "qz"),
-        units={"x, y, z": "m", "qw, qx, qy, qz": "1"},
-    ),
     "quaternion": replace(
         PLACEMENT,
         shape=(7,),
         labels=(*_POSITION, "qx", "qy", "qz", "qw"),
         units={"x, y, z": "m", "qx, qy, qz, qw": "1"},
+    ),
+    "wxyz": replace(
+        PLACEMENT,
+        shape=(7,),
+        labels=(*_POSITION, "qw", "qx", "qy", "qz"),
+        units={"x, y, z": "m", "qw, qx, qy, qz": "1"},
     ),
 }
 
