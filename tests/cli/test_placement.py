@@ -100,7 +100,7 @@ def test_the_analytical_jacobian_is_the_librarys_with_its_rows_named(representat
 
 
 def test_it_knows_every_sequence() -> None:
-    assert set(REPRESENTATIONS) == {"quaternion", *SEQUENCES}
+    assert set(REPRESENTATIONS) == {"rpy", "quaternion", *SEQUENCES}
 
 
 def test_a_representational_singularity_is_told_with_the_cure() -> None:

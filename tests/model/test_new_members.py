@@ -134,7 +134,7 @@ def test_the_oracles_refuse_a_new_reference_frame(
 def test_the_kernels_and_the_command_line_know_the_members_of_the_enumeration() -> None:
     assert dict(IN_KERNELS) == {reference: reference.value for reference in Reference}
     assert tuple(reference.name.lower() for reference in Reference) == REFERENCES
-    assert set(REPRESENTATIONS) == {QUATERNION, *SEQUENCES}
+    assert set(REPRESENTATIONS) == {"rpy", QUATERNION, *SEQUENCES}
 
 
 # -- joint kinds -----------------------------------------------------------------------------------------
