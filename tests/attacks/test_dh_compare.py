@@ -13,7 +13,7 @@ import pytest
 import urdfkin
 from tests.cli.running import urdfkin as command
 from urdfkin.dh import DHTable, dh_table, read_table, units_of
-from urdfkin.dh.compare import compare, comparison_text
+from urdfkin.dh.compare import compare, document
 from urdfkin.dh.convert import to_tree
 from urdfkin.dh.parse_table import read_mapping, reference_path, table_of
 from urdfkin.dh.rows import last_digits
@@ -46,7 +46,7 @@ def test_a_wrong_d1_that_the_base_takes_up_is_told_with_its_millimetres() -> Non
     assert found.written_metres == pytest.approx(0.01, rel=1e-6)
     assert found.base.metres == pytest.approx(0.01, rel=1e-6)
     assert (0, "d") in found.hidden
-    text = comparison_text(found, units_of("radians", "millimetres"))
+    text = document(found, units_of("radians", "millimetres")).text()
     assert "very cell" not in text
     assert "after a fit of base, tool and joint offsets" in text
     assert "changed the base by 10 mm" in text
@@ -83,7 +83,7 @@ def test_only_a_table_that_is_the_urdf_as_written_has_every_cell() -> None:
     table = robot.dh("panda_link8", "panda_link0")
     found = compare(robot.chain("panda_link8", "panda_link0"), table)
     assert found.as_written
-    assert "Every cell agrees with the URDF." in comparison_text(found, units_of())
+    assert "Every cell agrees with the URDF." in document(found, units_of()).text()
     assert found.base.metres == found.base.radians == found.tool.metres == found.tool.radians == 0.0
 
 
@@ -103,7 +103,7 @@ def test_cells_that_explain_nothing_are_not_blamed() -> None:
     found = compare(robot.chain(reference.tip_frame, reference.base_frame), reference, fit=False)
     assert not found.agrees
     assert found.differences == ()
-    text = comparison_text(found, units_of())
+    text = document(found, units_of()).text()
     assert "No change of cells explains the difference" in text
     assert "Omit --no-fit" in text
 
@@ -190,7 +190,7 @@ def test_a_difference_within_the_last_digit_is_told_from_one_beyond_it(
     largest = found.differences[0]
     assert (largest.row, largest.cell) == (4, "d")
     assert largest.is_rounding == is_rounding
-    assert ("within the last digit" in comparison_text(found, units_of())) == is_rounding
+    assert ("within the last digit" in document(found, units_of()).text()) == is_rounding
 
 
 def test_the_kinova_sheet_is_said_to_be_rounded() -> None:

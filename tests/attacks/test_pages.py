@@ -27,7 +27,7 @@ import urdfkin
 from tests.attacks.hostile import IN_XML, NAMES, chain_of_all, urdf
 from urdfkin.dh import DHTable, export
 from urdfkin.dh.parse_table import read_table
-from urdfkin.dh.tree_parameters import tree_parameters, write_tree
+from urdfkin.dh.tree_parameters import document, tree_parameters
 from urdfkin.dh.units import Units
 from urdfkin.errors.escape import csv_cell, from_csv_cell, markdown_code, markdown_text
 from urdfkin.errors.escape import latex_text as escaped
@@ -219,7 +219,7 @@ def test_a_name_in_markdown_is_code_and_prose_is_prose(kind: str) -> None:
 @pytest.mark.parametrize("form", ["markdown", "terminal"])
 def test_the_whole_tree_has_the_same_lines_under_any_names(form: str) -> None:
     texts = [
-        write_tree(tree_parameters(urdfkin.load(chain_of_all(names, names[0])).tree), form, Units())
+        document(tree_parameters(urdfkin.load(chain_of_all(names, names[0])).tree), Units()).written(form)
         for names in (list(IN_XML.values()), [f"n{k}" for k in range(len(IN_XML))])
     ]
     assert texts[0].count("\n") == texts[1].count("\n")

@@ -18,7 +18,8 @@ from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.rotation import log_rotation
 from urdfkin.loading import load
 from urdfkin.model.tree import FloatArray
-from urdfkin.report.calibration import print_calibration
+from urdfkin.report.calibration import document
+from urdfkin.report.listing import print_document
 
 ENDS = ("base", "tool")
 
@@ -172,7 +173,7 @@ def test_as_many_numbers_as_parameters_leave_nothing_to_judge_by() -> None:
     assert found.identification.rank == 30
     assert found.written_parameters == ()
     out = io.StringIO()
-    print_calibration(found, Console(file=out, width=200))
+    print_document(Console(file=out, width=200), document(found))
     assert "noise: unknown, there are no redundant measurements" in out.getvalue()
     assert not np.isfinite(found.deviations[list(found.identification.kept)]).any()
     assert any("the fit cannot be checked" in line for line in doubts(found))

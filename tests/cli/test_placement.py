@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 
 import urdfkin as library
 from tests.cli.running import urdfkin
-from urdfkin.cli import placement
-from urdfkin.cli.analytical_jacobian import REPRESENTATIONS
+from urdfkin.cli import quantity
+from urdfkin.cli.quantity import REPRESENTATIONS
 from urdfkin.kinematics.rotation import SEQUENCES
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.tree import FloatArray
@@ -189,6 +189,6 @@ def test_a_base_that_is_none_is_refused_with_its_option(words: list[str], messag
 
 
 def test_the_forms_are_told_apart_by_their_rows() -> None:
-    labels = [row.labels for row in placement._FORMS.values()]
+    labels = [row.labels for row in quantity._FORMS.values()]
     assert sorted(map(len, labels)) == [6, 7, 7]
     assert len(set(labels)) == len(labels)

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from tests.cli.running import urdfkin
-from urdfkin.cli import progress
-from urdfkin.cli.progress import Pace, line
+from urdfkin.cli import campaign
+from urdfkin.cli.campaign import Pace, line
 from urdfkin.validation.collector import CampaignProgress
 
 STANDING = CampaignProgress(
@@ -67,7 +67,7 @@ def test_the_first_is_told_before_any_work_so_that_a_pace_counts_from_there() ->
 
 def test_a_log_gets_a_line_now_and_then_and_a_short_run_none(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "chunks" not in urdfkin("validate", "planar_two_link", "--samples", "50").err
-    monkeypatch.setattr(progress, "_LINES", 0.0)
+    monkeypatch.setattr(campaign, "_LINES", 0.0)
     done = urdfkin("validate", "planar_two_link", "--samples", "50")
     assert "urdfkin: 1 of 1 robots, 2 of 2 chunks; " in done.err
     assert done.err.endswith("left, none failed; planar_two_link\n")

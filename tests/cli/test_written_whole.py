@@ -10,8 +10,7 @@ from typing import Any
 
 import pytest
 
-from urdfkin.cli.output import write_file
-from urdfkin.cli.report_options import check_writable
+from urdfkin.cli.output import check_writable, write_file
 from urdfkin.errors import SourceError
 
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from tests.dh.arms import arm
 from tests.random_chains import configurations, rotation, shift, trees
 from urdfkin.dh import DHTable, dh_table, table_from_rows, units_of
-from urdfkin.dh.compare import compare, comparison_text
+from urdfkin.dh.compare import compare, document
 from urdfkin.dh.convert import to_convention
 from urdfkin.errors import InputError, RangeError
 from urdfkin.model.chain import chain
@@ -167,7 +167,7 @@ def test_another_robot_differs_and_says_so() -> None:
     other = table_from_rows([[0.1, 1.0, 0.2, 0.0]] * 6, "standard")
     found = compare(chain(elbow(), "tip"), other)
     assert not found.agrees
-    assert "DIFFERS" in comparison_text(found, units_of())
+    assert "DIFFERS" in document(found, units_of()).text()
 
 
 def test_a_table_of_other_joints_is_refused() -> None:
@@ -178,9 +178,9 @@ def test_a_table_of_other_joints_is_refused() -> None:
 def test_the_text_names_row_cell_and_millimetres() -> None:
     table = dh_table(elbow(), "tip")
     wrong = (*table.rows[:2], replace(table.rows[2], a=table.rows[2].a + 3e-4), *table.rows[3:])
-    text = comparison_text(
+    text = document(
         compare(chain(elbow(), "tip"), replace(table, rows=wrong)), units_of("degrees", "millimetres")
-    )
+    ).text()
     assert "Cells that differ (mm, deg)" in text
     assert any(
         line.split()[:3] == ["3", "j3", "a"] and line.split()[-2:] == ["-0.3", "0.3"]

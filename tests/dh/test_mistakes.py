@@ -14,7 +14,7 @@ import pytest
 from tests.cli.test_dh import run
 from tests.dh.test_compare import elbow
 from urdfkin.dh import DHTable, dh_table, read_table, table_from_rows, units_of
-from urdfkin.dh.compare import Comparison, compare, comparison_text
+from urdfkin.dh.compare import Comparison, compare, document
 from urdfkin.dh.convert import to_tree
 from urdfkin.dh.parse_table import reference_path, references
 from urdfkin.loading import load
@@ -85,7 +85,7 @@ def test_rows_that_changed_places_are_named(name: str) -> None:
         assert [(str(one.kind), one.rows) for one in found.mistakes] == [("rows exchanged", (i, j))]
     found = compare(path, replace(table, rows=tuple(reversed(table.rows))))
     assert [str(one.kind) for one in found.mistakes] == ["rows reversed"]
-    assert "the rows in reverse order" in comparison_text(found, units_of())
+    assert "the rows in reverse order" in document(found, units_of()).text()
 
 
 @pytest.mark.parametrize("name", references())
@@ -110,10 +110,10 @@ def test_a_wrong_sign_is_named_where_the_table_leaves_out_its_tool() -> None:
 
 def test_a_table_on_other_frames_says_that_a_wrong_sign_can_hide() -> None:
     path, table = shipped("kinova")
-    text = comparison_text(compare(path, table), units_of())
+    text = document(compare(path, table), units_of()).text()
     assert "These changes can hide a wrong sign." in text
     path, table = shipped("panda")
-    assert "can hide" not in comparison_text(compare(path, replace(table, tool=np.eye(4))), units_of())
+    assert "can hide" not in document(compare(path, replace(table, tool=np.eye(4))), units_of()).text()
 
 
 def test_two_changes_that_explain_a_table_equally_well_are_both_named() -> None:
@@ -124,7 +124,7 @@ def test_two_changes_that_explain_a_table_equally_well_are_both_named() -> None:
     found = compare(chain(tree, right.tip_frame, right.base_frame), wrong)
     assert [one[:2] for one in named(found)] == [(1, "d"), (2, "d")]
     assert found.differences == ()
-    assert "Each of these changes makes the table right as written:" in comparison_text(found, units_of())
+    assert "Each of these changes makes the table right as written:" in document(found, units_of()).text()
 
 
 def test_a_wrong_sign_is_named_beside_a_difference_that_is_smaller() -> None:

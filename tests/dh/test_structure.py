@@ -111,7 +111,7 @@ def test_the_command_says_it_and_what_it_rests_on() -> None:
     assert result.exit_code == 0
     assert "three parallel axes: shoulder_lift_joint, elbow_joint, wrist_1_joint, exactly" in result.stdout
     assert "agrees within rounding" in result.stdout
-    data = json.loads(run_any("structure", "panda", "--json").stdout)
+    data = json.loads(run_any("structure", "panda", "--format", "json").stdout)
     assert data["freedoms"] == 6
     assert data["joints"] == "RRRRRRR"
     assert run_any("structure", "ur5", "--no-verify").exit_code == 3

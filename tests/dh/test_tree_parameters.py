@@ -14,7 +14,7 @@ from tests.dh.arms import arm
 from tests.oracle import TreeOracle
 from tests.random_chains import configurations, rotation, shift, step, trees
 from urdfkin.dh import dh_table, units_of
-from urdfkin.dh.tree_parameters import as_mapping, tree_parameters, write_tree
+from urdfkin.dh.tree_parameters import as_csv, as_mapping, document, tree_parameters
 from urdfkin.errors import InputError
 from urdfkin.model.tree import Joint, JointKind, KinematicTree, build_tree, with_root_joint
 
@@ -89,11 +89,11 @@ def test_a_floating_joint_is_refused_with_what_to_do() -> None:
 def test_the_table_is_written_with_its_antecedents() -> None:
     tree = arm(shift(0, 0, 0.3), shift(0.05, 0, 0) @ rotation("x", math.pi / 2), kinds="RP")
     table = tree_parameters(tree)
-    lines = write_tree(table, "terminal", units_of("degrees", "millimetres")).splitlines()
+    lines = document(table, units_of("degrees", "millimetres")).text().splitlines()
     assert lines[0] == "arm: Khalil-Kleinfinger parameters, l0 is frame 0"
     assert lines[6].split() == ["2", "j2", "1", "1", "0", "0", "90", "50", "0", "q(j2)"]
-    assert write_tree(table, "markdown", units_of()).count("|") == 11 * 5
-    sheet = list(csv.DictReader(write_tree(table, "csv", units_of()).splitlines()))
+    assert document(table, units_of()).markdown().count("|") == 11 * 5
+    sheet = list(csv.DictReader(as_csv(table).splitlines()))
     assert list(sheet[0])[:4] == ["joint", "link", "antecedent", "sigma"]
     for row, T in zip(sheet, table.T_frame_link, strict=True):
         assert [float(row[f"T{i}{j}"]) for i in (1, 2, 3) for j in (1, 2, 3, 4)] == T[:3].ravel().tolist()

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import urdfkin
-from urdfkin.cli.analytical_jacobian import REPRESENTATIONS
-from urdfkin.cli.arguments import REFERENCES
+from urdfkin.cli.options import REFERENCES
+from urdfkin.cli.quantity import REPRESENTATIONS
 from urdfkin.compiled.breakdown import acceleration_breakdown
 from urdfkin.compiled.kernel_args import REFERENCES as IN_KERNELS
 from urdfkin.compiled.plan import compile_tree

@@ -9,7 +9,8 @@ import pytest
 from rich.console import Console
 
 from tests.report.documents import arms, failing, hostile
-from urdfkin.report.compare import compare, print_comparison
+from urdfkin.report.compare import compare, document
+from urdfkin.report.listing import print_document
 from urdfkin.report.terminal import print_report
 from urdfkin.validation.document import Document
 
@@ -63,7 +64,7 @@ def test_failures_come_with_their_replay_line_and_reasons_are_told() -> None:
 def test_a_comparison_reads_without_colour() -> None:
     stream = io.StringIO()
     old, new = arms(), failing()
-    print_comparison(old, new, compare(old, new), Console(file=stream, width=80, markup=False))
+    print_document(Console(file=stream, width=80, markup=False), document(old, new, compare(old, new)))
     text = stream.getvalue()
     assert "REGRESSION panda: verdict: verified -> disagrees" in text
     assert "regressions" in text.splitlines()[-1]

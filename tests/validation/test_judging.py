@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from tests.cli.running import urdfkin
-from urdfkin.cli.accuracy import judge_all
+from urdfkin.cli.validate import judge_all
 from urdfkin.errors import InputError
 from urdfkin.loading import load
 from urdfkin.robot import Robot

@@ -1,4 +1,4 @@
-"""The command line: one module for each command, imported only when the command runs.
+"""The command line: one module for each subject, imported only when one of its commands runs.
 
 `urdfkin --help` imports neither NumPy nor Pinocchio: the summaries are in this module.
 """
@@ -23,34 +23,41 @@ from urdfkin.verify.quantities import by_command
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-#: Heading of the help page -> command name -> (module that defines `command`, one-line summary). The
-#: commands of the table of quantities come first under `_COMPUTE`.
+#: Heading of the help page -> command name -> (module, one-line summary). A module of several commands
+#: defines `NAME_command` for each, others define `command`. The commands of the table of quantities come
+#: first under `_COMPUTE`.
 _COMPUTE = "Compute"
 _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {
         "robots": ("urdfkin.cli.robots", "List the robots that have a short name."),
-        "info": ("urdfkin.cli.info", "Show the whole robot: links, joints, limits, frames and coordinates."),
+        "info": (
+            "urdfkin.cli.robots",
+            "Show the whole robot: links, joints, limits, frames and coordinates.",
+        ),
         "order": ("urdfkin.cli.order", "Show the order of the joints in MuJoCo, Drake, Isaac Lab and more."),
         "view": ("urdfkin.cli.view", "Show a robot in a browser tab, with sliders and checked numbers."),
         "plot": ("urdfkin.cli.plot", "Plot a frame's motion along a trajectory."),
     },
     _COMPUTE: {
         "analytical-jacobian": (
-            "urdfkin.cli.analytical_jacobian",
+            "urdfkin.cli.quantity",
             "Compute the derivatives of a frame's position and orientation angles.",
         ),
         "singular-values": (
-            "urdfkin.cli.manipulability",
+            "urdfkin.cli.quantity",
             "Compute a Jacobian's singular values and manipulability; explain a singularity.",
         ),
-        "imu": ("urdfkin.cli.imu", "Compute the readings of an accelerometer and a gyroscope on a frame."),
+        "imu": (
+            "urdfkin.cli.quantity",
+            "Compute the readings of an accelerometer and a gyroscope on a frame.",
+        ),
     },
     "Tables and code": {
         "dh": ("urdfkin.cli.dh", "Derive Denavit-Hartenberg tables, or compare one with a published table."),
-        "screws": ("urdfkin.cli.screws", "Derive the product of exponentials: zero pose and joint screws."),
-        "chain": ("urdfkin.cli.chain", "Show one path of the robot: the joint axes between two frames."),
+        "screws": ("urdfkin.cli.paths", "Derive the product of exponentials: zero pose and joint screws."),
+        "chain": ("urdfkin.cli.paths", "Show one path of the robot: the joint axes between two frames."),
         "structure": (
-            "urdfkin.cli.structure",
+            "urdfkin.cli.paths",
             "Classify the arm along a path: wrist, parallel axes, closed-form solvers.",
         ),
         "export": (
@@ -60,11 +67,11 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     },
     "Compare and calibrate": {
         "same": (
-            "urdfkin.cli.same",
+            "urdfkin.cli.models",
             "Prove that two models move alike, whatever their files, or bound their distance.",
         ),
         "diff": (
-            "urdfkin.cli.diff",
+            "urdfkin.cli.models",
             "List the edits between two versions of one file, and their effect on motion.",
         ),
         "calibrate": (
@@ -77,7 +84,7 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
             "urdfkin.cli.validate",
             "Compute all frames and joints on many samples, and compare with Pinocchio.",
         ),
-        "report": ("urdfkin.cli.report", "Show, convert, compare or merge the results of validations."),
+        "report": ("urdfkin.cli.reports", "Show, convert, compare or merge the results of validations."),
     },
     "Check files": {
         "check": ("urdfkin.cli.check", "Lint URDF files; every finding has a code, a line and a remedy."),
@@ -88,15 +95,13 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "warm": ("urdfkin.cli.warm", "Compile everything now, for container images and CI."),
     },
 }
-#: The module that makes a command from a row of the table of quantities, and the exceptions: name -> module.
-_QUANTITY, _OWN = "urdfkin.cli.quantity", {"placement": "urdfkin.cli.placement"}
+#: The module that makes a command from a row of the table of quantities.
+_QUANTITY = "urdfkin.cli.quantity"
 
 
 def groups() -> dict[str, dict[str, tuple[str, str]]]:
     """Return each command's module and summary, grouped by heading of the help page."""
-    rows = {
-        name: (_OWN.get(name, _QUANTITY), f"Compute the {row.summary}.") for name, row in by_command().items()
-    }
+    rows = {name: (_QUANTITY, f"Compute the {row.summary}.") for name, row in by_command().items()}
     return _GROUPS | {_COMPUTE: rows | _GROUPS[_COMPUTE]}
 
 
@@ -174,7 +179,9 @@ class LazyGroup(click.Group):
         if (found := commands().get(cmd_name)) is None:
             return None
         module = importlib.import_module(found[0])
-        made = module.command_of(by_command()[cmd_name]) if found[0] == _QUANTITY else module.command
+        made = getattr(module, f"{cmd_name.replace('-', '_')}_command", None)
+        if made is None:
+            made = module.command_of(by_command()[cmd_name]) if found[0] == _QUANTITY else module.command
         return cast("click.Command", made)
 
     def resolve_command(

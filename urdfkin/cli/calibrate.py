@@ -5,16 +5,24 @@ from __future__ import annotations
 import warnings
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from urdfkin.cli.arguments import forms, load_robot, robot_argument
-from urdfkin.cli.options import reject_unused_options
-from urdfkin.cli.output import check_line, compiling, console, exit_code, write_file
-from urdfkin.cli.report_options import check_writable
-from urdfkin.cli.streams import say, say_file
+from urdfkin.cli.options import load_robot, reject_unused_options, robot_argument
+from urdfkin.cli.output import (
+    TEXTS,
+    Answer,
+    check_line,
+    check_writable,
+    compiling,
+    exit_code,
+    format_option,
+    write_file,
+)
+from urdfkin.cli.streams import say
 from urdfkin.errors import InputError
+from urdfkin.errors.display import TextDocument
 from urdfkin.errors.escape import json_text
 
 if TYPE_CHECKING:
@@ -24,6 +32,7 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
 _FILE = click.Path(path_type=Path)
+_FORMS = (*TEXTS, "json")
 
 
 @click.command(epilog="Example: urdfkin calibrate ur5 --tip tool0 --fit base,tool,origins")
@@ -65,7 +74,7 @@ _FILE = click.Path(path_type=Path)
     help="Write all fitted parameters, not only those that moved by more than 2 sigma.",
 )
 @click.option("--force", is_flag=True, help="Write a calibration even if it is not plausible.")
-@forms("table", "json")
+@format_option(*_FORMS, help_="Output format.")
 @click.option("--output", "-o", type=_FILE, help="Write the calibrated URDF, or the table as TOML.")
 @click.pass_context
 def command(
@@ -89,8 +98,8 @@ def command(
 
     Exit 0: verified. 1: Pinocchio disagrees. 2: bad input. 3: not checked, or refused.
     """
-    from urdfkin.report.calibration import as_data, print_calibration, print_moved  # noqa: PLC0415
-    from urdfkin.report.diff import print_changes  # noqa: PLC0415  keeps --help fast
+    from urdfkin.report.calibration import as_data, document, moved_table  # noqa: PLC0415
+    from urdfkin.report.diff import lines_of  # noqa: PLC0415  keeps --help fast
 
     check_writable(output)
     given = [name for name in ("poses", "ur") if context.params[name] is not None]
@@ -105,32 +114,34 @@ def command(
         written = (
             _factory_calibration(loaded, ur, order) if ur is not None else found.written if found else None
         )
-    out, data = console(), {} if found is None else as_data(found)
-    if format_ == "json":
-        data |= {"origins": {joint: T.tolist() for joint, T in written.origins.items()}} if written else {}
-        say_file(json_text(data) + "\n")
-    elif found is not None:
-        print_calibration(found, out)
+    data = {} if found is None else as_data(found)
+    data |= {"origins": {joint: T.tolist() for joint, T in written.origins.items()}} if written else {}
+    sheet = TextDocument("") if found is None else document(found)
+    parts = list(sheet.parts)
+
+    def answer(check: str = "", code: int = 0) -> NoReturn:
+        whole = TextDocument(sheet.title, parts)
+        # The line about the check is not part of the data.
+        Answer(lambda: whole, {"json": lambda: json_text(data) + "\n"}, check, code).put(format_, _FORMS)
+        context.exit(code)
+
     if written is None or (found is not None and found.fitted is None):
-        return
+        answer()
     if found is not None and found.plausibility.objections:
         say(f"urdfkin: {'warning' if context.params['force'] else 'error'}: {_refusal(found)}", err=True)
         if not context.params["force"]:
-            context.exit(3)
-    if format_ == "table" and written.origins:
-        print_moved(written, out)
+            answer(code=3)
+    if written.origins:
+        parts.append(moved_table(written))
     if output is not None:
         table = None if found is None else found.table
         write_file(output, written.text if table is None else _as_toml(table))
-        if format_ == "table" and table is None:
-            print_changes(replace(written.changes, sources=(loaded.source, str(output))), out)
+        if table is None:
+            parts += lines_of(replace(written.changes, sources=(loaded.source, str(output))))
     certificate = written.certificate if found is None else found.certificate
-    if certificate is not None:
-        if format_ == "table":
-            out.print(check_line(certificate), style="green" if certificate.verified else "bold yellow")
-        else:
-            say(check_line(certificate), err=True)
-        context.exit(exit_code(certificate))
+    if certificate is None:
+        answer()
+    answer(check_line(certificate), exit_code(certificate))
 
 
 def _refusal(found: Calibration) -> ImplausibleError:

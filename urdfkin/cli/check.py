@@ -13,9 +13,16 @@ from typing import Any
 
 import click
 
-from urdfkin.cli.arguments import how_to_load, mimic_option, root_joint_option, together, xacro_option
-from urdfkin.cli.completion_items import complete_code, complete_file
-from urdfkin.cli.options import Whole, reject_unused_options
+from urdfkin.cli.completion import complete_code, complete_file
+from urdfkin.cli.options import (
+    Whole,
+    how_to_load,
+    mimic_option,
+    reject_unused_options,
+    root_joint_option,
+    together,
+    xacro_option,
+)
 from urdfkin.cli.streams import command_lines, harmless, say, say_file, say_styled
 from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
 from urdfkin.lint import Finding, Limits, Severity

@@ -1,13 +1,101 @@
-"""`urdfkin completion`: shell completion of commands, options, robots, frames, tables and codes."""
+"""Shell completion of commands, options, robots, files, frames, tables, codes and equations.
+
+Completion runs at each press of the Tab key, so it imports nothing heavy and reads only the names in a file.
+Names with characters that a shell interprets are not offered. A robot's file may come from a stranger, and
+the shell runs the completed command line.
+"""
 
 from __future__ import annotations
 
-from typing import Literal
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
 
 import click
-from click.shell_completion import get_completion_class
+from click.shell_completion import CompletionItem, get_completion_class
 
 from urdfkin.cli.streams import say_file
+from urdfkin.errors import UrdfkinError
+from urdfkin.urdf.catalogue import catalogue
+
+if TYPE_CHECKING:
+    Items = list[CompletionItem[str]]
+
+#: Names without quotes, blanks and characters that a shell expands; no colon, which separates words in bash.
+_HARMLESS = re.compile(r"(?=\w)[\w./+-]+")
+#: Largest file that is read for its names, in bytes.
+_MOST = 10_000_000
+#: Elements that name a frame: children of the root in a URDF, at any depth in an MJCF file.
+_URDF, _MJCF = ("link", "joint"), ("body", "site", "joint")
+
+
+def complete_robot(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
+    """Return files and the names of the catalogue."""
+    return [CompletionItem(incomplete, type="file"), *_offered(catalogue(), incomplete)]
+
+
+def complete_file(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
+    """Return files."""
+    return [CompletionItem(incomplete, type="file")]
+
+
+def complete_frame(context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
+    """Return the links and joints of the robot on the command line."""
+    # While an option has no value yet, click has not assigned the arguments.
+    robot = context.params.get("robot") or next(iter(context.args), "")
+    return _offered(_frames(robot), incomplete)
+
+
+def complete_table(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
+    """Return files and the shipped tables."""
+    from urdfkin.system.resources import robots_dir  # noqa: PLC0415  only for completion
+
+    shipped = sorted(path.stem for path in (robots_dir() / "dh").glob("*.toml"))
+    return [CompletionItem(incomplete, type="file"), *_offered(shipped, incomplete)]
+
+
+def complete_code(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
+    """Return the codes of findings and their short names."""
+    from urdfkin.lint.pages import RULES  # noqa: PLC0415  only for completion
+
+    return _offered((name for rule in RULES.values() for name in (rule.id, rule.slug)), incomplete)
+
+
+def complete_topic(context: click.Context, parameter: click.Parameter, incomplete: str) -> Items:
+    """Return the topics of `explain`: codes and equations."""
+    from urdfkin.kinematics.registry import equations  # noqa: PLC0415  only for completion
+
+    return [*complete_code(context, parameter, incomplete), *_offered(equations(), incomplete)]
+
+
+def _offered(names: Iterable[str], incomplete: str) -> Items:
+    return [
+        CompletionItem(name)
+        for name in names
+        if name.startswith(incomplete) and _HARMLESS.fullmatch(name) is not None
+    ]
+
+
+def _frames(word: str) -> Iterator[str]:
+    """Yield the frame names in a robot's file, without expanding or computing anything."""
+    from urdfkin.urdf.findings import Reporter  # noqa: PLC0415
+    from urdfkin.urdf.parser import read_document  # noqa: PLC0415
+    from urdfkin.urdf.sources import is_xacro, read_source  # noqa: PLC0415
+
+    if is_xacro(word) or not (word in catalogue() or Path(word).expanduser().is_file()):
+        return
+    try:
+        text = read_source(word, _MOST)
+        root = read_document(Reporter(text.label, text.data))
+    except (UrdfkinError, OSError):
+        return
+    if root is None:
+        return
+    elements, kinds = (root.walk(), _MJCF) if root.tag == "mujoco" else (root.children, _URDF)
+    names = (element.attributes.get("name", "") for element in elements if element.tag in kinds)
+    yield from dict.fromkeys(names)
+
 
 SHELLS = ("bash", "zsh", "fish")
 #: Environment variable with which a shell's script asks click for completions.

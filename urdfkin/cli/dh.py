@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import click
 
-from urdfkin.cli.arguments import load_robot, path_options, robot_argument, together, verify_option
-from urdfkin.cli.completion_items import complete_table
-from urdfkin.cli.options import Number, Whole, format_from_suffix, reject_unused_options, typed
-from urdfkin.cli.output import compiling, output_option
-from urdfkin.cli.report_options import check_writable
+from urdfkin.cli.completion import complete_table
+from urdfkin.cli.options import (
+    Number,
+    Whole,
+    load_robot,
+    path_options,
+    reject_unused_options,
+    robot_argument,
+    together,
+    typed,
+    verify_option,
+)
+from urdfkin.cli.output import Answer, answering, compiling
 
 #: Formats of a table. They repeat `urdfkin.dh.export.FORMATS`, so that --help need not import that module.
 FORMATS = (
@@ -111,14 +118,6 @@ compare_options = together(
     ),
 )
 form_options = together(
-    click.option(
-        "--format",
-        "format_",
-        type=click.Choice(FORMATS),
-        default="terminal",
-        show_default=True,
-        help="Output format; by default chosen by the suffix of the output file.",
-    ),
     click.option("--degrees/--radians", default=False, help="Angle unit in printed tables."),
     click.option("--millimetres/--metres", default=False, help="Length unit in printed tables."),
     click.option(
@@ -150,7 +149,7 @@ _UNITS = ("degrees", "millimetres", "digits", "columns")
 def _reject_unused(context: click.Context, is_table: bool, options: dict[str, Any]) -> None:
     """Reject options that have no effect together with other options."""
     compares, tree, form = options["compare"] is not None, options["tree"], options["format_"]
-    written = ("terminal", "markdown") if tree or compares else ("terminal", "markdown", "html", "latex")
+    written = ("terminal", "markdown", "html", "latex")
     for idle, where, because in (
         (("tolerance", "fit"), not compares, "without --compare"),
         ((*_CHOICES, "verify"), compares, "with --compare"),
@@ -176,9 +175,8 @@ def _reject_unused(context: click.Context, is_table: bool, options: dict[str, An
 @compare_options
 @form_options
 @verify_option
-@output_option
-@click.pass_context
-def command(context: click.Context, /, robot: str, verify: bool, output: Path | None, **options: Any) -> None:
+@answering(*FORMATS, suffixes=ENDINGS)
+def command(robot: str, verify: bool, **options: Any) -> Answer:
     """Write the Denavit-Hartenberg table of the path between two frames, exact to rounding and checked.
 
     The path may lead down the tree, up, or through the common ancestor. Angles and lengths are the file's.
@@ -194,15 +192,13 @@ def command(context: click.Context, /, robot: str, verify: bool, output: Path | 
     from urdfkin.cli.dh_tables import Work, run  # noqa: PLC0415
     from urdfkin.dh.parse_table import is_table_file  # noqa: PLC0415
 
-    is_table = is_table_file(robot)
-    options["format_"] = format_from_suffix(context, output, ENDINGS, "terminal")
+    context, is_table = click.get_current_context(), is_table_file(robot)
+    options["format_"] = context.params["format_"]
     _reject_unused(context, is_table, options)
-    check_writable(output)
     loaded = load_robot(robot, verify=verify)
     written = robot if is_table and not any(typed(context, name) for name in _DERIVED) else None
     if (written or options["like"]) and not typed(context, "convention"):
         options["convention"] = None
     with compiling():
         choices = {name: options.pop(name) for name in ("near_parallel", "slide", *_SIGNS)}
-        code = run(Work(robot=loaded, written=written, choices=choices, output=output, **options))
-    context.exit(code)
+        return run(Work(robot=loaded, written=written, choices=choices, **options))

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
-import click
 import numpy as np
 
-from urdfkin.cli.output import write_file
-from urdfkin.cli.streams import say, say_file
+from urdfkin.cli.output import Answer, check_of_path
+from urdfkin.cli.streams import say
 from urdfkin.dh import DHTable, Units, export, read_table, to_convention
 from urdfkin.dh.compare import (
     CellDifference,
@@ -19,22 +17,23 @@ from urdfkin.dh.compare import (
     Comparison,
     Mistake,
     compare,
-    comparison_text,
     convention_that_fits,
     diagnose,
 )
+from urdfkin.dh.compare import document as comparison_document
 from urdfkin.dh.convert import to_urdf
 from urdfkin.dh.export.data import to_mapping
 from urdfkin.dh.parse_table import published, read_mapping, read_table_or_screws, reference_path, table_of
 from urdfkin.dh.printed import printed, printed_tree
 from urdfkin.dh.rows import last_digits
 from urdfkin.dh.snapping import snap_hint
-from urdfkin.dh.tree_parameters import as_mapping, tree_parameters, write_tree
+from urdfkin.dh.tree_parameters import as_csv, as_mapping, tree_parameters
+from urdfkin.dh.tree_parameters import document as tree_document
 from urdfkin.dh.units import Angles, Lengths
 from urdfkin.errors import InputError
+from urdfkin.errors.display import Strong, TextDocument
 from urdfkin.robot import Robot
 from urdfkin.system.files import at_home
-from urdfkin.verify.pinocchio_module import version
 from urdfkin.verify.sampling import draw
 from urdfkin.verify.tables import TableCheck
 from urdfkin.verify.verifier import TABLE_SAMPLES
@@ -43,6 +42,8 @@ from urdfkin.verify.verifier import TABLE_SAMPLES
 _FORMATS_OF_SEVERAL = ("terminal", "markdown", "latex", "json")
 #: Formats with the check's result below the table; for the others it goes to stderr.
 _PRINTED = ("terminal", "markdown")
+#: Formats of a document.
+_TEXTS = (*_PRINTED, "html", "latex")
 #: Formats that round numbers, with their digits of base and tool (None: the option --digits).
 _ROUNDED = {"terminal": None, "markdown": None, "latex": 6}
 
@@ -59,7 +60,6 @@ class Work:
     robot: Robot
     written: str | None
     choices: dict[str, Any]
-    output: Path | None
     base: str | None
     tip: str | None
     all_: bool
@@ -87,8 +87,8 @@ class Work:
         )
 
 
-def run(work: Work) -> int:
-    """Run the command and return its exit code."""
+def run(work: Work) -> Answer:
+    """Run the command and return its answer."""
     chosen = [
         name for name, on in (("--all", work.all_), ("--tree", work.tree), ("--compare", work.compare)) if on
     ]
@@ -104,7 +104,7 @@ def run(work: Work) -> int:
 # -- tables --------------------------------------------------------------------------------------------
 
 
-def _tables(work: Work) -> int:
+def _tables(work: Work) -> Answer:
     tips = _tips(work)
     if len(tips) > 1 and work.format_ not in _FORMATS_OF_SEVERAL:
         raise InputError(
@@ -118,12 +118,11 @@ def _tables(work: Work) -> int:
         text = json.dumps(_document(*made[0]), indent=2) + "\n"
     else:
         text = "\n".join(_format_table(work, table, check) for table, check in made)
-    _write_output(work, text)
     if work.format_ not in (*_PRINTED, "json"):
         for table, check in made:
             for line in _notes(work, table, check).split("\n"):
                 say(line, err=True)
-    return 0 if all(check is not None and check.within for _, check in made) else 3
+    return _answer(work, text, 0 if all(check is not None and check.within for _, check in made) else 3)
 
 
 def _tips(work: Work) -> list[str | None]:
@@ -175,7 +174,7 @@ def _format_table(work: Work, table: DHTable, check: TableCheck | None) -> str:
 
 def _notes(work: Work, table: DHTable, check: TableCheck | None) -> str:
     """Return the lines under a table: the check, the error of the printed digits, and hints."""
-    lines = [check_line(check)]
+    lines = [check_of_path(check)[0]]
     if work.format_ in _ROUNDED:
         lines.append(str(printed(table, work.units, _ROUNDED[work.format_])))
     if work.written is None and (
@@ -188,59 +187,54 @@ def _notes(work: Work, table: DHTable, check: TableCheck | None) -> str:
 
 
 def _document(table: DHTable, check: TableCheck | None) -> dict[str, Any]:
-    return {**to_mapping(table), "checked": check_line(check)}
-
-
-def check_line(check: TableCheck | None) -> str:
-    """Return one line with the result of Pinocchio's check."""
-    if check is None:
-        return f"NOT VERIFIED by Pinocchio {version()}"
-    return f"Pinocchio {version()}: {check}"
+    return {**to_mapping(table), "checked": check_of_path(check)[0]}
 
 
 # -- the whole tree ------------------------------------------------------------------------------------
 
 
-def _tree(work: Work) -> int:
+def _tree(work: Work) -> Answer:
     parameters = tree_parameters(work.robot.tree)
     if work.format_ == "json":
         text = json.dumps(as_mapping(parameters), indent=2, allow_nan=False) + "\n"
-    elif work.format_ in ("terminal", "markdown", "csv"):
-        text = write_tree(parameters, work.format_, work.units)
+    elif work.format_ == "csv":
+        text = as_csv(parameters)
+    elif work.format_ in _TEXTS:
+        text = tree_document(parameters, work.units).written(work.format_)
     else:
         raise InputError(
             f"--tree does not support the format {work.format_!r}",
-            remedy="use terminal, markdown, csv or json",
+            remedy=f"use {', '.join(_TEXTS)}, csv or json",
         )
     check = work.robot.verifier.tree_parameters(parameters) if work.robot.verifier.policy else None
     if work.format_ in _PRINTED:
-        text += f"\n{check or check_line(None)}\n"
+        text += f"\n{check or check_of_path(None)[0]}\n"
         q = draw(work.robot.tree, TABLE_SAMPLES, np.random.default_rng(1), with_special=True).q
         text += f"{printed_tree(parameters, work.units, q)}\n"
     else:
-        say(str(check or check_line(None)), err=True)
-    _write_output(work, text)
-    return 0 if check is not None else 3
+        say(str(check or check_of_path(None)[0]), err=True)
+    return _answer(work, text, 0 if check is not None else 3)
 
 
 # -- a comparison --------------------------------------------------------------------------------------
 
 
-def _compare(work: Work, name: str) -> int:
-    if work.format_ not in ("terminal", "json"):
+def _compare(work: Work, name: str) -> Answer:
+    if work.format_ not in (*_TEXTS, "json"):
         raise InputError(
-            f"--compare does not support the format {work.format_!r}", remedy="use terminal or json"
+            f"--compare does not support the format {work.format_!r}",
+            remedy=f"use {', '.join(_TEXTS)} or json",
         )
     path = reference_path(name)
     data = read_mapping(path)
     tip = work.tip or _frame_of_robot(work, data.get("tip_frame"))
     base = work.base or _frame_of_robot(work, data.get("base_frame"))
     chain, tolerance = work.robot.chain(tip, base), work.tolerance / 1e3
-    note = ""
+    notes: list[str] = []
     if "convention" not in data:
         convention = convention_that_fits(chain, data, tolerance, str(path))
         data = {**data, "convention": convention}
-        note = f"The table names no convention; {convention} fits best. Write the convention into it.\n"
+        notes = [f"The table names no convention; {convention} fits best. Write the convention into it."]
     try:
         reference = table_of(data, str(path))
     except InputError as error:
@@ -252,9 +246,11 @@ def _compare(work: Work, name: str) -> int:
     if work.format_ == "json":
         text = json.dumps(_comparison(found, reference, slip), indent=2, allow_nan=False) + "\n"
     else:
-        text = note + comparison_text(found, work.units) + (f"\nhint: {slip}\n" if slip else "")
-    _write_output(work, text)
-    return 0 if found.passes else 1
+        document = comparison_document(found, work.units)
+        hints = ["", f"hint: {slip}"] if slip else []
+        parts = [*notes, Strong(document.title), *document.parts, *hints]
+        text = TextDocument("", parts).written(work.format_)
+    return _answer(work, text, 0 if found.passes else 1)
 
 
 def _frame_of_robot(work: Work, name: object) -> str | None:
@@ -312,10 +308,5 @@ def _mistake(one: Mistake) -> dict[str, Any]:
     }
 
 
-def _write_output(work: Work, text: str) -> None:
-    if work.output is not None:
-        write_file(work.output, text.encode())
-    elif work.format_ in _PRINTED:
-        click.echo(text, nl=False)
-    else:
-        say_file(text)
+def _answer(work: Work, text: str, code: int) -> Answer:
+    return Answer(lambda: TextDocument(""), {work.format_: lambda: text}, code=code)

@@ -10,7 +10,7 @@ import textwrap
 
 import click
 
-from urdfkin.cli.completion_items import complete_topic
+from urdfkin.cli.completion import complete_topic
 from urdfkin.errors import UnknownNameError
 from urdfkin.kinematics.registry import explain as explain_equation
 from urdfkin.lint.pages import OF_MJCF, RULES, WIDTH, explain, find_rule, page

@@ -6,9 +6,15 @@ from pathlib import Path
 
 import click
 
-from urdfkin.cli.arguments import frame_option, load_robot, reference_option, robot_options, verify_option
-from urdfkin.cli.completion_items import complete_robot
-from urdfkin.cli.options import reject_unused_options
+from urdfkin.cli.completion import complete_robot
+from urdfkin.cli.options import (
+    frame_option,
+    load_robot,
+    reference_option,
+    reject_unused_options,
+    robot_options,
+    verify_option,
+)
 from urdfkin.cli.output import check_line, exit_code, write_file
 from urdfkin.cli.streams import say, say_file
 from urdfkin.errors import InputError

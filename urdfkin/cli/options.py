@@ -1,4 +1,4 @@
-"""Shared rules for options: number types, the output format, and options without effect.
+"""Arguments and options that commands share, and the rules for all options.
 
 - Numbers are decimal digits in ASCII. Click's own types also accept `1_000`, Arabic digits, `nan` and `inf`.
 - The suffix of a file or --format selects the output format. A contradiction between them is an error.
@@ -7,15 +7,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+import warnings
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from urdfkin.errors import InputError
+from urdfkin.cli.completion import complete_frame, complete_robot
+from urdfkin.cli.streams import say
+from urdfkin.errors import InputError, Question, SourceError
 from urdfkin.errors.numbers import parse_float, parse_int, remedy
-from urdfkin.system.files import shortened
+from urdfkin.model.reference import Reference
+from urdfkin.system.files import MOST_DATA, read_standard_input, read_text, shortened
+
+if TYPE_CHECKING:
+    from urdfkin.conventions import Conversion
+    from urdfkin.model.base_motion import BaseMotion
+    from urdfkin.model.tree import FloatArray
+    from urdfkin.robot import Robot
+    from urdfkin.verify.oracles import WitnessName
 
 
 class Whole(click.IntRange):
@@ -109,3 +121,414 @@ def reject_unused_options(context: click.Context, idle: Collection[str], because
         if parameter.name in idle and typed(context, parameter.name):
             name = "/".join([*parameter.opts[:1], *parameter.secondary_opts[:1]])
             raise InputError(f"{name} does nothing {because}", remedy="leave it out")
+
+
+_F = TypeVar("_F", bound=Callable[..., Any])
+
+#: Names of the reference frames.
+REFERENCES = tuple(reference.name.lower() for reference in Reference)
+#: Number of samples that `random` draws; `random:N` draws N.
+_RANDOM_SAMPLES = 1
+
+
+def together(*decorators: Callable[[_F], _F]) -> Callable[[_F], _F]:
+    """Combine several click decorators, in the order given."""
+
+    def decorate(function: _F) -> _F:
+        for decorator in reversed(decorators):
+            function = decorator(function)
+        return function
+
+    return decorate
+
+
+_HOW = "urdfkin.how_to_load"
+
+
+def _remember(context: click.Context, parameter: click.Parameter, value: object) -> None:
+    """Store an option for `how_to_load`, so that no command has to pass it on."""
+    context.meta.setdefault(_HOW, {})[parameter.name] = value
+
+
+def _remember_xacro_args(context: click.Context, _: click.Parameter, words: Sequence[str]) -> None:
+    arguments = {}
+    for word in words:
+        name, colon, value = word.partition(":=")
+        if not colon or not name:
+            raise click.BadParameter(f"{word!r} is not NAME:=VALUE")
+        arguments[name] = value
+    context.meta.setdefault(_HOW, {})["xacro_args"] = arguments
+
+
+def how_to_load() -> dict[str, Any]:
+    """Return the running command's options for `load`: `mimic`, `root_joint` and `xacro_args`."""
+    return dict(click.get_current_context().meta.get(_HOW, {}))
+
+
+xacro_option = click.option(
+    "--xacro-arg",
+    multiple=True,
+    metavar="NAME:=VALUE",
+    expose_value=False,
+    callback=_remember_xacro_args,
+    help="Argument of a .xacro file, which is expanded in a restricted process; repeatable.",
+)
+
+
+def mimic_option(help_: str) -> Callable[[_F], _F]:
+    """Make the option that turns mimic rules on or off; `how_to_load` returns it."""
+    return click.option(
+        "--mimic/--no-mimic", default=None, expose_value=False, callback=_remember, help=help_
+    )
+
+
+def root_joint_option(help_: str) -> Callable[[_F], _F]:
+    """Make the option for the joint between the world and the root link; `how_to_load` returns it."""
+    joints = click.Choice(["floating", "planar"])
+    return click.option("--root-joint", type=joints, expose_value=False, callback=_remember, help=help_)
+
+
+robot_options = together(
+    mimic_option("Move mimic joints with the mimicked joints, as the URDF demands (default)."),
+    root_joint_option("Add a moving joint between the world and the root link."),
+    xacro_option,
+)
+robot_argument = together(
+    click.argument("robot", metavar="ROBOT", shell_complete=complete_robot), robot_options
+)
+
+
+def frame_name(option: str, help_: str) -> Callable[[_F], _F]:
+    """Make an option that takes a frame's name, with shell completion."""
+    return click.option(option, metavar="NAME", help=help_, shell_complete=complete_frame)
+
+
+frame_option = frame_name("--frame", "Link or joint. Default: the robot's tip.")
+path_options = together(
+    frame_name("--base", "Link or joint. Default: the robot's base frame."),
+    frame_name("--tip", "Link or joint. Default: the robot's tip."),
+)
+
+
+class _ReferenceName(click.Choice):  # type: ignore[type-arg]  # generic from click 8.2 on
+    """The name of a reference frame; the error for another word refers to their explanation."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the name in its standard spelling."""
+        try:
+            return super().convert(value, param, ctx)
+        except click.BadParameter as error:
+            self.fail(f"{error.message.rstrip('.')}; {Question.REFERENCE_FRAMES}", param, ctx)
+
+
+reference_option = click.option(
+    "--reference",
+    type=_ReferenceName(REFERENCES, case_sensitive=False),
+    default="local_world_aligned",
+    show_default=True,
+    help="Reference frame of the result, as in Pinocchio.",
+)
+verify_option = click.option(
+    "--verify/--no-verify", default=True, help="Check each result with Pinocchio (default)."
+)
+oracle_option = click.option(
+    "--oracle",
+    type=click.Choice(["pinocchio", "mujoco"]),
+    default="pinocchio",
+    help="Library that checks the results: Pinocchio (default) or MuJoCo.",
+)
+seed_option = click.option("--seed", type=Whole(0), default=0, show_default=True, help="Seed of `random`.")
+_VALUES = (
+    "Configuration: numbers '0,30deg,pi/2', names 'shoulder=30deg,elbow=0.5', a pose 'neutral' or 'ready',"
+    " a pose with changes 'ready,elbow=0.5', a batch '@FILE.csv', 'random' or 'random:N'."
+)
+q_option = click.option("--q", metavar="VALUES", default="neutral", show_default=True, help=_VALUES)
+v_option = click.option(
+    "--v", metavar="VALUES", default="neutral", help="Joint velocities, in the same forms; neutral is zero."
+)
+a_option = click.option(
+    "--a",
+    metavar="VALUES",
+    default="neutral",
+    help="Joint accelerations, in the same forms; neutral is zero.",
+)
+
+convention_option = click.option(
+    "--convention",
+    metavar="NAME|FILE",
+    help="Convention of --q, --v, --a and of the result: a tool of `urdfkin order`, or a TOML file.",
+)
+
+TRAJECTORY_HELP = "File: CSV with t, coordinates, v:NAME, a:NAME; or .npz with t, q, v, a."
+
+
+@dataclass(frozen=True, slots=True)
+class Inputs:
+    """A robot, a frame and the values to compute with.
+
+    Attributes:
+        robot: The robot.
+        frame: Name of the frame.
+        q: (n, n_q) configurations, rad or m.
+        v: (n, n_v) joint velocities.
+        a: (n, n_v) joint accelerations.
+        t: (n,) times of a trajectory in s, or None.
+        base: Motion of the root link, or None.
+        said: More settings that the result depends on, for titles and JSON.
+        conversion: The convention of q, v and a, if it is not urdfkin's.
+    """
+
+    robot: Robot
+    frame: str
+    q: FloatArray
+    v: FloatArray
+    a: FloatArray
+    t: FloatArray | None = None
+    base: BaseMotion | None = None
+    said: Mapping[str, Any] = field(default_factory=dict)
+    conversion: Conversion | None = None
+
+    @property
+    def coordinate_names(self) -> tuple[str, ...]:
+        """A name for each number of q."""
+        return (self.conversion or self.robot).coordinate_names
+
+    @property
+    def rate_names(self) -> tuple[str, ...]:
+        """A name for each number of v and a."""
+        return (self.conversion or self.robot).rate_names
+
+    def converted(self) -> Inputs:
+        """Return a copy with q, v and a in the convention."""
+        if self.conversion is None:
+            return self
+        q, v, a = self.conversion.to(self.q, self.v, self.a)
+        return replace(self, q=q, v=v, a=a).saying(convention=self.conversion.convention.name)
+
+    def saying(self, **more: Any) -> Inputs:
+        """Return a copy with additional settings, which titles and JSON output list."""
+        return replace(self, said={**self.said, **more})
+
+
+def load_robot(source: str, *, verify: bool = True, oracle: WitnessName = "pinocchio", **how: Any) -> Robot:
+    """Load a command's robot with the command's options or `how`; write each warning to stderr as a line."""
+    from urdfkin.loading import load  # noqa: PLC0415  keeps --help fast
+    from urdfkin.urdf.findings import UrdfWarning  # noqa: PLC0415
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        robot = load(source, **how_to_load() | how, verify=verify, oracle=oracle)
+    for warning in caught:
+        of_the_file = issubclass(warning.category, UrdfWarning)
+        say(f"{'' if of_the_file else 'urdfkin: warning: '}{warning.message}", err=True)
+    return robot
+
+
+def load_two(a: str, b: str) -> tuple[Robot, Robot]:
+    """Load a command's two robots; `--xacro-arg` applies to those that are .xacro files.
+
+    Raises:
+        UsageError: both come from standard input.
+    """
+    from urdfkin.urdf.sources import is_xacro  # noqa: PLC0415  keeps --help fast
+
+    if a == b == "-":
+        raise click.UsageError("only one of the two models can come from standard input")
+    none: dict[str, Any] = {"xacro_args": None} if is_xacro(a) or is_xacro(b) else {}
+    one, other = (load_robot(source, **({} if is_xacro(source) else none)) for source in (a, b))
+    return one, other
+
+
+def read_inputs(
+    robot: Robot,
+    frame: str | None,
+    seed: int,
+    q: str,
+    v: str = "neutral",
+    a: str = "neutral",
+    *,
+    option: str = "--q",
+    conversion: Conversion | None = None,
+) -> Inputs:
+    """Read the values of q, v and a from the command line.
+
+    Batches must have the same length; a single row is repeated. `option` is the name of the option of q. The
+    values are in the given convention; the result is in urdfkin's.
+
+    Raises:
+        InputError: an invalid number, a wrong count, batches of different lengths, or a --seed that has no
+            effect.
+        SourceError: a file that cannot be read.
+    """
+    import numpy as np  # noqa: PLC0415  keeps --help fast
+
+    if not any(text.startswith("random") for text in (q, v, a)):
+        reject_unused_options(click.get_current_context(), ("seed",), "without a random --q, --v or --a")
+    rng = np.random.default_rng(seed)
+    given = (("q", q, option), ("v", v, "--v"), ("a", a, "--a"))
+    rows = [_values(robot, letter, text, where, rng, conversion) for letter, text, where in given]
+    lengths = {len(part) for part in rows if len(part) != 1}
+    if len(lengths) > 1:
+        raise InputError(
+            "batches of --q, --v and --a have different lengths",
+            found=", ".join(str(len(part)) for part in rows),
+        )
+    n = lengths.pop() if lengths else 1
+    q_, v_, a_ = (np.ascontiguousarray(np.broadcast_to(part, (n, part.shape[1]))) for part in rows)
+    if conversion is not None:
+        q_, v_, a_ = conversion.from_(q_, v_, a_)
+    for line in robot.limit_violations(q_):
+        say(f"warning: {line}", err=True)
+    return Inputs(robot, frame or robot.tip_frame, q_, v_, a_, conversion=conversion)
+
+
+def _values(
+    robot: Robot, letter: str, text: str, where: str, rng: Any, conversion: Conversion | None
+) -> FloatArray:
+    """Return the (n, width) values of one option, in the given convention."""
+    from urdfkin.model.configuration import places  # noqa: PLC0415  keeps --help fast
+    from urdfkin.verify.sampling import sample  # noqa: PLC0415
+
+    known = conversion or robot
+    names = known.coordinate_names if letter == "q" else known.rate_names
+    word, _, count = text.partition(":")
+    if word == "random":
+        n = _count(where, count) if count else _RANDOM_SAMPLES
+        if letter != "q":
+            found: FloatArray = rng.standard_normal((n, len(names)))
+            return found
+        drawn = sample(robot.tree, n, rng)
+        return conversion.to(drawn) if conversion else drawn
+    if text.startswith("@"):
+        return read_batch(Path(text[1:]), where, (names,))[0]
+    layout = conversion.layout(letter) if conversion else places(robot.tree, letter)
+    return layout.read(text, where)[None]
+
+
+def _count(where: str, text: str) -> int:
+    count = parse_int(text)
+    if count is None or count < 1:
+        raise InputError("random:N needs a whole number from 1 on", where=where, found=repr(text))
+    return count
+
+
+def read_batch(path: Path, option: str, layouts: Sequence[Sequence[str]]) -> tuple[FloatArray, Sequence[str]]:
+    """Read a CSV file with one sample a line.
+
+    A first line of names may put the columns in any order.
+
+    Returns:
+        The (n, width) numbers, and the layout with as many columns as the file.
+    """
+    import numpy as np  # noqa: PLC0415  keeps --help fast
+
+    from urdfkin.motion.trajectory import read_columns, width_of  # noqa: PLC0415
+
+    text = _standard_input() if str(path) == "-" else read_text(path, MOST_DATA, pipes=True)
+    width = width_of(text, str(path)) if len(layouts) > 1 else None
+    names = next((names for names in layouts if len(names) == width), layouts[0])
+    columns = read_columns(text, str(path), option, names)
+    found = np.stack([columns[name] for name in names], axis=-1) if names else np.empty((0, 0))
+    if not len(found):
+        raise InputError(
+            "no samples",
+            where=str(path),
+            remedy="write one line for each sample, numbers separated by commas",
+        )
+    return np.ascontiguousarray(found), names
+
+
+def _standard_input() -> str:
+    try:
+        return read_standard_input(MOST_DATA).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise SourceError("cannot be read", where="-", found=f"text that is not UTF-8 ({error})") from None
+
+
+# -- the motion of the root link ----------------------------------------------------------------------
+
+_POSITION = ("x", "y", "z")
+_RPY = (*_POSITION, "roll", "pitch", "yaw")
+_QUATERNION = (*_POSITION, "qx", "qy", "qz", "qw")
+_RATES = ("vx", "vy", "vz", "wx", "wy", "wz")
+
+_OPTIONS = {
+    "q": click.option(
+        "--base-placement",
+        metavar="VALUES",
+        help="Pose of the root link in the world: x,y,z,roll,pitch,yaw (m, rad), x,y,z,qx,qy,qz,qw, or"
+        " @FILE.csv.",
+    ),
+    "v": click.option(
+        "--base-velocity",
+        metavar="VALUES",
+        help="Velocity of the root link: vx,vy,vz,wx,wy,wz in the world's axes, m/s and rad/s, or @FILE.csv.",
+    ),
+    "a": click.option(
+        "--base-acceleration",
+        metavar="VALUES",
+        help="Classical acceleration of the root link's origin, in the same form, m/s^2 and rad/s^2.",
+    ),
+}
+
+
+def base_options(inputs: str) -> Callable[[_F], _F]:
+    """Make the options of the base for a quantity of q, v and a; `with_base` reads them."""
+    return together(*(_OPTIONS[letter] for letter in inputs))
+
+
+def with_base(
+    x: Inputs, placement: str | None = None, velocity: str | None = None, acceleration: str | None = None
+) -> Inputs:
+    """Return the inputs with the motion of the base, if any was given; a single row applies to a whole batch.
+
+    Raises:
+        InputError: an invalid number, a wrong count, a quaternion that is not of length 1, or batches of
+            different lengths.
+        SourceError: a file that cannot be read.
+    """
+    import numpy as np  # noqa: PLC0415  keeps --help fast
+
+    from urdfkin.model.base_motion import BaseMotion  # noqa: PLC0415
+
+    if placement is None and velocity is None and acceleration is None:
+        return x
+    still = "0,0,0,0,0,0"
+    T = _placements(*_rows(placement or still, "--base-placement", (_RPY, _QUATERNION)))
+    v, _ = _rows(velocity or still, "--base-velocity", (_RATES,))
+    a, _ = _rows(acceleration or still, "--base-acceleration", (_RATES,))
+    parts = [x.q, x.v, x.a, T, v, a]
+    n = max(map(len, parts))
+    if any(len(part) not in (1, n) for part in parts):
+        raise InputError(
+            "the batches of q, v, a and of the base have different lengths",
+            found=", ".join(str(len(part)) for part in parts),
+        )
+    q, v_, a_, *base = (np.ascontiguousarray(np.broadcast_to(part, (n, *part.shape[1:]))) for part in parts)
+    inputs = replace(x, q=q, v=v_, a=a_, base=BaseMotion(*base))
+    names = "base_placement", "base_velocity", "base_acceleration"
+    return inputs.saying(**{name: part.tolist() for name, part in zip(names, base, strict=True)})
+
+
+def _rows(text: str, option: str, layouts: Sequence[Sequence[str]]) -> tuple[FloatArray, Sequence[str]]:
+    """Return the (n, width) numbers, and the layout that has as many columns."""
+    import numpy as np  # noqa: PLC0415
+
+    from urdfkin.motion.trajectory import numbers  # noqa: PLC0415
+
+    if text.startswith("@"):
+        return read_batch(Path(text[1:]), option, layouts)
+    cells = text.split(",")
+    names = next((names for names in layouts if len(names) == len(cells)), layouts[0])
+    return np.array([numbers(cells, option, names)]), names
+
+
+def _placements(rows: FloatArray, names: Sequence[str]) -> FloatArray:
+    import numpy as np  # noqa: PLC0415
+
+    from urdfkin.kinematics.rotation import rotation_from_rpy, rotation_of  # noqa: PLC0415
+
+    T: FloatArray = np.tile(np.eye(4), (len(rows), 1, 1))
+    turn = rotation_of if names is _QUATERNION else rotation_from_rpy
+    T[:, :3, :3], T[:, :3, 3] = turn(rows[:, 3:]), rows[:, :3]
+    return T

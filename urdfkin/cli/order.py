@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from urdfkin.cli.arguments import forms, load_robot, robot_argument
+from urdfkin.cli.options import load_robot, robot_argument
+from urdfkin.cli.output import format_option
 from urdfkin.cli.streams import say
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ EXAMPLE = "urdfkin order a1 --from isaaclab --to mujoco"
 @robot_argument
 @click.option("--from", "start", metavar="NAME|FILE", help="Convention to convert from. Default: urdfkin.")
 @click.option("--to", "end", metavar="NAME|FILE", help="Convention to convert to. Default: urdfkin.")
-@forms("table", "json", "csv")
+@format_option("table", "json", "csv", help_="Output format.")
 def command(robot: str, start: str | None, end: str | None, format_: str) -> None:
     """Show the order of the joints in Pinocchio, MuJoCo, Drake, Isaac Lab and other tools.
 

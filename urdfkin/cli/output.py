@@ -1,4 +1,4 @@
-"""Print results as tables or write them as JSON, CSV and npy.
+"""The answer of a command: one result, printed as a table or written in any format.
 
 A file is written completely or not at all.
 """
@@ -6,48 +6,44 @@ A file is written completely or not at all.
 from __future__ import annotations
 
 import io
+import math
 import os
 import sys
-from collections.abc import Iterator, Sequence
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from functools import update_wrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from urdfkin.cli.arguments import Inputs
-from urdfkin.cli.streams import say
-from urdfkin.errors.display import NOISE
-from urdfkin.errors.escape import csv_cell, csv_text, json_text
+from urdfkin.cli.options import format_from_suffix, together
+from urdfkin.cli.streams import say, say_file
+from urdfkin.errors import SourceError
+from urdfkin.errors.display import TextDocument
+from urdfkin.errors.escape import csv_text, json_text
 from urdfkin.errors.numbers import parse_int
-from urdfkin.report.listing import make_table, print_named
 from urdfkin.system.files import write_file
 
 __all__ = ["write_file"]
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
 
-    from urdfkin.model.tree import FloatArray
     from urdfkin.verify.certificate import Certificate
-    from urdfkin.verify.quantities import Quantity
 
-FORMATS = ("table", "json", "csv", "npy")
-ENDINGS = {".json": ("json",), ".csv": ("csv",), ".npy": ("npy",)}
+#: Formats of a printed table.
+TEXTS = ("table", "markdown", "html", "latex")
+#: Suffix of a file for each format.
+_SUFFIXES = {
+    "json": ".json", "csv": ".csv", "npy": ".npy", "table": ".txt", "markdown": ".md", "html": ".html",
+    "latex": ".tex",
+}  # fmt: skip
 #: Largest width of a table in columns: padding takes memory.
 _WIDEST = 10_000
-#: Number of samples of a batch that a table shows.
-_SHOWN = 5
 
-format_option = click.option(
-    "--format",
-    "format_",
-    type=click.Choice(FORMATS),
-    default="table",
-    show_default=True,
-    help="Output format; the suffix of --output also selects it.",
-)
 output_option = click.option(
     "--output",
     "-o",
@@ -55,6 +51,109 @@ output_option = click.option(
     callback=lambda _context, _parameter, path: None if path == Path("-") else path,
     help="Write to a file instead of standard output, in the format of its suffix.",
 )
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The result of a command, from which every format is made.
+
+    Attributes:
+        document: Returns what a person reads, for the formats of `TEXTS`.
+        data: For each other format, a function that returns its data: a mapping for JSON, rows for CSV, an
+            array for npy, text for all others. An entry for a format of `TEXTS` replaces the document.
+        check: The last line, about the check; empty where nothing is to be checked.
+        code: The exit code.
+        fitted: Returns the document for a terminal, if it depends on the width; None: `document`.
+    """
+
+    document: Callable[[], TextDocument]
+    data: Mapping[str, Callable[[], Any]] = field(default_factory=dict)
+    check: str = ""
+    code: int = 0
+    fitted: Callable[[Console], TextDocument] | None = None
+
+    def show(self, out: Console) -> None:
+        """Print the result on a terminal."""
+        from urdfkin.report.listing import print_document  # noqa: PLC0415  machine formats need no tables
+
+        print_document(out, self.document() if self.fitted is None else self.fitted(out))
+        if self.check:
+            out.print(self.check, style="bold yellow" if self.code else "green")
+
+    def write(self, form: str) -> tuple[bytes | str, bool]:
+        """Return the result in a format, and whether it contains the line about the check."""
+        if form in self.data:
+            found = self.data[form]()
+            stated = form == "json" and isinstance(found, Mapping)
+            if stated and self.check:
+                found = {**found, "verified": self.code == 0, "check": self.check}
+            return found if isinstance(found, str) else _WRITERS[form](found), stated
+        document = self.document()
+        if self.check:
+            document = replace(document, parts=[*document.parts, self.check])
+        return document.written(form), True
+
+    def put(self, form: str, forms: Sequence[str], output: Path | None = None) -> None:
+        """Print the result in the first of `forms`, or write it in any other to standard output or a file."""
+        if form == forms[0] and output is None and form not in self.data:
+            self.show(console())
+            return
+        written, stated = self.write(form)
+        hand_out(written, output)
+        if self.check and not stated:
+            say(self.check, err=True)
+
+
+def _npy(array: Any) -> bytes:
+    import numpy as np  # noqa: PLC0415  keeps --help fast
+
+    stream = io.BytesIO()
+    np.save(stream, array)
+    return stream.getvalue()
+
+
+_WRITERS: dict[str, Callable[[Any], bytes | str]] = {
+    "json": lambda data: json_text(data) + "\n", "csv": csv_text, "npy": _npy,
+}  # fmt: skip
+
+
+def answering(*names: str, suffixes: Mapping[str, tuple[str, ...]] | None = None) -> Callable[[Any], Any]:
+    """Make a command's function of one that returns an `Answer`: add --format and --output, write and exit.
+
+    Args:
+        names: The formats. By default those of `TEXTS`, and JSON and CSV.
+        suffixes: For each suffix of a file, its formats. By default each format has its own.
+    """
+    forms = names or (*TEXTS, "json", "csv")
+    endings = suffixes or {_SUFFIXES[form]: (form,) for form in forms}
+    plain = "csv" if "csv" in forms and "table" in forms else forms[0]
+
+    def decorate(function: Callable[..., Answer]) -> Any:
+        def command(context: click.Context, /, format_: str, output: Path | None, **values: Any) -> None:
+            context.params["format_"] = form = format_from_suffix(context, output, endings, plain)
+            check_writable(output)
+            answer = function(**values)
+            answer.put(form, forms, output)
+            context.exit(answer.code)
+
+        wrapped = click.pass_context(update_wrapper(command, function))
+        return together(format_option(*forms), output_option)(wrapped)
+
+    return decorate
+
+
+def format_option(
+    *names: str, help_: str = "Output format; the suffix of --output also selects it."
+) -> Callable[[Any], Any]:
+    """Make the option --format; the first format is the default."""
+    return click.option(
+        "--format",
+        "format_",
+        type=click.Choice(names),
+        default=names[0],
+        show_default=True,
+        help=help_,
+    )
 
 
 @contextmanager
@@ -89,43 +188,34 @@ def _columns() -> int:
     return min(wanted, _WIDEST) if wanted > 0 else _WIDEST
 
 
-def emit(
-    inputs: Inputs,
-    quantity: Quantity,
-    reference: str | None,
-    result: FloatArray,
-    format_: str,
-    output: Path | None,
-) -> None:
-    """Print or write (n, ...) results with their certificate."""
-    certificate = inputs.robot.certificate()
-    if format_ == "table" and output is None:
-        _print_table(inputs, quantity, reference, result, certificate)
-        return
-    data = {
-        "table": _as_csv, "csv": _as_csv, "json": _as_json, "npy": _as_npy,
-    }[format_](inputs, quantity, reference, result, certificate)  # fmt: skip
-    hand_out(data, output)
-    if format_ != "json":
-        say(check_line(certificate), err=True)
-
-
-def hand_out(data: bytes, output: Path | None) -> None:
-    """Write bytes to a file or, unchanged, to standard output."""
+def hand_out(data: bytes | str, output: Path | None) -> None:
+    """Write to a file or, unchanged, to standard output."""
     if output is not None:
-        write_file(output, data)
+        write_file(output, data.encode() if isinstance(data, str) else data)
+    elif isinstance(data, str):
+        say_file(data)
     else:
         sys.stdout.buffer.write(data)
         sys.stdout.buffer.flush()
 
 
-def npy(array: FloatArray) -> bytes:
-    """Return an array in NumPy's .npy format."""
-    import numpy as np  # noqa: PLC0415  keeps --help fast
+def check_writable(*paths: Path | None) -> None:
+    """Raise SourceError before the work if a file cannot be written.
 
-    stream = io.BytesIO()
-    np.save(stream, array)
-    return stream.getvalue()
+    Raises:
+        SourceError: Missing permission, or no such folder.
+    """
+    for path in paths:
+        if path is None:
+            continue
+        try:
+            if path.exists() and not path.is_file():  # a device or a pipe is written directly
+                continue
+            with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}."):
+                pass
+        except OSError as error:
+            found = error.strerror or str(error)
+            raise SourceError("cannot be written", where=str(path), found=found) from error
 
 
 def check_line(certificate: Certificate) -> str:
@@ -141,129 +231,27 @@ def check_line(certificate: Certificate) -> str:
     return f"verified by {by}: {'; '.join(parts)}"
 
 
-def end_of_path(said: str | None) -> tuple[str, int]:
-    """Return the last line and the exit code of a command about a path.
-
-    Args:
-        said: The result of the check, or None if nothing was checked.
-    """
-    from urdfkin.verify.pinocchio import version  # noqa: PLC0415  keeps --help fast
-
-    by = f"Pinocchio {version()}"
-    return (f"{by}: {said}", 0) if said else (f"NOT VERIFIED by {by}", 3)
-
-
 def exit_code(certificate: Certificate) -> int:
     """Return 0 for verified results, 3 for results without a check."""
     return 0 if certificate.verified else 3
 
 
-# -- machine formats ---------------------------------------------------------------------------------
+def check_of_path(check: object | None) -> tuple[str, int]:
+    """Return the last line and the exit code of a command about a path.
+
+    Args:
+        check: The result of the check, or None if nothing was checked.
+    """
+    from urdfkin.verify.pinocchio import version  # noqa: PLC0415  keeps --help fast
+
+    by = f"Pinocchio {version()}"
+    return (f"NOT VERIFIED by {by}", 3) if check is None else (f"{by}: {check}", 0)
 
 
-def _as_json(
-    inputs: Inputs, quantity: Quantity, reference: str | None, result: FloatArray, certificate: Certificate
-) -> bytes:
-    document: dict[str, Any] = {
-        "robot": inputs.robot.name,
-        "source": inputs.robot.source,
-        "path": inputs.robot.path,
-        "sha256": inputs.robot.sha256,
-        "urdfkin": certificate.urdfkin,
-        "quantity": quantity.name,
-        "frame": inputs.frame,
-        "reference": reference,
-        "rows": list(quantity.labels) or None,
-        "coordinates": list(inputs.coordinate_names),
-        "rates": list(inputs.rate_names),
-    }
-    if inputs.t is not None:
-        document["t"] = inputs.t.tolist()
-    document |= {letter: getattr(inputs, letter).tolist() for letter in quantity.inputs}
-    document |= inputs.said
-    document["result"] = result.tolist()
-    document["verified"] = certificate.verified
-    document["check"] = check_line(certificate)
-    return (json_text(document) + "\n").encode()
-
-
-def _as_csv(
-    inputs: Inputs, quantity: Quantity, reference: str | None, result: FloatArray, certificate: Certificate
-) -> bytes:
-    rows: list[list[object]]
-    if quantity.columns:
-        rates = [csv_cell(name) for name in inputs.rate_names]
-        # A Hessian's line is for one column of the Jacobian; its columns are for the joint velocities.
-        keys = [[row] for row in quantity.labels]
-        for _ in range(2, quantity.axes):
-            keys = [[*key, rate] for key in keys for rate in rates]
-        rows = [["sample", "row", *["column"] * (quantity.axes - 2), *rates]]
-        for k, J in enumerate(result.reshape(len(result), len(keys), len(rates)).tolist()):
-            rows += ([k, *key, *map(repr, row)] for key, row in zip(keys, J, strict=True))
-    else:
-        names = quantity.labels or [f"T{i}{j}" for i in range(4) for j in range(4)]
-        times = range(len(result)) if inputs.t is None else map(repr, inputs.t.tolist())
-        rows = [["sample" if inputs.t is None else "t", *names]]
-        samples = zip(times, result.reshape(len(result), -1).tolist(), strict=True)
-        rows += ([t, *map(repr, row)] for t, row in samples)
-    return csv_text(rows).encode()
-
-
-def _as_npy(
-    inputs: Inputs, quantity: Quantity, reference: str | None, result: FloatArray, certificate: Certificate
-) -> bytes:
-    return npy(result)
-
-
-# -- tables ------------------------------------------------------------------------------------------
-
-
-def _print_table(
-    inputs: Inputs, quantity: Quantity, reference: str | None, result: FloatArray, certificate: Certificate
-) -> None:
-    out = console()
-    how = [f"{name.replace('_', ' ')} {word}" for name, word in inputs.said.items() if isinstance(word, str)]
-    where = "".join(f", {said}" for said in ([reference] if reference else []) + how)
-    where += ", moving base" if inputs.base is not None else ""
-    out.print(f"{inputs.robot.name}: {quantity.name} of {inputs.frame}{where}", style="bold")
-    for k, value in enumerate(result[:_SHOWN]):
-        if len(result) > 1:
-            out.print(f"sample {k}" if inputs.t is None else f"t = {inputs.t[k]:.6g} s")
-        if quantity.columns:
-            _print_columns(out, quantity, inputs.rate_names, value)
-        else:
-            out.print(_table(inputs, quantity, value))
-    if len(result) > _SHOWN:
-        out.print(f"... and {len(result) - _SHOWN} more samples: --format csv, json or npy writes all")
-    out.print(check_line(certificate), style="green" if certificate.verified else "bold yellow")
-
-
-def _print_columns(out: Console, quantity: Quantity, rates: Sequence[str], value: FloatArray) -> None:
-    """Print a line for each joint velocity; for a Hessian, one for each non-zero pair of them."""
-    import numpy as np  # noqa: PLC0415
-
-    if quantity.axes == len(("row", "rate")):
-        print_named(out, ["joint", *quantity.labels], zip(rates, *value.tolist(), strict=True))
-        return
-    seen = np.abs(value).max(axis=0, initial=0.0) > NOISE * np.abs(value).max(initial=0.0)
-    rows = [(rates[i], rates[j], *value[:, i, j].tolist()) for i, j in zip(*np.nonzero(seen), strict=True)]
-    print_named(out, ["column", "changed by", *quantity.labels], rows, left=(0, 1))
-
-
-def _table(inputs: Inputs, quantity: Quantity, value: FloatArray) -> Table:
-    if not quantity.units:
-        return make_table(
-            [
-                f"axis of {inputs.said.get('relative_to', 'the world')}",
-                "x of frame",
-                "y of frame",
-                "z of frame",
-                "position [m]",
-            ],
-            ((axis, *row) for axis, row in zip("xyz", value[:3].tolist(), strict=True)),
-        )
-    if len(value) != 3 * len(quantity.units):  # a quaternion
-        return make_table(quantity.labels, [value.tolist()], left=())
-    names = [f"{name} [{unit}]" for name, unit in quantity.units.items()]
-    rows = zip(names, value.reshape(-1, 3).tolist(), strict=True)
-    return make_table(["", "x", "y", "z"], ((name, *row) for name, row in rows))
+def finite(value: Any) -> Any:
+    """Replace infinity and nan, which JSON does not have, by None."""
+    if isinstance(value, dict):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

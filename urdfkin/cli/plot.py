@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from urdfkin.cli.arguments import (
+from urdfkin.cli.options import (
     TRAJECTORY_HELP,
+    Number,
+    Whole,
     frame_option,
     load_robot,
     reference_option,
     robot_argument,
     seed_option,
 )
-from urdfkin.cli.options import Number, Whole
-from urdfkin.cli.output import compiling, write_file
-from urdfkin.cli.report_options import check_writable
+from urdfkin.cli.output import check_writable, compiling, write_file
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError
 
@@ -113,7 +113,7 @@ def command(
 
 
 def _line(robot: Robot, start: str, end: str, duration: float, samples: int, seed: int) -> Trajectory:
-    from urdfkin.cli.arguments import read_inputs  # noqa: PLC0415
+    from urdfkin.cli.options import read_inputs  # noqa: PLC0415
     from urdfkin.motion.trajectory import line  # noqa: PLC0415
 
     given = (("--from", start), ("--to", end))

@@ -1,97 +1,111 @@
-"""Commands that compute a quantity of a frame, such as `urdfkin jacobian`.
+"""Commands that compute a quantity of a frame, such as `urdfkin jacobian`, `placement` and `imu`.
 
 Each row of the table of quantities gives one command. All share their options, their input and their output.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import shlex
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from urdfkin.cli.arguments import (
+from urdfkin.cli.options import (
+    TRAJECTORY_HELP,
     Inputs,
+    NumberFrom,
     a_option,
+    base_options,
     convention_option,
+    frame_name,
     frame_option,
     load_robot,
     oracle_option,
     q_option,
     read_inputs,
     reference_option,
+    reject_unused_options,
     robot_argument,
     seed_option,
     together,
     v_option,
     verify_option,
+    with_base,
 )
-from urdfkin.cli.base import base_options, with_base
-from urdfkin.cli.breakdown import emit_breakdown
-from urdfkin.cli.options import format_from_suffix, reject_unused_options
-from urdfkin.cli.output import ENDINGS, compiling, emit, exit_code, format_option, output_option
-from urdfkin.cli.report_options import check_writable
-from urdfkin.verify.quantities import ACCELERATION_BREAKDOWN, SIX, Quantity
+from urdfkin.cli.output import TEXTS, Answer, answering, check_line, compiling, exit_code, finite
+from urdfkin.cli.streams import say
+from urdfkin.errors.display import NOISE, Table, TextDocument, six_digits
+from urdfkin.errors.escape import csv_cell
+from urdfkin.verify.quantities import (
+    ACCELERATION_BREAKDOWN,
+    ANALYTICAL_JACOBIAN,
+    IMU,
+    PLACEMENT,
+    SIX,
+    Quantity,
+)
+from urdfkin.verify.replay import replay_line
 
 if TYPE_CHECKING:
+    from urdfkin.compiled.breakdown import AccelerationBreakdown
     from urdfkin.conventions import Conversion
     from urdfkin.model.tree import FloatArray
-
+    from urdfkin.robot import Robot
+    from urdfkin.verify.singular_values import SingularValues
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 _VALUES = {"q": q_option, "v": v_option, "a": a_option}
+_BASE = ("base_placement", "base_velocity", "base_acceleration")
+#: Number of samples of a batch that a table shows.
+_SHOWN = 5
 
 
 def computing_options(inputs: str, *own: Any, last: tuple[Any, ...] = ()) -> Callable[[_F], _F]:
     """Combine the options: robot and frame, `own`, values, base, seed, checks, `last`, format and output."""
     return together(
         *(robot_argument, frame_option, *own, *(_VALUES[letter] for letter in inputs), base_options(inputs)),
-        *(seed_option, verify_option, oracle_option, *last, format_option, output_option, click.pass_context),
+        *(seed_option, verify_option, oracle_option, *last, answering(*TEXTS, "json", "csv", "npy")),
     )
 
 
-class Computing:
-    """A running command that computes a quantity of a frame.
+def _load() -> Robot:
+    """Load the robot of the running command."""
+    options = click.get_current_context().params
+    return load_robot(options["robot"], verify=options["verify"], oracle=options["oracle"])
 
-    Attributes:
-        robot: The robot of the command.
-        format_: The output format.
-        output: The output file, or None.
-    """
 
-    def __init__(self, context: click.Context) -> None:
-        self._context, self._options = context, context.params
-        self.output = self._options["output"]
-        self.format_ = format_from_suffix(context, self.output, ENDINGS, "csv")
-        check_writable(self.output)
-        options = self._options
-        self.robot = load_robot(options["robot"], verify=options["verify"], oracle=options["oracle"])
+def _read() -> Inputs:
+    """Load the robot of the running command, and read the values of q, v and a and the base."""
+    options = click.get_current_context().params
+    values: dict[str, Any] = {letter: options[letter] for letter in "qva" if letter in options}
+    robot, name = _load(), options.get("convention")
+    values["conversion"] = None if name is None else robot.convention(name)
+    inputs = read_inputs(robot, options["frame"], options["seed"], **values)
+    return with_base(inputs, *map(options.get, _BASE))
 
-    def inputs(self) -> Inputs:
-        """Read the values of q, v, a and the base."""
-        options, base = self._options, ("base_placement", "base_velocity", "base_acceleration")
-        values: dict[str, Any] = {letter: options[letter] for letter in "qva" if letter in options}
-        name = options.get("convention")
-        values["conversion"] = None if name is None else self.robot.convention(name)
-        return with_base(
-            read_inputs(self.robot, options["frame"], options["seed"], **values), *map(options.get, base)
-        )
 
-    def answer(
-        self, x: Inputs, quantity: Quantity, result: FloatArray, reference: str | None = None
-    ) -> NoReturn:
-        """Print or write the result, and exit."""
-        x = x.converted()
-        if x.conversion and x.conversion.angular_first and quantity.labels == SIX:
-            units = dict(reversed(list(quantity.units.items())))
-            quantity = replace(quantity, labels=(*SIX[3:], *SIX[:3]), units=units)
-        emit(x, quantity, reference, result, self.format_, self.output)
-        self.end()
+def _checked(x: Inputs, title: str, parts: Callable[[], Iterable[str | Table]], **data: Any) -> Answer:
+    """Return an answer whose check is the robot's certificate."""
+    certificate = x.robot.certificate()
+    return Answer(
+        lambda: TextDocument(f"{x.robot.name}: {title}", list(parts())),
+        data,
+        check_line(certificate),
+        exit_code(certificate),
+    )
 
-    def end(self) -> NoReturn:
-        """Exit with the code of the checks."""
-        self._context.exit(exit_code(self.robot.certificate()))
+
+def _samples(x: Inputs, shown: int, others: str) -> Iterator[tuple[int, list[str]]]:
+    """Yield the index of each sample that a table shows, with its heading."""
+    n = len(x.q)
+    for k in range(min(n, shown)):
+        heading = f"sample {k}" if x.t is None else f"t = {x.t[k]:.6g} s"
+        yield k, [heading] if n > 1 else []
+    if n > shown:
+        yield -1, [f"... and {n - shown} more samples: --format {others} writes all"]
 
 
 _ROBOT = (
@@ -124,26 +138,449 @@ def command_of(quantity: Quantity) -> click.Command:
     own = [*([reference_option] if quantity.referred else []), convention_option]
 
     @computing_options(quantity.inputs, *own, last=(_breakdown,) if has_breakdown else ())
-    def compute(
-        context: click.Context, /, reference: str = "local_world_aligned", breakdown: bool = False, **_: Any
-    ) -> None:
+    def compute(*, reference: str = "local_world_aligned", breakdown: bool = False, **_: Any) -> Answer:
         if breakdown:
-            reject_unused_options(context, ("convention",), "with --breakdown")
-        run = Computing(context)
-        x = run.inputs()
+            reject_unused_options(click.get_current_context(), ("convention",), "with --breakdown")
+        x = _read()
         with compiling():
             if breakdown:
-                parts = run.robot.acceleration_breakdown(x.q, x.v, x.a, x.frame, reference, base=x.base)
-            else:
-                inputs = [getattr(x, letter) for letter in quantity.inputs]
-                result = run.robot.compute(quantity.name, inputs, x.frame, reference, base=x.base)
-                if x.conversion is not None:
-                    result = _converted(x, x.conversion, quantity, reference, result)
-        if breakdown:
-            emit_breakdown(x, reference, parts, run.format_, run.output)
-            run.end()
-        run.answer(x, quantity, result, reference if quantity.referred else None)
+                parts = x.robot.acceleration_breakdown(x.q, x.v, x.a, x.frame, reference, base=x.base)
+                return _parts(x, reference, parts)
+            inputs = [getattr(x, letter) for letter in quantity.inputs]
+            result = x.robot.compute(quantity.name, inputs, x.frame, reference, base=x.base)
+            if x.conversion is not None:
+                result = _converted(x, x.conversion, quantity, reference, result)
+        return _answer(x, quantity, result, reference if quantity.referred else None)
 
     summary = f"{quantity.summary[0].upper()}{quantity.summary[1:]} (eq. {', '.join(quantity.equations)})."
     compute.__doc__ = f"{summary}\n\n{quantity.page}\n\n{_ROBOT}"
     return click.command(quantity.command, epilog=f"Example: {quantity.example}")(compute)
+
+
+# -- the result of a quantity ------------------------------------------------------------------------
+
+
+def _answer(x: Inputs, quantity: Quantity, result: FloatArray, reference: str | None = None) -> Answer:
+    """Return (n, ...) results as an answer."""
+    x = x.converted()
+    if x.conversion and x.conversion.angular_first and quantity.labels == SIX:
+        units = dict(reversed(list(quantity.units.items())))
+        quantity = replace(quantity, labels=(*SIX[3:], *SIX[:3]), units=units)
+    how = [f"{name.replace('_', ' ')} {word}" for name, word in x.said.items() if isinstance(word, str)]
+    where = "".join(f", {said}" for said in ([reference] if reference else []) + how)
+    where += ", moving base" if x.base is not None else ""
+
+    def parts() -> Iterator[str | Table]:
+        for k, heading in _samples(x, _SHOWN, "csv, json or npy"):
+            yield from heading
+            if k >= 0:
+                yield _table(x, quantity, result[k])
+
+    return _checked(
+        x,
+        f"{quantity.name} of {x.frame}{where}",
+        parts,
+        json=lambda: _data(x, quantity, reference, result),
+        csv=lambda: _rows(x, quantity, result),
+        npy=lambda: result,
+    )
+
+
+def _data(x: Inputs, quantity: Quantity, reference: str | None, result: FloatArray) -> dict[str, Any]:
+    return {
+        "robot": x.robot.name,
+        "source": x.robot.source,
+        "path": x.robot.path,
+        "sha256": x.robot.sha256,
+        "urdfkin": x.robot.certificate().urdfkin,
+        "quantity": quantity.name,
+        "frame": x.frame,
+        "reference": reference,
+        "rows": list(quantity.labels) or None,
+        "coordinates": list(x.coordinate_names),
+        "rates": list(x.rate_names),
+        **({} if x.t is None else {"t": x.t.tolist()}),
+        **{letter: getattr(x, letter).tolist() for letter in quantity.inputs},
+        **x.said,
+        "result": result.tolist(),
+    }
+
+
+def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[object]]:
+    if quantity.columns:
+        rates = [csv_cell(name) for name in x.rate_names]
+        # A Hessian's line is for one column of the Jacobian; its columns are for the joint velocities.
+        keys = [[row] for row in quantity.labels]
+        for _ in range(2, quantity.axes):
+            keys = [[*key, rate] for key in keys for rate in rates]
+        yield ["sample", "row", *["column"] * (quantity.axes - 2), *rates]
+        for k, J in enumerate(result.reshape(len(result), len(keys), len(rates)).tolist()):
+            yield from ([k, *key, *map(repr, row)] for key, row in zip(keys, J, strict=True))
+    else:
+        names = quantity.labels or [f"T{i}{j}" for i in range(4) for j in range(4)]
+        times = range(len(result)) if x.t is None else map(repr, x.t.tolist())
+        yield ["sample" if x.t is None else "t", *names]
+        samples = zip(times, result.reshape(len(result), -1).tolist(), strict=True)
+        yield from ([t, *map(repr, row)] for t, row in samples)
+
+
+def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
+    """Return the table of one sample."""
+    if quantity.columns:
+        return _columns(quantity, x.rate_names, value)
+    if not quantity.units:
+        relative_to = x.said.get("relative_to", "the world")
+        heads = (f"axis of {relative_to}", "x of frame", "y of frame", "z of frame", "position [m]")
+        return Table(heads, [(axis, *row) for axis, row in zip("xyz", value[:3].tolist(), strict=True)])
+    if len(value) != 3 * len(quantity.units):  # a quaternion
+        return Table(quantity.labels, [value.tolist()], left=0)
+    names = [f"{name} [{unit}]" for name, unit in quantity.units.items()]
+    rows = zip(names, value.reshape(-1, 3).tolist(), strict=True)
+    return Table(("", "x", "y", "z"), [(name, *row) for name, row in rows])
+
+
+def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Table:
+    """Return a row for each joint velocity; for a Hessian, one for each non-zero pair of them."""
+    import numpy as np  # noqa: PLC0415  keeps --help fast
+
+    if quantity.axes == len(("row", "rate")):
+        return Table(("joint", *quantity.labels), list(zip(rates, *value.tolist(), strict=True)), names=(0,))
+    seen = np.abs(value).max(axis=0, initial=0.0) > NOISE * np.abs(value).max(initial=0.0)
+    pairs = zip(*np.nonzero(seen), strict=True)
+    rows = [(rates[i], rates[j], *value[:, i, j].tolist()) for i, j in pairs]
+    return Table(("column", "changed by", *quantity.labels), rows, left=2, names=(0, 1))
+
+
+# -- the parts of an acceleration --------------------------------------------------------------------
+
+
+def _parts(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
+    """Return the acceleration split by joint and term, with the certificate of their sum."""
+    from urdfkin.compiled.breakdown import KINDS  # noqa: PLC0415  keeps --help fast
+
+    def parts() -> Iterator[str | Table]:
+        yield "m/s^2 and rad/s^2; transverse a z x d, centripetal, Coriolis 2 w x u, sliding a z (7.125)"
+        heads = ("joint", "kind", *(f"{side} {axis}" for side in ("lin", "ang") for axis in "xyz"))
+        for k, heading in _samples(x, 2, "csv, json or npy"):
+            yield from heading
+            if k < 0:
+                continue
+            noise = NOISE * float(abs(found.terms[k]).max(initial=0.0))
+            rows = [*found.contributions((k,)), ("sum", "", found.total[k])]
+            # Four digits, so that a row fits on the terminal.
+            cells = [
+                (*names, *(six_digits(n, noise, digits=4) for n in six.tolist())) for *names, six in rows
+            ]
+            yield Table(heads, cells, left=2)
+
+    def rows() -> Iterator[list[object]]:
+        yield ["sample", "joint", "kind", *SIX]
+        for k in range(len(found.base)):
+            for joint, kind, six in found.contributions((k,)):
+                yield [k, csv_cell(joint), kind, *map(repr, six.tolist())]
+            yield [k, "sum", "", *map(repr, found.total[k].tolist())]
+
+    def data() -> dict[str, Any]:
+        return {
+            "robot": x.robot.name,
+            "source": x.robot.source,
+            "quantity": "acceleration breakdown",
+            "frame": x.frame,
+            "reference": reference,
+            "rows": list(SIX),
+            "joints": list(found.joints),
+            "kinds": list(KINDS),
+            **{letter: getattr(x, letter).tolist() for letter in "qva"},
+            **{name: getattr(found, name).tolist() for name in ("base", "terms", "total")},
+        }
+
+    title = f"acceleration of {x.frame}, {reference}, by joint"
+    return _checked(x, title, parts, json=data, csv=rows, npy=lambda: found.terms)
+
+
+# -- commands with options of their own --------------------------------------------------------------
+
+_POSITION = ("x", "y", "z")
+#: Forms of a pose besides the matrix.
+_FORMS = {
+    "rpy": replace(
+        PLACEMENT,
+        shape=(6,),
+        labels=(*_POSITION, "roll", "pitch", "yaw"),
+        units={"x, y, z": "m", "roll, pitch, yaw": "rad"},
+    ),
+    "quaternion": replace(
+        PLACEMENT,
+        shape=(7,),
+        labels=(*_POSITION, "qx", "qy", "qz", "qw"),
+        units={"x, y, z": "m", "qx, qy, qz, qw": "1"},
+    ),
+    "wxyz": replace(
+        PLACEMENT,
+        shape=(7,),
+        labels=(*_POSITION, "qw", "qx", "qy", "qz"),
+        units={"x, y, z": "m", "qw, qx, qy, qz": "1"},
+    ),
+}
+
+
+@click.command("placement", epilog=f"Example: {PLACEMENT.example}")
+@computing_options(
+    PLACEMENT.inputs,
+    convention_option,
+    frame_name("--relative-to", "Link or joint relative to which the pose is given. Default: the world."),
+    click.option(
+        "--as",
+        "written",
+        type=click.Choice(["matrix", *_FORMS]),
+        default="matrix",
+        show_default=True,
+        help="Form of the pose. rpy: x, y, z, roll, pitch, yaw as in a URDF's <origin>."
+        " quaternion: x, y, z, qx, qy, qz, qw. wxyz: x, y, z, qw, qx, qy, qz.",
+    ),
+)
+def placement_command(relative_to: str | None, written: str, verify: bool, **_: Any) -> Answer:
+    """Compute the pose of a frame (eq. 7.77) in the world or in another frame, in metres.
+
+    The pose is a matrix T with the frame's axes and origin, or, with --as, six or seven numbers. Pinocchio
+    checks that these numbers give the same rotation.
+
+    ROBOT is a path, a name from `urdfkin robots`, or - for standard input. The path can also be a table of a
+    robot: .toml, .json or .csv.
+    """
+    if relative_to is not None:
+        reject_unused_options(click.get_current_context(), ("base_placement",), "with --relative-to")
+    x = _read()
+    with compiling():
+        if relative_to is None:
+            T = x.robot.placement(x.q, x.frame, base=x.base)
+        else:
+            T = x.robot.relative_placement(x.q, x.frame, relative_to)
+            x = x.saying(relative_to=relative_to)
+    if written == "matrix":
+        return _answer(x, PLACEMENT, T)
+    x = x.saying(written_as=written)
+    return _answer(x, _FORMS[written], _numbers(x, T, written, verify=verify))
+
+
+def _numbers(x: Inputs, T: FloatArray, written: str, *, verify: bool) -> FloatArray:
+    """Return the (n, 6) or (n, 7) position and orientation; Pinocchio checks them if it checked the poses."""
+    import numpy as np  # noqa: PLC0415  keeps --help fast
+
+    from urdfkin.kinematics.rotation import quaternion_of, rpy_of  # noqa: PLC0415
+
+    of: Callable[[Any], FloatArray] = rpy_of if written == "rpy" else quaternion_of
+    orientation = of(R := T[:, :3, :3])
+    if verify and x.robot.certificate().verified:
+        from urdfkin.verify.orientation import check_orientations  # noqa: PLC0415
+
+        check_orientations(orientation, R, x.frame, lambda k: _again(x, k, written))
+    if written == "wxyz":
+        orientation = np.roll(orientation, 1, axis=-1)
+    return np.hstack((T[:, :3, 3], orientation))
+
+
+def _again(x: Inputs, k: int, written: str) -> str:
+    """Return the command that computes sample `k` again."""
+    line = replay_line(x.robot.origin, "placement", x.frame, None, {"q": x.q[k].tolist()})
+    given = click.get_current_context().params
+    for name in ("relative_to", "base_placement"):
+        if given[name] is not None:
+            line += f" --{name.replace('_', '-')} {shlex.quote(given[name])}"
+    return f"{line} --as {written}"
+
+
+#: A copy of `urdfkin.kinematics.rotation.SEQUENCES`: importing it would slow --help down.
+_TRIPLES = [a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if a != b != c]
+REPRESENTATIONS = ("rpy", "quaternion", *(triple.upper() for triple in _TRIPLES), *_TRIPLES)
+
+
+@click.command(
+    "analytical-jacobian", epilog="Example: urdfkin analytical-jacobian ur5 --q random --representation rpy"
+)
+@computing_options(
+    ANALYTICAL_JACOBIAN.inputs,
+    click.option(
+        "--representation",
+        type=click.Choice(REPRESENTATIONS),
+        metavar="NAME",
+        default="ZYZ",
+        show_default=True,
+        help="rpy (roll, pitch, yaw as in a URDF), quaternion, or Euler angles by their axes: capitals are"
+        " moving axes (ZYZ), small letters fixed axes (xyz is rpy).",
+    ),
+    click.option(
+        "--nearest",
+        type=NumberFrom(min=0.0),
+        metavar="RAD",
+        help="Smallest allowed distance to the representational singularity; nearer is an error.",
+    ),
+)
+def analytical_jacobian_command(representation: str, nearest: float | None, **_: Any) -> Answer:
+    """Compute a frame's analytical Jacobian J = C^-1 J_v (eq. 7.118, 7.122).
+
+    The table has one row for each joint velocity. A row lists the derivatives of the frame's position and
+    orientation (Euler angles or a quaternion). `urdfkin jacobian` has angular velocities instead.
+    """
+    from urdfkin.kinematics.rotation.euler import NEAREST  # noqa: PLC0415  keeps --help fast
+
+    x, nearest = _read(), NEAREST if nearest is None else nearest
+    with compiling():
+        J = x.robot.analytical_jacobian(x.q, x.frame, representation, nearest=nearest, base=x.base)
+    row = replace(ANALYTICAL_JACOBIAN, labels=("x", "y", "z", *labels(representation)))
+    return _answer(x.saying(representation=representation), row, J)
+
+
+def labels(representation: str) -> tuple[str, ...]:
+    """Return the names of an orientation's numbers.
+
+    >>> labels("xyz"), labels("ZYZ")
+    (('roll', 'pitch', 'yaw'), ('Z1', 'Y2', 'Z3'))
+    """
+    angles = ("roll", "pitch", "yaw")
+    known = {"rpy": angles, "xyz": angles, "quaternion": ("qx", "qy", "qz", "qw")}
+    return known.get(representation) or tuple(f"{axis}{k}" for k, axis in enumerate(representation, 1))
+
+
+@click.command(
+    "imu", epilog="Example: urdfkin imu panda --frame panda_hand --trajectory log.csv --format csv"
+)
+@computing_options(
+    IMU.inputs,
+    click.option(
+        "--gravity",
+        metavar="X,Y,Z",
+        default="0,0,-9.81",
+        show_default=True,
+        help="Gravity in the world's axes, m/s^2.",
+    ),
+    click.option(
+        "--trajectory",
+        type=click.Path(path_type=Path),
+        help=f"{TRAJECTORY_HELP[:-1]}, base_placement, base_velocity, base_acceleration.",
+    ),
+)
+def imu_command(frame: str | None, gravity: str, trajectory: Path | None, **_: Any) -> Answer:
+    """Compute the readings of an accelerometer and a gyroscope on a frame, in the frame's own axes.
+
+    The accelerometer reads the proper acceleration in m/s^2: the second derivative of the frame's position
+    minus gravity. A sensor at rest reads 9.81 upwards. The gyroscope reads the angular velocity in rad/s.
+
+    The input is a configuration --q with joint velocities --v and joint accelerations --a, a batch of them,
+    or a --trajectory. For a moving base, use --base-velocity and the other --base options, or arrays in the
+    .npz file. With --root-joint floating, the pose of the base is part of --q. For details, run `urdfkin
+    explain gravity-in-an-acceleration`.
+    """
+    from urdfkin.motion.trajectory import numbers  # noqa: PLC0415  keeps --help fast
+
+    if trajectory is None:
+        x = _read()
+    else:
+        robot = _load()
+        idle = ("q", "v", "a", *_BASE, "seed")
+        reject_unused_options(click.get_current_context(), idle, "along a --trajectory")
+        x = _along(robot, frame, trajectory)
+    g = numbers(gravity.split(","), "--gravity", ("x", "y", "z"))
+    with compiling():
+        return _answer(x, IMU, x.robot.imu(x.q, x.v, x.a, x.frame, gravity=g, base=x.base))
+
+
+def _along(robot: Robot, frame: str | None, path: Path) -> Inputs:
+    from urdfkin.motion.trajectory import read_trajectory  # noqa: PLC0415
+
+    motion = read_trajectory(robot, path, with_base=True)
+    for note in (*motion.notes, *robot.limit_violations(motion.q)):
+        say(f"warning: {note}", err=True)
+    if motion.rates != "as given":
+        say(f"rates {motion.rates}", err=True)
+    return Inputs(robot, frame or robot.tip_frame, motion.q, motion.v, motion.a, motion.t, motion.base)
+
+
+@click.command(
+    "singular-values",
+    epilog="Example: urdfkin singular-values panda --q random --frame panda_hand --rows linear",
+)
+@robot_argument
+@frame_option
+@click.option(
+    "--rows",
+    type=click.Choice(["all", "linear", "angular"]),
+    default="all",
+    show_default=True,
+    help="Rows of the Jacobian; 'all' mixes metres and radians.",
+)
+@q_option
+@seed_option
+@verify_option
+@answering()
+def singular_values_command(
+    robot: str, frame: str | None, rows: str, q: str, seed: int, verify: bool
+) -> Answer:
+    """Compute the singular values, condition number and manipulability of a frame's Jacobian.
+
+    Each value has a guaranteed lower and upper bound. The bounds include the error of the Jacobian and the
+    rounding of the decomposition. Manipulability is Yoshikawa's sqrt(det J J^T), the product of the singular
+    values. Its derivative for each joint velocity comes from the Hessian.
+
+    At a singularity the command prints the rank, the lost directions and the joints that cause them. There
+    the manipulability may have no derivative; it is nan in CSV and null in JSON. See `urdfkin explain
+    singularity`.
+    """
+    x = read_inputs(load_robot(robot, verify=verify), frame, seed, q)
+    with compiling():
+        found = x.robot.singular_values(x.q, x.frame, rows)
+        gradient = found.manipulability_gradient(x.robot.hessian(x.q, x.frame))
+    names = [f"sigma_{k + 1}" for k in range(found.values.value.shape[-1])]
+
+    def parts() -> Iterator[str | Table]:
+        for k, heading in _samples(x, _SHOWN, "csv or json"):
+            yield from heading
+            if k >= 0:
+                lines = [(name, *(f"{n:.15g}" for n in sides)) for name, sides in _between(names, found, k)]
+                yield Table(("", "value", "no less than", "no more than"), lines)
+                if singularity := found.singularity(k):
+                    yield from str(singularity).splitlines()
+                    continue  # the manipulability has no derivative
+                slopes = zip(x.robot.rate_names, gradient[k].tolist(), strict=True)
+                yield Table(("joint", "manipulability changes by"), list(slopes), names=(0,))
+
+    def data() -> dict[str, Any]:
+        named = ("singular_values", found.values), ("condition", found.condition)
+        return {
+            "robot": x.robot.name,
+            "source": x.robot.source,
+            "frame": x.frame,
+            "rows": rows,
+            "coordinates": list(x.robot.coordinate_names),
+            "rates": list(x.robot.rate_names),
+            "q": x.q.tolist(),
+            **{
+                name: {side: finite(numbers.tolist()) for side, numbers in between._asdict().items()}
+                for name, between in (*named, ("manipulability", found.manipulability))
+            },
+            "manipulability_gradient": finite(gradient.tolist()),
+            "singularities": [
+                {"rank": one.rank, "full": one.full, "lost": one.lost.tolist(), "reasons": one.reasons}
+                if one
+                else None
+                for one in map(found.singularity, range(len(gradient)))
+            ],
+        }
+
+    def lines() -> Iterator[list[object]]:
+        sides = ("", " lower", " upper")
+        heads = [name + side for name in (*names, "condition", "manipulability") for side in sides]
+        yield ["sample", *heads, *(csv_cell(f"by {rate}") for rate in x.robot.rate_names)]
+        for k, slopes in enumerate(gradient.tolist()):
+            numbers = [n for _, sides in _between(names, found, k) for n in sides]
+            yield [k, *map(repr, numbers), *map(repr, slopes)]
+
+    return _checked(x, f"singular values of {x.frame}, {rows} rows", parts, json=data, csv=lines)
+
+
+def _between(names: list[str], found: SingularValues, k: int) -> Iterator[tuple[str, list[float]]]:
+    """Yield the name of each number of a sample, with its value, lower bound and upper bound."""
+    for i, name in enumerate(names):
+        yield name, [float(side[k, i]) for side in found.values]
+    for name, between in (("condition", found.condition), ("manipulability", found.manipulability)):
+        yield name, [float(side[k]) for side in between]

@@ -1,23 +1,30 @@
-"""`urdfkin robots`: list the robots that have a short name."""
+"""`urdfkin robots` and `urdfkin info`: list the robots that have a short name; show one robot."""
 
 from __future__ import annotations
 
 import json
-import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import click
 
-from urdfkin.cli.arguments import forms
+from urdfkin.cli.options import load_robot, robot_argument
+from urdfkin.cli.output import Answer, answering
+from urdfkin.errors.display import Table, TextDocument
+from urdfkin.errors.escape import csv_cell, csv_value
 from urdfkin.urdf.catalogue import Entry, catalogue
 
-EXAMPLE = "urdfkin robots --family arm"
+if TYPE_CHECKING:
+    from rich.console import Console
+
 _FAMILIES = sorted({entry.family for entry in catalogue().values()})
 
 
-@click.command(epilog=f"Example: {EXAMPLE}")
+@click.command("robots", epilog="Example: urdfkin robots --family arm")
 @click.option("--family", metavar="NAME", help=f"Show only one family: {', '.join(_FAMILIES)}.")
-@forms("table", "json")
-def command(family: str | None, format_: str) -> None:
+@answering()
+def robots_command(family: str | None) -> Answer:
     """List the robots that have a short name.
 
     They are the URDF files of example-robot-data and urdfkin's own. The base and tip of a robot's first limb
@@ -26,20 +33,18 @@ def command(family: str | None, format_: str) -> None:
     entries = [entry for entry in catalogue().values() if family in (None, entry.family)]
     if not entries:
         raise click.UsageError(f"no robots of family {family!r}; the families are: {', '.join(_FAMILIES)}")
-    if format_ == "json":
-        json.dump([_as_dict(entry) for entry in entries], sys.stdout, indent=2)
-        click.echo()
-        return
-    from urdfkin.cli.output import console  # noqa: PLC0415  json needs no tables
-    from urdfkin.report.listing import print_named  # noqa: PLC0415
-
-    rows = ((entry.name, entry.family, entry.base or "", entry.tip or "") for entry in entries)
-    out = console()
-    print_named(out, ["name", "family", "base", "tip"], rows, left=range(4))
-    out.print(f"{len(entries)} robots")
-    for entry in entries:
-        if entry.reason:
-            out.print(f"{entry.name}: mimic rules are off: {entry.reason}")
+    heads = ("name", "family", "base", "tip")
+    rows = [(entry.name, entry.family, entry.base or "", entry.tip or "") for entry in entries]
+    off = [f"{entry.name}: mimic rules are off: {entry.reason}" for entry in entries if entry.reason]
+    return Answer(
+        lambda: TextDocument(
+            "", [Table(heads, rows, left=4, names=(0, 2, 3)), f"{len(entries)} robots", *off]
+        ),
+        {
+            "json": lambda: json.dumps([_as_dict(entry) for entry in entries], indent=2) + "\n",
+            "csv": lambda: [heads, *rows],
+        },
+    )
 
 
 def _as_dict(entry: Entry) -> dict[str, object]:
@@ -52,3 +57,43 @@ def _as_dict(entry: Entry) -> dict[str, object]:
         "reason": entry.reason,
         "own": entry.own,
     }
+
+
+@click.command("info", epilog="Example: urdfkin info panda")
+@robot_argument
+@answering()
+def info_command(robot: str) -> Answer:
+    """Show a robot's links, joints, axes, limits, indices in q and v, and mimic rules.
+
+    Joints are in the order of q, of v and of a Jacobian's columns, which is Pinocchio's order. A line reports
+    it if the file has another order. Limits are in rad and rad/s; those of prismatic joints are in m and m/s.
+    A link that is not indented is a child of the link above it. If a link has several children, lines lead
+    to them.
+    """
+    from urdfkin.validation.robot_summary import describe  # noqa: PLC0415  keeps --help fast
+
+    loaded = load_robot(robot)
+    data = {"json": lambda: describe(loaded), "csv": lambda: _rows(loaded._sheet(), loaded.tree.links)}
+    return Answer(loaded._sheet, data, fitted=lambda out: _fitted(out, loaded._sheet()))
+
+
+def _fitted(out: Console, document: TextDocument) -> TextDocument:
+    """Put each link and its joint into one column if the table does not fit the terminal."""
+    from urdfkin.report.listing import fits  # noqa: PLC0415
+
+    parts = list(document.parts)
+    for k, part in enumerate(parts):
+        if isinstance(part, Table) and not fits(out, part):
+            rows = [(f"{link} by {joint}" if joint else link, *cells) for link, joint, *cells in part.rows]
+            left = [i - 1 for i in range(1, len(part.heads)) if part.is_left(i)]
+            parts[k] = Table(("link by joint", *part.heads[2:]), rows, left)
+    return replace(document, parts=parts)
+
+
+def _rows(document: TextDocument, links: Sequence[str]) -> Iterator[list[str]]:
+    """Yield the table's rows, without the lines of a tree."""
+    for part in document.parts:
+        if isinstance(part, Table):
+            yield list(part.heads)
+            for link, (_, *cells) in zip(links, part.rows, strict=True):
+                yield [csv_cell(link), *(csv_value(str(cell)) for cell in cells)]

@@ -8,15 +8,15 @@ from pathlib import Path
 
 import click
 
-from urdfkin.cli.arguments import (
+from urdfkin.cli.options import (
     TRAJECTORY_HELP,
+    Whole,
     load_robot,
     q_option,
     read_inputs,
     robot_argument,
     seed_option,
 )
-from urdfkin.cli.options import Whole
 from urdfkin.cli.output import compiling
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError

@@ -13,13 +13,12 @@ joint's kind: 0 revolute (theta), 1 prismatic (r), 2 fixed. A fixed joint uses a
 of the robot is exact. beta is not part of the original notation. It is zero except between nearly parallel
 axes (Hayati), where the other numbers would need offsets of kilometres.
 
-`write_tree` and `as_mapping` write the table as text, Markdown, CSV and plain data.
+`document`, `as_csv` and `as_mapping` return the table as a document, as CSV and as plain data.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
 from typing import Any
@@ -39,11 +38,12 @@ from urdfkin.dh.common_normals import (
     tilt_of,
 )
 from urdfkin.dh.derive import RIGHT_ANGLE_SLACK
-from urdfkin.dh.export.text import added, aligned
+from urdfkin.dh.export.text import added
 from urdfkin.dh.table import along_axis, between_axes
 from urdfkin.dh.units import Units
 from urdfkin.errors import InputError
-from urdfkin.errors.escape import csv_cell, csv_text, markdown_code, printable
+from urdfkin.errors.display import Code, Table, TextDocument
+from urdfkin.errors.escape import csv_cell, csv_text
 from urdfkin.kinematics.roundings import EPS, of_rows
 from urdfkin.model.path import elementary
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, frozen
@@ -326,22 +326,15 @@ def as_mapping(table: TreeParameters) -> dict[str, Any]:
     }
 
 
-def write_tree(table: TreeParameters, form: str, units: Units) -> str:
-    """Return the table as "terminal", "markdown" or "csv"; csv has metres, radians and T_frame_link."""
-    if form == "csv":
-        return _csv(table)
-    shown = markdown_code if form == "markdown" else str
-    title = f"{shown(table.robot)}: Khalil-Kleinfinger parameters, {shown(table.root)} is frame 0"
-    body = [_headings(table, units), *(_cells(table, j, units, shown) for j in range(len(table.rows)))]
-    if form == "markdown":
-        lines = ["| " + " | ".join(row) + " |" for row in body]
-        rule = "| " + " | ".join(["---:"] * len(body[0])) + " |"
-        return "\n".join([f"{title}: `{FORMULA}`", "", lines[0], rule, *lines[1:]]) + "\n"
-    return "\n".join([printable(title), FORMULA, "", *aligned(body)]) + "\n"
+def document(table: TreeParameters, units: Units) -> TextDocument:
+    """Return the table with its title and its formula."""
+    rows = [_cells(table, j, units) for j in range(len(table.rows))]
+    title = f"{table.robot}: Khalil-Kleinfinger parameters, {table.root} is frame 0"
+    return TextDocument(title, [Code(FORMULA), "", Table(_headings(table, units), rows, (1,), names=(1,))])
 
 
-def _csv(table: TreeParameters) -> str:
-    """Write a line for each row: its numbers, then the three upper rows of T_frame_link, T11 to T34."""
+def as_csv(table: TreeParameters) -> str:
+    """Return a line for each row, in metres and radians: its numbers, then T_frame_link from T11 to T34."""
     places = [f"T{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3, 4)]
     lines: list[list[object]] = [[*(field.name for field in fields(TreeRow)), *places]]
     for row, T in zip(as_mapping(table)["rows"], table.T_frame_link[:, :3].tolist(), strict=True):
@@ -357,17 +350,16 @@ def _headings(table: TreeParameters, units: Units) -> list[str]:
     return [*heads, f"beta [{angle}]"] if _has_beta(table) else heads
 
 
-def _cells(table: TreeParameters, j: int, units: Units, shown: Callable[[str], str]) -> list[str]:
+def _cells(table: TreeParameters, j: int, units: Units) -> list[str]:
     row = table.rows[j]
     theta, r = units.angle(row.theta), units.length(row.r)
     # The offset of a mimic joint is part of its constant, as in the other tables.
-    leader = shown(row.leader)
-    own = f"q({leader})" if row.leader == row.joint else f"{row.multiplier:.10g} q({leader})"
+    own = f"q({row.leader})" if row.leader == row.joint else f"{row.multiplier:.10g} q({row.leader})"
     if row.sigma == 0:
         theta = added(own, units.angle(row.theta + row.offset))
     elif row.sigma == 1:
         r = added(own, units.length(row.r + row.offset))
-    cells = [str(j + 1), shown(row.joint), str(row.antecedent + 1), str(row.sigma), units.angle(row.gamma)]
+    cells = [str(j + 1), row.joint, str(row.antecedent + 1), str(row.sigma), units.angle(row.gamma)]
     cells += [units.length(row.b), units.angle(row.alpha), units.length(row.d), theta, r]
     return [*cells, units.angle(row.beta)] if _has_beta(table) else cells
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from html import escape
 
-from urdfkin.errors.escape import latex_text, log_line, markdown_text, printable
+from urdfkin.errors.escape import latex_text, log_line, markdown_cell, markdown_code, markdown_text, printable
 
 #: Characters that draw the lines of a tree before a name, and their ASCII replacements.
 LINES = "├│└ "
@@ -30,16 +30,20 @@ class Table:
         rows: Cells of each row. Numbers are displayed with six digits.
         left: Left-aligned columns: the number of first columns, or the column indices. Leading blanks in
             these columns are kept.
+        names: Indices of columns with names, which are code in Markdown.
     """
 
     heads: Sequence[str]
     rows: Sequence[Sequence[str | float]]
     left: int | Collection[int] = 1
+    names: Collection[int] = ()
 
-    def _left(self, i: int) -> bool:
+    def is_left(self, i: int) -> bool:
+        """Return whether a column is left-aligned."""
         return i < self.left if isinstance(self.left, int) else i in self.left
 
-    def _cells(self) -> list[list[str]]:
+    def cells(self) -> list[list[str]]:
+        """Return the cells of each row as text."""
         largest = max((abs(x) for row in self.rows for x in row if not isinstance(x, str)), default=0.0)
         return [
             [x if isinstance(x, str) else six_digits(x, NOISE * largest) for x in row] for row in self.rows
@@ -49,16 +53,16 @@ class Table:
         """Split each cell, including the heads, into the lines of a tree and the text after them."""
         return [
             [(cell[: len(cell) - len(words)], words) for cell in row for words in (cell.lstrip(LINES),)]
-            for row in (self.heads, *self._cells())
+            for row in (self.heads, *self.cells())
         ]
 
     def text(self) -> str:
         """Return the table as aligned plain text."""
-        body = [[log_line(cell) for cell in row] for row in (self.heads, *self._cells())]
+        body = [[log_line(cell) for cell in row] for row in (self.heads, *self.cells())]
         widths = [max(map(len, column)) for column in zip(*body, strict=True)]
         lines = [
             "  ".join(
-                cell.ljust(width) if self._left(i) else cell.rjust(width)
+                cell.ljust(width) if self.is_left(i) else cell.rjust(width)
                 for i, (cell, width) in enumerate(zip(row, widths, strict=True))
             ).rstrip()
             for row in body
@@ -67,30 +71,34 @@ class Table:
 
     def markdown(self) -> str:
         """Return the table in Markdown."""
-        marks = [":---" if self._left(i) else "---:" for i in range(len(self.heads))]
-        rows = [
-            [lines.replace(" ", "&nbsp;") + markdown_text(words) for lines, words in row]
-            for row in self._split_cells()
-        ]
-        return "\n".join(f"| {' | '.join(row)} |" for row in (rows[0], marks, *rows[1:]))
+        marks = [":---" if self.is_left(i) else "---:" for i in range(len(self.heads))]
+        heads, *rows = self._split_cells()
+
+        def cell(i: int, lines: str, words: str) -> str:
+            shown = markdown_code(words) if i in self.names else markdown_cell(words)
+            return lines.replace(" ", "&nbsp;") + shown
+
+        body = [[cell(i, *parts) for i, parts in enumerate(row)] for row in rows]
+        titles = [markdown_cell("".join(head)) for head in heads]
+        return "\n".join(f"| {' | '.join(row)} |" for row in (titles, marks, *body))
 
     def html(self) -> str:
         """Return the table in HTML with inline styles."""
 
         def row(cells: Sequence[str], tag: str) -> str:
-            sides = ("left;white-space:pre" if self._left(i) else "right" for i in range(len(cells)))
+            sides = ("left;white-space:pre" if self.is_left(i) else "right" for i in range(len(cells)))
             cells = [
                 f'<{tag} style="text-align:{side};padding:0 .5em">{_html(c)}</{tag}>'
                 for c, side in zip(cells, sides, strict=True)
             ]
             return f"<tr>{''.join(cells)}</tr>"
 
-        body = "\n".join(row(cells, "td") for cells in self._cells())
+        body = "\n".join(row(cells, "td") for cells in self.cells())
         return f"<table>\n<thead>{row(self.heads, 'th')}</thead>\n<tbody>\n{body}\n</tbody>\n</table>"
 
     def latex(self) -> str:
         """Return a LaTeX tabular that uses the package booktabs."""
-        sides = "".join("l" if self._left(i) else "r" for i in range(len(self.heads)))
+        sides = "".join("l" if self.is_left(i) else "r" for i in range(len(self.heads)))
         rows = [
             " & ".join(lines.translate(ASCII).replace(" ", "~") + latex_text(words) for lines, words in row)
             + r" \\"
@@ -108,47 +116,112 @@ class Table:
 
 
 @dataclass(frozen=True, slots=True)
+class Matrix:
+    """A matrix, such as a pose, with each number as text."""
+
+    rows: Sequence[Sequence[str]]
+
+    def lines(self) -> list[str]:
+        """Return the rows with aligned columns."""
+        widths = [max(map(len, column)) for column in zip(*self.rows, strict=True)]
+        return ["  ".join(map(str.rjust, row, widths)) for row in self.rows]
+
+    def text(self) -> str:
+        """Return indented lines."""
+        return "\n".join(f"  {line}" for line in self.lines())
+
+    def markdown(self) -> str:
+        """Return a block of code."""
+        return "\n".join(["```", *self.lines(), "```"])
+
+    def html(self) -> str:
+        """Return a table without headings in HTML."""
+        rows = (
+            "".join(f'<td style="text-align:right;padding:0 .5em">{escape(cell)}</td>' for cell in row)
+            for row in self.rows
+        )
+        body = "\n".join(f"<tr>{row}</tr>" for row in rows)
+        return f"<table>\n<tbody>\n{body}\n</tbody>\n</table>"
+
+    def latex(self) -> str:
+        """Return a matrix in LaTeX that uses the package amsmath."""
+        rows = r" \\ ".join(" & ".join(row) for row in self.rows)
+        return rf"$\begin{{bmatrix}}{rows}\end{{bmatrix}}$"
+
+
+class Strong(str):
+    """A sentence with emphasis.
+
+    Attributes:
+        style: The style on a terminal, such as "bold red".
+    """
+
+    __slots__ = ("style",)
+    style: str
+
+    def __new__(cls, words: str, style: str = "bold") -> Strong:
+        """Return the sentence with a style."""
+        sentence = super().__new__(cls, words)
+        sentence.style = style
+        return sentence
+
+
+class Code(str):
+    """A formula or another sentence of code."""
+
+    __slots__ = ()
+
+
+@dataclass(frozen=True, slots=True)
 class TextDocument:
     """The displayed content of an object.
 
     Attributes:
-        title: The title.
-        parts: Sentences and tables, in order.
+        title: The title; empty for a document without one.
+        parts: Sentences, tables and matrices, in order. An empty sentence is a blank line in plain text.
     """
 
     title: str
-    parts: Sequence[str | Table] = ()
+    parts: Sequence[str | Table | Matrix] = ()
+
+    def written(self, form: str) -> str:
+        """Return the file in the format "terminal" (or "table"), "markdown", "html" or "latex"."""
+        text: str = self.text() if form in ("terminal", "table") else getattr(self, form)()
+        return text + "\n"
 
     def text(self) -> str:
         """Return plain text for a terminal."""
-        return self._joined("\n", log_line, log_line, Table.text)
+        return self._joined("text", "\n", log_line, log_line)
 
     def markdown(self) -> str:
         """Return Markdown."""
-        return self._joined(
-            "\n\n", markdown_text, lambda title: f"**{markdown_text(title)}**", Table.markdown
-        )
+
+        def sentence(words: str) -> str:
+            return markdown_code(words) if isinstance(words, Code) else markdown_text(words)
+
+        return self._joined("markdown", "\n\n", sentence, lambda title: f"**{markdown_text(title)}**")
 
     def html(self) -> str:
         """Return an HTML `div`."""
         body = self._joined(
-            "\n", lambda x: f"<p>{_html(x)}</p>", lambda x: f"<p><b>{_html(x)}</b></p>", Table.html
+            "html", "\n", lambda x: f"<p>{_html(x)}</p>", lambda x: f"<p><b>{_html(x)}</b></p>"
         )
         return f"<div>\n{body}\n</div>"
 
     def latex(self) -> str:
-        """Return LaTeX that uses the package booktabs."""
-        return self._joined("\n\n", latex_text, lambda title: rf"\textbf{{{latex_text(title)}}}", Table.latex)
+        """Return LaTeX that uses the packages amsmath and booktabs."""
+        return self._joined("latex", "\n\n", latex_text, lambda title: rf"\textbf{{{latex_text(title)}}}")
 
     def _joined(
-        self,
-        between: str,
-        sentence: Callable[[str], str],
-        title: Callable[[str], str],
-        table: Callable[[Table], str],
+        self, form: str, between: str, sentence: Callable[[str], str], title: Callable[[str], str]
     ) -> str:
-        parts = [table(part) if isinstance(part, Table) else sentence(part) for part in self.parts]
-        return between.join([title(self.title), *parts])
+        def one(part: str | Table | Matrix) -> str:
+            if isinstance(part, str):
+                return title(part) if isinstance(part, Strong) else sentence(part)
+            return str(getattr(part, form)())
+
+        parts = [one(part) for part in self.parts if part or form == "text"]
+        return between.join([title(self.title), *parts] if self.title else parts)
 
 
 class Displayable:

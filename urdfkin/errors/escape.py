@@ -20,6 +20,7 @@ FORMULA = ("=", "+", "-", "@")
 #: is the character to escape. JSON and TOML parsers turn the escape back into the character.
 COMMAND_ANYWHERE = re.compile(r"##(?:vso|teamcity)?(\[)")
 COMMANDS = (re.compile(r"\A\s*:(:)"), COMMAND_ANYWHERE)
+_NUMBER = re.compile(r"[-+]?[0-9.]+(?:e[-+]?[0-9]+)?")
 #: An invisible character (word joiner). It prevents that text becomes a link, a mention or an issue number.
 _JOINER = "&#8288;"
 
@@ -52,16 +53,20 @@ def log_line(text: str) -> str:
 
 
 def markdown_text(words: str) -> str:
-    r"""Escape text for Markdown: one line without markup, HTML, links and mentions.
+    r"""Escape a sentence for Markdown: one line without markup, HTML, links and mentions.
 
     Example:
-        >>> markdown_text("<b>*x*")
-        '&lt;b&gt;\\*x\\*'
+        >>> markdown_text("<b>*x*"), markdown_text("1. x")
+        ('&lt;b&gt;\\*x\\*', '1\\. x')
     """
+    return re.sub(r"^(\d*)([-+=.])", r"\1\\\2", markdown_cell(words))  # prevents a list or a horizontal rule
+
+
+def markdown_cell(words: str) -> str:
+    """Escape text for a cell of a table in Markdown, where no list and no horizontal rule can begin."""
     flat = printable(re.sub(r"\s+", " ", words)).replace("&", "&amp;")
     flat = flat.replace("<", "&lt;").replace(">", "&gt;")
     flat = re.sub(r"([\\`*_{}\[\]()|~!#$])", r"\\\1", flat.strip())
-    flat = re.sub(r"^(\d*)([-+=.])", r"\1\\\2", flat)  # prevents a list or a horizontal rule
     return re.sub(r"(?i)(@|\\#|:(?=//)|www(?=\.)|(?:mailto|xmpp):)", rf"\1{_JOINER}", flat)
 
 
@@ -128,6 +133,15 @@ def csv_cell(name: str) -> str:
     """
     line = printable(name).replace("##", r"#\x23")
     return f"'{line}" if line.lstrip("' ").startswith(FORMULA) else line
+
+
+def csv_value(text: str) -> str:
+    """Escape text for a CSV cell as `csv_cell` does, unless it is a number.
+
+    >>> csv_value("-0.5"), csv_value("-y")
+    ('-0.5', "'-y")
+    """
+    return text if _NUMBER.fullmatch(text) else csv_cell(text)
 
 
 def from_csv_cell(cell: str) -> str:

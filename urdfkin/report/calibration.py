@@ -1,8 +1,8 @@
-"""Print a calibration, or return it as JSON data: parameters, errors and warnings."""
+"""A calibration as a document and as JSON data: parameters, errors and warnings."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -10,34 +10,28 @@ from urdfkin.calibration.calibrate import Calibration, doubts
 from urdfkin.calibration.fit import Fit
 from urdfkin.calibration.write_back import Rewritten
 from urdfkin.comparison.result import angle, length
+from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.tree import FloatArray
-from urdfkin.report.listing import print_named
 from urdfkin.report.words import counted
-
-if TYPE_CHECKING:
-    from rich.console import Console
-
 
 #: Ratio of residuals to noise below which the noise is only rounding.
 _ROUNDING = 0.5
 
 
-def print_calibration(found: Calibration, out: Console) -> None:
-    """Print a calibration: parameters, errors, noise, base, tool and warnings."""
+def document(found: Calibration) -> TextDocument:
+    """Return a calibration: parameters, errors, noise, base, tool and warnings."""
     model, identification = found.model, found.identification
     poses = f", {counted(len(found.fitted.errors), 'pose')}" if found.fitted is not None else ""
-    out.print(f"{found.robot.name}: {model.base} to {model.tip}{poses}", style="bold")
+    title = f"{found.robot.name}: {model.base} to {model.tip}{poses}"
     identifiable, fixed = identification.rank, len(identification.still)
-    out.print(f"{identifiable} of {len(found.parameters)} parameters identifiable, {fixed} fixed")
+    parts: list[str | Table] = [
+        f"{identifiable} of {len(found.parameters)} parameters identifiable, {fixed} fixed"
+    ]
     if found.fitted is None:
-        print_named(out, ["identifiable"], [(str(found.parameters[k]),) for k in sorted(identification.kept)])
-        print_named(
-            out,
-            ["fixed", "reason"],
-            [(str(found.parameters[k]), reason) for k, reason in sorted(identification.still.items())],
-            left=(0, 1),
-        )
+        kept = [(str(found.parameters[k]),) for k in sorted(identification.kept)]
+        still = [(str(found.parameters[k]), reason) for k, reason in sorted(identification.still.items())]
+        parts += [Table(["identifiable"], kept), Table(["fixed", "reason"], still, left=2)]
     else:
         rows = [
             (
@@ -50,9 +44,9 @@ def print_calibration(found: Calibration, out: Console) -> None:
             )
             for k in sorted(identification.kept)
         ]
-        print_named(out, ["parameter", "moved by", "standard deviation", "written"], rows)
+        parts.append(Table(["parameter", "moved by", "standard deviation", "written"], rows))
     if found.fitted is None or found.before is None:
-        return
+        return TextDocument(title, parts)
     noise = found.fitted.noise
     said = f"{length(noise.metres)}" + (
         f", {angle(noise.radians)}" if found.fitted.errors.shape[1] == 6 else ""
@@ -60,32 +54,33 @@ def print_calibration(found: Calibration, out: Console) -> None:
     every = sum(p in found.writable for p in identification.kept)
     few = found.written_fit is not None and len(found.written_parameters) < every
     as_written = f"; as written: {_rms(found.written_fit)}" if few and found.written_fit is not None else ""
-    out.print(f"rms error before the fit: {_rms(found.before)}; after: {_rms(found.fitted)}{as_written}")
+    parts.append(f"rms error before the fit: {_rms(found.before)}; after: {_rms(found.fitted)}{as_written}")
     if few:
-        out.print(
+        parts.append(
             f"written: {len(found.written_parameters)} of {every} parameters, those that moved by more than "
             "2 sigma"
         )
     if not found.stated and not found.fitted.is_judged:
-        out.print("noise: unknown, there are no redundant measurements")
+        parts.append("noise: unknown, there are no redundant measurements")
     elif found.stated:
         ratio = f"{found.fitted.ratio:.3g} +- {found.fitted.spread:.2g}"
-        out.print(f"noise: {said} as stated; the residuals are {ratio} times as large")
+        parts.append(f"noise: {said} as stated; the residuals are {ratio} times as large")
     elif found.fitted.ratio < _ROUNDING:
-        out.print("noise: none, the residuals are rounding")
+        parts.append("noise: none, the residuals are rounding")
     else:
-        out.print(f"noise: {said}, estimated from the residuals")
+        parts.append(f"noise: {said}, estimated from the residuals")
     for name, T in (("base", found.base), ("tool", found.tool)):
         if T is not None:
-            out.print(f"{name}: {_written(T)}", soft_wrap=True)
+            parts.append(f"{name}: {_written(T)}")
     for line in doubts(found):
-        out.print(f"warning: {line}", soft_wrap=True, style="bold yellow")
+        parts.append(Strong(f"warning: {line}", "bold yellow"))
+    return TextDocument(title, parts)
 
 
-def print_moved(written: Rewritten, out: Console) -> None:
-    """Print by how much each joint's origin moved."""
+def moved_table(written: Rewritten) -> Table:
+    """Return by how much each joint's origin moved."""
     rows = [(joint, length(shift), angle(turn)) for joint, (shift, turn) in written.moved.items()]
-    print_named(out, ["joint", "origin moved by", "rotated by"], rows)
+    return Table(["joint", "origin moved by", "rotated by"], rows)
 
 
 def _amount(value: float, unit: str) -> str:

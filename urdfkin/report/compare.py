@@ -18,26 +18,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, TypedDict, cast
+from typing import Annotated, Any, TypedDict, cast
 
 import numpy as np
 
 from urdfkin.comparison.result import angle, length, pose_words
 from urdfkin.dh.snapping import rotation_angle
+from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.errors.escape import log_line
 from urdfkin.errors.escape import markdown_text as text
 from urdfkin.model.mechanisms.mechanism import Tolerance
 from urdfkin.model.summary import axis_words, rule_words
-from urdfkin.report.listing import print_named
 from urdfkin.report.markdown import LIMIT, shortened
 from urdfkin.report.words import VERDICTS, check_name, counted, percent, quantity_name, summary, units, worst
 from urdfkin.system.documents import Header, Layout, plain, says
 from urdfkin.validation.document import Check, Document, Joint, Model, Robot, Units, outcome_of
 from urdfkin.verify.oracles import versions
-
-if TYPE_CHECKING:
-    from rich.console import Console
-
 
 #: Maximum length of a text; longer ones are truncated.
 _LONGEST = 200
@@ -110,17 +106,17 @@ def _cut(text: str) -> str:
     return text if len(text) <= _LONGEST else text[: _LONGEST - 4] + " ..."
 
 
-def print_comparison(old: Document, new: Document, found: Comparison, out: Console) -> None:
-    """Print the changes. Every line is complete without colour."""
-    for title, document in (("old", old), ("new", new)):
-        out.print(f"{title}: {document['started']}, {summary(document)}")
-    heads = ["worst, eps*scale", "old", "new"]
+def document(old: Document, new: Document, found: Comparison) -> TextDocument:
+    """Return the changes."""
+    parts: list[str | Table] = [
+        f"{title}: {one['started']}, {summary(one)}" for title, one in (("old", old), ("new", new))
+    ]
     rows = [[quantity_name(name), _cell(a), _cell(b)] for name, a, b in figures(old, new)]
-    print_named(out, heads, rows)
+    parts.append(Table(["worst, eps*scale", "old", "new"], rows))
     for change in sorted(found.changes, key=lambda change: not change.regression):
-        mark = "REGRESSION " if change.regression else ""
-        out.print(f"{mark}{change}", style="bold red" if change.regression else "")
-    out.print(f"{verdict(found)} ({_exit(found)})", style="bold red" if found.regressions else "bold green")
+        parts.append(Strong(f"REGRESSION {change}", "bold red") if change.regression else str(change))
+    style = "bold red" if found.regressions else "bold green"
+    return TextDocument("", [*parts, Strong(f"{verdict(found)} ({_exit(found)})", style)])
 
 
 def verdict(found: Comparison) -> str:

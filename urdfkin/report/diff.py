@@ -1,16 +1,17 @@
-"""Print the changes between two versions of a description, or return them as Markdown or JSON data."""
+"""The changes between two versions of a description, as lines, a table, Markdown and JSON data."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from urdfkin.comparison.diff import Change, Changes, motion_words, word
+from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.errors.escape import markdown_text as text
 from urdfkin.report.markdown import LIMIT, shortened
 from urdfkin.report.words import counted
 
-if TYPE_CHECKING:
-    from rich.console import Console
+#: Titles of the columns.
+HEADS = ("element", "what", "old", "new", "alone")
 
 
 def headline(found: Changes) -> str:
@@ -30,31 +31,45 @@ def _by_element(found: Changes) -> dict[str, list[Change]]:
     return grouped
 
 
-def print_changes(found: Changes, out: Console) -> None:
-    """Print the changes by element, with the effect of each joint's changes alone."""
-    out.print(f"{found.sources[0]} -> {found.sources[1]}", soft_wrap=True)
+def lines_of(found: Changes) -> list[str]:
+    """Return a line for each change by element, with the effect of each joint's changes alone."""
+    lines = [f"{found.sources[0]} -> {found.sources[1]}"]
     for element, changes in _by_element(found).items():
-        for change in changes:
-            out.print(f"  {change}", soft_wrap=True)
+        lines += [f"  {change}" for change in changes]
         if (effect := found.effect_of.get(element)) is not None:
-            out.print(f"    {effect}", soft_wrap=True)
-    out.print(headline(found), style="bold")
+            lines.append(f"    {effect}")
+    return [*lines, Strong(headline(found))]
+
+
+def document(found: Changes) -> TextDocument:
+    """Return the changes as a table."""
+    parts: list[str | Table] = [f"{found.sources[0]} \u2192 {found.sources[1]}"]
+    parts += [Table(HEADS, rows_of(found), left=len(HEADS))] if found else []
+    return TextDocument(headline(found), parts)
+
+
+def rows_of(found: Changes, longest: int | None = None) -> list[tuple[str, ...]]:
+    """Return the cells of each change; old and new values have at most `longest` characters."""
+    rows: list[tuple[str, ...]] = []
+    for change in found.changes:
+        effect = found.effect_of.get(change.element)
+        said = effect.words if effect and change.moves else ""
+        old, new = ("" if value is None else word(value) for value in (change.old, change.new))
+        if longest is not None:
+            old, new = shortened(old, longest), shortened(new, longest)
+        cells = (change.element, change.what, old, new) if change.what else (str(change), "", "", "")
+        rows.append((*cells, said))
+    return rows
 
 
 def markdown_of(found: Changes, limit: int = LIMIT) -> str:
     """Return the changes as Markdown for a pull request's comment, at most `limit` characters."""
     lines = [f"## {text(headline(found))}", "", f"{text(found.sources[0])} → {text(found.sources[1])}", ""]
     if found:
-        lines += ["| element | what | old | new | alone |", "| --- | --- | --- | --- | --- |"]
+        lines += [f"| {' | '.join(HEADS)} |", f"|{' --- |' * len(HEADS)}"]
     left = limit - sum(map(len, lines)) - 200
-    for k, change in enumerate(found.changes):
-        effect = found.effect_of.get(change.element)
-        said = effect.words if effect and change.moves else ""
-        old, new = (
-            shortened("" if value is None else word(value), 120) for value in (change.old, change.new)
-        )
-        cells = (change.element, change.what, old, new) if change.what else (str(change), "", "", "")
-        row = f"| {' | '.join(map(text, (*cells, said)))} |"
+    for k, cells in enumerate(rows_of(found, 120)):
+        row = f"| {' | '.join(map(text, cells))} |"
         left -= len(row) + 1
         if left < 0:
             lines += ["", f"{counted(len(found.changes) - k, 'more change')} not shown."]

@@ -9,27 +9,22 @@ import math
 import shlex
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from urdfkin.comparison.result import BOUNDED, Interval, Question, Sameness, Verdict, angle, length, up_to
 from urdfkin.comparison.verdict import base_as_written
-from urdfkin.errors.display import Table, TextDocument
+from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.errors.escape import markdown_text
 from urdfkin.kinematics.roundings import NOT_ZERO
 from urdfkin.model.mechanisms.mechanism import Mechanism
 from urdfkin.model.pose import inverse
 from urdfkin.model.tree import FloatArray
 from urdfkin.report.html import as_is, asset, environment, when
-from urdfkin.report.terminal import plain_table
 from urdfkin.report.words import counted
 from urdfkin.robot import Robot
 from urdfkin.verify.oracles import versions
-
-if TYPE_CHECKING:
-    from rich.console import Console
-
 
 #: Number of lines of a kind that are shown without --all.
 SHOWN = 12
@@ -153,38 +148,34 @@ def renamed(found: Sameness) -> list[str]:
     return joints + [f"link {ours} is {theirs}" for ours, theirs in found.links if ours != theirs]
 
 
-def print_sameness(
-    found: Sameness, out: Console, question: Question = EQUIVALENT, *, all_: bool = False
-) -> None:
-    """Print the answer and its reasons; every line is readable without colour.
+def document(found: Sameness, question: Question = EQUIVALENT, *, all_: bool = False) -> TextDocument:
+    """Return the answer and its reasons.
 
     Args:
         found: The result of `same`.
-        out: The console.
         question: The question.
         all_: Whether to show every line, not only the first dozen of a kind.
     """
-    for which, name, source in zip("AB", found.names, found.sources, strict=True):
-        out.print(f"{which}: {name} ({source})", soft_wrap=True)
+    sources = zip("AB", found.names, found.sources, strict=True)
+    parts: list[str | Table] = [f"{which}: {name} ({source})" for which, name, source in sources]
     head = headline(found, question)
-    out.print(head, style="bold green" if found.holds(question) else "bold red", soft_wrap=True)
+    parts.append(Strong(head, "bold green" if found.holds(question) else "bold red"))
     some = None if all_ else SHOWN
-    _print_lines(out, "changes of B", found.after, some)
+    parts += _lines("changes of B", found.after, some)
     if found.after and as_written(found) not in head:
-        _print_lines(out, "", [as_written(found)], some)
+        parts += _lines("", [as_written(found)], some)
     words = [one.words for one in found.differences]
-    _print_lines(out, "differences", words[1:] if words and words[0] in head else words, some)
+    parts += _lines("differences", words[1:] if words and words[0] in head else words, some)
     frames = far_frames(found)
     if frames:
-        out.print("largest distance over all configurations within limits:")
-        out.print(plain_table(list(HEADS), rows(frames[:some]), words=(0,)))
-        _print_rest(out, len(frames), some)
+        parts.append("largest distance over all configurations within limits:")
+        parts += [Table(HEADS, rows(frames[:some])), *_rest(len(frames), some)]
         if off := attained(frames[0]):
-            out.print(f"{frames[0].frame} is {off} off at: {where(found, frames[0])}", soft_wrap=True)
-    _print_lines(out, NARROWED, found.narrowed, some)
-    _print_lines(out, "different names", renamed(found), some)
-    _print_lines(out, "differences without effect on motion", [one.words for one in found.remarks], some)
-    out.print(str(found.checked), soft_wrap=True)
+            parts.append(f"{frames[0].frame} is {off} off at: {where(found, frames[0])}")
+    parts += _lines(NARROWED, found.narrowed, some)
+    parts += _lines("different names", renamed(found), some)
+    parts += _lines("differences without effect on motion", [one.words for one in found.remarks], some)
+    return TextDocument("", [*parts, str(found.checked)])
 
 
 def as_document(found: Sameness) -> TextDocument:
@@ -215,19 +206,15 @@ def attained(frame: Interval) -> str:
     return " and ".join(parts)
 
 
-def _print_lines(out: Console, head: str, lines: Sequence[str], some: int | None) -> None:
+def _lines(head: str, lines: Sequence[str], some: int | None) -> list[str]:
     if not lines or not any(lines):
-        return
-    if head:
-        out.print(f"{head}:")
-    for line in lines[:some]:
-        out.print(f"  {line}", soft_wrap=True)
-    _print_rest(out, len(lines), some)
+        return []
+    heads = [f"{head}:"] if head else []
+    return [*heads, *(f"  {line}" for line in lines[:some]), *_rest(len(lines), some)]
 
 
-def _print_rest(out: Console, n: int, some: int | None) -> None:
-    if some is not None and n > some:
-        out.print(f"  ... and {n - some} more: --all shows them")
+def _rest(n: int, some: int | None) -> list[str]:
+    return [f"  ... and {n - some} more: --all shows them"] if some is not None and n > some else []
 
 
 def markdown_of(found: Sameness, question: Question = EQUIVALENT) -> str:

@@ -5,11 +5,11 @@ The text is complete without colour.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from urdfkin.errors.escape import printable
-from urdfkin.report.listing import print_named
+from urdfkin.errors.display import Table
+from urdfkin.report.listing import print_named, print_table
 from urdfkin.report.words import (
     SIDES,
     check_name,
@@ -37,7 +37,6 @@ from urdfkin.validation.document import Check, Document, Judgement, Robot, outco
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
 
 #: Minimum width for a table with a column for each quantity.
 _WIDE = 100
@@ -65,7 +64,7 @@ def print_report(document: Document, out: Console, *, cases: bool = False) -> No
         _print_quantities(robots, out)
     if (title := witness_title(robots)) is not None:
         out.print(f"urdfkin, Pinocchio and {title}: the largest ratio to each pair's bound", style="bold")
-        out.print(_three_sides(robots, title))
+        print_table(out, _three_sides(robots, title))
     for robot in robots:
         _print_robot(robot, out, cases=cases)
     found = outcome_of(document)
@@ -73,20 +72,6 @@ def print_report(document: Document, out: Console, *, cases: bool = False) -> No
     out.print(passed + summary(document), style="bold green" if found.passed else "bold red")
     if found.reason:
         out.print(f"not passed: {found.reason}", style="bold red")
-
-
-def plain_table(heads: Sequence[str], rows: Iterable[Sequence[str]], words: Sequence[int]) -> Table:
-    """Return a table with the columns in `words` left-aligned and the others right-aligned."""
-    from rich import box  # noqa: PLC0415  keeps --help fast
-    from rich.table import Table  # noqa: PLC0415
-
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold")
-    for i, head in enumerate(heads):  # a head may have two lines
-        left = i in words
-        table.add_column(head, justify="left" if left else "right", overflow="fold", vertical="top")
-    for row in rows:
-        table.add_row(*map(printable, row))
-    return table
 
 
 def _counts(robot: Robot) -> list[str]:
@@ -136,7 +121,7 @@ def _three_sides(robots: Sequence[Robot], title: str) -> Table:
     """Return one row for each quantity, all robots and reference frames together."""
     rows = ([quantity_name(name), *cells] for name, cells in witness_rows(robots, title))
     heads = [head.replace(", ", ",\n") for head in witness_heads(title)]
-    return plain_table(["quantity", *heads], rows, words=(0, 5))
+    return Table(["quantity", *heads], list(rows), left=(0, 5))
 
 
 def _figures(checks: Sequence[Check]) -> list[str]:
@@ -186,7 +171,7 @@ def _judged(judgement: Judgement) -> Table:
         ]
         for line in judgement["lines"]
     )
-    return plain_table([*heads, "smaller\nerror"], rows, words=(0,))
+    return Table([*heads, "smaller\nerror"], list(rows))
 
 
 def _print_robot(robot: Robot, out: Console, *, cases: bool) -> None:
@@ -209,7 +194,7 @@ def _print_robot(robot: Robot, out: Console, *, cases: bool) -> None:
             f" {judged_on(robot['judge'])}",
             style="bold",
         )
-        out.print(_judged(robot["judge"]))
+        print_table(out, _judged(robot["judge"]))
     for check in robot["checks"]:
         case = check["worst_case"]
         if case is None or not (cases or check["failed"]):

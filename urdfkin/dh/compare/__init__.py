@@ -1,7 +1,7 @@
 """Compare a URDF with a published Denavit-Hartenberg table."""
 
 from urdfkin.dh.compare.agreement import TOLERANCE, compare
-from urdfkin.dh.compare.result import CellDifference, Comparison, Mistake, comparison_text
+from urdfkin.dh.compare.result import CellDifference, Comparison, Mistake, document
 from urdfkin.dh.compare.slips import CommonMistake, convention_that_fits, diagnose
 
 __all__ = [
@@ -11,7 +11,7 @@ __all__ = [
     "Comparison",
     "Mistake",
     "compare",
-    "comparison_text",
     "convention_that_fits",
     "diagnose",
+    "document",
 ]

@@ -12,12 +12,14 @@ from enum import StrEnum
 
 import numpy as np
 
-from urdfkin.dh.export.text import added, aligned, pose_lines
+from urdfkin.dh.export.text import added, pose_matrix
 from urdfkin.dh.table import DHRow, DHTable, nearest_twelfth
 from urdfkin.dh.units import Units
 from urdfkin.errors import Question
-from urdfkin.errors.escape import printable
+from urdfkin.errors.display import Matrix, Table, TextDocument
 from urdfkin.kinematics.roundings import EPS, of_a_fit
+
+Parts = list[str | Table | Matrix]
 
 #: Largest remaining error (metres per metre of reach, rad) if changed cells explain the whole difference: far
 #: above the rounding of a fit, far below the last digit of any data sheet.
@@ -218,23 +220,24 @@ def resolution(share: float, radians: float) -> float:
     return float(10.0 ** math.ceil(math.log10(2.0 * max(share, radians, _FINEST))))
 
 
-def comparison_text(found: Comparison, units: Units) -> str:
-    """Return a comparison as text: the verdict, the fitted parameters and the cells that differ."""
-    lines = [*_verdict(found), *(_mistakes(found, units) if found.mistakes else _cells(found, units))]
+def document(found: Comparison, units: Units) -> TextDocument:
+    """Return the verdict, the fitted parameters and the cells that differ."""
+    title, *verdict = _verdict(found)
+    parts: Parts = [*verdict, *(_mistakes(found, units) if found.mistakes else _cells(found, units))]
     if found.residual > EXPLAINED * found.reach and not found.mistakes:
-        lines.append(f"No change of cells explains the difference: {found.residual * 1e3:.3g} mm remain.")
+        parts.append(f"No change of cells explains the difference: {found.residual * 1e3:.3g} mm remain.")
         if not found.fitted:
-            lines.append("The table may have other frames. Omit --no-fit to fit base and tool.")
+            parts.append("The table may have other frames. Omit --no-fit to fit base and tool.")
     if found.agrees or not found.mistakes:
-        lines += _fitted(found, units)
+        parts += _fitted(found, units)
     if not found.agrees:
-        lines += ["", str(Question.DH_AND_URDF_DISAGREE)]
-    return "\n".join(map(printable, lines)) + "\n"
+        parts += ["", str(Question.DH_AND_URDF_DISAGREE)]
+    return TextDocument(title, parts)
 
 
-def _fitted(found: Comparison, units: Units) -> list[str]:
-    """Return lines with the fitted variables, base and tool that are not the identity."""
-    lines = list[str]()
+def _fitted(found: Comparison, units: Units) -> Parts:
+    """Return the fitted variables, base and tool that are not the identity."""
+    parts: Parts = []
     table, fine = found.reference, resolution(found.metres / found.reach, found.radians)
     moved = [
         f"  {row.joint}: {added('-q' if sense < 0 else 'q', shown_offset(offset, row, fine, units))}"
@@ -242,12 +245,12 @@ def _fitted(found: Comparison, units: Units) -> list[str]:
         if sense < 0 or abs(offset) > fine
     ]
     if moved:
-        lines += ["", "The table's joint variables in terms of the URDF's:", *moved]
+        parts += ["", "The table's joint variables in terms of the URDF's:", *moved]
     for what, T in (("base", table.base), ("tool", table.tool)):
         rounded = np.round(T / fine) * fine
         if np.abs(rounded - np.eye(4)).max() > fine:
-            lines += ["", f"{what} (metres):", *("  " + line for line in pose_lines(rounded, 6))]
-    return lines
+            parts += ["", f"{what} (metres):", pose_matrix(rounded, 6)]
+    return parts
 
 
 def _verdict(found: Comparison) -> list[str]:
@@ -341,37 +344,38 @@ def _change(mistake: Mistake, table: DHTable, units: Units) -> str:
     return f"{row}: {one.cell} = {write(one.urdf)} {unit}, not {write(one.reference)} ({why})"
 
 
-def _cells(found: Comparison, units: Units) -> list[str]:
-    """Return lines with the cells that differ, those not compared, and the changes without a fit."""
+def _cells(found: Comparison, units: Units) -> Parts:
+    """Return the cells that differ, those not compared, and the changes without a fit."""
     unit = f"({units.length_name}, {units.angle_name})"
-    lines = []
+    parts: Parts = []
     if found.differences:
-        lines += ["", f"Cells that differ {unit}:", *_table(found.differences, units)]
+        parts += ["", f"Cells that differ {unit}:", _table(found.differences, units)]
         rounded = sum(one.is_rounding for one in found.differences)
         if rounded:
             all_ = "All" if rounded == len(found.differences) else f"{rounded} of {len(found.differences)}"
-            lines.append(f"{all_} within the last digit of the table (*).")
+            parts.append(f"{all_} within the last digit of the table (*).")
     elif found.as_written:
-        lines.append("Every cell agrees with the URDF.")
+        parts.append("Every cell agrees with the URDF.")
     elif found.exact:
-        lines.append("No cell differs, except those that the fit can replace.")
+        parts.append("No cell differs, except those that the fit can replace.")
     if found.hidden and not found.as_written:
         cells = ", ".join(f"{cell}{row + 1}" for row, cell in found.hidden)
-        lines.append(f"Not compared, because base, tool and offsets can replace them: {cells}.")
+        parts.append(f"Not compared, because base, tool and offsets can replace them: {cells}.")
     if {(one.row, one.cell) for one in found.instead} - {(one.row, one.cell) for one in found.differences}:
-        lines += ["", f"Without fitting, these cells would have to change {unit}:"]
-        lines += _table(found.instead, units)
-    return lines
+        parts += ["", f"Without fitting, these cells would have to change {unit}:"]
+        parts.append(_table(found.instead, units))
+    return parts
 
 
-def _table(cells: Sequence[CellDifference], units: Units) -> list[str]:
-    body = [["row", "joint", "cell", "table", "URDF", "difference", "tip [mm]"]]
+def _table(cells: Sequence[CellDifference], units: Units) -> Table:
+    rows = []
     for one in cells:
         write = units.length if one.cell in ("a", "d") else units.angle
         texts = [write(one.reference), write(one.urdf), write(one.difference), f"{one.tip * 1e3:.3g}"]
         star = "*" if one.is_rounding else ""
-        body.append([str(one.row + 1), one.joint, one.cell + star, *texts])
-    return aligned(body)
+        rows.append((str(one.row + 1), one.joint, one.cell + star, *texts))
+    heads = ("row", "joint", "cell", "table", "URDF", "difference", "tip [mm]")
+    return Table(heads, rows, left=(1,), names=(1,))
 
 
 def shown_offset(offset: float, row: DHRow, fine: float, units: Units) -> str:

@@ -1,8 +1,9 @@
 """Export a table as text: for a terminal, in Markdown, in HTML and in LaTeX.
 
-All formats contain the convention, the formula, base and tool. LaTeX uses booktabs, has the convention in the
-caption, and fits the table to the width of the text. The functions for headings, cells, formulas and poses do
-not depend on a format. Each format passes its own notation for pi, products and names.
+All formats contain the convention, the formula, base and tool. One `document` gives text, Markdown and HTML.
+LaTeX uses booktabs, has the convention in the caption, and fits the table to the width of the text. The
+functions for headings, cells, formulas and poses do not depend on a format. Each format passes its own
+notation for pi, products and names.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ import numpy as np
 
 from urdfkin.dh.table import Convention, DHRow, DHTable
 from urdfkin.dh.units import Angles, Units
-from urdfkin.errors.display import Table, TextDocument
-from urdfkin.errors.escape import latex_text, markdown_code, markdown_text, printable
+from urdfkin.errors.display import Code, Matrix, Table, TextDocument
+from urdfkin.errors.escape import latex_text
 from urdfkin.model.tree import FloatArray
 
 FORMULA = {
@@ -52,11 +53,11 @@ def variable(
     return {1.0: q, -1.0: f"-{q}"}.get(multiplier, f"{number(multiplier)}{times}{q}")
 
 
-def coordinate_names(table: DHTable, shown: Callable[[str], str] = str) -> str:
+def coordinate_names(table: DHTable) -> str:
     """Return the joint of each coordinate as text; "" if the coordinates are the rows' joints in order."""
     if [row.joint for row in table.rows] == list(table.joint_names):
         return ""
-    return "with " + ", ".join(f"q{i} = {shown(name)}" for i, name in enumerate(table.joint_names, 1))
+    return "with " + ", ".join(f"q{i} = {name}" for i, name in enumerate(table.joint_names, 1))
 
 
 def constant_of(row: DHRow) -> float:
@@ -104,11 +105,9 @@ def is_identity(T: FloatArray) -> bool:
     return bool(np.array_equal(T, np.eye(4)))
 
 
-def pose_lines(T: FloatArray, digits: int = 10) -> list[str]:
-    """Return the three upper rows of a pose in metres, with aligned columns."""
-    texts = [[f"{x + 0.0:.{digits}g}" for x in row] for row in T[:3]]
-    widths = [max(len(row[i]) for row in texts) for i in range(4)]
-    return ["  ".join(text.rjust(width) for text, width in zip(row, widths, strict=True)) for row in texts]
+def pose_matrix(T: FloatArray, digits: int = 10) -> Matrix:
+    """Return the three upper rows of a pose in metres."""
+    return Matrix([[f"{x + 0.0:.{digits}g}" for x in row] for row in T[:3]])
 
 
 def at_most(value: float) -> str:
@@ -124,7 +123,7 @@ def at_most(value: float) -> str:
     return f"{math.ceil(value / unit * _ON_THE_DIGIT) * unit:.2e}"
 
 
-def snap_lines(table: DHTable, bullet: str = "  ") -> list[str]:
+def snap_lines(table: DHTable) -> list[str]:
     """Return the effect of snapping as text, then a line for each change."""
     snap = table.snap
     if snap is None:
@@ -142,92 +141,52 @@ def snap_lines(table: DHTable, bullet: str = "  ") -> list[str]:
         n = len(table.rows)
         row = "base" if change.row < 0 else "tool" if change.row >= n else f"row {change.row + 1}"
         moved = f"turned by {change.angle:.2e} rad, tip moves by at most {at_most(change.tip)} m"
-        lines.append(f"{bullet}{row}: {change.what}, {moved}")
+        lines.append(f"  {row}: {change.what}, {moved}")
     return lines
+
+
+def document(table: DHTable, units: Units, pi: str = "pi", *, wrapped: bool = False) -> TextDocument:
+    """Return a title, the formula, the table, base and tool, and the effect of snapping.
+
+    Args:
+        table: The table.
+        units: Units, digits and order of the columns.
+        pi: Notation of pi.
+        wrapped: Whether long sentences are on several lines.
+    """
+    rows = [(str(i), row.joint, *cells(table, row, units, pi)) for i, row in enumerate(table.rows, 1)]
+    parts: list[str | Table | Matrix] = [Code(formula(table)), ""]
+    parts.append(Table(("i", "joint", *headings(table, units)), rows, left=(1,), names=(1,)))
+    parts += [] if table.rows else ["(no joint between the two frames moves)"]
+    parts += ["", names] if (names := coordinate_names(table)) else []
+    for what, T in (("base", table.base), ("tool", table.tool)):
+        if not is_identity(T):
+            parts += ["", f"{what} (metres):", pose_matrix(T, units.digits)]
+        else:
+            parts += [] if what == "tool" and is_identity(table.base) else [""]
+            parts.append(f"{what}: the identity")
+    report = snap_lines(table)
+    changes = table.snap.changes if table.snap is not None else ()
+    if not wrapped and changes:
+        report = [" ".join(report[: -len(changes)]), *report[-len(changes) :]]
+    parts += ["", *report] if report else []
+    title = f"{table.robot}: {table.base_frame} to {table.tip_frame}"
+    return TextDocument(f"{title}, {table.convention} Denavit-Hartenberg parameters", parts)
 
 
 def write_terminal(table: DHTable, units: Units) -> str:
     """Return the table for a terminal."""
-    title = f"{table.robot}: {table.base_frame} to {table.tip_frame}"
-    lines = [f"{title}, {table.convention} Denavit-Hartenberg parameters", formula(table), ""]
-    body = [["i", "joint", *headings(table, units)]]
-    body += [[str(i), row.joint, *cells(table, row, units)] for i, row in enumerate(table.rows, 1)]
-    lines += aligned(body)
-    if not table.rows:
-        lines.append("(no joint between the two frames moves)")
-    if names := coordinate_names(table):
-        lines += ["", names]
-    for what, T in (("base", table.base), ("tool", table.tool)):
-        if not is_identity(T):
-            lines += ["", f"{what} (metres):", *("  " + line for line in pose_lines(T, units.digits))]
-        else:
-            lines += [] if what == "tool" and is_identity(table.base) else [""]
-            lines.append(f"{what}: the identity")
-    if table.snap is not None:
-        lines += ["", *snap_lines(table)]
-    return "\n".join(map(printable, lines)) + "\n"
-
-
-def aligned(body: list[list[str]]) -> list[str]:
-    """Align columns under headings with a rule: the second column to the left, the others to the right."""
-    body = [[printable(text) for text in row] for row in body]
-    widths = [max(len(row[i]) for row in body) for i in range(len(body[0]))]
-    lines = []
-    for row in body:
-        texts = [
-            text.ljust(width) if i == 1 else text.rjust(width)
-            for i, (text, width) in enumerate(zip(row, widths, strict=True))
-        ]
-        lines.append("  ".join(texts).rstrip())
-    return [lines[0], "-" * (sum(widths) + 2 * (len(widths) - 1)), *lines[1:]]
+    return document(table, units, wrapped=True).text() + "\n"
 
 
 def write_markdown(table: DHTable, units: Units) -> str:
-    """Return a heading line, the table, base and tool, and the effect of snapping, in Markdown."""
-    body = [["i", "joint", *headings(table, units)]]
-    body += [
-        [str(i), markdown_code(row.joint), *cells(table, row, units)] for i, row in enumerate(table.rows, 1)
-    ]
-    robot, base, tip = (markdown_code(name) for name in (table.robot, table.base_frame, table.tip_frame))
-    title = f"**{robot}**, {base} to {tip}"
-    lines = [f"{title}, {table.convention} Denavit-Hartenberg parameters: `{formula(table)}`", ""]
-    lines += [_line(body[0]), _line(["---:", ":---", *["---:"] * (len(body[0]) - 2)])]
-    lines += [_line(row) for row in body[1:]]
-    if names := coordinate_names(table, markdown_code):
-        lines += ["", names]
-    for what, T in (("Base", table.base), ("Tool", table.tool)):
-        if is_identity(T):
-            lines += ["", f"{what}: the identity."]
-        else:
-            lines += ["", f"{what} (metres):", "", "```", *pose_lines(T, units.digits), "```"]
-    if table.snap is not None:
-        report = snap_lines(table, "- ")  # escaped, because it has names of joints
-        lines += ["", *(f"- {markdown_text(s[2:])}" if s.startswith("- ") else s for s in report)]
-    return "\n".join(lines) + "\n"
-
-
-def _line(texts: list[str]) -> str:
-    return "| " + " | ".join(texts) + " |"
+    """Return the table in Markdown."""
+    return document(table, units).markdown() + "\n"
 
 
 def write_html(table: DHTable, units: Units) -> str:
-    """Return a title, the formula, the table, base and tool, and the effect of snapping, in HTML."""
-    heads = ["i", "joint", *headings(table, units)]
-    rows = [
-        (str(i), row.joint, *cells(table, row, units, pi="\u03c0")) for i, row in enumerate(table.rows, 1)
-    ]
-    ends = f"{table.robot}: {table.base_frame} to {table.tip_frame}"
-    parts: list[str | Table] = [formula(table), Table(heads, rows, left=2)]
-    parts += [names] if (names := coordinate_names(table)) else []
-    for what, T in (("base", table.base), ("tool", table.tool)):
-        if is_identity(T):
-            parts.append(f"{what}: the identity")
-        else:
-            lines = [line.split() for line in pose_lines(T, units.digits)]
-            parts += [f"{what} (metres):", Table(("x", "y", "z", "position"), lines, left=0)]
-    parts += snap_lines(table)
-    title = f"{ends}, {table.convention} Denavit-Hartenberg parameters"
-    return TextDocument(title, parts).html() + "\n"
+    """Return the table in HTML."""
+    return document(table, units, pi="\u03c0").html() + "\n"
 
 
 _FORMULA = {

@@ -25,13 +25,13 @@ from collections.abc import Callable
 
 from urdfkin.dh.convert import frame_poses
 from urdfkin.dh.export.code import bounds, demand_free, docstring, header, identifier, matrix, numbers, plain
-from urdfkin.dh.export.text import aligned, fitted, is_identity, maths, pose, pose_lines
+from urdfkin.dh.export.text import fitted, is_identity, maths, pose, pose_matrix
 from urdfkin.dh.screws import ProductOfExponentials
 from urdfkin.dh.structure import axes_and_steps
 from urdfkin.dh.table import Convention, DHRow, DHTable
 from urdfkin.dh.units import Units
-from urdfkin.errors.display import six_digits
-from urdfkin.errors.escape import latex_text, printable
+from urdfkin.errors.display import Code, Matrix, Table, TextDocument, six_digits
+from urdfkin.errors.escape import latex_text
 from urdfkin.model.tree import FloatArray
 
 
@@ -140,23 +140,25 @@ FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] 
 
 
 def write_screws(screws: ProductOfExponentials, form: str, digits: int = 10) -> str:
-    """Return the screws as "terminal", "latex", "toml", "json", "numpy" or "matlab"."""
-    return _FORMS[form](screws, digits)
+    """Return the screws as "terminal", "markdown", "html", "latex", "toml", "json", "numpy" or "matlab"."""
+    if form == "latex":
+        return _latex(screws, digits)
+    return _CODE[form](screws) if form in _CODE else screws_document(screws, digits).written(form)
 
 
-def _terminal(screws: ProductOfExponentials, digits: int) -> str:
-    path = f"{screws.robot}: {screws.base_frame} to {screws.tip_frame}"
-    lines = [f"{path}, product of exponentials (metres, angular first)", FORMULA]
+def screws_document(screws: ProductOfExponentials, digits: int = 10) -> TextDocument:
+    """Return a title, the formula, the screws in space and body axes, and M."""
+    parts: list[str | Table | Matrix] = [Code(FORMULA)]
+    heads = ("i", "joint", "w_x", "w_y", "w_z", "v_x", "v_y", "v_z")
     for what, rows in (("space screws S", screws.space), ("body screws B", screws.body)):
-        body = [["i", "joint", "w_x", "w_y", "w_z", "v_x", "v_y", "v_z"]]
-        body += [
-            [str(i), joint.name, *(six_digits(x, digits=digits) for x in row)]
+        body = [
+            (str(i), joint.name, *(six_digits(x, digits=digits) for x in row))
             for i, (joint, row) in enumerate(zip(screws.joints, rows, strict=True), 1)
         ]
-        lines += ["", what, *aligned(body)]
-    lines += ["", "M, the tip in the zero configuration (metres):"]
-    lines += ["  " + line for line in pose_lines(screws.M, digits)]
-    return "\n".join(map(printable, lines)) + "\n"
+        parts += ["", what, Table(heads, body, left=(1,), names=(1,))]
+    parts += ["", "M, the tip in the zero configuration (metres):", pose_matrix(screws.M, digits), ""]
+    path = f"{screws.robot}: {screws.base_frame} to {screws.tip_frame}"
+    return TextDocument(f"{path}, product of exponentials (metres, angular first)", parts)
 
 
 def _latex(screws: ProductOfExponentials, digits: int) -> str:
@@ -172,15 +174,15 @@ def _latex(screws: ProductOfExponentials, digits: int) -> str:
     return "\n".join([*lines, *pose("$M$", screws.M), r"\end{table}"]) + "\n"
 
 
-def _toml(screws: ProductOfExponentials, _digits: int) -> str:
+def _toml(screws: ProductOfExponentials) -> str:
     return "".join(f"{key} = {json.dumps(value)}\n" for key, value in screws.as_mapping().items())
 
 
-def _json(screws: ProductOfExponentials, _digits: int) -> str:
+def _json(screws: ProductOfExponentials) -> str:
     return json.dumps(screws.as_mapping(), indent=2) + "\n"
 
 
-def _numpy(screws: ProductOfExponentials, _digits: int) -> str:
+def _numpy(screws: ProductOfExponentials) -> str:
     lines = [
         f'"""{plain(screws.robot)}: M, space and body screws as columns (w, v), metres: Modern Robotics."""'
     ]
@@ -204,7 +206,7 @@ def _array(name: str, rows: FloatArray, end: str) -> list[str]:
     return [f"{name} = np.array(", "    [", *(f"        [{numbers(row)}]," for row in rows), "    ]", end]
 
 
-def _matlab(screws: ProductOfExponentials, _digits: int) -> str:
+def _matlab(screws: ProductOfExponentials) -> str:
     lines = [f"function [M, Slist, Blist] = {identifier(screws.robot)}_screws()"]
     lines += [f"% {plain(screws.robot)}: screws are columns (w; v), metres, as in Modern Robotics"]
     lines += matrix("M", screws.M, 4)
@@ -213,9 +215,8 @@ def _matlab(screws: ProductOfExponentials, _digits: int) -> str:
     return "\n".join([*lines, "end"]) + "\n"
 
 
-_FORMS: dict[str, Callable[[ProductOfExponentials, int], str]] = {
-    "terminal": _terminal,
-    "latex": _latex,
+#: Data and code, which are exact.
+_CODE: dict[str, Callable[[ProductOfExponentials], str]] = {
     "toml": _toml,
     "json": _json,
     "numpy": _numpy,

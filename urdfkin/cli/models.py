@@ -1,0 +1,168 @@
+"""`urdfkin same` and `urdfkin diff`: compare two robot models."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from urdfkin.cli.completion import complete_robot
+from urdfkin.cli.options import NumberFrom, Whole, load_two, xacro_option
+from urdfkin.cli.output import TEXTS, Answer, answering, check_writable, compiling, write_file
+from urdfkin.cli.streams import say
+from urdfkin.errors.display import TextDocument
+from urdfkin.errors.escape import csv_value, json_text
+
+if TYPE_CHECKING:
+    from urdfkin.robot import Robot
+
+_PATH = click.Path(path_type=Path, dir_okay=False)
+
+
+@click.command("same", epilog="Example: urdfkin same ur5 ur5_limited --certificate same.json")
+@click.argument("a", metavar="A", required=False, shell_complete=complete_robot)
+@click.argument("b", metavar="B", required=False, shell_complete=complete_robot)
+@click.option(
+    "--map",
+    "pairs",
+    multiple=True,
+    metavar="JOINT_OF_A=JOINT_OF_B",
+    help="Match two joints; may be repeated.",
+)
+@click.option(
+    "--strict",
+    is_flag=True,
+    help="Also exit 1 if the models are only equivalent, or if limits differ.",
+)
+@click.option(
+    "--within",
+    type=NumberFrom(0.0),
+    help="Exit 0 only if all frames provably stay within this distance (m and rad) as written.",
+)
+@click.option(
+    "--boxes",
+    type=Whole(0),
+    help="Number of boxes for bounds (default 131072). More: sharper but slower; 0: none.",
+)
+@click.option("--all", "all_", is_flag=True, help="Show every line.")
+@click.option("--certificate", type=_PATH, help="Write the result as JSON that --recheck verifies.")
+@click.option("--recheck", type=_PATH, help="Verify a certificate for both models, without a search.")
+@click.option("--markdown", type=_PATH, help="Write Markdown for a pull request's comment.")
+@click.option(
+    "--html", type=_PATH, help="Write an HTML page with a picture of both at the worst configuration."
+)
+@click.option("--schema", is_flag=True, help="Print the JSON Schema of a certificate instead.")
+@xacro_option
+@answering(*TEXTS, "json")
+def same_command(
+    a: str | None,
+    b: str | None,
+    pairs: tuple[str, ...],
+    strict: bool,
+    within: float | None,
+    boxes: int | None,
+    all_: bool,
+    recheck: Path | None,
+    schema: bool,
+    **paths: Path | None,
+) -> Answer:
+    """Prove whether A and B are the same robot in every configuration.
+
+    A and B are robots as in other commands, or Denavit-Hartenberg tables. They are the same if the screws of
+    all joints and the zero-configuration poses of all links agree. A different base pose, joint zeros and
+    senses, fixed links, names and order are allowed. If they differ, the command prints an interval for the
+    largest distance of each frame over all configurations within limits. Its lower bound is attained at a
+    printed configuration; its upper bound is proven.
+
+    Exit 0: same, or equivalent up to the printed changes. 1: different; with --strict also if only
+    equivalent. With --within: 0 if all frames stay within the distance as written, else 1. 2: bad input.
+    """
+    if schema:
+        from urdfkin.comparison.certificate import SAME  # noqa: PLC0415  keeps --help fast
+
+        click.echo(SAME.schema_text(), nl=False)
+        click.get_current_context().exit()
+    if a is None or b is None:
+        raise click.UsageError("two models are needed: urdfkin same A B")
+    check_writable(*paths.values())
+    robots = load_two(a, b)
+    with compiling():
+        if recheck is not None:
+            return _recheck(robots, recheck)
+        from urdfkin.comparison.bounds import MOST  # noqa: PLC0415
+        from urdfkin.comparison.result import Question  # noqa: PLC0415
+        from urdfkin.comparison.verdict import parse_map, same  # noqa: PLC0415
+
+        how_many = MOST if boxes is None else boxes
+        found = same(*robots, map=parse_map(pairs), boxes=how_many, within=within)
+    from urdfkin.comparison.certificate import certificate  # noqa: PLC0415
+    from urdfkin.report.same import as_html, command_of, document, markdown_of  # noqa: PLC0415
+
+    question = Question(within, strict)
+    words = [word for pair in pairs for word in ("--map", pair)]
+    words += ["--boxes", str(boxes)] if boxes is not None else []
+    forms: dict[str, Callable[[], str]] = {
+        "certificate": lambda: json_text(certificate(found, command_of(robots, question, words))) + "\n",
+        "markdown": lambda: markdown_of(found, question),
+        "html": lambda: as_html(found, robots, question, words),
+    }
+    for name, form in forms.items():
+        if (path := paths[name]) is not None:
+            write_file(path, form().encode())
+    data = {"json": forms["certificate"], "markdown": forms["markdown"], "html": forms["html"]}
+    code = int(not found.holds(question))
+    return Answer(lambda: document(found, question, all_=all_), data, code=code)
+
+
+def _recheck(robots: tuple[Robot, Robot], path: Path) -> Answer:
+    from urdfkin.comparison.certificate import SAME, recheck, words_of  # noqa: PLC0415  keeps --help fast
+
+    certificate = SAME.read(path)
+    errors = recheck(certificate, *robots)
+    for line in errors:
+        say(line, err=True)
+    first = [f"; first difference: {words_of(one)}" for one in certificate["differences"][:1]]
+    holds = f"the certificate holds: {certificate['verdict']}{''.join(first)}"
+    words = "the certificate does not hold" if errors else holds
+    return Answer(
+        lambda: TextDocument("", [words]), code=int(bool(errors) or certificate["verdict"] == "differs")
+    )
+
+
+@click.command("diff", epilog="Example: urdfkin diff arm.urdf my.urdf --markdown comment.md")
+@click.argument("a", metavar="OLD", shell_complete=complete_robot)
+@click.argument("b", metavar="NEW", shell_complete=complete_robot)
+@click.option("--effects/--no-effects", default=True, help="Bound how far the changes move frames (default).")
+@click.option("--markdown", type=_PATH, help="Write Markdown for a pull request's comment.")
+@xacro_option
+@answering()
+def diff_command(a: str, b: str, effects: bool, markdown: Path | None) -> Answer:
+    """List the changes from OLD to NEW, attribute by attribute, and how far they move the robot's frames.
+
+    For each changed joint, the command prints how far its changes alone move the most affected frame. This is
+    the maximum over all configurations within limits, at equal coordinates. The last line is for all changes
+    together.
+
+    Exit 0: no changes. 1: changes. 2: bad input.
+    """
+    from urdfkin.comparison.diff import diff  # noqa: PLC0415  keeps --help fast
+    from urdfkin.report.diff import HEADS, as_data, document, lines_of, markdown_of, rows_of  # noqa: PLC0415
+
+    check_writable(markdown)
+    old, new = load_two(a, b)
+    with compiling():
+        found = diff(old, new, effects=effects)
+    if markdown is not None:
+        write_file(markdown, markdown_of(found).encode())
+    return Answer(
+        lambda: document(found),
+        {
+            "json": lambda: as_data(found),
+            "csv": lambda: [HEADS, *(map(csv_value, row) for row in rows_of(found))],
+            "markdown": lambda: markdown_of(found),
+        },
+        code=1 if found else 0,
+        fitted=lambda _: TextDocument("", lines_of(found)),
+    )

@@ -1,0 +1,235 @@
+"""Commands about a path between two frames: `urdfkin chain`, `screws` and `structure`."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from urdfkin.cli.options import (
+    Number,
+    Whole,
+    load_robot,
+    path_options,
+    q_option,
+    read_inputs,
+    reject_unused_options,
+    robot_argument,
+    seed_option,
+    together,
+    verify_option,
+)
+from urdfkin.cli.output import TEXTS, Answer, answering, check_of_path, finite
+from urdfkin.errors import InputError
+from urdfkin.errors.display import Table, TextDocument, six_digits
+from urdfkin.errors.escape import csv_cell
+
+if TYPE_CHECKING:
+    from urdfkin.dh.structure import Kind, Structure
+    from urdfkin.model.tree import FloatArray
+
+
+def _path_command(
+    name: str, example: str, *options: Any, answers: Any
+) -> Callable[[Callable[..., Answer]], click.Command]:
+    """Make a command with the options of a path; `answers` is a result of `answering`."""
+
+    def decorate(function: Callable[..., Answer]) -> click.Command:
+        own = together(robot_argument, path_options, *options, verify_option, answers)
+        return click.command(name, epilog=f"Example: {example}")(own(function))
+
+    return decorate
+
+
+@_path_command(
+    "chain",
+    "urdfkin chain panda --base panda_link0 --tip panda_hand",
+    q_option,
+    seed_option,
+    answers=answering(),
+)
+def chain_command(robot: str, base: str | None, tip: str | None, q: str, seed: int, verify: bool) -> Answer:
+    """List the joints between two frames (section 7.5), in one configuration and in the base's axes.
+
+    Each joint has its axis z, its origin O and the interorigin vector d to the next origin, in metres. The
+    last vector d leads to the tip. The path may run up the tree: such a joint is marked "backwards", and its
+    axis is reversed so that its coordinate keeps the URDF's sign. Fixed joints are folded in. --q is the
+    configuration of the whole robot.
+
+    Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
+    """
+    from urdfkin.verify.chain_checks import check_chain  # noqa: PLC0415  keeps --help fast
+
+    loaded = load_robot(robot, verify=verify)
+    path = loaded.chain(tip, base)
+    at = read_inputs(loaded, path.tip, seed, q).q
+    if len(at) != 1:
+        raise InputError("the chain needs exactly one configuration", where="--q", found=str(len(at)))
+    own = path.coupling.select(loaded.tree, at)[0]
+    origins = path.origins(own)
+    joints = list(zip(path.joints, path.axes(own), origins, path.interorigin(own), strict=False))
+
+    def document() -> TextDocument:
+        names = ", ".join(path.joint_names) or "none: nothing moves"
+        rows = [(joint.name, _kind_of_joint(joint), *map(_vector, three)) for joint, *three in joints]
+        rows.append((path.tip, "tip", "", _vector(origins[-1]), ""))
+        heads = ("joint", "kind", "axis z", "origin O [m]", "to the next d [m]")
+        title = f"{path.robot}: {path.base} to {path.tip}, coordinates {names}"
+        return TextDocument(title, [Table(heads, rows, left=5, names=(0,))])
+
+    def data() -> dict[str, Any]:
+        return {
+            "robot": loaded.name,
+            "source": loaded.source,
+            "base": path.base,
+            "tip": path.tip,
+            "q": at[0].tolist(),
+            "coordinates": list(path.joint_names),
+            "path_q": own.tolist(),
+            "joints": [
+                {
+                    "name": joint.name,
+                    "kind": joint.kind.value,
+                    "backwards": joint.backwards,
+                    "follows": joint.mimic.leader if joint.mimic else None,
+                    "axis": z.tolist(),
+                    "origin": origin.tolist(),
+                    "interorigin": d.tolist(),
+                }
+                for joint, z, origin, d in joints
+            ],
+            "placement": path.placement(own).tolist(),
+        }
+
+    def rows() -> Iterator[list[object]]:
+        yield ["i", "joint", "kind", "backwards", *(f"{name}{axis}" for name in "zOd" for axis in "xyz")]
+        for i, (joint, *three) in enumerate(joints, 1):
+            numbers = [repr(x) for vector in three for x in vector.tolist()]
+            yield [i, csv_cell(joint.name), joint.kind.value, int(joint.backwards), *numbers]
+
+    check = check_chain(loaded.verifier, path, at) if verify else None
+    return Answer(document, {"json": data, "csv": rows}, *check_of_path(check))
+
+
+def _kind_of_joint(joint: Any) -> str:
+    follows = f", follows {joint.mimic.leader}" if joint.mimic else ""
+    return f"{joint.kind.value}{', backwards' if joint.backwards else ''}{follows}"
+
+
+def _vector(numbers: FloatArray) -> str:
+    """Return the numbers with six digits; rounding errors of a metre appear as 0."""
+    return " ".join(six_digits(x) for x in numbers.tolist())
+
+
+SCREW_FORMATS = ("terminal", "markdown", "html", "latex", "toml", "json", "numpy", "matlab")
+_SUFFIXES = {
+    ".txt": ("terminal",), ".md": ("markdown",), ".html": ("html",), ".tex": ("latex",), ".toml": ("toml",),
+    ".json": ("json",), ".py": ("numpy",), ".m": ("matlab",),
+}  # fmt: skip
+
+
+@_path_command(
+    "screws",
+    "urdfkin screws ur5 --tip tool0",
+    click.option(
+        "--digits", type=Whole(3, 17), default=10, show_default=True, help="Number of significant digits."
+    ),
+    answers=answering(*SCREW_FORMATS, suffixes=_SUFFIXES),
+)
+def screws_command(robot: str, base: str | None, tip: str | None, digits: int, verify: bool) -> Answer:
+    """Derive the product of exponentials of a path in the notation of Lynch and Park.
+
+    The result is the pose M in the zero configuration, and each joint's screw in space and body axes. A
+    screw is (w, v), angular part first; generated code has the screws as columns of Slist and Blist. Every
+    command accepts the toml or json output as a robot. A handwritten file needs M, and space or body.
+
+    Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
+    """
+    from urdfkin.dh.export.toolboxes import screws_document, write_screws  # noqa: PLC0415  keeps --help fast
+    from urdfkin.verify.chain_checks import check_screws  # noqa: PLC0415
+
+    loaded = load_robot(robot, verify=verify)
+    screws = loaded.screws(tip, base, verify=False)
+    check = check_screws(loaded.verifier, screws) if verify else None
+    exact = (form for form in SCREW_FORMATS if form not in ("terminal", "markdown", "html"))
+    data = {form: partial(write_screws, screws, form, digits) for form in exact}
+    return Answer(partial(screws_document, screws, digits), data, *check_of_path(check))
+
+
+@_path_command(
+    "structure",
+    "urdfkin structure ur5 --tip tool0",
+    click.option(
+        "--opw",
+        type=Number(),
+        metavar="MM",
+        help="Print parameters for OPW solvers as YAML; an error if the tip deviates by more than MM"
+        " (and mrad).",
+    ),
+    answers=answering(*TEXTS, "json"),
+)
+def structure_command(
+    robot: str, base: str | None, tip: str | None, opw: float | None, verify: bool
+) -> Answer:
+    """Classify an arm by its consecutive parallel and intersecting axes: wrist, SCARA, gantry, solvers.
+
+    An arm counts as a kind within 0.02 rad or 5 mm. The deviation is printed, since a calibrated arm is never
+    exactly of a kind. The screws are compared with Pinocchio. JSON is in metres and radians.
+
+    Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
+    """
+    from urdfkin.dh.structure import opw_of, structure  # noqa: PLC0415  keeps --help fast
+    from urdfkin.verify.chain_checks import check_opw, check_screws  # noqa: PLC0415
+
+    if opw is not None:
+        reject_unused_options(click.get_current_context(), ("format_",), "with --opw")
+    loaded = load_robot(robot, verify=verify)
+    if opw is None:
+        screws = loaded.screws(tip, base, verify=False)
+        check = check_screws(loaded.verifier, screws) if verify else None
+        found = structure(screws)
+        data = {"json": lambda: finite(found.as_mapping())}
+        return Answer(lambda: _document(found), data, *check_of_path(check))
+    path = loaded.chain(tip, base)
+    parameters = opw_of(path, opw / 1e3)
+    check = check_opw(loaded.verifier, path, parameters) if verify else None
+    yaml = "".join(f"{key}: {json.dumps(value)}\n" for key, value in parameters.as_mapping().items())
+    return Answer(lambda: TextDocument(""), {"table": lambda: yaml}, *check_of_path(check))
+
+
+def _document(found: Structure) -> TextDocument:
+    spare = len(found.joints) - found.freedoms
+    title = (
+        f"{found.robot}: {found.base_frame} to {found.tip_frame}, {found.joints or 'no joints'},"
+        f" {found.freedoms} freedoms{f', redundant by {spare}' if spare > 0 else ''}"
+    )
+    parts: list[str | Table] = []
+    if found.pairs:
+        rows = []
+        for pair in found.pairs:
+            degrees = math.degrees(pair.angle)
+            angle = f"{degrees:.6g}" if degrees > 1e-9 else "0"
+            apart = f"{pair.distance * 1e3:.6g}" if pair.distance > 1e-12 else "0"
+            rows.append((f"{pair.first}, {pair.second}", angle, apart))
+        parts += ["", Table(("axes", "angle [deg]", "apart [mm]"), rows)]
+    parts += ["", *(_kind(kind) for kind in found.kinds)] if found.kinds else []
+    far = "" if math.isinf(found.reach) else f", at most {found.reach:.6g} m"
+    parts += [
+        f"reach: {found.reached:.4g} m on samples{far}, from the first axis where the second is nearest",
+        *(f"closed form: {solver}" for solver in found.solvers),
+        "",
+    ]
+    return TextDocument(title, parts)
+
+
+def _kind(kind: Kind) -> str:
+    near = f"{kind.radians:.3g} rad off" if kind.radians else f"{kind.metres * 1e3:.3g} mm off"
+    off = "exactly" if kind.is_exact else near
+    at = (
+        "" if kind.at is None else f", centre ({', '.join(f'{round(x, 12):.6g}' for x in kind.at)}) m at zero"
+    )
+    return f"{kind.name}: {', '.join(kind.joints)}, {off}{at}"

@@ -1,0 +1,201 @@
+"""`urdfkin report`: show, convert and compare results of validations; progress and merging of stores."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from urdfkin.cli.campaign import merge, status
+from urdfkin.cli.exit import crash, refuse
+from urdfkin.cli.options import NumberFrom, together
+from urdfkin.cli.output import TEXTS, Answer, answering, check_writable, console, write_file
+from urdfkin.cli.streams import say
+from urdfkin.errors import SourceError, UrdfkinError
+from urdfkin.system.files import is_folder
+
+if TYPE_CHECKING:
+    from urdfkin.validation.document import Document
+
+
+#: The files of a format, each with its path: one file, or a page with a folder of files.
+Files = Iterator[tuple[Path, bytes]]
+
+_PATH = click.Path(path_type=Path, dir_okay=False)
+
+#: Parameter names of the options for a report's files.
+FILES = ("json_", "html", "junit", "markdown")
+report_options = together(
+    click.option("--html", type=_PATH, help="Write the report as an offline HTML page."),
+    click.option(
+        "--junit", type=_PATH, help="Write JUnit XML, with a test case for each robot and quantity."
+    ),
+    click.option("--markdown", type=_PATH, help="Write Markdown for a pull request comment."),
+    click.option(
+        "--cases/--no-cases", default=False, help="Show the command that computes each worst case again."
+    ),
+)
+
+
+def write_reports(document: Document, files: Mapping[str, Path | None]) -> int:
+    """Write the requested formats. A failure of one does not affect the others.
+
+    Returns:
+        0, or the exit code of the first format that could not be written. Its error has been printed.
+    """
+    forms = {"json_": _json, "html": _html, "junit": _junit, "markdown": _markdown}
+    codes = (_write(path, forms[name], document) for name in FILES if (path := files[name]) is not None)
+    return next(filter(None, list(codes)), 0)
+
+
+def say_written(files: Mapping[str, Path | None]) -> None:
+    """Print the names of the written files, if any."""
+    if named := [str(files[name]) for name in FILES if files[name]]:
+        say(f"wrote {', '.join(named)}")
+
+
+def _write(path: Path, form: Callable[[Document, Path], Files], document: Document) -> int:
+    try:
+        for place, data in form(document, path):
+            if place.parent != path.parent:
+                place.parent.mkdir(exist_ok=True)
+            write_file(place, data)
+    except UrdfkinError as error:
+        return refuse(error)
+    except OSError as error:
+        return refuse(SourceError("cannot be written", where=str(path), found=error.strerror or str(error)))
+    except Exception as error:
+        return crash(error)
+    return 0
+
+
+def _json(document: Document, path: Path) -> Files:
+    yield path, (json.dumps(document, allow_nan=False) + "\n").encode()
+
+
+def _html(document: Document, path: Path) -> Files:
+    from urdfkin.report.html import as_files  # noqa: PLC0415  draws plots
+
+    return ((path.parent / place, text.encode()) for place, text in as_files(document, path.name))
+
+
+def _junit(document: Document, path: Path) -> Files:
+    from urdfkin.report.junit import as_junit  # noqa: PLC0415
+
+    yield path, as_junit(document)
+
+
+def _markdown(document: Document, path: Path) -> Files:
+    from urdfkin.report.markdown import as_markdown  # noqa: PLC0415
+
+    yield path, as_markdown(document).encode()
+
+
+EXAMPLE = "urdfkin report results.json --html report.html --junit report.xml"
+
+
+class _Results(click.Group):
+    """The subcommands; `report FILE` without one is `report show FILE`."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Insert `show` unless a subcommand or help is asked for."""
+        if not ctx.resilient_parsing and (not args or args[0] not in (*self.commands, "-h", "--help")):
+            args = ["show", *args]
+        return super().parse_args(ctx, args)
+
+
+@click.group("report", cls=_Results, epilog=f"Example: {EXAMPLE}")
+def report_command() -> None:
+    """Show, convert or compare the results of earlier validations.
+
+    Results are the JSON file of `urdfkin validate --json FILE`, or the folder of `--store DIR`. `urdfkin
+    report RESULTS` is short for `urdfkin report show RESULTS`.
+    """
+
+
+@report_command.command("show", epilog=f"Example: {EXAMPLE}")
+@click.argument("results", metavar="RESULTS.json|DIR", type=click.Path(path_type=Path), required=False)
+@click.option("--json", "json_", type=click.Path(path_type=Path), help="Write the report of a store as JSON.")
+@report_options
+@click.option("--schema", is_flag=True, help="Print the JSON Schema of the data and exit.")
+@click.pass_context
+def show(
+    context: click.Context, /, results: Path | None, cases: bool, schema: bool, **files: Path | None
+) -> None:
+    """Show a report or convert it to HTML, JUnit or Markdown.
+
+    A store has a report at any time. An incomplete store is reported as an interrupted run.
+
+    The exit status is that of the run. 0: everything verified. 1: a disagreement. 2: a robot could not be
+    read, or the file cannot be used. 3: a robot was not verified. 130: interrupted.
+    """
+    from urdfkin.report.reading import read_document, stored_document  # noqa: PLC0415
+    from urdfkin.validation.document import VALIDATION, outcome_of  # noqa: PLC0415  keeps --help fast
+
+    if schema:
+        click.echo(VALIDATION.schema_text(), nl=False)
+        return
+    if results is None:
+        raise click.UsageError("give the file of `urdfkin validate --json FILE`, or the folder of --store")
+    document = stored_document(results) if is_folder(results) else read_document(results)
+    check_writable(*files.values())
+    failed = write_reports(document, files)
+    if not failed:
+        say_written(files)
+    if not any(files.values()):
+        from urdfkin.report.terminal import print_report  # noqa: PLC0415
+
+        print_report(document, console(), cases=cases)
+    context.exit(outcome_of(document).exit_code or failed)
+
+
+@report_command.command(
+    "compare",
+    short_help="Compare the reports of two validations.",
+    epilog="Example: urdfkin report compare main.json branch.json --markdown comment.md",
+)
+@click.argument("old", metavar="OLD.json", type=click.Path(path_type=Path))
+@click.argument("new", metavar="NEW.json", type=click.Path(path_type=Path))
+@click.option(
+    "--factor",
+    type=NumberFrom(1.0),
+    default=2.0,
+    show_default=True,
+    help="Factor by which a worst disagreement may grow without a regression.",
+)
+@click.option(
+    "--markdown", type=click.Path(path_type=Path), help="Write Markdown for a pull request comment."
+)
+@answering(*TEXTS, "json")
+def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) -> Answer:
+    """Compare two reports: versions, robots, verdicts and disagreements.
+
+    A regression is one of these: the run passed before and fails now; a robot is missing, or its verdict is
+    worse; more results lie outside their bound; something is no longer compared, or on fewer samples; a bound
+    is wider; a worst disagreement grew by more than the factor and is above 2 eps*scale. A changed model is
+    listed joint by joint. It is not a regression by itself; `same` and `diff` compute how far a frame moves.
+    A report that contradicts itself is an error.
+    Exit 0: no regression. 1: a regression. 2: a file that cannot be used.
+    """
+    from urdfkin.report.compare import compare, document, markdown_of  # noqa: PLC0415
+    from urdfkin.report.reading import read_document  # noqa: PLC0415
+
+    before, after = read_document(old), read_document(new)
+    check_writable(markdown)
+    found = compare(before, after, factor)
+    if markdown is not None:
+        write_file(markdown, markdown_of(before, after, found).encode())
+    words = ["urdfkin", "report", "compare", str(old), str(new), "--factor", str(factor), "--format", "json"]
+    data = {
+        "json": lambda: found.as_dict(shlex.join(words)),
+        "markdown": lambda: markdown_of(before, after, found),
+    }
+    return Answer(lambda: document(before, after, found), data, code=found.exit_code)
+
+
+report_command.add_command(status, "status")
+report_command.add_command(merge, "merge")
