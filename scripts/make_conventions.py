@@ -511,7 +511,7 @@ def _tools() -> str:
     lines = []
     for name in BUILT_IN:
         how = find_convention(name)
-        order = "a hash table's" if how.order == "given" else how.order.replace("file", "place in the file")
+        order = "no known rule" if how.order == "given" else how.order.replace("file", "place in the file")
         order = {"name": "by name", "place in the file": "that of the file"}.get(order, order)
         parts = ["x, y, z", f"q{', q'.join(how.quaternion)}"]
         q = ", then ".join(parts if how.base_q == "position first" else parts[::-1])

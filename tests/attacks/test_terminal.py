@@ -26,6 +26,7 @@ FILE = "\x1b[31m\n::error::forged\u202e ##vso[x]"
 
 ROBOT = {
     "info": [[], ["--format", "json"]],
+    "order": [[], ["--format", "csv"], ["--from", "isaaclab", "--format", "json"], ["--to", FILE]],
     "placement": [
         [], ["--format", "json"], ["--format", "csv"], ["--frame", "FRAME"], ["--relative-to", "FRAME"],
         ["--as", "rpy"], ["--base-placement", FILE],
