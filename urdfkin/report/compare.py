@@ -242,7 +242,7 @@ class ChangeEntry(TypedDict):
 
 
 class ComparisonDocument(Header):
-    """The output of `urdfkin compare --format json`; `sha256` is of the robots of the new report."""
+    """The output of `urdfkin report compare --format json`; `sha256` is of the robots of the new report."""
 
     changes: Annotated[list[ChangeEntry], says("All changes between the two reports.")]
 
