@@ -54,8 +54,8 @@ MODULES = (
     "verify.table_check", "kinematics.bodies", "verify.pinocchio", "model.base_motion", "compiled.batch",
     "compiled.evaluate", "compiled.plan", "compiled.program", "model.reference", "robot",
     "kinematics.rotation.matrix", "kinematics.inputs", "kinematics.rotation.euler",
-    "kinematics.rotation.quaternion", "model.tree", "urdf.reader", "urdf.writer", "verify.bounds",
-    "verify.derived", "verify.certificate", "verify.sampling", "verify.analytical_reference",
+    "kinematics.rotation.quaternion", "model.path", "model.tree", "urdf.reader", "urdf.writer",
+    "verify.bounds", "verify.derived", "verify.certificate", "verify.sampling", "verify.analytical_reference",
     "verify.quantities", "verify.tables", "verify.verifier",
 )  # fmt: skip
 

@@ -61,7 +61,7 @@ FRAGMENTS = [
     # the tree and the plan
     ("model.tree", "return link if link is not None else self._joint_index[name] + 1",
      "return joint + 1 if joint is not None else self._link_index[name] - 1"),
-    ("urdf.reader", "T_parent_joint=pose(R, joint.xyz)", "T_parent_joint=pose(R.round(9), joint.xyz)"),
+    ("urdf.reader", "T[:3, 3] = joint.xyz", "T = T.round(9); T[:3, 3] = joint.xyz"),
     ("urdf.reader", "axis if length == 1.0 else axis / length", "axis if length == 1.0 else -axis / length"),
     ("compiled.plan", "T[:3, :3].ravel(), T[:3, 3]))", "T[:3, :3].ravel(), T[:3, :3].T @ T[:3, 3]))"),
     ("compiled.program", "return bool((R[axis] == one).all() and (R[:, axis] == one).all())",
@@ -80,8 +80,7 @@ FRAGMENTS = [
      "order = sorted(range(len(links)), key=lambda place: -anchors[links[place]].step)"),
     ("kinematics.rotation.matrix", "return np.stack([*columns, axis]", "return -np.stack([*columns, axis]"),
     # a table's URDF
-    ("model.tree", "return self in (JointKind.REVOLUTE, JointKind.CONTINUOUS)",
-     "return self not in (JointKind.REVOLUTE, JointKind.CONTINUOUS)"),
+    ("model.path", "    if motion.turns:", "    if not motion.turns:"),
     ("dh.convert", "ways = [s @ x for s, x", "ways = [x @ s for s, x"),
     ("dh.convert", "poses[-1] @ table.tool\n", "table.tool @ poses[-1]\n"),
     ("urdf.writer", "numbers(rpy_of(T[:3, :3]))", "numbers(rpy_of(T[:3, :3])[::-1])"),

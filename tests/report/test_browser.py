@@ -201,7 +201,7 @@ def test_a_hostile_name_does_nothing(desk: Browser, pages: dict[str, Path]) -> N
     assert desk.js("return window.hacked") is None
     assert desk.js("return document.images.length") == 0
     assert desk.errors() == []
-    assert desk.js("return document.querySelector('details.robot h3').textContent").startswith("<script>")
+    assert desk.js("return document.querySelector('details.robot h2').textContent").startswith("<script>")
     desk.screenshot("report-hostile")
 
 
