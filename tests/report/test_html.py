@@ -245,7 +245,8 @@ def test_the_banner_answers_for_the_computation_and_for_the_model() -> None:
     document = arms()
     computation, model = banner(document)
     assert computation.startswith("Does urdfkin compute right? Verified against Pinocchio")
-    assert model.startswith("Is the model right? No")
+    assert model.startswith("Is the model right? No errors and no warnings")
+    assert "No model was read" in banner(document | {"robots": []})[1]
     (note, *_) = document["robots"][0]["findings"]
     document["robots"][0]["findings"] = []
     document["robots"][1]["findings"] = [note | {"severity": "warning"}] * 2

@@ -203,6 +203,7 @@ def _latex(lines: list[str]) -> _Grid | None:
 def _bars(lines: list[str]) -> _Grid | None:
     """Parse columns between the bars of Markdown or the vertical lines of printed boxes."""
     plain = [re.sub("[\u2502\u2503\u2551]", "|", line) for line in lines]
+    plain = [re.sub(r"\\([\[\]()])", r"\1", line) for line in plain]  # Markdown's escapes: a \[m\]
 
     def split(line: str) -> list[str]:
         return [cell.strip().strip("`") for cell in line.strip().strip("|").split("|")] if "|" in line else []

@@ -375,7 +375,7 @@ class DHTable(Displayable):
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
-        >>> print(table.to_markdown("degrees", "millimetres").splitlines()[4])
+        >>> print(table.to_markdown("degrees", "millimetres").splitlines()[6])
         | 1 | `joint_1` | 500 | 0 | 0 | q1 |
         """
         return self._written("markdown", units_of(angles, lengths, digits))

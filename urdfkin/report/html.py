@@ -71,7 +71,6 @@ def environment() -> Environment:
     )
     environment.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False}
     environment.filters["counted"] = counted
-    environment.filters["sentence"] = _sentence
     return environment
 
 
@@ -187,10 +186,6 @@ def _totals(document: Document) -> dict[str, Any]:
     }
 
 
-def _sentence(text: str) -> str:
-    return f"{text[:1].upper()}{text[1:]}."
-
-
 def _model_verdict(document: Document) -> dict[str, Any]:
     """Return the banner's answer on the files: colour, title, counts, and the first robot to read."""
     severities = ("error", "warning", "note")
@@ -208,16 +203,20 @@ def _model_verdict(document: Document) -> dict[str, Any]:
     for counts in found:
         total.update(counts)
     words = ", ".join(counted(total[word], word) for word in severities if total[word])
+    if not found:
+        answer, title = "warn", "No model was read"
+    elif any(unread):
+        answer, title = "bad", f"{sum(unread)} of {files} unusable"
+    elif worst_word == "error":
+        answer, title = "bad", f"Errors in {affected} of {files}"
+    elif worst_word == "warning":
+        answer, title = "warn", f"Warnings in {affected} of {files}"
+    else:
+        answer, title = "good", "No errors and no warnings"
     return {
-        "verdict": {"error": "bad", "warning": "warn"}.get(worst_word, "good"),
-        "title": {
-            "error": f"{sum(unread)} of {files} unusable"
-            if any(unread)
-            else f"Errors in {affected} of {files}",
-            "warning": f"Warnings in {affected} of {files}",
-            "note": "No errors and no warnings",
-        }.get(worst_word, "No findings"),
-        "counts": f"{words}." if words else "No findings of the linter.",
+        "verdict": answer,
+        "title": title,
+        "counts": f"{words}." if words else "The linter has no findings." if found else "",
         "first": worst_of_file.index(worst_word) if worst_word else None,
     }
 
