@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
-os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # idle threads of PyTorch must not disturb the next one
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # idle threads of PyTorch must not slow the next library
 
 from scripts.benchmarking.contenders import ALWAYS, PEERS, Contender
 from scripts.benchmarking.machine import USES, first_uses, machine, peak_over_output

@@ -40,7 +40,7 @@ from urdfkin.verify.verifier import bound_of
 LENGTHS = (1, 2, 7, 8, 9, 100)
 #: Numbers of threads of a batch; None: urdfkin's default.
 THREADS = (None, 1, 2, 3)
-#: Number of configurations and frames that are stored.
+#: Number of stored configurations, and of stored frames.
 KEPT, FRAMES = 9, 6
 
 Arrays = Mapping[str, Any]
@@ -178,7 +178,7 @@ def share(what: str, now: Arrays, stored: Arrays) -> float:
     apart = np.abs(now[what] - stored[what])
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = np.where(apart == 0.0, 0.0, apart / stored[f"{what}/bound"])
-    # Different bits without a difference: zeros of different signs.
+    # If the bits differ but the difference is 0, the two results are zeros of different signs.
     return float(np.nan_to_num(shares, nan=np.inf, posinf=np.inf).max()) or sys.float_info.min
 
 

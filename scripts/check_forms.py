@@ -36,7 +36,7 @@ from urdfkin.verify.sampling import sample
 
 #: Number of configurations of each table.
 SAMPLES = 4
-#: Number of small tables for Octave's symbolic package, which takes 20 s for six joints.
+#: Octave's symbolic package takes 20 s for six joints. It gets 6 tables of at most 4 joints.
 FEW, SMALL = 6, 4
 
 
@@ -50,13 +50,13 @@ class Subject:
 
     @property
     def table(self) -> DHTable:
-        """Whose."""
+        """The table of the job."""
         return self.job.table
 
     def off(self, found: FloatArray) -> tuple[float, float]:
         """Return the difference from Pinocchio in metres, and from the table as a fraction of the bound."""
         apart = np.abs(found - self.table.placement(self.job.q))[:, :3].max(axis=(-1, -2))
-        # Each rounds differently; a table without lengths still has angles.
+        # urdfkin and Pinocchio round differently. A table without lengths still has rounding of its angles.
         allowed = 2.0 * np.maximum(self.table.rounding(self.job.q), EPS * of_rows(len(self.table.rows)))
         return float(np.abs(found - self.theirs)[:, :3, 3].max()), float((apart / allowed).max())
 

@@ -3,8 +3,8 @@
     python scripts/check_growth.py                      # 1, 4, 16 and 64 MB of every kind of content
     python scripts/check_growth.py --sizes 1,4 number   # kinds with "number" in the name
 
-With linear growth, the numbers of a row are equal. Each document is checked in its own process. A check
-that takes longer than `--patience` ends its row.
+If the cost grows linearly, all numbers in a row are equal. Each document is checked in its own process. A
+check that takes longer than `--patience` ends its row.
 """
 
 from __future__ import annotations

@@ -93,7 +93,7 @@ def _places_agree(found: Sameness, a: Robot, b: Robot) -> bool:
 
 
 def summary(some: list[dict[str, Any]]) -> Iterator[str]:
-    """The figures."""
+    """Yield the lines of the summary for docs/same.md."""
     wrong = [one for one in some if not one["right"]]
     bounded = [one for one in some if "holds" in one]
     missed = [one for one in bounded if not one["holds"]]

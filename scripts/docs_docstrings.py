@@ -1,6 +1,6 @@
 """An extension of mkdocs that shows doctests in docstrings as blocks of code; mkdocs.yml refers to it.
 
-A block is as wide as its column: a section `Example:` would be a box around it.
+The heading `Example:` is removed, because the site would draw a box around such a section.
 """
 
 from __future__ import annotations

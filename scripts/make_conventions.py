@@ -55,7 +55,7 @@ ARM = _robot(
     _joint("b", "revolute", "l1", "l2", _axis("0 1 0")),
     _joint("a", "revolute", "l2", "l3", _axis("0.6 0 0.8")),
 )
-#: Two limbs on one base, and a third on the first, to find the order of coordinates.
+#: Two limbs on one base, and a third limb on the first one, to find the order of coordinates.
 LIMBS = _robot(
     _joint("z", "revolute", "base", "l1"),
     _joint("a", "revolute", "base", "l2"),
@@ -225,7 +225,7 @@ class MeasuredMotion:
         mujoco.mj_rnePostConstraint(self.mj_model, self.mj_data)
         self.body = self.mj_model.body("l3").id
 
-    # Candidate definitions, computed from placements at times around 0 only.
+    # The candidate definitions use only placements at times around 0.
 
     def path(self, t: float) -> FloatArray:
         """Return T_world_frame at time t, for q(t) = q + v t + a t^2 / 2."""

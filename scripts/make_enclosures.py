@@ -128,12 +128,12 @@ def _parts(proof: Enclosures) -> tuple[Enclosure, ...]:
 
 
 def _larger_end(part: Enclosure) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    """Return the largest number of the quantity, because small numbers are differences of larger ones."""
+    """Return an array like the enclosure, filled with the largest magnitude of all its intervals' ends."""
     return np.full_like(part.lower, np.maximum(np.abs(part.lower), np.abs(part.upper)).max(initial=1e-300))
 
 
 def _inside(parts: list[Enclosure], side: str) -> str:
-    """Return the share of numbers inside, without numbers that are the same for every q."""
+    """Return the share of a library's numbers that lie in their intervals, without intervals of width 0."""
     found = [part.contains(getattr(part, side))[part.width > 0.0] for part in parts]
     return f"{np.concatenate(found).mean():.0%}"
 

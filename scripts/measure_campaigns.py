@@ -37,7 +37,7 @@ def store(*robots: Any, **how: Any) -> ValidationReport:
 
 
 def cluster(*robots: Any, **how: Any) -> ValidationReport:
-    """Validate with two local workers of dask; the time includes their end but not their start."""
+    """Validate with two local workers of dask; the time includes their exit, not their start."""
     with connected("local:2") as two:
         validate("planar_two_link", samples=400, executor=two)  # loads the modules of the workers
         chunks = len(Cut(how["samples"])) * len(robots[0])

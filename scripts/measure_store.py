@@ -18,7 +18,7 @@ from urdfkin.validation.store import opened
 
 
 def main() -> None:
-    """Print them."""
+    """Print the measured times."""
     robot, cut = subject("ur5"), Cut(100_000)
     chunk = cut.chunk(robot, 0, 1)
     found = run_chunk(chunk)

@@ -109,7 +109,7 @@ def judge_named(slip: Named, *, timeout: float) -> Outcome:
     texts = json.dumps([slip.before, slip.after])
     word, by = _run({"URDFKIN_MUTANT": slip.module, "URDFKIN_MUTANT_TEXTS": texts}, [slip.test], timeout)
     if word == "noticed" and not by.startswith(f"FAILED {slip.test}"):
-        word = "not run"  # another failure than the test's claim
+        word = "not run"  # the test failed for another reason than the mutant
     file = f"{slip.module.replace('.', '/')}.py"
     mutant = Mutant(slip.claim, file, 0, f"{slip.before}  ->  {slip.after}", slip.module)
     return Outcome(mutant, word, by, round(time.perf_counter() - begin, 1))

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
-#: A pattern for text -> the plain form. Each pattern stood in sentences that a blind test's reader failed.
+#: A pattern for text -> the plain form. In a blind test, a reader did not understand sentences with them.
 PLAIN = {
     r"\bwitness(es)?\b": "oracle",
     r"\b(stands?|stood) still\b": "fixed",

@@ -37,7 +37,8 @@ from urdfkin.verify.oracles import WitnessName, witness_of
 from urdfkin.verify.sampling import Verify, checked_choice
 from urdfkin.verify.table_check import check_table_source
 
-#: Findings for the author of a URDF file; not reported for a URDF that urdfkin generates.
+#: Codes of findings that only help the author of a URDF file. They are not reported for a URDF that urdfkin
+#: generates.
 _OF_A_TEXT = {NEWER_VERSION.id, MIMIC_CONTINUOUS.id}
 
 
@@ -66,8 +67,8 @@ def load(
     - a path: .urdf, .xacro, or .xml for MJCF (`docs/mjcf.md`)
     - a name of the catalogue; `urdfkin robots` lists them
     - URDF or MJCF as text, bytes or an open file; `-` is standard input
-    - a `DHTable`, or a file with one (.toml, .json, .csv, .tsv, .md, .tex, .txt); its base frame becomes the
-      root link, its tip the leaf link
+    - a `DHTable`, or a file with one (.toml, .json, .csv, .tsv, .md, .tex, .txt); the table's base frame
+      becomes the root link, and its tip becomes the leaf link
     - a product of exponentials (`urdfkin.dh.screws`), or a file with M and screws
     - a `pinocchio.Model` or RobotWrapper, a `yourdfpy.URDF`, an ElementTree of Python or lxml
     - a module of robot_descriptions, or its name, such as "panda_description", if that package is installed
@@ -89,7 +90,7 @@ def load(
         UrdfError: the file has errors; `findings` lists them with their positions.
         SourceError: the source cannot be read.
         UnknownNameError: no file and no robot has that name; the message lists the nearest names.
-        TableError: the URDF made from a table gives other placements than the table.
+        TableError: the URDF made from a table has other placements of the tip than the table itself.
 
     >>> arm = load("planar_two_link")
     >>> arm.placement([0.0, 0.0], "tip")[:3, 3].tolist()
@@ -229,9 +230,9 @@ def robot_of(
         mimic: As in `load`.
         root_joint: As in `load`.
         oracle: As in `load`.
-        listed: Findings about the original source, if the text was generated from it.
-        made: The text was generated and does not exist as a file.
-        table: The original source is a table.
+        listed: Findings about the original source, if the text was generated from another format.
+        made: Whether the text was generated, so that no file contains it.
+        table: Whether the original source is a table.
 
     Raises:
         UrdfError: the text has errors.

@@ -79,10 +79,10 @@ if TYPE_CHECKING:
     from urdfkin.verify.exact.enclosure import Enclosures
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
-#: m/s^2, in world axes; the default of Pinocchio and MuJoCo.
+#: Gravity in m/s^2, in world axes. Pinocchio and MuJoCo have the same default.
 GRAVITY = (0.0, 0.0, -9.81)
 _ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
-#: Number of random configurations whose Jacobians show the usual rank.
+#: Number of random configurations at which the usual rank of a Jacobian is computed.
 _GENERIC = 3
 #: Members for internal use, hidden from name completion.
 _INSIDE = {"plan", "verifier"}
@@ -94,8 +94,8 @@ class Robot(Displayable):
     """A loaded robot and its kinematics; make one with `urdfkin.load`.
 
     A configuration `q` has shape (..., nq). Joint velocities `v` and joint accelerations `a` have shape
-    (..., nv). Leading batch axes are free, and the three broadcast against each other. The order of joints
-    and the meaning of `v` are Pinocchio's.
+    (..., nv). Each may have any leading batch axes; the batch axes of the three broadcast against each other.
+    The order of joints and the meaning of `v` are Pinocchio's.
 
     Each of `q`, `v` and `a` may be given in one of four forms:
 
@@ -108,7 +108,8 @@ class Robot(Displayable):
 
     Attributes:
         tree: Links and joints.
-        verifier: The verifier of its results, with the URDF text that Pinocchio reads and the record so far.
+        verifier: The verifier of the robot's results. It has the URDF text that Pinocchio reads, and the
+            record of all checks so far.
         findings: Warnings and notes about the URDF; a robot with errors does not load.
         base_frame: Default base of chains: the catalogue's base, or the root link of other robots.
 
@@ -147,7 +148,7 @@ class Robot(Displayable):
         self._compiled: dict[object, CompiledFrame] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        # Compiled trees are cheap to rebuild. A copy gets a verifier of its own.
+        # Compiled trees are not copied, because they are cheap to rebuild. A copy has its own verifier.
         empty: dict[str, Any] = {"_plans": {}, "_prepared": {}, "_compiled": {}}
         return {**self.__dict__, "verifier": copy(self.verifier), **empty}
 
@@ -166,7 +167,7 @@ class Robot(Displayable):
         """Return a three-dimensional view of the robot for a notebook cell, with a slider for each joint.
 
         The view needs no network and no server, and it is saved with the notebook. The browser computes the
-        motion; its poses are not checked. `urdfkin view` checks every pose that it shows.
+        motion, and nothing checks the poses that it shows. `urdfkin view` checks every pose that it shows.
 
         Args:
             q: (nq,) initial configuration, rad, m.
@@ -345,8 +346,8 @@ class Robot(Displayable):
     def all_frames(self) -> tuple[str, ...]:
         """All links and all joints as frames `link:NAME` and `joint:NAME`, each once.
 
-        Each is a `FrameName` and therefore unique. It means the link or joint NAME even if another link or
-        joint has the literal name `link:NAME`.
+        Each is a `FrameName`, so it is never ambiguous: it means the link or joint NAME, even if another link
+        or joint has the literal name `link:NAME`.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").all_frames[-3:]
@@ -450,8 +451,8 @@ class Robot(Displayable):
     def sample(self, n: int, seed: int = 0) -> FloatArray:
         """Draw random configurations (n, nq) within the limits, those of mimic joints included.
 
-        The same seed gives the same configurations. If no value of a mimicked joint satisfies the mimic
-        joint's limits, only the limits of the mimicked joint apply; `limit_violations` then names the mimic
+        The same seed gives the same configurations. If no value of a mimicked joint satisfies both its own
+        limits and the mimic joint's, only its own limits apply; `limit_violations` then names the mimic
         joint.
 
         Args:
@@ -517,7 +518,7 @@ class Robot(Displayable):
         """Return the joint velocities (..., nv) that lead from `start` to `end` in one second.
 
         The definition is Pinocchio's `difference`, the shortest motion. `integrate(start, difference(start,
-        end))` is the same pose as `end`.
+        end))` gives the same pose of the robot as `end`.
 
         Args:
             start: (..., nq) rad, m.
@@ -563,8 +564,8 @@ class Robot(Displayable):
     def pinocchio_model(self, *, mimic: bool = False) -> Any:
         """Return a new `pinocchio.Model` that Pinocchio builds from this robot's URDF text.
 
-        `to_pinocchio(q)` returns its configurations. With a root joint, the model has Pinocchio's free-flyer
-        or planar joint.
+        `to_pinocchio(q)` returns a configuration of this model. With a root joint, the model has Pinocchio's
+        free-flyer or planar joint.
 
         Args:
             mimic: True: the model couples its mimic joints, which Pinocchio 4.1 rejects for some robots.
@@ -589,7 +590,7 @@ class Robot(Displayable):
     def from_pinocchio(self, q: ArrayLike, *, mimic: bool = False) -> FloatArray:
         """Convert Pinocchio's configuration to `q` (..., nq), the inverse of `to_pinocchio`.
 
-        Angles of continuous joints are returned in [-pi, pi]. The double nearest to pi or -pi is returned
+        Angles of continuous joints are in [-pi, pi]. The doubles nearest to -pi and pi are returned
         unchanged.
 
         Args:
@@ -611,11 +612,11 @@ class Robot(Displayable):
         Args:
             name: A built-in convention, such as "mujoco", "drake" or "isaaclab" (docs/conventions.md), or the
                 path of a TOML file.
-            joints: The order of the joints, if the tool or your policy has another one.
+            joints: The order of the joints, if your tool or policy uses another order than the convention.
 
         Raises:
             UnknownNameError: there is no such convention, file or joint.
-            InputError: an invalid file, a joint without a column, or two columns of one name.
+            InputError: an invalid file, a joint without a column, or two columns with the same name.
 
         >>> import urdfkin
         >>> a1 = urdfkin.load("a1")
@@ -659,7 +660,7 @@ class Robot(Displayable):
 
         Args:
             name: "placement", "velocity", "jacobian", "jacobian rate", "hessian" or "acceleration".
-            inputs: The inputs of that method, in order: (q,), (q, v) or (q, v, a).
+            inputs: The inputs of the method of that name, in order: (q,), (q, v) or (q, v, a).
             frame: Name of a link or joint, or a list of names; None: the robot's only tip.
             reference: Reference frame of the result; a placement has none.
             base: Motion of the root link; None: fixed at the world origin.
@@ -887,9 +888,9 @@ class Robot(Displayable):
         """Return J-dot (..., 6, nv), the time derivative of `jacobian` along the motion (eq. 7.126).
 
         In LOCAL_WORLD_ALIGNED, J a + J-dot v equals the result of `acceleration`, the classical one. In LOCAL
-        and WORLD, J a + J-dot v is the *spatial* acceleration, because the axes or the point move. Its linear
-        part is the classical one minus w x vel. On a moving base, the acceleration that the base causes must
-        be added.
+        and WORLD, J a + J-dot v is the *spatial* acceleration, because the axes or the point move. The linear
+        part of the spatial acceleration is that of the classical one minus w x vel. If the base moves, you
+        must add the acceleration that the base causes.
 
         Args:
             q: (..., nq) rad, m.
@@ -992,8 +993,8 @@ class Robot(Displayable):
         """Return the classical acceleration of a frame (..., 6), [linear; angular] (eq. 7.129, 7.130).
 
         Units are m/s^2 and rad/s^2. The linear part is p'', the second derivative of the position of the
-        frame's origin. It is not the spatial acceleration p'' - w x p'. Pinocchio's function for it is
-        `getFrameClassicalAcceleration`. Gravity is not included; `imu` includes it.
+        frame's origin. It is not the spatial acceleration p'' - w x p'. Pinocchio's function for the
+        classical acceleration is `getFrameClassicalAcceleration`. Gravity is not included; `imu` includes it.
 
         In LOCAL_WORLD_ALIGNED the result equals J a + J-dot v, with `jacobian` and `jacobian_rate`.
         `acceleration_breakdown` lists the contribution of each joint.
@@ -1046,9 +1047,10 @@ class Robot(Displayable):
     ) -> FloatArray:
         """Return the readings of an IMU in a frame (..., 6), in the frame's own axes.
 
-        The first three numbers are the accelerometer's, the *proper* acceleration R^T (p'' - g) in m/s^2. At
-        rest it is 9.81 upwards. p'' is the classical acceleration of `acceleration` (eq. 7.130), not the
-        spatial one. The last three numbers are the gyroscope's, R^T w in rad/s (eq. 7.127).
+        The first three numbers are the accelerometer's reading, the *proper* acceleration R^T (p'' - g) in
+        m/s^2. At rest this acceleration is 9.81 m/s^2 upwards. p'' is the classical acceleration of
+        `acceleration` (eq. 7.130), not the spatial one. The last three numbers are the gyroscope's reading,
+        R^T w in rad/s (eq. 7.127).
 
         Args:
             q: (..., nq) rad, m.
@@ -1093,9 +1095,9 @@ class Robot(Displayable):
         """Return the singular values of `jacobian` with guaranteed bounds, condition and manipulability.
 
         The bounds include the rounding error of J and of the decomposition. Columns of J that are 0 for every
-        q are left out. The values are the same in LOCAL and LOCAL_WORLD_ALIGNED. With rows "all" they mix
-        metres and radians in SI units. `found.manipulability_gradient(robot.hessian(q, frame))` returns the
-        gradient of the manipulability. `print(found)` shows a table, and explains a singularity:
+        q are left out. The values are the same in LOCAL and LOCAL_WORLD_ALIGNED. With rows "all" the values
+        combine rows in metres and rows in radians. `found.manipulability_gradient(robot.hessian(q, frame))`
+        returns the gradient of the manipulability. `print(found)` shows a table, and explains a singularity:
         `found.singularity()` names the lost direction and the joints that cause it.
 
         Args:
@@ -1151,8 +1153,8 @@ class Robot(Displayable):
 
         The orientation is three Euler angles or a quaternion. The check uses Pinocchio's rotation and
         Jacobian, and an independent formula for the angle derivatives
-        (`urdfkin.verify.analytical_reference`). Near the representational singularity digits are lost: the
-        bound grows as 1 / s^2, where s is the sine or cosine of the middle angle.
+        (`urdfkin.verify.analytical_reference`). Near the representational singularity, the result has fewer
+        correct digits. The bound grows as 1 / s^2, where s is the sine or cosine of the middle angle.
 
         Args:
             q: (..., nq) rad, m.
@@ -1294,9 +1296,10 @@ class Robot(Displayable):
         """Return intervals that provably contain the true placement, velocity, acceleration, J and J-dot.
 
         The true values are those of eq. 7.77, 7.85 and 7.126 to 7.130, without rounding. Their inputs are the
-        decimals in the URDF and the exact doubles of `q`, `v`, `a` and `base`. An interval has two doubles as
-        ends, which are nearly always neighbours. The result also states whether urdfkin's and Pinocchio's
-        values lie within. The time is about 5 ms for each joint before the frame.
+        decimals in the URDF and the exact doubles of `q`, `v`, `a` and `base`. Each end of an interval is a
+        double, and the two ends are nearly always neighbouring doubles. The result also states whether
+        urdfkin's and Pinocchio's values lie in the intervals. The time is about 5 ms for each joint before
+        the frame.
 
         Args:
             q: (nq,) rad, m.
@@ -1306,8 +1309,8 @@ class Robot(Displayable):
             reference: Reference frame of velocities, accelerations and Jacobians.
             base: Motion of the root link; None: fixed at the world origin.
             digits: Decimal digits of the interval arithmetic, at least 15. None: 30, plus one for each joint
-                before the frame, which makes the ends neighbouring doubles. 15 digits, those of a double,
-                show the possible rounding error.
+                before the frame. With so many digits, the ends are nearly always neighbouring doubles. With
+                15 digits, as in a double, the intervals show the possible rounding error of doubles.
             hessian: Also enclose the Hessian, about 1 ms for each pair of joints.
 
         Raises:
@@ -1346,9 +1349,9 @@ class Robot(Displayable):
         [0.0, 0.9, 0.0, 0.0, 0.0, 1.0]
         """
         frame = self._default_frame() if frame is None else frame
-        # Hashing an enumeration member takes longer than the rest of this function, so a plain name is a key
-        # by itself. The types in the key distinguish a member from an equal number, and `LinkFrame("link:a")`
-        # from a link with the literal name "link:a".
+        # Hashing an enumeration member takes longer than the rest of this function. So for the default
+        # reference, the key is the plain name alone. The types in the other keys distinguish a member from an
+        # equal number, and `LinkFrame("link:a")` from a link with the literal name "link:a".
         plain = reference is _ALIGNED and type(frame) is str
         key = frame if plain else (type(frame), frame, type(reference), reference)
         try:
@@ -1364,9 +1367,9 @@ class Robot(Displayable):
     def compiled(self, frame: str | None = None, reference: Reference | str = _ALIGNED) -> CompiledFrame:
         """Return an evaluator of one frame in machine code for this robot, the fastest form.
 
-        The system's C compiler compiles each quantity at its first use. That takes a few seconds, once on a
-        machine, and the compiled code is compared with Pinocchio. Without a C compiler, Numba's forward
-        recursion is used. `CompiledFrame` lists the methods.
+        The system's C compiler compiles each quantity at its first use. The compilation takes a few seconds,
+        once on each machine. The compiled code is compared with Pinocchio. Without a C compiler, Numba's
+        forward recursion is used. `CompiledFrame` lists the methods.
 
         Args:
             frame: Name of a link or joint; None: the robot's only tip.
@@ -1402,8 +1405,8 @@ class Robot(Displayable):
     ) -> str:
         """Return the kinematics of a frame as straight-line source code.
 
-        The code is compared with Pinocchio before it is returned. Its text states the agreement. It also
-        contains a self-test with true values at fifty digits.
+        The code is compared with Pinocchio before it is returned. Its text states the agreement. The code
+        also contains a self-test. The expected values of the self-test were computed with fifty digits.
 
         Args:
             to: Language, one of `urdfkin.export.LANGUAGES`, such as "c" or "numpy".
@@ -1494,7 +1497,8 @@ class Robot(Displayable):
         """Return the Denavit-Hartenberg table of the path between two frames, checked with Pinocchio.
 
         The table's methods take only the coordinates of the path, in the order of `table.joint_names`;
-        `robot.select(table, q)` returns them. `urdfkin.dh.dh_table` explains the other arguments in full.
+        `robot.select(table, q)` returns these coordinates. `urdfkin.dh.dh_table` explains the other arguments
+        in full.
 
         Args:
             tip: Name of a link or joint; None: `tip_frame`.
@@ -1502,15 +1506,16 @@ class Robot(Displayable):
             convention: "standard" (distal, the textbook's) or "modified" (proximal, Craig's).
             near_parallel: Row type for nearly parallel axes, "hayati" or "strict".
             snap: Tolerance in rad for rounding angles to multiples of 15 degrees; 0 for an exact table.
-            last: "tip": the last row reaches the tip. "flange": the tool transform does.
-            parallel_offset: Row that has the offset along a run of parallel axes: "last" (the first row after
-                the run), "first", or "each" (each row has that of its own link).
+            last: "tip": the last row ends at the tip. "flange": the last row ends at the flange, and the tool
+                transform leads to the tip.
+            parallel_offset: Row that contains the offset along consecutive parallel axes: "last" (the first
+                row after these axes), "first", or "each" (each row contains the offset of its own link).
             flip: Names of joints to count in the opposite sense.
             first: "base": the first row includes the offset from the base. "joint": Craig's choice, d_1 = 0.
             sign: Rule for the direction of x: "theta" (smallest), "a" or "alpha" (not negative).
             slide: Position of the axes of sliding joints: "drawn" (as in the URDF) or "minimal".
-            like: A published table, a source of frames, senses and zeros; `flip`, `first`, `last`, `sign` and
-                `parallel_offset` are then ignored.
+            like: A published table. The new table gets the frames, signs and zero positions of this one;
+                `flip`, `first`, `last`, `sign` and `parallel_offset` are then ignored.
             verify: True: check the table with Pinocchio. None: as chosen in `load`.
 
         Raises:
@@ -1609,7 +1614,7 @@ class Robot(Displayable):
     # -- internal ------------------------------------------------------------------------------------
 
     def plan(self, links: Sequence[int]) -> CompiledTree:
-        """Return the compiled tree of the joints that move the given links; it is built once."""
+        """Return the compiled tree of the joints that move the given links. It is built at the first call."""
         key = tuple(links)
         if (plan := self._plans.get(key)) is None:
             plan = self._plans[key] = compile_tree(self.tree, key)
@@ -1639,7 +1644,10 @@ class Robot(Displayable):
         return result
 
     def _sampled(self, frame: str) -> FloatArray:
-        """Return Jacobians (n, 6, nv) of a frame at random configurations, without a check or a record."""
+        """Return Jacobians (n, 6, nv) of a frame at random configurations.
+
+        They are neither checked nor recorded.
+        """
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (self.sample(_GENERIC),))
         found: FloatArray = call.compute(JACOBIAN.ours, call.plan, (call.q,), _ALIGNED)
         return found[:, 0]

@@ -1,4 +1,4 @@
-"""Calls of a library that computes one configuration at a time, as lines of Python, in a loop or single.
+"""Calls of a library that computes one configuration at a time, as lines of Python: in a loop, or one by one.
 
 The lines become the body of a loop, with their names as local variables. So no library pays for a function
 call of the benchmark.

@@ -50,7 +50,7 @@ class Contender:
 
     @property
     def missing(self) -> str | None:
-        """Return the reason to leave it out, or None."""
+        """Return the reason to leave the library out, or None if it can run."""
         if util.find_spec(self.module) is None:
             return "not installed"
         if self.program and shutil.which(self.program) is None:
@@ -59,14 +59,14 @@ class Contender:
 
     @property
     def state(self) -> str:
-        """Return its version, or the reason to leave it out."""
+        """Return the library's version, or the reason to leave the library out."""
         try:
             return self.missing or metadata.version(self.library)
         except metadata.PackageNotFoundError:
             return "a checkout"
 
     def works(self, subject: Subject, quantity: str) -> list[Work]:
-        """Its batches."""
+        """Return the library's computations of a whole batch."""
         if self.missing:
             return []
         if self.batches is not None:
@@ -82,7 +82,7 @@ class Contender:
 
 
 def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
-    """Yield one thread, all threads, new memory, and the floor: an array written once."""
+    """Yield the batches with one thread, all threads and new memory, and one that only writes the output."""
     method = getattr(subject.robot, quantity)
     inputs = subject.inputs(quantity, subject.n)
     out = np.empty((subject.n, *subject.width(quantity)))
@@ -105,7 +105,7 @@ def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
 
 
 def urdfkin_calls(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """Yield the method, and the prepared form with and without `out=`."""
+    """Yield the calls of the robot's method, and of a prepared frame with and without `out=`."""
     robot, arguments = subject.robot, "q" if quantity == "jacobian" else "q, v, a"
     names = {
         "robot": robot,
@@ -129,7 +129,7 @@ def urdfkin_calls(subject: Subject, quantity: str) -> Iterator[Calls]:
 
 
 def pinocchio_calls(urdf: str, frame: str, quantity: str) -> Calls:
-    """Return the fewest calls: `computeFrameJacobian`, or `getFrameClassicalAcceleration` with its pass."""
+    """Return the fewest calls: `computeFrameJacobian`, or a recursion and `getFrameClassicalAcceleration`."""
     model = pin.buildModelFromXML(urdf)
     names = {
         "model": model,

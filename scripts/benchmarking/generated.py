@@ -1,11 +1,11 @@
 """Code generated for one robot, frame and quantity, as a limit for the speed of a general kernel.
 
-The textbook's equations run once on CasADi's symbols. This folds in the robot's constants and removes
-products with 0 and 1. CasADi writes the rest as straight-line C, and the system's compiler compiles it. A
-number is a vector of as many doubles as a register has (`generated.c`). The time includes sine, cosine and
-the transposition of the arrays, which are the same for all contenders. The code does not check its inputs,
-so a non-finite number or an angle of a million turns gives nonsense. It also lacks urdfkin's correction of
-the last digit of sine and cosine.
+The textbook's equations run once on CasADi's symbols. The resulting expressions contain the robot's
+constants, without products with 0 and 1. CasADi writes them as straight-line C, and the system's compiler
+compiles it. A number is a vector of as many doubles as a register has (`generated.c`). The time includes
+sine, cosine and the transposition of the arrays, which are the same for all contenders. The code does not
+check its inputs, so a non-finite number or an angle of a million turns gives nonsense. It also lacks
+urdfkin's correction of the last digit of sine and cosine.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _FLAGS = ("-std=gnu11", "-O3", "-march=native", "-shared", "-fPIC")
 def columns(
     plan: CompiledTree, x: Any, sines: Any, cosines: Any, eq: Any = equations
 ) -> Iterator[tuple[Any, Any]]:
-    """Compute 7.85 in the world's axes: (linear, angular) of each joint of the path, one number each.
+    """Compute 7.85 in the world's axes: (linear, angular) columns of each joint of the path.
 
     Args:
         plan: The compiled tree of one frame.

@@ -23,7 +23,7 @@ import urdfkin
 from urdfkin.robot import Robot
 
 ROOT = Path(__file__).parents[2]
-#: Measurements of a first use: with an empty cache, and with the kernels on disk.
+#: Keys of the time of a first use: with an empty kernel cache, and with the compiled kernels on disk.
 EMPTY, KEPT = "empty_ms", "kept_ms"
 #: Quantity whose first use compiles a kernel -> number of its inputs among q, v, a.
 USES = {

@@ -207,7 +207,7 @@ def toolbox(subject: Subject, quantity: str) -> Iterator[Calls]:
 
 #: Number of configurations of a call to PyTorch Kinematics; more are slower per configuration.
 _MOST = 20_000
-#: Tolerance: it reads a URDF's angles in single precision.
+#: Tolerance for PyTorch Kinematics, which reads the angles of a URDF in single precision.
 _SINGLE = 1e-6
 
 

@@ -32,7 +32,7 @@ def draw(figures: Mapping[str, Any], path: Path) -> bytes:
     """
     rows = figures["rows"]
     with style(font_size=11, svg_fonttype="none", hatch_linewidth=0.8):
-        figure = new_figure(11.0, 12.0)  # as wide as the longest name and title beside it
+        figure = new_figure(11.0, 12.0)  # wide enough for the longest contender's name
         grid = figure.add_gridspec(3, 2, height_ratios=[1.2, 1.2, 1.0])
         for row, quantity in enumerate(MARKS):
             bars = figure.add_subplot(grid[row, :])

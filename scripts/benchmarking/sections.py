@@ -25,7 +25,7 @@ from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, TIP, Subject, cha
 from scripts.benchmarking.timing import Row, Table, Work, agree, measure
 from urdfkin.model.tree import FloatArray
 
-#: Pinocchio's part of a check.
+#: Name of the calls of Pinocchio that a check contains.
 OWN = "Pinocchio's own calls, Python loop"
 FEWEST = "Pinocchio, computeFrameJacobian, Python loop"
 ONE_PASS, ONE_BY_ONE = "urdfkin, all in one pass", "urdfkin, one after the other"

@@ -109,7 +109,7 @@ def _contest(section: str, title: str, rows: list[Entry]) -> Words:
 
 
 _SHARE = "times generated code"
-#: A pattern, since the measurements may come from a machine with another number of processors.
+#: Name of urdfkin with all threads. The number of threads depends on the machine of the measurements.
 _SEVERAL = re.compile(r"urdfkin, \d+ threads")
 
 

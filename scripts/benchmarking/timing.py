@@ -26,7 +26,7 @@ TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class Work:
-    """One contender's computation of one quantity.
+    """The computation of one quantity by one contender.
 
     Attributes:
         who: Name of the contender in the tables.

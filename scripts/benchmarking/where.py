@@ -40,7 +40,7 @@ def parts_of_batches(n: int, rounds: int) -> Iterator[dict[str, Any]]:
         program = program_of(subject.plan, turned=False, columns=quantity == "jacobian")
         works = [_core(subject, quantity, cut(program, end), part) for end, part in enumerate(PARTS, start=1)]
         if quantity == "acceleration":
-            works = [work for work in works if work.who != "columns"]  # it has no columns
+            works = [work for work in works if work.who != "columns"]  # no Jacobian, no columns
         found = _times(works, rounds)
         before, parts = np.zeros(rounds), {}
         for who, taken in found.items():
@@ -113,7 +113,7 @@ def _calls(subject: Subject, quantity: str) -> Iterator[Calls]:
         "out": np.empty(subject.width(quantity)),
     }
     for line in (
-        "q",  # an empty loop
+        "q",  # an expression without a call: the cost of the loop
         f"function({q_v_a}, out=out)",
         f"compute({q_v_a}, shape)",  # a tuple is rejected after the check of the arrays
         "empty(shape)",

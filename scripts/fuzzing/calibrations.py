@@ -25,7 +25,7 @@ _SHIFT = {"rows one later": 1, "rows one earlier": -1}
 
 
 def calibration(seed: int, number: int) -> Case:
-    """Return the data of a number."""
+    """Return the random measured poses with a given number."""
     rng = random.Random(f"{seed}:{FAMILY}:{number}")
     drawn = {
         "arm": rng.choice(ARMS),

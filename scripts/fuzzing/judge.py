@@ -93,7 +93,7 @@ def _computed(robot: Robot, findings: list[Finding], warned: list[warnings.Warni
 
 
 def _unverified(robot: Robot, findings: list[Finding], warned: list[warnings.WarningMessage]) -> Outcome:
-    """Return the outcome of unverified results: with a reported reason or without."""
+    """Return the outcome of unverified results: did urdfkin report a reason for them or not?"""
     marked = [finding for finding in findings if finding.oracle is not None]
     if marked:
         return Outcome("not verified, with a finding that says why", marked[0].code)

@@ -28,13 +28,13 @@ mujoco.set_mju_user_warning(
 
 
 def robot(seed: int, family: str, number: int) -> Case:
-    """Return the file of a number."""
+    """Return the random MJCF file with a given number in its family."""
     rng = random.Random(f"{seed}:{family}:{number}")
     return Case(f"{family} {number}", _File(rng, family).text().encode())
 
 
 class _File:
-    """Writes a random file."""
+    """Writer of one random MJCF file."""
 
     def __init__(self, rng: random.Random, family: str) -> None:
         self.rng, self.family = rng, family
@@ -154,7 +154,7 @@ class _File:
         )
 
     def vector(self) -> str:
-        """Three lengths."""
+        """Return three random lengths as text."""
         return " ".join(repr(odd.tame_length(self.rng)) for _ in range(3))
 
     def equalities(self) -> str:

@@ -120,7 +120,7 @@ Mutator = Callable[[random.Random, bytes], bytes]
 
 
 def mutant(seed: int, number: int, files: Sequence[Path]) -> Case:
-    """Return the mutant of a number: its description and its bytes."""
+    """Return the mutant with a given number: its description and its bytes."""
     rng = random.Random(f"{seed}:{number}")
     path = rng.choice(list(files))
     data = path.read_bytes()
@@ -400,5 +400,5 @@ FAMILIES: tuple[tuple[Mutator, ...], ...] = (
         )
     ),
 )
-# Structure is where a wrong robot can hide; the blunt mutants nearly all end in a refusal.
+# Mutants of the structure are three times as frequent: most other mutants are simply rejected.
 FAMILIES = (*FAMILIES, FAMILIES[3], FAMILIES[3])

@@ -80,7 +80,7 @@ def odd_quaternion(rng: random.Random) -> list[float]:
 
 
 def odd_size(rng: random.Random) -> float:
-    """Return the factor of a direction: mostly about one, sometimes near the limits of a double."""
+    """Return a length for a direction vector: mostly about 1, sometimes near the limits of a double."""
     exponent = rng.choice((0.0, 0.0, rng.uniform(-1e-9, 1e-9), rng.uniform(-6, 6), rng.uniform(-170, 170)))
     return math.pow(10.0, rng.uniform(-320, 300) if rng.random() < 0.05 else exponent)
 

@@ -52,7 +52,7 @@ PREFIXES = ("drake", "gazebo", "link", "joint", "x", "mujoco", "ns0", "xml", "_"
 
 
 def robot(seed: int, family: str, number: int) -> Case:
-    """Return the robot of a number."""
+    """Return the random robot with a given number in its family."""
     rng = random.Random(f"{seed}:{family}:{number}")
     if family == "everything":
         strange: Collection[str] = {name for name in ODDITIES if rng.random() < 0.4}
@@ -65,7 +65,7 @@ def robot(seed: int, family: str, number: int) -> Case:
 
 
 class _Robot:
-    """Writes a random robot."""
+    """Writer of the URDF of one random robot."""
 
     def __init__(self, rng: random.Random, strange: Collection[str]) -> None:
         self.rng, self.strange = rng, strange
@@ -174,8 +174,8 @@ class _Robot:
         rng = self.rng
         if "followers" not in self.strange or self.kinds[i] not in _ONE_COORDINATE or rng.random() < 0.35:
             return ""
-        # A mimic joint only refers to lower numbers, so there is no cycle. The order in the tree differs,
-        # since joints are sorted by depth and name.
+        # A mimic joint mimics only a joint with a lower number, so there is no cycle.
+        # The order in the tree differs, since joints are sorted by depth and name.
         leaders = [j for j in range(i) if self.kinds[j] in _ONE_COORDINATE]
         if not leaders:
             return ""

@@ -34,7 +34,7 @@ PIECES = (
     "1e155",
     "(i-1)",
 )
-#: One of this many damages is anywhere in the table; the others are in the headings.
+#: One in this many changes is anywhere in the table. The other changes are in the headings.
 _ANYWHERE = 3
 
 

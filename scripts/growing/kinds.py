@@ -1,6 +1,6 @@
 """Functions of a size in bytes that return a URDF of about that size, each with one kind of growing content.
 
-A careless exporter or a hostile stranger could write such files. Most are rejected. The time and memory of
+A faulty exporter or an attacker could write such files. Most are rejected. The time and memory of
 the rejection must be proportional to the size of the file.
 """
 

@@ -43,7 +43,7 @@ class Slip:
 
     @property
     def line(self) -> int:
-        """Where."""
+        """Line of the mutated node in its file."""
         return getattr(self.shown, "lineno", 0)
 
     @property

@@ -9,8 +9,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 PACKAGE, TESTS = ROOT / "urdfkin", ROOT / "tests"
 
-#: Numba compiles these files itself, so a mutant made on import has no effect. tests/laws/test_mutation.py
-#: mutates them without the compiler.
+#: Numba compiles these files from their source, so a mutant made on import has no effect.
+#: tests/laws/test_mutation.py mutates them without the compiler.
 _COMPILED = {
     "numbers", "registers", "sine", "memory", "walk", "outputs", "cores", "single", "equations", "worst",
 }  # fmt: skip
@@ -44,7 +44,7 @@ def _below(path: Path) -> str:
 
 
 def near_tests(path: Path) -> list[str]:
-    """Return the test files that mention the module or have its name, and those of its part, nearest first.
+    """Return the tests near a module, nearest first: those that mention it, and those of its package.
 
     A part without its own tests is tested by all the others, through a robot.
     """

@@ -1,13 +1,14 @@
 """Calibrate a robot: fit its parameters to measured poses, and report their uncertainty and warnings.
 
-A fit that is not plausible (`plausible.py`) is refused. Of a plausible fit, only parameters that moved by
-more than two standard deviations are written. The other parameters keep their values, and the written ones
-are fitted again.
+A fit that is not plausible (`plausible.py`) is refused. If the fit is plausible, only the parameters that
+changed by more than two standard deviations are written. The other parameters keep their original values, and
+the parameters to write are fitted again.
 
-`read_poses` reads measured poses. A CSV file has a column for each coordinate, named like it. The columns x,
-y, z are the position. The columns qx, qy, qz, qw are the orientation, which is optional. Instead of both, the
-columns T00 to T23, or to T33, are the matrix, as `urdfkin placement --format csv` writes it. An .npz file has
-q (n, nq) and either T (n, 4, 4) or p (n, 3) and optionally quat (n, 4), scalar last.
+`read_poses` reads measured poses. A CSV file has a column for each coordinate, with the coordinate's name.
+The columns x, y, z contain the position. The optional columns qx, qy, qz, qw contain the orientation. Instead
+of position and orientation, the columns T00 to T23, or T00 to T33, may contain the pose matrix, as `urdfkin
+placement --format csv` writes it. An .npz file has q (n, nq) and either T (n, 4, 4) or p (n, 3) and
+optionally quat (n, 4), scalar last.
 """
 
 from __future__ import annotations
@@ -54,23 +55,26 @@ from urdfkin.system.files import MOST_DATA, read_text
 from urdfkin.urdf.sources import Source
 from urdfkin.verify.certificate import Certificate
 
-#: Number of random configurations that show which parameters are identifiable in principle.
+#: Number of random configurations from which the parameters that are identifiable in principle are found.
 _GENERAL = 40
-#: Standard deviations of the residual noise from the stated noise; more is a warning.
+#: If the residual noise differs from the stated noise by more than this number of standard deviations, a
+#: warning is given.
 _UNLIKELY = 4.0
-#: Ratio of a parameter's uncertainty to that with random configurations; more is a warning.
+#: If a parameter's uncertainty exceeds its uncertainty with random configurations by more than this factor, a
+#: warning is given.
 _WEAK = 10.0
-#: Seed of the random configurations for that ratio; not the seed of `general`.
+#: Seed of the random configurations for this factor. It differs from the seed for `general`.
 _OTHERS = 1
-#: Share of the largest entry of R; a column with a smaller diagonal entry depends on those before it.
+#: A column with a diagonal entry of R below this share of the largest entry depends on the columns before it.
 _DEPENDENT = 1e-12
-#: Divisors of the robot's size that give x, y and z of a target in general position.
+#: The robot's size divided by these numbers gives x, y and z of a target in general position.
 _ASIDE = {"x": 5.0, "y": 6.0, "z": 7.0}
-#: Factor on `ParametricChain.rounding`: Pinocchio computes base and tip, from origins that were rewritten.
+#: Factor on `ParametricChain.rounding`, because Pinocchio computes both base and tip, and from rewritten
+#: origins.
 _READ_BACK = 4.0
 #: Number of parameters or poses that a warning names.
 _NAMED = 6
-#: Text for a refused fit that no correction makes plausible.
+#: Text of the error for a fit that no correction makes plausible.
 _NO_REASON = "degrees, shifted rows of q and reversed signs of joints do not explain it"
 
 
@@ -87,12 +91,12 @@ class Calibration:
         before: The fit of base and tool alone, with the robot's original parameters.
         odd: Indices of the outliers among the poses.
         without_odd: The fit without the outliers.
-        weak: Poorly observable parameters, each with the ratio of its uncertainty to that with as many random
-            configurations.
+        weak: Poorly observable parameters. Each has the ratio of its uncertainty to its uncertainty with the
+            same number of random configurations.
         certificate: Pinocchio's check of the written model.
-        stated: Whether the noise was stated.
+        stated: Whether the user stated the noise.
         written_fit: The fit of only the written parameters; `fitted` if all are written.
-        significant: Indices of the parameters in that fit.
+        significant: Indices of the parameters in `written_fit`.
         plausibility: The objections to the fit; empty for a plausible one.
     """
 
@@ -224,16 +228,17 @@ def calibrate(
         fit: Sets of parameters: "base" (pose of the instrument), "tool" (pose of the target on the tip),
             "offsets" (joint zeros), "origins" (six numbers of each joint of the path; all cells of a table),
             "gains" (scale factors of joint values).
-        noise: Standard deviations of the measurements: m of a coordinate, rad of a rotation about an axis.
-            None: estimated from the residuals.
+        noise: Standard deviations of the measurements, for a position coordinate (m) and for a rotation about
+            an axis (rad). None: the noise is estimated from the residuals.
         drop_odd: Whether to exclude outlier poses; they are reported in any case.
-        complete: Without poses: whether full poses will be measured, not positions alone.
-        radians: Whether joint angles above one turn, which look like degrees, are radians.
-        force: Whether to return a fit that is not plausible, with the objections in `plausibility`.
-        every: Whether to write all fitted parameters, also those within two standard deviations of 0.
+        complete: Used without poses: whether you will measure full poses, not positions alone.
+        radians: Whether joint angles above one turn are radians, although they look like degrees.
+        force: Whether to return a fit even if it is not plausible; the objections are then in `plausibility`.
+        every: Whether to write all fitted parameters, including those with a change of less than two standard
+            deviations.
 
     Raises:
-        InputError: wrong shapes, too few poses, or positions that are not in metres.
+        InputError: an array has a wrong shape, there are too few poses, or the positions are not in metres.
         ImplausibleError: the fit is not plausible; the message names the likeliest reason.
         UnknownNameError: a frame or a set of parameters does not exist.
         UrdfError, SourceError: as for `load`.
@@ -278,7 +283,7 @@ def fitted_model(
     every: bool = True,
     judged: bool = True,
 ) -> Calibration:
-    """Fit as `calibrate` does, but return implausible fits too.
+    """Fit as `calibrate` does, but also return fits that are not plausible.
 
     Args:
         source: As for `calibrate`.
@@ -327,7 +332,7 @@ def fitted_model(
 
 
 def _general_target(model: Model) -> FloatArray:
-    """Return the model's parameters (p,), with a fitted target in general position."""
+    """Return the model's parameters (p,); if the target is fitted, it is put in general position."""
     at = model.way.start.copy()
     for k, parameter in enumerate(model.way.parameters):
         if parameter.end and parameter.where == "tool" and parameter.unit == "m":
@@ -403,7 +408,7 @@ def _fit(
 
 
 def _significant(model: Model, ended: Ended, stated: Noise | None) -> tuple[tuple[int, ...], Fit]:
-    """Return the parameters to write, and their fit; base and tool are always among them."""
+    """Return the parameters to write, always with base and tool, and the fit of these parameters."""
     kept, found = ended.identification.kept, ended.fitted
     fixed = [model.way.parameters[k].end for k in kept]
     moved = found.at[list(kept)] - model.way.start[list(kept)]
@@ -423,10 +428,11 @@ def _significant(model: Model, ended: Ended, stated: Noise | None) -> tuple[tupl
 def _add_identifiable(
     model: Model, measured: Measured, identification: Identification, stated: Noise | None, found: Fit
 ) -> tuple[Identification, Fit]:
-    """Add parameters that become identifiable at the fit, if they explain more than chance would.
+    """Add parameters that are identifiable at the fit, if they reduce the residuals more than chance would.
 
-    A nominal model is often a special case. For example, a tip on the last axis does not show the angle of
-    the last joint. A tip beside the axis does.
+    A nominal model is often a special case in which fewer parameters are identifiable. For example, the
+    position of a tip on the last axis does not depend on the last joint's angle. The position of a tip beside
+    this axis does.
     """
     again = identify(model, measured.values, complete=measured.complete, at=found.at)
     more = again.rank - identification.rank
@@ -450,7 +456,7 @@ def _parse_noise(noise: tuple[float, float]) -> Noise:
 def _weak(
     robot: Robot, model: Model, measured: Measured, kept: Sequence[int], at: FloatArray
 ) -> dict[int, float]:
-    """Return the parameters that as many random configurations would determine much better."""
+    """Return the parameters that the same number of random configurations would determine much better."""
     general = _values(model, robot, robot.sample(len(measured), seed=_OTHERS))
     sizes = []
     for values in (measured.values, general):
@@ -466,7 +472,8 @@ def _weak(
 def _verify_written(found: Calibration, measured: Measured, q: ArrayLike) -> Certificate | None:
     """Compare the written model with Pinocchio at the measured configurations.
 
-    A URDF contains neither base, tool nor gains, so these are 0 in the comparison. `load` checks a table.
+    A URDF cannot contain base, tool or gains, so these parameters are 0 in the comparison. A calibrated table
+    is checked by `load`.
     """
     model, fitted = found.model, found.written_fit
     if fitted is None:
@@ -549,7 +556,8 @@ def _list(names: Iterable[str]) -> str:
     return ", ".join(every[:_NAMED]) + (f" and {len(every) - _NAMED} more" if len(every) > _NAMED else "")
 
 
-#: Largest deviation of a matrix from a rotation, or of a quaternion's length from 1, by rounded digits.
+#: Largest deviation of a matrix from a rotation, or of a quaternion's length from 1, that counts as rounding
+#: of digits.
 _WRITTEN = 1e-3
 _POSITION, _QUATERNION = ("x", "y", "z"), ("qx", "qy", "qz", "qw")
 _MATRIX = tuple(f"T{i}{j}" for i in range(3) for j in range(4))
@@ -566,7 +574,7 @@ def read_poses(
     Args:
         path: The file; .npz by its suffix, else CSV.
         coordinates: Names of the coordinates of q.
-        needed: Names of the required columns; the other coordinates are neutral if they are missing.
+        needed: Names of the required columns. If another coordinate has no column, it has its neutral value.
         unit: Unit of the positions: "m" or "mm".
 
     Raises:

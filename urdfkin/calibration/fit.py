@@ -1,19 +1,22 @@
 """Identify and fit the parameters of a model from measured poses.
 
-**Identifiability.** A change of parameters without effect on the measurements cannot be identified. It lies
-in the null space of the stacked Jacobian. The rank of this Jacobian is the number of identifiable parameters.
-A singular value counts if its lower bound is above 0 (`urdfkin.verify.singular_values`: Weyl's inequality,
-with the errors of the columns and of the decomposition). There is no tolerance to choose.
+**Identifiability.** A change of parameters cannot be identified if it has no effect on the measurements. Such
+a change is in the null space of the stacked Jacobian. The rank of this Jacobian is the number of identifiable
+parameters. For the rank, a singular value counts if its lower bound is above 0.
+`urdfkin.verify.singular_values` computes this bound by Weyl's inequality from the errors of the columns and
+of the decomposition. There is no tolerance to choose.
 
-The frame of a revolute joint may slide along its axis and turn about it, if the next frame compensates. The
-frame of a prismatic joint may be shifted anywhere and turn about its direction. So 4 of the 6 parameters of
-each revolute joint are identifiable, 2 of each prismatic joint, and 6 of the tip (Everett, Driels and
-Mooring, 1987). From positions alone it is 3 fewer, because the tool's orientation is not measured.
+The frame of a revolute joint can be shifted along the joint's axis and rotated about it, if the next frame
+compensates this change. The frame of a prismatic joint can be shifted anywhere and rotated about the joint's
+direction. So 4 of the 6 parameters of each revolute joint are identifiable, 2 of each prismatic joint, and 6
+of the tip (Everett, Driels and Mooring, 1987). From positions alone, 3 parameters fewer are identifiable,
+because the tool's orientation is not measured.
 
-The other parameters are fixed. They are chosen joint by joint, from base to tip, by orthogonal elimination.
-Among the columns that are nearly as independent as the most independent one, the first in the model's order
-is kept. So no fitted parameter becomes large to compensate for a fixed one. Without this rule, four
-parameters of nearly parallel axes would become hundreds of metres that cancel.
+The other parameters are fixed. Orthogonal elimination chooses them joint by joint, from base to tip. It
+compares the columns of the Jacobian. Among the columns that are nearly as independent as the most independent
+one, it keeps the first in the model's order of preference. As a result, no fitted parameter becomes large to
+compensate for a fixed one. Without this choice, four parameters of nearly parallel axes would become hundreds
+of metres that cancel.
 
 **Fit.** Damped Gauss-Newton (`urdfkin.kinematics.least_squares`) minimizes the tip's errors, each divided by
 its noise. At the minimum, let J be the weighted Jacobian and r the weighted residuals. Then
@@ -21,18 +24,20 @@ its noise. At the minimum, let J be the weighted Jacobian and r the weighted res
     C = (J^T J)^-1       is the covariance of the parameters,
     H = J C J^T          is the hat matrix; 1 - H_ii is the redundancy of measurement i.
 
-Noise that is not stated is estimated from the residuals, separately for positions and rotations. It is the
-sum of their squares over the sum of their redundancies, iterated (Foerstner's variance components).
+Noise that you do not state is estimated from the residuals, separately for positions and rotations. The
+variance of each is the sum of the squared residuals divided by the sum of their redundancies. This estimate
+is repeated until it is constant (Foerstner's variance components).
 
-A pose is an **outlier** if r_i^T (1 - H_ii)^-1 r_i is too large. For a good pose this is chi^2 distributed,
-with 3 or 6 degrees of freedom. The limit is exceeded in one of a hundred data sets without an outlier. The
-largest outlier is removed and the others are fitted again, until there is none: one bad pose hides another.
+A pose is an **outlier** if r_i^T (1 - H_ii)^-1 r_i is too large. For a correct pose this number is chi^2
+distributed, with 3 or 6 degrees of freedom. Of a hundred data sets without an outlier, one exceeds the limit.
+One outlier can hide another. Therefore only the largest outlier is removed, and the other poses are fitted
+again, until no outlier is left.
 
 **Start values.** Base and tool are computed from the poses before the fit. With the robot's poses T_i, the
 measured poses M_i, the base B and the tool X, M_i = B T_i X. The equations R_B^T R_Mi = R_i R_X are linear in
-the two unknown rotations, which are their common null vector (Shah, 2013). The positions are linear in the
-other unknowns, p_Mi = R_B (R_i x + p_i) + b. From positions alone, base and target are computed alternately:
-each is a linear problem if the other is known.
+the two unknown rotations. Together these rotations form the null vector of the equations (Shah, 2013). The
+positions are linear in the unknown translations x and b: p_Mi = R_B (R_i x + p_i) + b. From positions alone,
+base and target are computed alternately, because each is a linear problem if the other is known.
 """
 
 from __future__ import annotations
@@ -53,9 +58,11 @@ from urdfkin.kinematics.roundings import NOT_ZERO
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singular_values import singular_values
 
-#: Share of the most independent column's size from which a column is as good.
+#: A column counts as nearly as independent as the most independent one if it has at least this share of its
+#: size.
 _AS_GOOD = 0.5
-#: Number of parameters that a reason names, and the smallest share of the fixed column that counts.
+#: Number of parameters that a reason names, and the smallest share of a fixed parameter's column for which a
+#: parameter is named.
 _NAMED, _SHARE = 3, 1e-6
 
 
@@ -64,9 +71,9 @@ class Identification:
     """The identifiable and the fixed parameters.
 
     Attributes:
-        kept: Indices of the fitted parameters: the minimal set.
+        kept: Indices of the fitted parameters, a minimal set.
         still: Indices of the fixed parameters, each with the reason.
-        numbers: Number of measured numbers.
+        numbers: How many numbers were measured.
     """
 
     kept: tuple[int, ...]
@@ -105,7 +112,7 @@ def identify(
         model: The model.
         values: (s, n) joint values.
         complete: Whether full poses are measured, not positions alone.
-        at: (p,) parameters at which to determine it; the model's own when None.
+        at: (p,) parameters at which identifiability is determined; the model's own when None.
     """
     J = stacked(model, values, complete=complete, at=at)
     error = np.full_like(J, model.way.rounding(values))
@@ -152,15 +159,15 @@ def _reason(model: Model, J: FloatArray, error: FloatArray, kept: Sequence[int],
     return f"same effect as {', '.join(names)}{more}{' together' if len(order) > 1 else ''}"
 
 
-#: Redundancy below which there is none.
+#: A redundancy below this number counts as no redundancy.
 _ONE_OR_MORE = 0.5
-#: Share of a pose's largest redundancy; a direction with less is fully absorbed by the fit.
+#: The fit fully absorbs a direction with less than this share of a pose's largest redundancy.
 _FOLLOWED = 1e-9
-#: Largest number of noise estimates, and the relative change at which they end.
+#: Largest number of noise estimates, and the relative change below which the estimates end.
 _ESTIMATES, _STAYS = 20, 1e-3
 #: Probability that a data set without outliers is reported with one.
 WRONGLY = 0.01
-#: Standard deviations: a parameter that moved by less is not written.
+#: A parameter that changed by less than this number of standard deviations is not written.
 SIGMAS = 2.0
 #: Largest share of outliers among all poses.
 _MOST_ODD = 0.25
@@ -217,10 +224,11 @@ class Fit:
     Attributes:
         at: (p,) values of all parameters.
         errors: (s, 6) or (s, 3) residuals: measured minus computed, in the base, m and rad.
-        noise: The noise used as weight.
-        covariance: (k, k) of the fitted parameters, in their units; inf without redundancy.
+        noise: The noise from which the weights are computed.
+        covariance: (k, k) covariance of the fitted parameters, in the units of the parameters; inf without
+            redundancy.
         left: (s, 6) or (s, 3) redundancy of each number, 1 - H_ii.
-        odd: (s,) chi^2 of each pose.
+        odd: (s,) chi^2 statistic of each pose.
     """
 
     at: FloatArray
@@ -242,7 +250,7 @@ class Fit:
 
     @property
     def ratio(self) -> float:
-        """The ratio of the residual noise to the stated noise: 1, give or take 1/sqrt(2 freedom)."""
+        """The ratio of the residual noise to the stated noise: 1 within about 1/sqrt(2 freedom)."""
         if not self.is_judged:
             return math.nan
         whitened = self.errors / self.noise.of(self.errors.shape[1] == 6)
@@ -250,7 +258,7 @@ class Fit:
 
     @property
     def spread(self) -> float:
-        """The standard deviation of that ratio."""
+        """The standard deviation of `ratio`."""
         return 1.0 / math.sqrt(2.0 * max(self.freedom, _ONE_OR_MORE))
 
     def rms(self) -> tuple[float, float | None]:
@@ -260,7 +268,7 @@ class Fit:
 
 
 def errors(model: Model, measured: Measured, at: FloatArray) -> FloatArray:
-    """Return the residuals (s, 6) or (s, 3): measured minus computed, [position; rotation] in the base."""
+    """Return the residuals (s, 6) or (s, 3), measured minus computed: [position; rotation] in the base."""
     T = model.way.poses(measured.values, at)
     away = measured.p - T[:, :3, 3]
     if measured.R is None:
@@ -300,7 +308,7 @@ def best_fit(
 
 
 def _estimate_noise(found: Fit, model: Model, measured: Measured) -> Noise:
-    """Estimate the noise from the residuals; at least rounding, since residuals are divided by it."""
+    """Estimate the noise from the residuals; it is at least rounding, since residuals are divided by it."""
     rounding = model.way.rounding(measured.values)
 
     def of(part: slice, least: float, former: float) -> float:
@@ -317,7 +325,7 @@ def _estimate_noise(found: Fit, model: Model, measured: Measured) -> Noise:
 def _whitened(
     model: Model, measured: Measured, kept: Sequence[int], noise: Noise, at: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return residuals (rows,) and columns (rows, k), divided by the noise."""
+    """Return residuals (rows,) and columns (rows, k) of the Jacobian, divided by the noise."""
     scale = noise.of(measured.complete)
     _, columns = model.way.columns(measured.values, at)
     J = columns[:, : len(scale), list(kept)] / scale[:, np.newaxis]
@@ -363,7 +371,7 @@ def odd_poses(
 ) -> tuple[tuple[int, ...], Fit]:
     """Return the indices of the outliers, and the fit without them."""
     out = list[int]()
-    # More numbers than parameters must remain, and at most a quarter of the poses are outliers.
+    # More measured numbers than parameters must remain. At most a quarter of the poses may be outliers.
     most = min(int(_MOST_ODD * len(measured)), len(measured) - 1 - -(-len(kept) // found.errors.shape[1]))
     clean = found
     while len(out) < most:
@@ -381,9 +389,9 @@ def odd_poses(
 def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]) -> NDArray[np.bool_]:
     """Select the parameters that moved by more than `SIGMAS` standard deviations, by backward elimination.
 
-    The least significant parameter is reset to its old value. This moves the others by their covariance with
-    it. The elimination ends when all remaining parameters are significant. Of two parameters of which only a
-    combination is known, one remains.
+    The function resets the least significant parameter to its old value. It then changes the other parameters
+    by their covariance with this one. The elimination ends when all remaining parameters are significant. If
+    only a combination of two parameters is known, one of the two remains.
 
     Args:
         moved: (k,) change of each parameter.
@@ -398,7 +406,8 @@ def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]
         return ~free
     x, C = moved.copy(), covariance.copy()
     while (rest := np.flatnonzero(stays & free)).size:
-        # The difference of two variances may round to 0 or less: the change is then exact beside the noise.
+        # C contains differences of variances, so rounding may make a small variance 0 or negative. Such a
+        # change is known far more precisely than the noise, and counts as significant.
         sizes = np.abs(x[rest]) / np.sqrt(np.maximum(C[rest, rest], NOT_ZERO))
         k = rest[int(np.argmin(sizes))]
         if sizes.min() > SIGMAS:
@@ -411,19 +420,21 @@ def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]
 
 
 def quantile(share: float, freedom: int) -> float:
-    """Return the quantile of chi^2 (Wilson and Hilferty, 1931), within a few per cent, also in the tail."""
+    """Return the quantile of chi^2 to a few per cent, also in the tail (Wilson and Hilferty, 1931)."""
     step = 2.0 / (9.0 * freedom)
     return freedom * (1.0 - step + NormalDist().inv_cdf(share) * math.sqrt(step)) ** 3
 
 
-#: Largest number of alternations of base and target, and the relative change of the target at their end.
+#: Largest number of alternations between base and target, and the relative change of the target below which
+#: they end.
 _TURNS, _FIXED_END = 200, 1e-9
-#: Largest ratio of the spread of measured positions to that of the robot's tip; millimetres give 1000.
+#: Largest ratio of the spread of the measured positions to the spread of the tip's positions. Positions in
+#: millimetres have a ratio of 1000.
 _FARTHER = 100.0
 
 
 def starting(model: Model, measured: Measured) -> FloatArray:
-    """Return the model's parameters (p,), with base and tool computed from the poses."""
+    """Return the model's parameters (p,); base and tool are computed from the poses."""
     at = model.way.start.copy()
     places = {parameter.where for parameter in model.way.parameters if parameter.end}
     if not places:
@@ -472,7 +483,7 @@ def _from_positions(T: FloatArray, p: FloatArray, base: bool, tool: bool) -> tup
 
 
 def _rotations(R: FloatArray, M: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Solve R_B^T M_i = R_i R_X for R_B and R_X: M_i^T R_B - R_X^T R_i^T = 0, matrices as rows."""
+    """Solve R_B^T M_i = R_i R_X for R_B and R_X, as M_i^T R_B - R_X^T R_i^T = 0 with the matrices as rows."""
     unit = np.eye(3)
     left = np.einsum("sab,cd->sacbd", M.swapaxes(-1, -2), unit).reshape(-1, 9)
     right = np.einsum("ab,scd->sacbd", unit, R).reshape(-1, 9)

@@ -1,18 +1,20 @@
-"""Parametric models of a path: a URDF's origins or a table's cells as parameters, with their Jacobian.
+"""Models of a path with a URDF's origins or a table's cells as parameters, and the Jacobian by these.
 
-A model is a path (`urdfkin.model.path`): both a URDF's origins and the rows of a Denavit-Hartenberg table are
-products of constants and elementary motions. The amount of a motion is a parameter or a joint's value. The
-gain g of a joint scales its value by (1 + g), so the column of g is the joint's column times the value.
+A model is a path (`urdfkin.model.path`), because both a URDF's origins and the rows of a Denavit-Hartenberg
+table are products of constants and elementary motions. The amount of a motion is a parameter or a joint's
+value. The gain g of a joint scales its value by (1 + g), so the column of g in the Jacobian is the joint's
+column times the joint's value.
 
 **URDF.** Each joint of the path has six parameters of its origin. Let A be the rotation that maps the z axis
-to the joint's axis. The new origin is  T . A . Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry) Rz(rz) . A^-1. So z slides
-along the joint's axis, and rz is the joint's zero, whatever axis the file uses. The other four move the axis.
-The gain is a seventh parameter, which a URDF cannot store. `base` and `tool` have six parameters each, before
-the first constant and after the last one. They are the poses of the instrument and of the target.
+to the joint's axis. The new origin is  T . A . Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry) Rz(rz) . A^-1. Therefore z
+shifts the origin along the joint's axis, and rz is the joint's zero, for every axis in the file. The other
+four parameters move the axis. The gain is a seventh parameter, which a URDF cannot store. `base` and `tool`
+have six parameters each. Those of `base` are before the first constant of the path and give the pose of the
+instrument. Those of `tool` are after the last constant and give the pose of the target.
 
-**Table.** Each row has its cells. A row whose axis is parallel to the next within `PARALLEL` also has beta,
-Hayati's fifth parameter. There d has no separate effect, and alpha alone cannot tilt the axis in both
-directions.
+**Table.** The parameters of a row are its cells. If the row's axis is parallel to the next axis within
+`PARALLEL`, the row also has beta, Hayati's fifth parameter. In such a row d has no separate effect, and alpha
+alone cannot tilt the axis in both directions.
 """
 
 from __future__ import annotations
@@ -58,7 +60,7 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class Drive(Motion):
-    """An elementary motion with what determines its amount.
+    """An elementary motion, with the parameter or the joint that determines its amount.
 
     Attributes:
         parameter: Index of the parameter, or of the joint's gain; None if there is none.
@@ -91,7 +93,7 @@ class ParametricChain:
 
     @property
     def size(self) -> float:
-        """Sum of all lengths of the model, metres; 1 if there are none. It converts radians to metres."""
+        """Sum of all lengths of the model, metres; 1 if this sum is 0. It converts radians to metres."""
         lengths = [
             float(np.linalg.norm(step[:3, 3])) for step in self.path.steps if not isinstance(step, Motion)
         ]
@@ -131,17 +133,20 @@ class ParametricChain:
         return 2.0 * ROUNDINGS * (len(self.path.steps) + 1) * EPS * (self.size + slid * len(slides))
 
 
-#: Radians within which two axes of a table count as parallel. Axes of real arms are off by some mrad. The
-#: foot of the common normal of two axes is about a link's length divided by their angle away.
+#: Angle (rad) within which two axes of a table count as parallel. Parallel axes of a real arm deviate by some
+#: milliradians. The distance to the foot of the common normal is about a link's length divided by the angle
+#: between the axes.
 PARALLEL = math.radians(5.0)
 
 #: Names of the sets of parameters.
 FITTED = ("base", "tool", "offsets", "origins", "gains")
-#: The six parameters of an origin, in the order of multiplication: name, whether a rotation, axis.
+#: The six parameters of an origin, in the order of multiplication. Each has a name, whether it is a rotation,
+#: and the index of its axis.
 SIX = (("x", False, 0), ("y", False, 1), ("z", False, 2), ("rx", True, 0), ("ry", True, 1), ("rz", True, 2))
 _ALL = tuple(what for what, *_ in SIX)
-#: Order of preference among parameters with the same effect, for a rotation and for a translation: the
-#: joint's zero, then parameters that move its axis, then those that only move its frame.
+#: Order of preference among parameters with the same effect, for a revolute or fixed joint (True) and for a
+#: prismatic joint (False): first the joint's zero, then parameters that move the joint's axis, then those
+#: that only move its frame.
 _KEPT = {True: ("rz", "x", "y", "rx", "ry", "z", "gain"), False: ("z", "rx", "ry", "x", "y", "rz", "gain")}
 _ROW = (("theta", True, 2), ("d", False, 2), ("a", False, 0), ("alpha", True, 0), ("beta", True, 1))
 _KEPT_CELLS = ("theta", "a", "alpha", "beta", "d", "gain")
@@ -258,7 +263,7 @@ class _Maker:
     ) -> Model:
         """Return the model; `kept` is the order of preference of the parameters, by joint."""
         at = {(p.where, p.end, p.what): k for k, p in enumerate(self.parameters)}
-        # Base and tool come first: they are unknown, while the joints are nearly known.
+        # Base and tool are first, because they are unknown, while the values of the joints are nearly known.
         places = dict.fromkeys((p.where, p.end) for p in self.parameters)
         groups = tuple(
             tuple(at[*place, what] for what in kept.get(place[0], _KEPT[True]) if (*place, what) in at)
@@ -271,8 +276,8 @@ class _Maker:
 def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -> Model:
     """Make the model of a URDF's path with the parameters to fit.
 
-    The last fixed joint before the tip has parameters, too. Other fixed joints have none, because the moving
-    joints beside them have the same effect.
+    The last fixed joint before the tip also has parameters. Other fixed joints have no parameters, because
+    parameters of the neighbouring moving joints have the same effect.
 
     Raises:
         UnknownNameError: a frame or a set of parameters does not exist.
@@ -313,7 +318,10 @@ def _parameters_to_fit(fit: Collection[str], joint: Joint, *, ending: bool) -> C
 
 
 def table_model(table: DHTable, fit: Collection[str]) -> Model:
-    """Make the model of a table: "origins" are all cells, "offsets" the cells that the joint values add to.
+    """Make the model of a table.
+
+    The set "origins" contains all cells. The set "offsets" contains the cells to which joint values are
+    added.
 
     Raises:
         UnknownNameError: a set of parameters does not exist.

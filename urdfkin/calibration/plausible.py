@@ -1,10 +1,10 @@
 """Check whether a fit is plausible, and find the likeliest mistake in the measured data if it is not.
 
-A fit always ends with some result. This is so even if joint angles are in degrees, rows of q belong to other
-poses, or the sign of a joint is reversed. A fit is refused in four cases: its residuals are a large share of
-the robot's reach, it hardly improves the original model, it tilts a joint's axis far, or it has no
-redundancy. Then each common mistake is corrected on trial. The correction with a plausible fit is the
-likeliest mistake.
+A fit always has some result, even if joint angles are in degrees, rows of q belong to other poses, or the
+sign of a joint is reversed. A fit is refused in four cases: its residuals are a large share of the robot's
+reach, it hardly improves the original model, it tilts a joint's axis by a large angle, or it has no
+redundancy. The module then corrects each common mistake in the data and fits again. The mistake with a
+plausible fit after its correction is the likeliest one.
 """
 
 from __future__ import annotations
@@ -31,27 +31,36 @@ from urdfkin.comparison.result import angle, length
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree
 
 #: Limits of the rms position error as shares of the reach. Above the first, a fit is refused. The second and
-#: third apply with `_UNEXPLAINED` and `_HARDLY_BELOW`. Above the last, mistakes are tried.
+#: third limits apply together with `_UNEXPLAINED` and `_HARDLY_BELOW`. Above the last, corrections of
+#: mistakes are tried.
 _MISSED, _CLOSE_BY, _NO_BETTER, _SUSPECT = 0.05, 0.01, 0.03, 0.002
-#: Share of the spread of measured positions; a larger error above `_CLOSE_BY` of the reach is refused.
+#: A fit is refused if its error exceeds both this share of the spread of measured positions and `_CLOSE_BY`
+#: of the reach.
 _UNEXPLAINED = 0.25
-#: Share of the error before the fit; a larger error above `_NO_BETTER` of the reach is refused.
+#: A fit is refused if its error exceeds both this share of the error before the fit and `_NO_BETTER` of the
+#: reach.
 _HARDLY_BELOW = 0.7
-#: Limits of the rms orientation error, radians: above the first refused, above the second mistakes are tried.
+#: Limits of the rms orientation error, radians. Above the first, a fit is refused. Above the second,
+#: corrections of mistakes are tried.
 _MISTURNED, _SUSPECT_TURN = 0.2, 0.005
-#: Largest plausible joint angle, radians: more than one turn, since some industrial wrists turn 400 degrees.
+#: Largest plausible joint angle, radians. It is more than one turn, because some industrial wrists turn 400
+#: degrees.
 _TURN = 2.5 * math.pi
-#: Smallest excess over a joint's limits that counts: radians or metres, and share of the range.
+#: Smallest excess over a joint's limits that counts, in radians or metres, and as a share of the joint's
+#: range.
 _OUTSIDE, _OF_RANGE = 0.5, 0.25
 #: Largest plausible tilt of a joint's axis, radians, and largest plausible gain.
 _TILTED, _GAINED = 0.5, 0.5
-#: Joint values (rad, m) that differ by less are one configuration.
+#: Two configurations count as one if their joint values (rad, m) differ by less than this number.
 _ONE_CONFIGURATION = 1e-6
-#: Standard deviations subtracted from a change: the tilt of an axis near the target is poorly observable.
+#: Number of standard deviations that are subtracted from a change, because the tilt of an axis near the
+#: target is poorly observable.
 _UNCERTAIN = 5.0
-#: Largest ratio of a correction's error to the fit's error: for an accepted fit, and for a refused one.
+#: Largest ratio of the error after a correction to the error of the fit, for an accepted fit and for a
+#: refused one.
 _BETTER, _NOT_WORSE = 0.25, 1.5
-#: Number of corrections that are fitted, the most promising first; row shifts of q that are tried.
+#: Number of corrections that are fitted, beginning with the most promising ones, and the shifts of q by rows
+#: that are tried.
 _FITTED, _SHIFTS = 4, (1, -1, 2, -2)
 #: Number of joints that an objection names.
 _NAMED = 4
@@ -164,7 +173,7 @@ def _misfits(model: Model, ended: Ended) -> Iterator[str]:
 
 
 def _extreme_parameters(model: Model, ended: Ended) -> Iterator[str]:
-    """Yield objections to parameters far from those of any real robot."""
+    """Yield objections to fitted parameters that no real robot has."""
     tilted, gained = dict[str, str](), dict[str, str]()
     for parameter, moved, surely in _changes(model, ended):
         if parameter.what in ("rx", "ry", "alpha", "beta") and surely > _TILTED:
@@ -178,7 +187,7 @@ def _extreme_parameters(model: Model, ended: Ended) -> Iterator[str]:
 
 
 def _turned_zeros(model: Model, ended: Ended) -> list[str]:
-    """Return joints whose zero moved by half a turn: the effect of a reversed sign of the next joint."""
+    """Return the joints whose zero changed by half a turn, as after a reversed sign of the next joint."""
     return [
         f"{parameter.where!r} by {angle(abs(moved))}"
         for parameter, moved, surely in _changes(model, ended)
@@ -189,7 +198,7 @@ def _turned_zeros(model: Model, ended: Ended) -> list[str]:
 def _changes(model: Model, ended: Ended) -> Iterator[tuple[Parameter, float, float]]:
     """Yield each fitted parameter of a moving joint, its change, and the change minus its uncertainty.
 
-    For positions alone, joints are skipped whose axis passes near the tip of the original model.
+    If only positions were measured, joints with an axis near the tip of the original model are skipped.
     """
     kept, fitted = ended.identification.kept, ended.fitted
     near = set[str]()
@@ -284,7 +293,7 @@ def _sign(names: Sequence[str]) -> str:
 
 
 def _likeliest(model: Model, ended: Ended, limit: float, reach: float) -> _Trial | None:
-    """Return the correction whose fit is plausible and has an error below the limit; else None."""
+    """Return the correction with a plausible fit and an error below the limit; None if there is none."""
     trials = [_Trial(model, ended, correction, reach) for correction in _corrections(model, ended.q)]
     trials.sort(key=lambda trial: trial.left_before)
     for trial in trials[:_FITTED]:
@@ -295,7 +304,10 @@ def _likeliest(model: Model, ended: Ended, limit: float, reach: float) -> _Trial
 
 
 def _several_signs(model: Model, ended: Ended, reach: float) -> _Trial | None:
-    """Try two or more reversed signs: add the best reversal while it reduces the error before the fit."""
+    """Try two or more reversed signs.
+
+    The search adds the best reversal as long as it reduces the error before the fit.
+    """
     names, signs = model.coupling.names, np.ones(ended.q.shape[1])
     best, least = None, math.inf
     for _ in names:
@@ -325,7 +337,7 @@ class _Trial:
         )
         self.weights = Noise(1.0, 1.0 / reach)
         self.start = starting(model, self.measured)
-        #: Error of a number (m) with base and tool alone fitted.
+        #: Error of a measured number (m) after a fit of base and tool alone.
         self.left_before = _size(errors(model, self.measured, self.start), reach) / math.sqrt(
             len(self.measured)
         )
@@ -359,7 +371,7 @@ def _size(left: FloatArray, reach: float) -> float:
 
 
 def _left(ended: Ended, reach: float) -> float:
-    """Return the residual standard deviation of a number, metres."""
+    """Return the standard deviation of the residuals of a measured number, metres."""
     return _size(ended.fitted.errors, reach) / math.sqrt(max(ended.fitted.freedom, 1.0))
 
 

@@ -1,13 +1,14 @@
 """Apply the factory calibration of a Universal Robots arm, from the YAML file of its ROS driver.
 
-The controller stores Denavit-Hartenberg parameters. Two axes are a milliradian from parallel, so one d is
-hundreds of metres, and the next d compensates it. The driver's tool `ur_calibration` shifts the links back
-along their axes. It writes the pose of each joint relative to the previous one: x, y, z, roll, pitch, yaw.
+The controller stores Denavit-Hartenberg parameters. Two axes of the arm deviate by a milliradian from
+parallel. One d is therefore hundreds of metres, and the next d compensates it. The driver's tool
+`ur_calibration` shifts the link frames along their axes, so that these large offsets disappear. The tool
+writes the pose of each joint relative to the previous one: x, y, z, roll, pitch, yaw.
 
 The order of the rotations is ambiguous. The driver computes the angles from R = Rx(roll) Ry(pitch) Rz(yaw)
 (Eigen's `eulerAngles(0, 1, 2)`). The ROS description copies them into a URDF, where they mean
 Rz(yaw) Ry(pitch) Rx(roll). If one angle is a quarter turn and another is small, the two rotations differ by
-the small one, 1e-5 to 1e-4 rad. The order "driver" agrees with the robot's controller. The order "urdf"
+the small angle, 1e-5 to 1e-4 rad. The order "driver" agrees with the robot's controller. The order "urdf"
 agrees with the ROS description of the same file.
 """
 
@@ -45,14 +46,14 @@ LINKS = {
     "wrist_2": "wrist_2_joint",
     "wrist_3": "wrist_3_joint",
 }
-#: SciPy's names of the two orders; small letters are rotations about fixed axes.
+#: SciPy's names of the two orders; lowercase letters are rotations about fixed axes.
 ORDERS = {"driver": "XYZ", "urdf": "xyz"}
 _SIX = ("x", "y", "z", "roll", "pitch", "yaw")
 #: Number of configurations for the fit, and for its check.
 _FITTED = 40
 #: Seeds of the configurations for the fit, and for its check.
 _FITTED_SEED, _CHECKED_SEED = 2, 3
-#: Largest residual, metres and radians: the rounding of a file with nine digits.
+#: Largest allowed residual, metres and radians. It is the rounding of a file with nine digits.
 _LEFT = 1e-8
 #: Number of configurations on which two calibrations are compared.
 _COMPARED = 1000
@@ -94,8 +95,8 @@ def _origin(kinematics: Mapping[Any, Any], link: str, sequence: str, where: str)
         raise InputError("the file lacks a link", where=where, found=f"no {link}")
     six = []
     for name in _SIX:
-        # YAML 1.1 reads 1e-05, which the driver writes for 0.00001, as a word. A list is never printed: with
-        # YAML references, a short file may contain a very long one.
+        # The driver writes 0.00001 as 1e-05, and YAML 1.1 reads 1e-05 as a string. The error message never
+        # prints a list, because with YAML references a short file may contain a very long list.
         value = entry.get(name)
         number = parse_float(str(value)) if isinstance(value, int | float | str) else None
         if number is None:
@@ -119,8 +120,8 @@ def universal_robots(robot: Robot | Source, path: Path, order: str = "driver") -
     """Apply a calibration file to the URDF of a Universal Robots arm.
 
     In the current ROS description all six joints turn about z, and their origins become those of the file. In
-    another URDF, such as the older description, the origins are fitted. The arm then moves like the
-    calibrated one, from `base` to `tool0`.
+    another URDF, such as the older description, the origins are fitted. The fitted arm then moves like the
+    calibrated arm, from `base` to `tool0`.
 
     Args:
         robot: The arm.
@@ -130,7 +131,7 @@ def universal_robots(robot: Robot | Source, path: Path, order: str = "driver") -
 
     Raises:
         SourceError: the file cannot be read.
-        InputError: the file is not a calibration, or the robot is not such an arm.
+        InputError: the file is not a calibration, or the robot is not a Universal Robots arm.
         UnknownNameError: the order is unknown.
     """
     robot = robot if isinstance(robot, Robot) else load(robot)
@@ -145,7 +146,7 @@ def universal_robots(robot: Robot | Source, path: Path, order: str = "driver") -
 
 
 def _fit_origins(robot: Robot, calibrated: FrameChain, tip: str, base: str) -> Rewritten:
-    """Fit the robot's origins to the calibrated arm's poses, measured without noise."""
+    """Fit the robot's origins to poses of the calibrated arm, which have no noise."""
     own = robot.chain(tip, base).coupling
     if len(own.names) != len(calibrated.joint_names):
         raise InputError(
@@ -189,7 +190,7 @@ def _is_the_descriptions(robot: Robot, prefix: str) -> bool:
 
 
 def _verify_written(result: Rewritten, calibrated: FrameChain, prefix: str) -> Certificate:
-    """Compare the written text with the file: poses that Pinocchio checks with the calibrated arm's poses."""
+    """Compare the poses of the written text, which Pinocchio checks, with those of the calibration file."""
     written = result.loaded
     q = written.sample(_FITTED, seed=_CHECKED_SEED)
     T = written.placement(q, [f"{prefix}base", f"{prefix}tool0"])

@@ -28,7 +28,8 @@ from urdfkin.urdf.records import JointRecord, Vector
 from urdfkin.urdf.writer import before, numbers, with_attributes
 from urdfkin.verify.certificate import Certificate
 
-#: Decimals of a metre and of a radian that are written: the precision of a double of a robot's size.
+#: Number of decimals of written metres and radians. It is the precision of a double for lengths of a robot's
+#: size.
 _DECIMALS = 15
 _SAME = 10.0**-_DECIMALS
 
@@ -36,14 +37,14 @@ _SAME = 10.0**-_DECIMALS
 def with_origins(data: bytes, origins: Mapping[str, FloatArray]) -> bytes:
     """Return the URDF's bytes with new origins (4, 4) of joints, by name.
 
-    A number that is unchanged up to rounding keeps its digits. Of all roll, pitch and yaw angles of a
-    rotation, the ones nearest to the old angles are written.
+    A number that is unchanged up to rounding keeps its digits. A rotation has several triples of roll, pitch
+    and yaw angles; the triple nearest to the old angles is written.
 
     Raises:
         InputError: the text has errors, or a joint does not exist.
     """
     report = Reporter("<text>", data)
-    urdf = read_urdf(report, mimic=False)  # mimic rules do not matter here
+    urdf = read_urdf(report, mimic=False)  # origins do not depend on mimic rules
     if urdf is None or report.failed:
         errors = [one for one in report.findings() if one.severity is Severity.ERROR]
         raise InputError("a URDF with errors is not edited", found=str(errors[0]))
@@ -67,7 +68,7 @@ def _edits(data: bytes, joint: JointRecord, T: FloatArray) -> list[Edit]:
     if joint.origin_element is not None:
         return list(with_attributes(data, joint.origin_element, values))
     written = " ".join(f'{name}="{value}"' for name, value in values.items())
-    # A joint without errors has a parent and a child at least.
+    # A joint without errors has at least the child elements parent and child.
     return [before(data, joint.element.children[0], f"<origin {written}/>")]
 
 
@@ -82,14 +83,14 @@ def _three_numbers(joint: JointRecord, name: str, new: FloatArray, old: Vector) 
 
 
 def nearest_rpy(R: FloatArray, old: Vector) -> FloatArray:
-    """Return roll, pitch and yaw (3,) of a rotation, the ones nearest to the old angles.
+    """Return the roll, pitch and yaw (3,) of a rotation that are nearest to the old angles.
 
     >>> from urdfkin.kinematics.rotation import rotation_from_rpy
     >>> nearest_rpy(rotation_from_rpy([3.1, 3.0, 3.1]), (3.1, 3.0, 3.1)).round(12).tolist()
     [3.1, 3.0, 3.1]
     """
     roll, pitch, yaw = rpy_of(R).tolist()
-    if math.cos(pitch) <= ANGLE * EPS:  # roll and yaw share one axis: only their sum matters
+    if math.cos(pitch) <= ANGLE * EPS:  # roll and yaw turn about one axis: only their combination is defined
         roll, yaw = old[0], yaw + (old[0] - roll) * math.copysign(1.0, pitch)
     turns = ([roll, pitch, yaw], [roll + math.pi, math.pi - pitch, yaw + math.pi])
     wrapped = [

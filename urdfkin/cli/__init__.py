@@ -110,7 +110,7 @@ def commands() -> dict[str, tuple[str, str]]:
     return {name: entry for entries in groups().values() for name, entry in entries.items()}
 
 
-#: Other words for a command -> the command; a text that is no command is what urdfkin has in its place.
+#: Other words for a command -> the command. If the value is no command, it is a text that urdfkin suggests.
 _SYNONYMS = {
     **dict.fromkeys(("fk", "forward", "forward-kinematics", "pose", "transform", "tf"), "placement"),
     **dict.fromkeys(("relative-placement", "relative-pose"), "placement --relative-to FRAME"),
@@ -155,7 +155,7 @@ _ABSENT = {
 
 
 def _unknown(name: str) -> UrdfkinError:
-    """Return the error for an unknown command; it knows other words for the commands."""
+    """Return the error for an unknown command; it suggests commands for common other words."""
     word = name.lower().replace("_", "-")
     if word in commands():
         return UnknownNameError("command", name, [word])

@@ -183,7 +183,7 @@ def _run(context: click.Context, robot: Robot) -> Calibration:
         else (None, None)
     )
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # a table is loaded a second time
+        warnings.simplefilter("ignore")  # the table is loaded again here; do not repeat its warnings
         return calibrate(
             source,
             q,

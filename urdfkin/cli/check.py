@@ -411,7 +411,10 @@ class Run:
             if file not in self._taken:
                 self._taken.add(file)
                 try:
-                    if file not in (word, f"./{word}"):  # found in a folder, not named by the user
+                    if file not in (
+                        word,
+                        f"./{word}",
+                    ):  # found in a folder that the user named
                         demand_regular(Path(file))
                     self._check(file)
                 except (SourceError, UnknownNameError, XacroError) as error:

@@ -138,10 +138,10 @@ form_options = together(
 )
 
 
-#: Options that --like decides.
+#: Options that have no effect with --like, which chooses their values.
 _SIGNS = ("last", "parallel_offset", "flip", "first", "sign")
 _CHOICES = ("convention", "near_parallel", "snap", "slide", "like", *_SIGNS)
-#: Options that need a new derivation of a table that is the robot; without them it is written unchanged.
+#: If ROBOT is a table, these options derive a new table. Without them, the table is written unchanged.
 _DERIVED = ("base", "tip", "all_", *_CHOICES[1:])
 _UNITS = ("degrees", "millimetres", "digits", "columns")
 

@@ -53,7 +53,7 @@ class Work:
     """The command's options.
 
     Attributes:
-        written: File of a table that is the robot and is written without a derivation; None otherwise.
+        written: File of the table, if ROBOT is a table that is written without a new derivation; else None.
         choices: Other arguments of `Robot.dh`.
     """
 
@@ -139,7 +139,7 @@ def _make_table(work: Work, tip: str | None, snap: float) -> DHTable:
     robot, base = work.robot, work.base
     if work.written is not None:
         table = read_table_or_screws(at_home(work.written))
-        if isinstance(table, DHTable):  # a table is derived from screws as from a URDF
+        if isinstance(table, DHTable):  # `Robot.dh` can derive a table from screws, as from a URDF
             return to_convention(table, work.convention or table.convention)
     like = None
     if work.like is not None:

@@ -25,7 +25,7 @@ _SIGNALS = (signal.SIGTERM, signal.SIGHUP)
 
 @dataclass(slots=True)
 class Stop:
-    """The signal that stopped the command.
+    """Record of the signal that stopped the command.
 
     Attributes:
         signal: Its number, or None.
@@ -63,9 +63,9 @@ def stoppable() -> Iterator[Stop]:
                 signal.signal(each, signal.SIG_DFL)
 
 
-#: EX_SOFTWARE of sysexits.h.
+#: Exit code after an unexpected error: EX_SOFTWARE of sysexits.h.
 CRASH = 70
-#: 128 + the number of SIGINT, as in shells.
+#: Exit code after an interrupt: 128 + the number of SIGINT, as in shells.
 _INTERRUPTED = 130
 
 

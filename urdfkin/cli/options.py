@@ -146,7 +146,7 @@ _HOW = "urdfkin.how_to_load"
 
 
 def _remember(context: click.Context, parameter: click.Parameter, value: object) -> None:
-    """Store an option for `how_to_load`, so that no command has to pass it on."""
+    """Store an option, which `how_to_load` returns later. So no command has to pass the option on."""
     context.meta.setdefault(_HOW, {})[parameter.name] = value
 
 
@@ -176,14 +176,14 @@ xacro_option = click.option(
 
 
 def mimic_option(help_: str) -> Callable[[_F], _F]:
-    """Make the option that turns mimic rules on or off; `how_to_load` returns it."""
+    """Make the option that turns mimic rules on or off; `how_to_load` returns its value."""
     return click.option(
         "--mimic/--no-mimic", default=None, expose_value=False, callback=_remember, help=help_
     )
 
 
 def root_joint_option(help_: str) -> Callable[[_F], _F]:
-    """Make the option for the joint between the world and the root link; `how_to_load` returns it."""
+    """Make the option for the joint between the world and the root link; `how_to_load` returns its value."""
     joints = click.Choice(["floating", "planar"])
     return click.option("--root-joint", type=joints, expose_value=False, callback=_remember, help=help_)
 
@@ -211,7 +211,7 @@ path_options = together(
 
 
 class _ReferenceName(click.Choice):  # type: ignore[type-arg]  # generic from click 8.2 on
-    """The name of a reference frame; the error for another word refers to their explanation."""
+    """The name of a reference frame; the error for another word says where the frames are explained."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the name in its standard spelling."""
@@ -274,7 +274,7 @@ class Inputs:
         a: (n, n_v) joint accelerations.
         t: (n,) times of a trajectory in s, or None.
         base: Motion of the root link, or None.
-        said: More settings that the result depends on, for titles and JSON.
+        said: Other settings on which the result depends; titles and JSON list them.
         conversion: The convention of q, v and a, if it is not urdfkin's.
     """
 

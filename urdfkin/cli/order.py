@@ -65,7 +65,7 @@ def _table(robot: Robot) -> Answer:
 
 
 def _cells(robot: Robot, conversion: Conversion) -> tuple[str, ...]:
-    """Return the cell of each moving joint: its index in q, or in q/v; "-" without a column."""
+    """Return the cell of each moving joint: its index in q, or both as q/v; "-" if it has no column."""
     indices = conversion.q_and_v_indices
 
     def span(at: list[int]) -> str:

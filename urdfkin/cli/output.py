@@ -41,7 +41,7 @@ _SUFFIXES = {
     "json": ".json", "csv": ".csv", "npy": ".npy", "table": ".txt", "markdown": ".md", "html": ".html",
     "latex": ".tex",
 }  # fmt: skip
-#: Largest width of a table in columns: padding takes memory.
+#: Largest width of a table in characters. The limit saves memory, because cells are padded.
 _WIDEST = 10_000
 
 output_option = click.option(

@@ -255,7 +255,7 @@ def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Tab
 
 
 def _parts(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
-    """Return the acceleration split by joint and term, with the certificate of their sum."""
+    """Return the terms of each joint's acceleration, with the certificate of the total acceleration."""
     from urdfkin.compiled.breakdown import KINDS  # noqa: PLC0415  keeps --help fast
 
     def parts() -> Iterator[str | Table]:

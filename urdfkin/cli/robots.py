@@ -91,7 +91,7 @@ def _fitted(out: Console, document: TextDocument) -> TextDocument:
 
 
 def _rows(document: TextDocument, links: Sequence[str]) -> Iterator[list[str]]:
-    """Yield the table's rows, without the lines of a tree."""
+    """Yield the table's rows, without the drawn lines from links to their children."""
     for part in document.parts:
         if isinstance(part, Table):
             yield list(part.heads)

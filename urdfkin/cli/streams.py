@@ -1,7 +1,7 @@
 """Safe standard streams: robust against stream failures, and against control characters in names.
 
 A shell can close a stream, connect it to a full disk or to a reader that exits, or give it an encoding that
-lacks a name's letters. None of these causes a traceback here.
+lacks a name's letters. With this module, none of these failures causes a traceback.
 
 `guard` wraps standard output and standard error in a `SafeStream`, which escapes control characters and
 commands of CI services. All output passes through it, also that of click and Python. Line feeds pass,
@@ -74,7 +74,7 @@ class _Raw(io.FileIO):
 
 
 def _with_errors(stream: Any, descriptor: int) -> Any:
-    """Replace a stream of this process by one that reports errors; keep other streams, such as a test's."""
+    """Replace a standard stream by one that reports errors; leave a substitute, such as a test's."""
     try:
         if stream.fileno() != descriptor:
             return stream
@@ -184,7 +184,7 @@ class SafeStream:
         before = len(self._line)
         whole = self._line + piece
         at = [m.start(1) for command in COMMANDS for m in command.finditer(whole) if m.start(1) >= before]
-        # Of a long line, keep the end, and whether the line was blank so far.
+        # Keep only the end of a long line, and whether the line was blank so far.
         self._line = whole if len(whole) <= _STORED else ("x" if whole.strip() else "") + whole[-16:]
         return "".join(escape(c) if before + k in at else c for k, c in enumerate(piece)) if at else piece
 
@@ -204,7 +204,7 @@ def guard() -> None:
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is not None and not isinstance(stream, SafeStream):
-            # With another encoding, click would bypass the stream; this one escapes missing characters.
+            # Click bypasses streams with other encodings. SafeStream escapes missing characters.
             setattr(sys, name, SafeStream(stream, encoding="utf-8"))
 
 
@@ -228,7 +228,7 @@ def say_file(text: str) -> None:
 
 
 def harmless(text: str) -> str:
-    """Return a file's text, of whole lines, as `say_file` writes it."""
+    """Return a file's text, which consists of whole lines, in the form that `say_file` writes."""
     return SafeStream(sys.stdout).tamed_file(text)
 
 

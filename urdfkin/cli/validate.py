@@ -92,7 +92,7 @@ def judge_all(
 
 @contextmanager
 def _open_results(folder: Path | None, asked: Asked, shard: str | None) -> Iterator[AccuracyResult | None]:
-    """Open the accuracy results of a store, locked as a whole or for one part."""
+    """Open the accuracy results of a store, and lock the whole store or one part of it."""
     if folder is None:
         yield None
         return
@@ -111,7 +111,7 @@ def _open_results(folder: Path | None, asked: Asked, shard: str | None) -> Itera
 def _study(
     source: Robot | str, asked: Asked, stamp: str | None, how: Mapping[str, Any]
 ) -> tuple[Judgement | NotJudged, bool]:
-    """Return the accuracy result of a robot, and whether a repetition would give the same."""
+    """Return the accuracy result of a robot, and whether another study would give the same."""
     import numpy as np  # noqa: PLC0415  keeps --help fast
 
     from urdfkin.validation.accuracy import judge  # noqa: PLC0415

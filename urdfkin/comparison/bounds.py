@@ -1,25 +1,29 @@
-"""Bound the distance between a frame of two models from below by search, and from above by branch and bound.
+"""Bound the largest distance between the poses of a frame in two models, from below and from above.
 
-**Search.** The distance at the configuration found is attained, so it is a lower bound of the largest
-distance. The upper bound (`urdfkin.model.mechanisms.upper_bound`) limits how far the search can be off. Each
-joint value enters a position as a sine and a cosine. Therefore coordinate search from the worst of many
-random configurations works well.
+**Search.** The search looks for the configuration with the largest distance. The distance at the best
+configuration found is a lower bound of the largest distance. The true largest distance is between this lower
+bound and the upper bound (`urdfkin.model.mechanisms.upper_bound`). The search varies one coordinate at a
+time, from the worst of many random configurations. This works well because a position depends on the sine and
+the cosine of each joint value.
 
 **Branch and bound.** `urdfkin.model.mechanisms.upper_bound` adds the effects of all differences, each at its
-own worst configuration. Where many things differ, that sum is too large. `Boxes` bounds D(q) = p_B - p_A in
-boxes of all variables together. In a box with middle c and half widths h,
+own worst configuration. If the models differ in many places, this sum is far above the largest distance.
+`Boxes` gives a sharper bound. It divides the space of all variables into boxes, and bounds D(q) = p_B - p_A
+in each box. In a box with middle c and half widths h,
 
     |D(q)| <= max |D(c) + sum_i D_i(c) x_i| + (1/2) sum_ij M_ij h_i h_j,     |x_i| <= h_i.
 
-Here M_ij bounds the second derivatives at every configuration. Boxes whose bound is small enough are
-dropped. The others are halved.
+Here D_i is the derivative of D by variable i, and M_ij bounds the second derivatives at every configuration.
+A box with a bound below the target needs no further work. Every other box is halved.
 
-M_ij is computed joint by joint. The derivative of a rotation about the axis u is the rotation, followed by
-u x. Let y be the position of B's frame, and d its distance from A's frame. The derivatives of both are
+M_ij is computed joint by joint. The derivative of a rotated vector by the angle is the cross product of the
+axis u with the rotated vector. Let y be the position of B's frame, and d the vector from A's frame to B's
+frame. Their derivatives by a joint value are
 
     y_i = u' x (Y - o'),    d_i = u x (Y - e(S t) (y - d)) + (u' - u) x (Y - o') + u x (o - o'),
 
-with Y = e(S' t') y. The joints in front transform these derivatives as free vectors
+with Y = e(S' t') y. Here S, u, o and t are the screw, axis, point and value of the joint in A, and S', u', o'
+and t' are those in B. The joints between the base and this joint transform the derivatives as free vectors
 (`urdfkin.model.mechanisms.upper_bound`).
 """
 
@@ -51,16 +55,18 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.verify.sampling import sample
 
-#: Number of random configurations, and of corners of all ranges, at the start of a search.
+#: Number of random configurations at the start of a search, and number of configurations with each variable
+#: at an end of its range.
 SAMPLES, CORNERS = 512, 128
-#: Number of the worst configurations that the search starts from, and of values tried along a coordinate.
+#: Number of configurations (the worst ones) that the search starts from, and number of values tried along a
+#: coordinate.
 STARTS, ALONG = 4, 13
 #: Frames that are searched in one batch.
 SEARCHED_TOGETHER = 24
-#: Share of its range within which a coordinate is varied, round by round.
+#: Share of its range over which a coordinate is varied, for each round of the search.
 WINDOWS = (1.0, 1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001)
 
-#: Computes the poses (n, frames, 4, 4) of a robot's frames at q.
+#: Function that computes the poses (n, frames, 4, 4) of a robot's frames at q.
 Placements = Callable[[Robot, FloatArray, Sequence[str]], FloatArray]
 
 
@@ -81,7 +87,7 @@ class Search:
         self.names = list(variables.ranges)
         self.ends = np.array([self._ends(name) for name in self.names]).reshape(-1, 2)
         self.rng = np.random.default_rng(seed)
-        #: (4, 4) pose of B's base link in A's root frame; it moves with A's base link.
+        #: (4, 4) pose in A's root frame at which B's base link is placed; this pose moves with A's base link.
         self.hold = found.X @ found.b.homes[found.base[1]]
         #: For each robot, whether its base link is on the root body.
         self.stands = tuple(
@@ -124,7 +130,7 @@ class Search:
         return q_a, q_b
 
     def belong_together(self, q_a: FloatArray, q_b: FloatArray) -> bool:
-        """Return whether two configurations (1, nq) correspond and are within all ranges, to rounding."""
+        """Return whether configurations (1, nq) correspond and are within all ranges, up to rounding."""
         sizes = tuple(robot.nq for robot in self.robots)
         if (q_a.shape, q_b.shape) != ((1, sizes[0]), (1, sizes[1])):
             return False
@@ -139,13 +145,13 @@ class Search:
         return bool(off.all() and (low - room <= z).all() and (z <= high + room).all())
 
     def poses(self, z: FloatArray, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
-        """Return poses (n, frames, 4, 4) of A and of B, on A's base, at values (n, variables)."""
+        """Return poses (n, frames, 4, 4) of A and of B in A's root frame, at values (n, variables)."""
         return self.poses_at(*self.configurations(z), frames, urdfkins)
 
     def poses_at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
     ) -> tuple[FloatArray, FloatArray]:
-        """Return `poses` at configurations (n, nq) of each robot, computed by the function `computed`."""
+        """Return `poses` at configurations (n, nq) of each robot; the function `computed` computes them."""
         a, b = self.robots
         Ts_a = computed(a, q_a, [a.tree.link_frames[frame.a] for frame in frames])
         base = b.tree.link_frames[self.found.base[1]]
@@ -161,7 +167,7 @@ class Search:
     def at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
     ) -> FloatArray:
-        """Return distances (n, frames), metres, at configurations (n, nq) of each robot."""
+        """Return distances (n, frames) of the origins, metres, at configurations (n, nq) of each robot."""
         return _distances(*self.poses_at(q_a, q_b, frames, computed))
 
     def random(self, n: int) -> FloatArray:
@@ -174,7 +180,7 @@ class Search:
         return _distances(*self.poses(z, frames))
 
     def seen(self, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
-        """Return distances (n, frames) at random values and at corners of the ranges, and these values."""
+        """Return distances (n, frames) at random values and at corners of the ranges, with these values."""
         low, high = self.ends.T
         z = self.random(SAMPLES)
         corners = np.where(self.rng.random((CORNERS, len(self.names))) < 0.5, low, high)
@@ -182,7 +188,7 @@ class Search:
         return self.metres(z, frames), z
 
     def worst(self, frames: Sequence[FramePair]) -> list[tuple[float, FloatArray]]:
-        """Return for each frame the largest distance found, metres, and the values there."""
+        """Return the largest distance found for each frame, metres, and the values of the variables there."""
         found: list[tuple[float, FloatArray]] = []
         for first in range(0, len(frames), SEARCHED_TOGETHER):
             some = frames[first : first + SEARCHED_TOGETHER]
@@ -191,7 +197,7 @@ class Search:
         return found
 
     def most_turned(self, frame: FramePair) -> FloatArray:
-        """Return the sampled values (variables,) at which a frame's orientations differ most."""
+        """Return the sampled values (variables,) at which the frame's orientations in A and B differ most."""
         z = self.seen([frame])[1]
         Ts_a, Ts_b = self.poses(z, [frame])
         turned = [apart(T, other)[0] for T, other in zip(Ts_a[:, 0], Ts_b[:, 0], strict=True)]
@@ -233,7 +239,7 @@ class Search:
         return [(float(best[n, m]), z[n, m]) for n, m in enumerate(at)]
 
     def _own_distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return distances (frames, starts, values) of each frame at its own values, variables last."""
+        """Return distances (frames, starts, values), each frame at its own values; `z` has variables last."""
         flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])  # also for robots without variables
         off = self.metres(flat, frames).reshape(*z.shape[:-1], len(frames))
         n = np.arange(len(frames))
@@ -261,7 +267,7 @@ def _distances(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def urdfkins(robot: Robot, q: FloatArray, frames: Sequence[str]) -> FloatArray:
-    """Return poses (n, frames, 4, 4) computed by the forward recursion."""
+    """Return poses (n, frames, 4, 4) computed by urdfkin's forward recursion."""
     return robot.placement(q, frames, verify=False)
 
 
@@ -281,9 +287,10 @@ _Vectors = tuple[Support, Support]
 def curvature(
     steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables, frame: FramePair
 ) -> tuple[list[str], FloatArray]:
-    """Return names of variables, and bounds (variables, variables) of the second derivatives of D, metres.
+    """Return the variables' names, and bounds (variables, variables) of the second derivatives of D, metres.
 
-    Bounds are inf where two variables move one pair of joints, or one variable moves them by two factors.
+    A bound is inf if two variables move a pair of matched joints, or if one variable moves the two joints by
+    different factors.
     """
     names = list(dict.fromkeys(line.variable for pair in pairs for line in (pair.a, pair.b) if line.slope))
     found = np.zeros((len(names), len(names)))
@@ -303,7 +310,7 @@ def curvature(
 def _second_derivatives(
     steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables, frame: FramePair
 ) -> Iterator[tuple[int, int, float]]:
-    """Yield i, j <= i and the largest second derivative by the values of joints i and j."""
+    """Yield i, j and a bound of the second derivative by the values of joints i and j, for all j <= i."""
     free = [_as_free_vectors(step) for step in steps]
     d, y = at_the_frame(frame, COARSE)
     for i in reversed(range(len(steps))):
@@ -324,7 +331,7 @@ def _second_derivatives(
 def _pass_to_front(
     vectors: _Vectors, steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables
 ) -> float:
-    """Return the largest d in front of all steps, from vectors behind the last step's L."""
+    """Return the largest d in front of all steps, given vectors behind the link pose L of the last step."""
     vectors = before_it(steps[-1], *vectors)
     for step, pair in zip(reversed(steps[:-1]), reversed(pairs[: len(steps) - 1]), strict=True):
         slides = step.kind != "turns"
@@ -333,7 +340,7 @@ def _pass_to_front(
 
 
 def _derivatives(step: Step, pair: Pair, variables: Variables, d: Support, y: Support) -> _Vectors:
-    """Return the derivatives of d and y by a joint's value, behind its L."""
+    """Return the derivatives of d and y by a joint's value, behind the link pose L of the joint."""
     if step.kind != "turns":
         u, other = step.axis.direction, step.other.direction
         return point(d.grid, other - u), point(d.grid, other)
@@ -342,7 +349,7 @@ def _derivatives(step: Step, pair: Pair, variables: Variables, d: Support, y: Su
 
 
 def _cross_products(step: Step, d: Support, y: Support) -> _Vectors:
-    """Return the cross products of u with d and of u' with y."""
+    """Return the cross product of u with d, corrected for different axes, and of u' with y."""
     G, axis, other = d.grid.points, step.axis, step.other
     most = 0.0
     if other is not axis:
@@ -355,16 +362,16 @@ def _cross_products(step: Step, d: Support, y: Support) -> _Vectors:
 
 
 def _as_free_vectors(step: Step) -> Step:
-    """Return the step's effect on free vectors."""
+    """Return the step with its effect on free vectors: the rotations without the translations."""
     axis = Screw(step.axis.direction, _ORIGIN)
     other = axis if step.other is step.axis else Screw(step.other.direction, _ORIGIN)
     before = IDENTITY if step.before is IDENTITY else pose(step.before[:3, :3])
     return replace(step, axis=axis, other=other, before=before)
 
 
-#: Largest number of boxes at a time: one or two seconds of a processor for a frame.
+#: Largest number of boxes at a time. With this number, a frame takes one or two seconds of processor time.
 MOST = 2**17
-#: Boxes computed in one batch: Jacobians of more would take gigabytes.
+#: Number of boxes computed in one batch. The Jacobians of more boxes would take gigabytes of memory.
 TOGETHER = 2**16
 
 
@@ -374,7 +381,7 @@ class Boxes:
     Args:
         search: Both robots.
         frame: The frame.
-        names: Names of the variables that move it: see `moved_together`.
+        names: Names of the variables that change the distance: see `moved_together`.
     """
 
     def __init__(self, search: Search, frame: FramePair, names: Sequence[str]) -> None:
@@ -383,7 +390,7 @@ class Boxes:
         self.middle = search.ends.mean(axis=1)
         trees = [robot.tree for robot in search.robots]
         self.frames = trees[0].link_frames[frame.a], trees[1].link_frames[frame.b]
-        # B's frame as a tool, expressed in A's root frame.
+        # B's robot and frame are expressed in A's root frame.
         q = search.configurations(self.middle[np.newaxis])[1]
         base = trees[1].link_frames[search.found.base[1]]
         self.seen = search.hold @ inverse(urdfkins(search.robots[1], q, [base])[0, 0])
@@ -426,7 +433,7 @@ class Boxes:
 
 
 def tightened(search: Search, frame: FramePair, target: float, upper: float, most: int = MOST) -> float:
-    """Return a bound of a frame's distance, metres: `target` if it can be proven, else up to `upper`.
+    """Return a bound of a frame's distance, metres: `target` if it can be proven, else at most `upper`.
 
     Args:
         search: Both robots.
@@ -452,7 +459,7 @@ def tightened(search: Search, frame: FramePair, target: float, upper: float, mos
     c, h, proven = ends.mean(axis=1)[np.newaxis], (ends[:, 1] - ends[:, 0]) / 2.0, np.array([upper])
     if not np.isfinite(M).all() or 2 ** _halvings(h, M, upper) > most:
         return upper
-    if not names:  # no joint of the path changes the distance
+    if not names:  # no joint of the path changes the frame's distance
         return min(upper, float(boxes.bounds(c, h)[0]))
     while len(c) and 2 * len(c) <= most:
         i = _longest(h, M)
@@ -471,16 +478,18 @@ def tightened(search: Search, frame: FramePair, target: float, upper: float, mos
 def moved_together(
     found: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[Step], list[Pair | None]]:
-    """Return the steps to a frame, from the first that differs or shares a variable with one that does.
+    """Return the steps to a frame that can change the frame's distance.
 
-    A joint before the first difference rotates D and does not change its length. But its variable may also
-    move a mimic joint behind the difference. Then D depends on both motions, and the step is included.
+    A joint before the first difference of the models rotates D and does not change its length. However, the
+    variable of this joint may also move a mimic joint behind the difference. Then D depends on both motions,
+    and the step is included. The result begins with the first step that differs, or that shares a variable
+    with a differing step.
     """
     steps, pairs = found.path(frame.previous), [variables.pairs[i] for i in found.indices(frame.previous)]
     first = len(steps) - len(behind_first(found, variables, frame)[0])
     for i in reversed(range(first)):
         if _variables(pairs[i : i + 1]) & _variables(pairs[first:]):
-            first = i  # the steps between have variables too
+            first = i  # the steps between the two are included too
     return steps[first:], pairs[first:]
 
 
@@ -490,7 +499,7 @@ def _variables(pairs: Sequence[Pair | None]) -> set[str]:
 
 
 def _longest(h: FloatArray, M: FloatArray) -> int:
-    """Return the index of the variable that contributes most to the second-order term."""
+    """Return the index of the variable that contributes most to the second-order term of the bound."""
     return int((h * (M @ h)).argmax())
 
 

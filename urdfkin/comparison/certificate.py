@@ -22,13 +22,14 @@ from urdfkin.robot import Robot
 from urdfkin.system.documents import Count, Header, Layout, Matrix, Size, of_length, plain, says
 from urdfkin.verify.oracles import versions
 
-#: Largest number of boxes at a time when a claimed bound is proven.
+#: Largest number of boxes at a time in the proof of a claimed bound.
 MOST_AGAIN = 2**22
-#: Relative tolerance of a document's numbers between machines; absolute tolerance (m or rad) for zero.
+#: Relative tolerance for numbers of a document made on another machine, and absolute tolerance (m or rad) for
+#: zero.
 _RELATIVE, _ZERO = 1e-9, 1e-15
-#: Tolerance of a bound that is proven again, in eps of the bound: sums round differently on other machines.
+#: Tolerance of a bound that is proven again, in eps of the bound. Sums round differently on other machines.
 _LAST_BITS = 64.0
-#: Parts that follow from the alignment of the models.
+#: Parts of the document that follow from the alignment of the models.
 DERIVED = ("up_to", "remarks", "joints", "orders", "links", "base", "base_links", "rounding")
 
 
@@ -87,7 +88,7 @@ class JointEntry(TypedDict):
 
 
 class ToolEntry(TypedDict):
-    """A matched frame that counts as a different tool."""
+    """A matched frame that counts as another tool."""
 
     a: Annotated[str, says("Link of A.")]
     b: Annotated[str, says("Link of B.")]
@@ -164,7 +165,10 @@ SAME = Layout(
 
 
 def certificate(found: Sameness, command: str | None = None) -> Certificate:
-    """Return the document: map, verdict, differences and the interval of each frame; null is "no bound"."""
+    """Return the document with map, verdict, differences and the interval of each frame.
+
+    A bound that does not exist is null.
+    """
     a, b = ({"name": name, "source": source} for name, source in zip(found.names, found.sources, strict=True))
     document = {
         "schema": SAME.name,
@@ -180,7 +184,7 @@ def certificate(found: Sameness, command: str | None = None) -> Certificate:
     return cast("Certificate", plain(document))
 
 
-#: Entries with the value of the attribute of `Sameness` with the same name.
+#: Entries of the document that copy the attribute of `Sameness` with the same name.
 _TAKEN_OVER = (
     "up_to", "differences", "remarks", "joints", "links", "tools", "orders", "base", "base_links", "frames",
     "as_written", "checked",
@@ -200,10 +204,11 @@ def words_of(entry: DifferenceEntry) -> str:
 def recheck(document: Certificate, a: Robot, b: Robot) -> list[str]:
     """Return the statements of a certificate that are wrong for two models; empty if all are right.
 
-    The models are aligned as the certificate states, so no search is needed. The stated alignment must be
-    allowed: its transforms are rigid motions, its joints exist, and the axes allow its orders. All statements
-    that follow from the alignment are compared, including the remarks. Each lower bound is computed at its
-    configuration by urdfkin and by Pinocchio. Each upper bound is proven again.
+    The recheck aligns the models as the certificate states, so it needs no search. First it checks that this
+    alignment is allowed: the transforms are rigid motions, the joints exist, and the axes allow the stated
+    orders. Then it compares all statements that follow from the alignment, including the remarks. urdfkin and
+    Pinocchio both compute each lower bound at the configuration of that bound. Each upper bound is proven
+    again.
 
     Args:
         document: The result of `certificate`, or of `SAME.read`.
@@ -211,7 +216,8 @@ def recheck(document: Certificate, a: Robot, b: Robot) -> list[str]:
         b: The second model.
 
     Raises:
-        InputError: the certificate is about other texts, or names a joint or link that a model lacks.
+        InputError: the certificate is about other model texts, or names a joint or link that a model does not
+            have.
     """
     for k, robot in enumerate((a, b)):
         if (claimed := document["sha256"][k : k + 1]) != [robot.sha256]:
@@ -255,7 +261,7 @@ def _errors(document: Certificate, comparator: Comparator) -> Iterator[str]:
 
 
 def _statement_errors(document: Certificate, comparator: Comparator, said: Sameness) -> Iterator[str]:
-    """Yield the wrong statements about names, verdict, differences and everything else without a proof."""
+    """Yield the wrong statements about names, verdict, differences and other entries that need no proof."""
     models = document["a"], document["b"]
     for which, model, robot in zip("AB", models, comparator.robots, strict=True):
         if model["name"] != robot.name:
@@ -280,7 +286,7 @@ def _statement_errors(document: Certificate, comparator: Comparator, said: Samen
     )
 
 
-#: A confirmation of nothing, as data.
+#: The data of an empty confirmation, for a result that Pinocchio did not check.
 _NOTHING = plain(Confirmation())
 
 
@@ -289,7 +295,7 @@ def _place(one: DifferenceEntry) -> tuple[str, str]:
 
 
 def _same_difference(claimed: DifferenceEntry, said: DifferenceEntry, rounding: tuple[float, float]) -> bool:
-    """Return whether the values and the sizes of a difference agree, sizes within rounding."""
+    """Return whether two differences have equal values, and equal sizes within rounding."""
     return (
         all(_equal(claimed[part], said[part]) for part in ("a", "b", "detail"))
         and math.isclose(claimed["metres"], said["metres"], rel_tol=_RELATIVE, abs_tol=rounding[0])
@@ -300,7 +306,7 @@ def _same_difference(claimed: DifferenceEntry, said: DifferenceEntry, rounding: 
 def _confirmation_errors(
     claimed: Confirmed, comparator: Comparator, found: Alignment, variables: Variables
 ) -> Iterator[str]:
-    """Yield the wrong statements about Pinocchio's confirmation; a skipped check claims nothing."""
+    """Yield the wrong statements about Pinocchio's confirmation; a skipped check makes no statement."""
     if claimed["reason"].startswith(REASONS) and claimed == {**_NOTHING, "reason": claimed["reason"]}:
         return
     if claimed["reason"] or claimed["configurations"] != CONFIRMED or not claimed["by"]:
@@ -329,7 +335,7 @@ def _gauge(document: Certificate) -> Gauge:
 
 
 def _not_a_gauge(document: Certificate, gauge: Gauge, comparator: Comparator) -> str | None:
-    """Return why the stated gauge is not allowed; None if it is allowed."""
+    """Return the reason why the stated gauge is not allowed; None if it is allowed."""
     a, b = comparator.mechanisms
     for joint in document["joints"]:
         a.tree.joint_index(joint["a"])
@@ -347,7 +353,7 @@ def _not_a_gauge(document: Certificate, gauge: Gauge, comparator: Comparator) ->
 
 
 def _equal(claimed: Any, said: Any, zero: float = _ZERO) -> bool:
-    """Return whether two parts of a document are equal, numbers except for their last digits."""
+    """Return whether two parts of a document are equal; the last digits of numbers may differ."""
     if isinstance(said, dict):
         return (
             isinstance(claimed, dict)
@@ -368,7 +374,7 @@ def _equal(claimed: Any, said: Any, zero: float = _ZERO) -> bool:
 def _as_written_errors(
     claim: FrameEntry, comparator: Comparator, found: Alignment, *, sharply: bool
 ) -> Iterator[str]:
-    """Yield the wrong statements about the largest distance of a frame as written."""
+    """Yield the wrong statements about the farthest frame of the models as they are written."""
     written = comparator.as_written(found)
     variables = variables_of(written, comparator.tolerance)
     names = [
@@ -391,14 +397,15 @@ def _interval_errors(
     *,
     sharply: bool,
 ) -> Iterator[str]:
-    """Yield the wrong statements about an interval: compute its lower bound, prove its upper bounds.
+    """Yield the wrong statements about an interval: compute its lower bound, and prove its upper bounds.
 
     Args:
         search: Both robots.
         frame: The frame.
         claim: The document's statement about the frame.
-        rounding: (m, rad) that counts as zero.
-        sharply: Whether to prove an upper bound by branch and bound; useless if another part is wrong.
+        rounding: Distance and angle (m, rad) that count as zero.
+        sharply: Whether to prove an upper bound by branch and bound. This is useless if another part of the
+            certificate is wrong.
     """
     problems = list[str]()
     if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:
@@ -416,7 +423,7 @@ def _interval_errors(
     if _within(proven[1], radians, rounding[1]):
         if problems or not sharply:
             return
-        # A claimed bound below an attained distance cannot be proven.
+        # No claimed bound below an attained distance can be proven.
         attained = max(claim["lower"], float(search.seen([frame])[0].max()))
         if metres < attained - 2.0 * rounding[0]:
             yield f"{place}: its upper bound is wrong: {attained:.6g} m is attained"
@@ -430,7 +437,10 @@ def _interval_errors(
 def _not_attained(
     search: Search, frame: FramePair, claim: FrameEntry, rounding: tuple[float, float]
 ) -> Iterator[str]:
-    """Yield why a lower bound is wrong: its configurations, or the distance that a library finds there."""
+    """Yield reasons why a lower bound is wrong.
+
+    The configurations may be invalid, or a library may compute another distance there.
+    """
     place = f"frame {claim['frame']}"
     q_a, q_b = np.array([claim["q_a"]]), np.array([claim["q_b"]])
     if not search.belong_together(q_a, q_b):

@@ -1,4 +1,4 @@
-"""List the changes between two versions of a robot description, and bound how far each moves a frame."""
+"""List the changes between two versions of a robot description, and bound their effect on the frames."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from urdfkin.urdf.plain_xml import plain_xml
 from urdfkin.urdf.sources import Source
 from urdfkin.urdf.writer import to_urdf
 
-#: Attributes of several numbers, and the name of each number.
+#: Attributes that consist of several numbers, and the names of these numbers.
 _PARTS = {"xyz": ("x", "y", "z"), "rpy": ("roll", "pitch", "yaw")}
-#: Values of a joint's attributes that the file omits.
+#: Values that a joint's attributes have if the file omits them.
 _DEFAULTS = {f"origin {part}": 0.0 for parts in _PARTS.values() for part in parts}
 _AXIS = {"axis x": 1.0, "axis y": 0.0, "axis z": 0.0}
 _RULE = {"mimic multiplier": 1.0, "mimic offset": 0.0}
@@ -59,14 +59,14 @@ class Change:
 
 
 def word(value: Value | None) -> str:
-    """Return a value as text: the shortest decimal that reads back exactly, or "none"."""
+    """Return a value as text: the shortest decimal number that reads back exactly, or "none"."""
     if isinstance(value, float):
         return next(text for text in (f"{value:.15g}", repr(value)) if float(text) == value)
     return "none" if value is None else value
 
 
 def motion_words(frame: Interval, moves: str = "move", turns: str = "turn") -> str:
-    """Return in words how far changes move a frame, or how far they turn it if they do not move it."""
+    """Return words about how far changes move a frame, or how far they turn a frame that they do not move."""
     if frame.lower == 0.0:
         return f"{turns} {frame.frame} by up to {up_to(angle, frame.radians_seen, frame.radians)}"
     return f"{moves} {frame.frame} by up to {up_to(length, frame.lower, frame.upper)}"
@@ -74,7 +74,7 @@ def motion_words(frame: Interval, moves: str = "move", turns: str = "turn") -> s
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """The frame that one joint's changes move most, and how far they move it."""
+    """The frame that the changes of one joint move most, and how far this frame moves."""
 
     element: str
     interval: Interval
@@ -95,8 +95,8 @@ class Changes:
     Attributes:
         sources: The two sources, as given.
         changes: The changes: the robot's name, then joints, then links, in the order of the file.
-        effects: The effect of each joint whose changes move links, each joint alone.
-        total: The farthest frame under all changes together; None where nothing moves.
+        effects: For each joint with changes that move links, the effect of the changes of this joint alone.
+        total: The frame that all changes together move most; None if no frame moves.
     """
 
     sources: tuple[str, str]
@@ -110,7 +110,7 @@ class Changes:
 
     @property
     def effect_of(self) -> dict[str, Effect]:
-        """The effects by element."""
+        """The effects, by the name of the element."""
         return {effect.element: effect for effect in self.effects}
 
 
@@ -119,11 +119,11 @@ def diff(a: Robot | Source | DHTable, b: Robot | Source | DHTable, *, effects: b
 
     Args:
         a: The old version: a robot, or a source for `load`.
-        b: The new version, likewise.
+        b: The new version: a robot, or a source for `load`.
         effects: Whether to bound how far the changes of each joint move the frames behind it.
 
     Raises:
-        UrdfError: a version with errors; SourceError, UnknownNameError, InputError: as `load`.
+        UrdfError: a version has errors. SourceError, UnknownNameError, InputError: as for `load`.
 
     Example:
         >>> import urdfkin
@@ -157,7 +157,7 @@ def _changes(old: str, new: str) -> Iterator[Change]:
 
 
 def _facts(element: Element, tag: str) -> dict[str, Value]:
-    """Return the attributes of an element and its children: the path in words, and the value."""
+    """Return the attributes of an element and of its children: the names in words, and the values."""
     found = dict(_attributes(element, ""))
     found.pop("name", None)
     if tag == "joint":
@@ -190,7 +190,10 @@ def _value(text: str) -> Value:
 
 
 def _effect(old: Robot, new: Robot, element: str) -> Effect | None:
-    """Compute the effect of one joint's changes alone: the old robot with that joint of the new one."""
+    """Compute the effect of the changes of one joint alone.
+
+    The old robot is compared with a copy that has this joint of the new robot.
+    """
     name = element.removeprefix("joint ")
     trees = old.tree, new.tree
     if any(name not in {joint.name for joint in tree.joints} for tree in trees):
@@ -206,7 +209,7 @@ def _effect(old: Robot, new: Robot, element: str) -> Effect | None:
     try:
         changed = load(to_urdf(_with_joint(trees[0], at, joint)), verify=False)
         plain = load(to_urdf(trees[0]), verify=False)
-    except InputError:  # a model that cannot be written as a URDF again: no effect is computed
+    except InputError:  # such a model cannot be written as a URDF again, so no effect is computed
         return None
     worst = same(plain, changed).worst_as_written
     return None if worst is None else Effect(element, worst)

@@ -1,4 +1,4 @@
-"""The result of comparing two models, in numbers and words: verdict, differences, joint map, distances."""
+"""Store the result of comparing two models: verdict, differences, map of joints, and distances of frames."""
 
 from __future__ import annotations
 
@@ -22,19 +22,20 @@ from urdfkin.model.mechanisms.mechanism import JointTransform, Mechanism, Tolera
 from urdfkin.model.tree import FloatArray, Joint, KinematicTree, Mimic
 from urdfkin.system.lazy_import import hook
 
-#: Smallest number printed with a prefix (0.1 to four digits); the unit alone is used from 9 times it on.
+#: Smallest number printed with a unit prefix (0.1 to four digits). From 9 times this number on, the unit
+#: without a prefix is used.
 _TENTH, _NINE = 0.09995, 9.0
 
 
 class Verdict(Enum):
-    """Whether two models are the same, equivalent up to the kinds in `Sameness.up_to`, or different."""
+    """Whether two models are the same, the same after the changes of `Sameness.up_to`, or different."""
 
     SAME = "same"
     SAME_AFTER = "same after"
     DIFFERS = "differs"
 
 
-#: Kinds of changes up to which two models are equivalent, in the order of the headline.
+#: Kinds of changes after which two models still count as equivalent, in the order of the headline.
 FREE = ("base", "zeros", "senses", "free joints", "tools")
 #: Kinds of differences for which the distance of each common frame is still bounded.
 BOUNDED = frozenset({"axis", "place", "frame", "mimic rule", "fixed"})
@@ -42,11 +43,11 @@ BOUNDED = frozenset({"axis", "place", "frame", "mimic rule", "fixed"})
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """A question about two models.
+    """A question about two models that has the answer yes or no.
 
     Attributes:
-        within: Largest allowed distance of a frame as written, in metres and in radians. None: ask whether
-            the models are equivalent.
+        within: Largest allowed distance of a frame in the models as they are written, in metres and in
+            radians. None: the question is whether the models are equivalent.
         strict: Whether equivalent models and models with remarks count as different.
     """
 
@@ -56,15 +57,15 @@ class Question:
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """An interval that contains a frame's largest distance over all configurations within limits.
+    """An interval that contains the largest distance of a frame in two models within their limits.
 
     Attributes:
         frame: The link of A.
         frame_b: The link of B.
-        lower: Lower bound, metres; attained at `q_a` and `q_b`.
-        upper: Upper bound, metres, proven; inf where there is no bound.
-        radians: Upper bound of the angle between the orientations, proven.
-        radians_seen: An attained angle between the orientations.
+        lower: Lower bound, metres; the distance at `q_a` and `q_b`.
+        upper: Proven upper bound, metres; inf if there is no bound.
+        radians: Proven upper bound of the angle between the two orientations of the frame.
+        radians_seen: The angle between the two orientations at some configuration.
         q_a: Configuration of A.
         q_b: The corresponding configuration of B.
     """
@@ -79,7 +80,7 @@ class Interval:
     q_b: tuple[float, ...]
 
 
-#: Value of a parameter: a kind or a name, a number, the two ends of a range or several names, a mimic rule.
+#: Value of a parameter: a kind or name, a number, the two ends of a range, several names, or a mimic rule.
 Value = str | float | tuple[str | float | None, ...] | Mimic | None
 
 
@@ -91,11 +92,11 @@ class Difference:
         place: The joint or link of A, for example "joint elbow".
         what: The parameter: "axis", "place", "mimic rule", "only in A", ...
         a: Its value in A; None where the parameter has no value, such as a limit that is not there.
-        b: Its value in B, likewise.
+        b: Its value in B; None where the parameter has no value.
         radians: Size of the difference as an angle, 0 where it has none.
         metres: Size of the difference as a length, 0 where it has none.
-        detail: "alone" for an axis behind which the links agree; "converted" for limits of B in A's
-            coordinate; empty otherwise.
+        detail: "alone" if an axis differs but the links behind it agree; "converted" if limits of B are given
+            in the coordinate of A; otherwise empty.
     """
 
     place: str
@@ -162,14 +163,14 @@ def _range(ends: Value) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """A frame that counts as another tool: link `b` of B is link `a` of A moved by `pose` (4, 4)."""
+    """A frame that counts as another tool: link `b` of B is at `pose` (4, 4) in the frame of A's link `a`."""
 
     a: str
     b: str
     pose: FloatArray
 
 
-#: Beginnings of the reasons why there is no confirmation.
+#: First words of the reasons why there is no confirmation.
 REASONS = NOT_ASKED, NOT_VERIFIED = "not asked of Pinocchio: ", "not verified by Pinocchio: "
 
 
@@ -179,9 +180,9 @@ class Confirmation:
 
     Attributes:
         by: Name and version of the oracle: "Pinocchio 4.1.0".
-        configurations: Number of configurations at which it computed the distances.
+        configurations: Number of configurations at which the oracle computed the distances.
         metres: The largest of these distances.
-        reason: Why it computed none; empty if it did.
+        reason: Reason why the oracle computed no distances; empty if it did.
     """
 
     by: str = ""
@@ -200,7 +201,8 @@ class Confirmation:
 class JointMap:
     """A joint of A and its joint of B: value_b = sense * value_a + offset (rad, m).
 
-    A planar or floating joint has the sense 1 and the offset 0. It has a conversion where its pose differs.
+    A planar or floating joint has the sense 1 and the offset 0. If its pose differs between A and B, it has a
+    conversion.
     """
 
     a: str
@@ -214,14 +216,15 @@ class JointMap:
 class Sameness(Displayable):
     """Whether two models are the same robot; the result of `urdfkin.same`.
 
-    `print` and notebooks show the answer, by how much the models differ, and the reasons.
+    `print` and notebooks show the answer, the size of the difference, and the reasons.
 
     Attributes:
         names: The robots' names.
         sources: The two sources, as given.
         digests: SHA-256 of the two texts.
         verdict: `Verdict.SAME`, `SAME_AFTER` the changes in `after`, or `DIFFERS`.
-        after: The changes of B that bring it closest to A, one line each; also where the models still differ.
+        after: The changes that bring B closest to A, one line each. They are given even if the models still
+            differ after them.
         up_to: The kinds of these changes: "base", "zeros", "senses", "free joints", "tools".
         differences: The differences, ordered from the base to the tips.
         remarks: Differences that do not affect motion: limits, kinds, links of one model only.
@@ -229,16 +232,17 @@ class Sameness(Displayable):
         links: The matched links of A and B.
         tools: The matched links that count as different tools.
         orders: Runs of joints of B that were taken in another order, which their axes allow.
-        base: (4, 4) pose of B's root in A's root frame, in the zero configuration; the identity where they
+        base: (4, 4) pose of B's root in A's root frame, in the zero configuration; the identity if the two
             agree.
-        base_links: The link of A and the link of B, on the same body, relative to which poses are compared.
+        base_links: The link of A and the link of B relative to which poses are compared; both belong to the
+            same body.
         rounding: (m, rad) distance of frames that counts as rounding.
-        frames: The interval of each common link, with the changes in `after`.
-        as_written: The interval of the farthest frame without these changes; None where there are none.
-        written: (m, rad) proven bound of all common frames as written; infinite where there is no bound. Of
-            a table, only frames that have the same name in the robot count.
-        narrowed: Joints whose mimic joints leave their limits, one line each. Intervals cover the whole
-            range of the joint itself.
+        frames: The interval of each common link, after the changes in `after`.
+        as_written: The interval of the farthest frame without these changes; None if there are no changes.
+        written: (m, rad) proven bound of all common frames without these changes; infinite if there is no
+            bound. If one model is a table, only frames with the same name in both models count.
+        narrowed: Joints with mimic joints that leave their limits, one line for each joint. The intervals
+            cover the whole range of such a joint itself.
         checked: Pinocchio's confirmation, or the reason why there is none.
         trees: The two robot models.
 
@@ -285,7 +289,7 @@ class Sameness(Displayable):
 
     @property
     def worst(self) -> Interval | None:
-        """The frame with the largest bound of its distance, or of its angle; None if all are rounding.
+        """The frame with the largest bound of its distance, or else of its angle; None if all are rounding.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -301,7 +305,7 @@ class Sameness(Displayable):
 
     @property
     def worst_as_written(self) -> Interval | None:
-        """The frame with the largest bound at equal coordinates, without the changes in `after`.
+        """The interval of the farthest frame at equal coordinates, without the changes in `after`.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -311,10 +315,11 @@ class Sameness(Displayable):
         return self.as_written or self.worst
 
     def within(self, most: float) -> bool:
-        """Return whether all common frames provably stay within a distance (m and rad) as written.
+        """Return whether all common frames are proven to be within a distance (m and rad) of each other.
 
-        The roots coincide, and equal coordinates are compared. So a different base, zero or tool counts.
-        The result is False if a joint has another kind or exists in one model only.
+        The models are compared as they are written: with coinciding roots and at equal coordinates. A
+        different base, zero or tool therefore counts as a difference. The result is False if a joint has
+        another kind or exists in one model only.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -352,7 +357,8 @@ class Sameness(Displayable):
     def to_b(self, q: ArrayLike) -> FloatArray:
         """Return B's configurations (..., nq) for A's configurations (..., nq).
 
-        There both models have the same poses, except for `base`. Coordinates of B alone are neutral.
+        At these configurations both models have the same poses, except for `base`. Coordinates that only B
+        has are neutral.
 
         Raises:
             InputError: q does not have A's length.
@@ -398,7 +404,7 @@ def length(metres: float) -> str:
 
 
 def up_to(words: Callable[[float], str], lower: float, upper: float) -> str:
-    """Return an interval as text: the attained value, and the proven bound where its text differs.
+    """Return an interval as text: the attained value, and the proven bound if its text is different.
 
     >>> up_to(length, 0.025, 0.025), up_to(angle, 0.4297, 0.4327), up_to(length, 1.0, math.inf)
     ('25 mm', '429.7 mrad (at most 432.7 mrad)', '1 m (without bound)')
@@ -430,7 +436,7 @@ def _with_prefix(value: float, unit: str) -> str:
 
 
 def demand_joint_names(tree: KinematicTree, names: list[str], which: str) -> None:
-    """Raise UnknownNameError if no joint has a name, and InputError if a name occurs twice."""
+    """Raise UnknownNameError if a name is not that of a joint, and InputError if a name occurs twice."""
     for name in names:
         tree.joint_index(name)
     if len(set(names)) < len(names):
@@ -439,7 +445,7 @@ def demand_joint_names(tree: KinematicTree, names: list[str], which: str) -> Non
 
 
 def put_right(found: Alignment, rounding: Tolerance, *, tables: bool = False) -> tuple[tuple[str, str], ...]:
-    """Return the changes that turn B into A: a kind of `result.FREE` and a line each. Correct the tools.
+    """Correct the tools, and return the changes that turn B into A: for each, a kind of `FREE` and a line.
 
     Args:
         found: The alignment of the models; differing tools are corrected in it.
@@ -477,24 +483,25 @@ def put_right(found: Alignment, rounding: Tolerance, *, tables: bool = False) ->
 
 
 def _tools_put_right(found: Alignment, rounding: Tolerance, *, tables: bool) -> Iterator[tuple[str, str]]:
-    """Treat frames without children and frames around the base as tools; yield a line for each."""
+    """Treat frames without children and frames around the base as tools; yield a line for each tool."""
     around, links = _around(found), (found.a.tree.links, found.b.tree.links)
     for k, frame in enumerate(found.frames):
         beside = (frame.a, frame.b) in around
         if frame.differs and (beside or tables or _is_tool(found, frame)):
             found.frames[k] = frame.put_right()
             if beside and rounding.holds(*apart(found.a.homes[frame.a], found.b.homes[frame.b])):
-                continue  # its pose in the root frame is unchanged: the line about the base is enough
+                continue  # its pose in the root frame is unchanged, so the line about the base is enough
         if (tool := found.frames[k].tool) is not IDENTITY:
             moved = pose_words(tool, rounding)
             yield "tools", f"frame {links[1][frame.b]} is A's {links[0][frame.a]} moved by {moved}"
 
 
 def _around(found: Alignment) -> set[tuple[int, int]]:
-    """Return the common frames on the fixed body whose pose only states where the robot is mounted.
+    """Return the common frames on the root body with a pose that only describes the mounting of the robot.
 
-    These are links before all links that carry moving joints. They are also links without moving joints
-    whose pose in the root frame is the same in both models, such as a world or a table.
+    There are two kinds. One kind is a link between the root and the first link to which a moving joint is
+    attached. The other kind is a link, such as a world or a table, that carries no moving joint and has the
+    same pose in the root frame of both models.
     """
     if found.a.body_of[found.base[0]] or found.b.body_of[found.base[1]]:
         return set()
@@ -512,9 +519,10 @@ def _around(found: Alignment) -> set[tuple[int, int]]:
 
 
 def _beside_the_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
-    """Return the links of the root body before all moving joints, and those that carry no moving joint.
+    """Return the links of the root body that lead to all moving joints, and those that lead to none.
 
-    Both sets are empty if no joint moves.
+    A link of the first set has a fixed child link from which all moving joints descend. From a link of the
+    second set no moving joint descends. Both sets are empty if no joint moves.
     """
     tree = mechanism.tree
     carried = [0] * len(tree.links)
@@ -585,7 +593,7 @@ def differences(found: Alignment, variables: Variables) -> tuple[Difference, ...
 
 
 def _of_the_pair(found: Alignment, tree_a: KinematicTree, tree_b: KinematicTree, link: str) -> bool:
-    """Return whether the bodies of a common link are also common; otherwise a joint is reported already."""
+    """Return whether the bodies of a common link also match; otherwise a joint is already reported."""
     alone_a = {found.a.body_of[j + 1] for j in found.only_a}
     alone_b = {found.b.body_of[j + 1] for j in found.only_b}
     return (
@@ -595,7 +603,7 @@ def _of_the_pair(found: Alignment, tree_a: KinematicTree, tree_b: KinematicTree,
 
 
 def _carrier(tree: KinematicTree, link: str) -> str:
-    """Return the last moving joint before a link, in words."""
+    """Return words that name the last moving joint before a link."""
     path = [tree.joints[i] for i in tree.path(tree.link_index(link)) if tree.joints[i].kind.nv]
     return f"joint {path[-1].name}" if path else "the base"
 
@@ -622,7 +630,7 @@ def _of_step(found: Alignment, variables: Variables, i: int) -> list[Difference]
 
 
 def _beyond(one: Step | FramePair, rounding: Tolerance) -> tuple[float, float]:
-    """Return the tilt (rad) and the shift (m) of a joint or frame, each 0 where it is rounding."""
+    """Return the tilt (rad) and the shift (m) of a joint or frame between the models; rounding becomes 0."""
     return one.tilt if one.tilt > rounding.angle else 0.0, one.shift if one.shift > rounding.way else 0.0
 
 

@@ -51,11 +51,12 @@ from urdfkin.verify.sampling import checked_choice
 
 #: Configurations at which Pinocchio checks the distances.
 CONFIRMED = 8
-#: Number of frames, farthest at random configurations, among which the farthest one is searched.
+#: Number of frames among which the farthest one is searched: those that are farthest apart at random
+#: configurations.
 FARTHEST = 4
-#: Longest path, metres: squares of longer lengths overflow.
+#: Longest allowed path, metres; squares of longer lengths overflow.
 LONGEST = 1e150
-#: Ratio of a bound to the distance found at which the bound needs no improvement.
+#: A bound needs no improvement if its ratio to the distance found is at most this number.
 NEAR = 1.05
 
 
@@ -71,19 +72,20 @@ def same(
     """Decide and prove whether two models move alike in every configuration.
 
     By the product of exponentials T(q) = exp(S_1 q_1) ... exp(S_n q_n) H, the motion of a link depends on the
-    screws S_i of the joints and on the link's pose H in the zero configuration. If these agree, two models
-    move alike for all q. The models may still differ in the base's pose, fixed links, joint zeros and senses,
-    names, the order of coordinates, and tool frames.
+    screws S_i of the joints and on the link's pose H in the zero configuration. If the screws and poses of
+    two models agree, the models move alike for all q. The models may still differ in the base's pose, fixed
+    links, joint zeros and senses, names, the order of coordinates, and tool frames.
 
     Args:
         a: A robot, or a source for `load`.
-        b: The other robot, likewise.
-        map: Names of joints of `a` and of their joints in `b`, where names and axes do not decide.
+        b: The other robot, or a source for `load`.
+        map: Names of joints of `a`, each with the name of its joint in `b`. Needed where names and axes do
+            not determine the pairs.
         bounds: Whether to bound the largest distances; this takes most of the time where models differ.
-        boxes: Largest number of boxes of configurations at a time, for sharper bounds where many things
-            differ; 0: no boxes.
-        within: Distance (metres and radians) that you will pass to `Sameness.within`; the boxes are then
-            used to prove it.
+        boxes: Largest number of boxes of configurations at a time. Boxes give sharper bounds if the models
+            differ in many places; 0: no boxes.
+        within: Distance (metres and radians) that you will pass to `Sameness.within`. The boxes are then used
+            to prove that all frames are within this distance.
 
     Returns:
         The verdict, the map of joints and links, the differences, and for every frame an interval that
@@ -109,7 +111,7 @@ def same(
         within = real_number(within, "within")
     for which, robot, names in (("A", robots[0], list(given)), ("B", robots[1], list(given.values()))):
         demand_joint_names(robot.tree, names, which)
-    # Copies with ledgers of their own: results computed here are not counted as the user's results.
+    # The copies have separate ledgers, so results computed here are not counted as the user's results.
     return Comparator((copy(robots[0]), copy(robots[1])), given, bounds, boxes, within).judged()
 
 
@@ -138,10 +140,10 @@ class Comparator:
 
     Args:
         robots: A and B.
-        given: Names of joints of A and of their joints in B.
+        given: Names of joints of A, each with the name of its joint in B.
         bounds: Whether to bound the largest distances.
         boxes: Largest number of boxes of configurations at a time.
-        within: Distance (metres and radians) to prove first; None: none.
+        within: Distance (metres and radians) that is proven first; None: no distance.
     """
 
     def __init__(
@@ -189,9 +191,9 @@ class Comparator:
         return replace(said, frames=frames, as_written=as_written, written=most, checked=checked)
 
     def said(self, found: Alignment, variables: Variables) -> Sameness:
-        """Return the result that follows from the alignment: everything except intervals and confirmation.
+        """Return the result that follows from the alignment, without intervals and without confirmation.
 
-        This also corrects the tools in `found`: frames without children that differ.
+        The method also corrects the tools in `found`. Tools are frames without children that differ.
         """
         names = tuple([joint.name for joint in tree.joints] for tree in self.trees)
         links = self.trees[0].links, self.trees[1].links
@@ -232,10 +234,11 @@ class Comparator:
         )
 
     def as_written(self, found: Alignment) -> Alignment:
-        """Return the alignment of the same joints and links without any change: root on root.
+        """Return the alignment of the same joints and links without any change, with coinciding roots.
 
         If only one model has the name of the other's root link, the two links of that name coincide instead.
-        Of a table, only links with equal names count; its other frames depend on its convention.
+        If one model is a table, only links with equal names count, because the other frames depend on its
+        convention.
         """
         a, b = self.mechanisms
         gauge = replace(AS_WRITTEN, X=base_as_written(a, b), orders=found.b.orders)
@@ -251,7 +254,7 @@ class Comparator:
         return [(a, b) for a, b in pairs if not tables or links[0][a] == links[1][b]]
 
     def _check_map(self, found: Alignment) -> None:
-        """Raise InputError for a pair of the given map that is not possible."""
+        """Raise InputError if the given map contains a pair of joints that cannot be matched."""
         made = found.names
         for ours, theirs in self.given.items():
             if made.get(ours) != theirs:
@@ -267,9 +270,9 @@ class Comparator:
         return Search(self.robots, found, variables)
 
     def rounding(self, found: Alignment, variables: Variables) -> tuple[float, float]:
-        """Return (m, rad) that all ignored rounding can add up to, step by step.
+        """Return the distance and angle (m, rad) to which all ignored rounding can add up along the joints.
 
-        A joint without limits counts with the range in which it is sampled.
+        For a joint without limits, the range counts in which the joint is sampled.
         """
         ways = [
             max(abs(end) for end in ends)
@@ -308,7 +311,7 @@ class Comparator:
     def _most(
         self, written: Alignment, variables: Variables, farthest: Interval | None
     ) -> tuple[float, float]:
-        """Return the bound (m, rad) of all frames; sharpen it only if `within` needs it."""
+        """Return the bound (m, rad) of all frames; sharpen it only if this is needed to prove `within`."""
         metres, radians = self.rounding(written, variables)
         uppers = self._uppers(written, variables)
         target = 0.0 if self.within is None else self.within - metres
@@ -318,7 +321,7 @@ class Comparator:
         return most[0] + metres, most[1] + radians
 
     def _uppers(self, found: Alignment, variables: Variables) -> list[tuple[float, float]]:
-        """Return the bound (m, rad) of each frame, on a finer grid for the largest ones."""
+        """Return the bound (m, rad) of each frame; compute the largest bounds on a finer grid."""
         frames = found.frames
         uppers = [upper_bounds(found, variables, frame) for frame in frames]
         off = [k for k, upper in enumerate(uppers) if max(upper) > 0.0]
@@ -331,7 +334,7 @@ class Comparator:
     def _sharpen(
         self, uppers: list[tuple[float, float]], frames: Sequence[FramePair], search: Search, target: float
     ) -> None:
-        """Prove that no frame is off by more than a target (m), the largest bound first, with boxes."""
+        """Prove with boxes that no frame is off by more than a target (m), in descending order of bounds."""
         for _ in uppers:
             widest = max(range(len(uppers)), key=lambda k: uppers[k])
             if uppers[widest][0] <= target:
@@ -349,7 +352,7 @@ class Comparator:
         search = self.search(found, variables)
         off = search.seen(found.frames)[0].max(axis=0)
         far = [found.frames[k] for k in np.argsort(-off, kind="stable")[:FARTHEST]]
-        if off.max() <= metres:  # no position differs: take the largest angle
+        if off.max() <= metres:  # no position differs: take the frame with the largest angle
             far = [max(found.frames, key=lambda frame: upper_bounds(found, variables, frame)[1])]
         climbed = zip(search.worst(far), far, strict=True)
         seen, frame = max(climbed, key=lambda both: both[0][0])
@@ -378,7 +381,7 @@ class Comparator:
         return Interval(*names, lower, *upper, turned, tuple(q_a[0].tolist()), tuple(q_b[0].tolist()))
 
     def _confirm(self, found: Alignment, variables: Variables, frames: tuple[Interval, ...]) -> Confirmation:
-        """Check the bounds with Pinocchio, which reads both texts itself, at some configurations."""
+        """Check the bounds with Pinocchio at some configurations; Pinocchio reads both texts itself."""
         if not all(checked_choice(robot.verifier.policy) for robot in self.robots):
             return Confirmation(reason=f"{NOT_ASKED}loaded with verify=False")
         for robot in self.robots:
@@ -403,12 +406,12 @@ class Comparator:
 
 
 def _largest(bounds: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Return the largest of all metres and the largest of all radians."""
+    """Return the largest bound in metres and the largest bound in radians."""
     return max((way for way, _ in bounds), default=0.0), max((turn for _, turn in bounds), default=0.0)
 
 
 def _fixed_here(tree: KinematicTree, other: KinematicTree) -> set[int]:
-    """Return the fixed joints of a tree that move in the other one, by joint name or by child link."""
+    """Return the fixed joints of a tree that move in the other tree, matched by joint or child link name."""
     moving = {joint.name for joint in other.joints if joint.kind.nv}
     ours = {joint.name for joint in tree.joints if joint.kind.nv}
     children = {
@@ -434,7 +437,7 @@ def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
 
 
 def parse_map(words: tuple[str, ...]) -> dict[str, str]:
-    """Parse several NAME=NAME; raise InputError for a word of another form."""
+    """Parse words of the form NAME=NAME; raise InputError for a word of another form."""
     return dict(_pairs(words))
 
 

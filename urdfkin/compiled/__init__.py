@@ -1,8 +1,9 @@
-"""The textbook's recursion (sections 7.4 and 7.7), written once and compiled, for batches.
+"""The textbook's recursion (sections 7.4 and 7.7), compiled to compute batches.
 
-Numba reads settings from a file `.numba_config.yaml` in the current folder, when it is imported and before
-each compilation. One of them is the folder of its cache, whose files are executed. To avoid that, this
-package reads Numba's settings from the environment only, unless a program imported Numba before.
+Numba reads its settings from a file `.numba_config.yaml` in the current folder, when Numba is imported and
+before each compilation. One setting is the folder of Numba's cache, and Numba executes the files of this
+folder. A file in the current folder could therefore run foreign code. To avoid this, this package makes Numba
+read its settings from the environment only, unless the program imported Numba before this package.
 """
 
 from __future__ import annotations

@@ -1,15 +1,17 @@
-"""Axes in which the recursion expresses vectors: the world's, as in the textbook, or each link's own.
+"""Selection of the axes in which the recursion expresses vectors: world axes or each link's own axes.
 
-A rotation R takes vectors from a link's axes to the world's. The joint axis and the interorigin vector are
-constant in the link's axes.
+The textbook uses world axes.
 
-| axes | joint axis and interorigin vector | motion of the previous link |
+The rotation R of a link converts components in the link's axes to components in world axes. The joint axis
+and the interorigin vector have constant components in the link's axes.
+
+| axes | joint axis and interorigin vector | velocities and accelerations of the previous link |
 |---|---|---|
 | world | rotated by R | unchanged |
 | link's own | constant: (0, 0, 1) and a constant vector | rotated to the next link's axes |
 
-Results are computed in the axes in which they are requested. A rotation at the end would add the rounding of
-a second rotation.
+The recursion uses the axes in which the result is requested. A conversion of the result to other axes would
+add the rounding errors of another rotation.
 """
 
 from __future__ import annotations
@@ -20,23 +22,23 @@ from urdfkin.compiled.compiling import compiled
 
 @compiled
 def link_axes(own, world):
-    """Select the link's own axes."""
+    """Return the vector expressed in the link's own axes, the first of the two arguments."""
     return own
 
 
 @compiled
 def world_axes(own, world):
-    """Select the world's axes."""
+    """Return the vector expressed in world axes, the second of the two arguments."""
     return world
 
 
 @compiled
 def seen(axes, R, x):
-    """Express a vector of a link in the axes of the recursion."""
+    """Express x, given in a link's own axes, in world axes or in the link's axes, as `axes` selects."""
     return axes(x, eq.rotate(R, x))
 
 
 @compiled
 def seen_after(axes, S, x):
-    """Express a vector of the motion after its frame is rotated by S."""
+    """Express a velocity or acceleration x after the link's axes are rotated by S; world axes stay fixed."""
     return axes(eq.rotate(eq.transposed(S), x), x)

@@ -1,6 +1,7 @@
 """Compute a batch with several threads.
 
-Configurations are independent: results have the same bits for any number of threads.
+Each configuration is computed independently of the others. The results therefore have the same bits for any
+number of threads.
 """
 
 from __future__ import annotations
@@ -18,16 +19,17 @@ from urdfkin.model.tree import FloatArray
 #: Smallest batch for several threads by default; starting a thread costs about ten microseconds.
 _WORTH_THREADS = 4096
 
-#: Number of rows that NumPy computes at a time, so that intermediate results fit into a cache.
+#: Number of rows that NumPy computes at a time, so that the intermediate results fit into the processor's
+#: cache.
 PART = 2048
 
-#: Computes rows of inputs into rows of an output, (inputs, out); returns 1 for an input that is not ordinary,
-#: else 0.
+#: A function (inputs, out) that computes the rows of `out` from the rows of the inputs. It returns 1 if an
+#: input is not ordinary (`urdfkin.compiled.memory.ordinary`), else 0.
 Compute = Callable[[Sequence[FloatArray], FloatArray], int]
 
 
 def default_threads(n: int) -> int:
-    """Return the number of processors that this process may use, for large batches; 1 for small ones."""
+    """Return the default number of threads: 1 for a small batch, else all processors this process may use."""
     return _processors() if n >= _WORTH_THREADS else 1
 
 
@@ -39,12 +41,12 @@ def _processors() -> int:
 
 
 def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, threads: int | None) -> int:
-    """Compute `out` (n, ...) from `inputs`, each (n, ...) or (1, ...); return 1 if any is not ordinary.
+    """Compute `out` (n, ...) from `inputs`, each (n, ...) or (1, ...); return 1 if an input is not ordinary.
 
     Args:
         compute: The computation; it must release the interpreter's lock.
-        inputs: C-contiguous.
-        out: C-contiguous.
+        inputs: C-contiguous arrays.
+        out: C-contiguous array.
         threads: Largest number of threads; None for `default_threads`.
 
     Raises:
@@ -65,7 +67,7 @@ def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> N
     """Compute `n` rows with NumPy, part by part, so that the memory for intermediate results stays constant.
 
     Args:
-        compute: Computes some rows. An empty batch is one empty part.
+        compute: Computes the rows of a slice. For an empty batch it is called once, with an empty slice.
         n: Number of rows.
         threads: Largest number of threads, as in `in_blocks`.
 
@@ -84,14 +86,14 @@ def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> N
     if len(shares) == 1:
         return compute_all(parts)
     work = [_pool().submit(compute_all, share) for share in shares]
-    wait(work)  # before an error is raised, all threads have finished writing
+    wait(work)  # an error is raised only after all threads have finished writing
     for future in work:
         future.result()
     return None
 
 
 def _parts(n: int, threads: int) -> list[tuple[int, int]]:
-    """Cut `n` rows at block boundaries into at most `threads` runs of one block or more."""
+    """Split `n` rows at block boundaries into at most `threads` parts; each part has at least one block."""
     blocks = n // LANES
     edges = [*(LANES * (blocks * i // threads) for i in range(threads)), n]
     return [(a, b) for a, b in pairwise(edges) if a < b]

@@ -1,8 +1,9 @@
 """The acceleration of a frame as a sum of contributions by joint and kind.
 
-Sections 7.6 and 7.7. Relative to link k-1, the frame moves about or along the axis of joint k, with velocity
-u_k = v_k z x d (or v_k z). Link k-1 itself rotates with w_{k-1}. This is a moving point in a moving frame,
-and 7.125 names its terms. Summed over the joints, from the last joint inwards, they give 7.130:
+This module follows sections 7.6 and 7.7. Consider joint k, with all later joints fixed. Relative to link k-1,
+the frame's origin then moves about or along the axis of joint k, with velocity u_k = v_k z x d (or v_k z).
+Link k-1 itself rotates with w_{k-1}. The origin is thus a moving point in a moving frame, and 7.125 gives the
+terms of its acceleration. The sum of these terms over all joints, from the last joint to the first, is 7.130:
 
 | kind | term | cause |
 |---|---|---|
@@ -11,13 +12,13 @@ and 7.125 names its terms. Summed over the joints, from the last joint inwards, 
 | coriolis | 2 w_{k-1} x u_k | velocity of the joint while its link rotates |
 | sliding | a_k z | acceleration of a prismatic joint |
 
-The vector d leads from the joint's origin to the frame. It is the sum of the interorigin vectors behind the
-joint, as in 7.110: a difference of two positions would lose digits far from the world's origin and behind a
-long link.
+The vector d leads from the joint's origin to the frame's origin. It is computed as the sum of the interorigin
+vectors after the joint, as in 7.110. A difference of two positions would lose digits if the robot is far from
+the world's origin or has a long link.
 
-The angular rows are those of 7.129: a_k z, and v_k w_{k-1} x z under coriolis. A planar or floating joint
-translates and rotates at once, along axes that rotate with it. Its linear velocity s then adds o x s under
-coriolis, with its own angular velocity o.
+The angular rows follow from 7.129: a_k z under transverse, and v_k w_{k-1} x z under coriolis. A planar or
+floating joint translates and rotates at the same time, and its axes of translation rotate with it. Let s be
+the joint's linear velocity and o its angular velocity. Such a joint then adds o x s under coriolis.
 """
 
 from __future__ import annotations
@@ -106,7 +107,10 @@ class AccelerationBreakdown(Displayable):
 
 
 class _Moves(NamedTuple):
-    """Linear and angular part (n, 3) of a joint's motion relative to its parent link, in world axes."""
+    """Linear and angular part (n, 3) of a joint's velocity or acceleration, in world axes.
+
+    Both are relative to the joint's parent link.
+    """
 
     slide: FloatArray
     turn: FloatArray
@@ -185,7 +189,7 @@ def _contributions(
     base: FloatArray,
     terms: FloatArray,
 ) -> FloatArray:
-    """Fill in the terms; return the base's contribution. Joint k of the path carries link k + 1."""
+    """Fill in the terms; return the base's contribution. Joint k of the path moves link k + 1 of the path."""
     path = tree.path(link)
     Ts = placements(plan, q, base=base, threads=1)
     velocity = velocities(plan, q, v, base=base, threads=1)
@@ -218,7 +222,7 @@ def _levers(tree: KinematicTree, path: Sequence[int], q: FloatArray, Rs: FloatAr
 
 
 def _slide(joint: Joint, q: FloatArray) -> FloatArray:
-    """Return a joint's displacement (n, 3) in its own axes; its coordinates come first in q."""
+    """Return the displacement (n, 3) of a joint in the joint's axes; q begins with the displacement."""
     slide = np.zeros((len(q), 3))
     if joint.kind is JointKind.PLANAR:
         slide[:, :2] = q[:, :2]
@@ -259,7 +263,7 @@ def _moves(joint: Joint, x: FloatArray, R: FloatArray) -> _Moves:
 
 
 def _rigid(base: FloatArray, d: FloatArray) -> FloatArray:
-    """Return the acceleration of a point fixed to the base, at d from its origin (7.123)."""
+    """Return the acceleration of a point fixed to the base; d leads from the base's origin to it (7.123)."""
     w, alpha, a = base[:, 12:15], base[:, 18:21], base[:, 21:24]
     linear = eq.point_acceleration(a, alpha, w, d)
     return np.concatenate((linear, np.broadcast_to(alpha, linear.shape)), axis=-1)

@@ -1,4 +1,4 @@
-"""The textbook's equations, compiled for each kind of number that they are called with."""
+"""The textbook's equations as compiled functions; Numba compiles them for each type of argument."""
 
 from __future__ import annotations
 

@@ -1,15 +1,18 @@
 """Compile kernels with Numba and cache them on disk.
 
-Cache. Each machine compiles a kernel once. The name of the cache folder contains a digest of every source
-file of `compiled` and of `kinematics`, because kernels consist of functions from all of them. Numba's own
-cache files have no digest: a truncated file stops every later run, and a changed bit is executed. Here each
-file has a digest. A damaged file is compiled again; without a writable folder, nothing is cached.
+Cache. Each machine compiles a kernel once. The name of the cache folder contains a digest of all source files
+of `compiled` and `kinematics`, because a kernel may use functions of any of these files. Numba's own cache
+files have no digest: a truncated file makes every later run fail, and a changed bit is executed. Here each
+cache file has a digest. If a cache file is damaged, its kernel is compiled again. If no folder is writable,
+nothing is cached.
 
-Parts. A function that is only a part of kernels is inlined and never called by itself. It needs no machine
-code, no optimization before it is inlined, and no passes for closures, `with`, literal loops, inlining by
-Numba, or rewriting of array expressions. Skipping them halves the compile time.
+Parts. A part is a function that only other compiled functions call. It is inlined and never called by itself,
+so it needs no machine code of its own and no optimization before it is inlined. It also needs none of Numba's
+passes for closures, `with`, literal loops, inlining by Numba, or rewriting of array expressions. Skipping
+these passes halves the compile time.
 
-Events. Compiling takes seconds, reading from disk almost no time. Listeners are informed of each compilation.
+Events. Compiling a kernel takes seconds; reading it from disk takes almost no time. Listeners are functions
+that are called at the beginning and at the end of each compilation.
 """
 
 from __future__ import annotations
@@ -49,7 +52,7 @@ Listener = Callable[[str, float | None], None]
 
 
 def _log(name: str, seconds: float | None) -> None:
-    """Log one warning in each process, which goes to standard error by default."""
+    """Log a warning, once in each process; by default it is printed to standard error."""
     if seconds is None and not _logged:
         _logged.append(name)
         logging.getLogger("urdfkin").warning(
@@ -64,7 +67,7 @@ _listeners: list[Listener] = [_log]
 
 @contextmanager
 def listen_to_compile_events(listener: Listener) -> Iterator[None]:
-    """Send compile events to `listener` only, while the context is open."""
+    """Send all compile events to `listener`, and to no other listener, while the context is open."""
     _listeners.append(listener)
     try:
         yield
@@ -74,7 +77,7 @@ def listen_to_compile_events(listener: Listener) -> Iterator[None]:
 
 @contextmanager
 def compile_event(name: str) -> Iterator[Callable[[], None]]:
-    """Report a compilation. The context yields a function that must be called if a compilation begins."""
+    """Report a compilation to the listener. The context yields a function; call it when compiling begins."""
     begun: list[float] = []
 
     def missed() -> None:
@@ -92,11 +95,11 @@ _dumps: Any = dumps
 
 
 class KernelCache(_Null):  # type: ignore[misc]
-    """Numba's cache of one function, used before and after its compilation.
+    """Numba's cache of one function: Numba reads it before a compilation and writes it afterwards.
 
-    The folder's name stands for the sources that all kernels share. A file's name stands for the function,
-    its own source file (which may be elsewhere), its argument types and the processor. `missed` is called if
-    no file is usable.
+    The folder's name contains a digest of the source files that all kernels share. A file's name depends on
+    the function, on its own source file (which may be in another package), on its argument types and on the
+    processor. The function `missed` is called if the cache has no usable file.
     """
 
     def __init__(self, function: Callable[..., int], folder: Path, missed: Callable[[], None]) -> None:
@@ -110,14 +113,14 @@ class KernelCache(_Null):  # type: ignore[misc]
         if (content := get(place)) is not None:
             try:
                 return _Result._rebuild(target_context, *pickle.loads(content))
-            except Exception as error:  # complete, but from another version: any error is possible
+            except Exception as error:  # an undamaged file of another version can cause any error
                 report_damaged(place, f"{type(error).__name__}: {error}")
         self._missed()
         return None
 
     def save_overload(self, sig: Any, cres: Any) -> None:
         """Write the compiled result to the cache."""
-        if not cres.library.has_dynamic_globals:  # these are addresses of this process
+        if not cres.library.has_dynamic_globals:  # dynamic globals are addresses of this process
             put(self._place(sig, cres.library.codegen), _dumps(cres._reduce()))
 
     def _place(self, signature: Any, codegen: Any) -> Path:
@@ -138,7 +141,7 @@ _register: Any = register_pass
 
 
 class _Part(_Library):  # type: ignore[misc]
-    """LLVM code of a function, to be linked into a kernel together with the functions that it calls."""
+    """LLVM code of a part, which is linked into a kernel together with the functions that the part calls."""
 
     def finalize(self) -> None:
         """Complete the library without machine code of its own."""
@@ -147,7 +150,7 @@ class _Part(_Library):  # type: ignore[misc]
 
     @property
     def all(self) -> list[Any]:
-        """This library and those of all functions that it calls."""
+        """This library and the libraries of all functions that the part calls."""
         return [self, *dict.fromkeys(self._linking_libraries)]
 
 
@@ -160,7 +163,7 @@ class _PartLowering(_Lowering):  # type: ignore[misc]
         state.library = _Part(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         super().run_pass(state)
-        # Numba registers functions by the pointers that Python would call; a part has none.
+        # Numba registers a function by the pointer that Python calls; a part has no such pointer.
         what, environment = state.cr.fndesc, state.cr.env
         handle = make_function(what.lookup_module(), what.qualname, "", 0, environment, (state.library,))
         state.targetctx.insert_user_function(handle, what, state.library.all)
@@ -195,9 +198,10 @@ class PartCompiler(_Compiler):  # type: ignore[misc]
 
 _config: Any = numba.config  # settings that numba sets at run time
 
-#: Options of every compiled function. Nothing is reordered, and only explicit products are fused (`numbers`):
-#: results must not depend on the compiler's choices. Division by zero gives inf as in C, so that loops
-#: contain no branch that raises. Nothing is allocated, so arrays need no reference counts.
+#: Options of every compiled function. The compiler must not reorder operations, and it fuses a product and a
+#: sum only where `numbers` requests it, so that results do not depend on the compiler. Division by zero gives
+#: inf as in C, so that loops contain no branch that raises an error. The functions allocate no memory, so
+#: their arrays need no reference counts.
 COMPILED: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 #: Options of a part, which is only inlined: no entry point for Python or C.
 _PART: dict[str, Any] = {
@@ -210,7 +214,7 @@ _PART: dict[str, Any] = {
 
 @contextmanager
 def compiling_allowed() -> Iterator[None]:
-    """Allow compilation even with NUMBA_DISABLE_JIT, which is meant for functions that Python could run."""
+    """Allow compilation even with NUMBA_DISABLE_JIT, because Python cannot run these functions uncompiled."""
     before, _config.DISABLE_JIT = _config.DISABLE_JIT, 0
     try:
         yield
@@ -219,10 +223,11 @@ def compiling_allowed() -> Iterator[None]:
 
 
 def _skip_blas_check() -> None:
-    """Prevent Numba from importing SciPy's linear algebra for a check, a fifth of a command's time.
+    """Prevent Numba from importing SciPy's linear algebra for a check.
 
-    No kernel calls linear algebra. Compiled code that does imports and checks it as usual. If a version of
-    Numba has this check elsewhere, this function has no effect.
+    The import takes a fifth of a command's time. No kernel calls linear algebra. Other compiled code that
+    calls it still imports and checks it. If a version of Numba makes this check in another function,
+    `_skip_blas_check` has no effect.
     """
     if "numba.np.arraymath" in sys.modules or find_spec("scipy") is None:
         return
@@ -236,7 +241,7 @@ def _skip_blas_check() -> None:
 
 
 def jitted(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Return Numba's decorator with the options of this package and the given ones."""
+    """Return Numba's decorator with the options of this package and the given options."""
 
     def decorate(function: Callable[..., Any]) -> Any:
         with compiling_allowed():
@@ -248,14 +253,15 @@ def jitted(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 #: Decorator for functions that are parts of kernels.
 compiled = jitted(**_PART)
 
-# Inputs may be read-only; a writable array converts without a copy. So one signature is enough.
+# An input array may be read-only. Numba passes a writable array to this signature without a copy, so the
+# kernels need no second signature.
 NUMBERS = types.Array(types.float64, 1, "C", readonly=True)
 ROWS = types.Array(types.float64, 2, "C", readonly=True)
 PLACES = types.Array(types.int64, 1, "C", readonly=True)
 SCRATCH = types.Array(types.float64, 1, "C")
 
-#: Kernels are compiled one after the other, as in Numba. A fork waits for the current compilation, because
-#: the child process could not finish it.
+#: Only one kernel is compiled at a time, as in Numba. A fork waits until the current compilation has
+#: finished, because the child process could not finish it.
 _compiling = lock_over_forks()
 
 
@@ -273,8 +279,8 @@ class Kernel:
         self.__doc__, self.__name__ = function.__doc__, function.__name__
 
     def __getattr__(self, name: str) -> Any:
-        # Called for attributes that do not exist yet. Before Python 3.12 a cached property has a lock of its
-        # own, which could be locked forever in a forked child.
+        # Python calls this for attributes that do not exist yet. A cached property is no alternative: before
+        # Python 3.12 it has a lock of its own, which could stay locked forever in a forked child process.
         if name != "compiled":
             raise AttributeError(name)
         with _compiling:
@@ -304,9 +310,10 @@ class Kernel:
 
 
 class Core(Kernel):
-    """A function of addresses, with C's calling convention.
+    """A compiled function that takes addresses and has C's calling convention.
 
-    Kernels call it, and Python by ctypes. Python calls it without the interpreter's lock.
+    Kernels call this function directly. Python calls it through ctypes, which releases the interpreter's
+    lock.
     """
 
     def __init__(self, function: Callable[..., int]) -> None:
@@ -319,7 +326,7 @@ class Core(Kernel):
 
     @property
     def address(self) -> int:
-        """Its address in this process."""
+        """The address of the compiled function in this process."""
         return int(self.compiled.address)
 
     def __call__(self, *arguments: Any) -> int:
@@ -328,21 +335,22 @@ class Core(Kernel):
 
 
 def core(function: Callable[..., int]) -> Core:
-    """Decorator for a kernel of addresses: compiled at the first call, cached on disk."""
+    """Decorate a function that takes addresses: it is compiled at the first call and cached on disk."""
     return Core(function)
 
 
 def helper(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Decorator for a part of kernels, with extra options of Numba."""
+    """Return a decorator for a part of kernels, with additional options of Numba."""
     return jitted(**_PART, **options)
 
 
 def kernel(*arguments: Any, nogil: bool = True) -> Callable[[Callable[..., int]], Kernel]:
-    """Decorator for a kernel with these argument types: compiled at the first call, cached on disk.
+    """Return a decorator for a kernel with these argument types, compiled at the first call, cached on disk.
 
     Args:
         arguments: Numba's types.
-        nogil: Whether a call releases the interpreter's lock; a call of a microsecond is too short for that.
+        nogil: Whether a call releases the interpreter's lock. This is not worthwhile for calls of a
+            microsecond.
     """
     return lambda function: Kernel(function, arguments, nogil)
 

@@ -1,7 +1,8 @@
 """The compiled recursions as plain functions of arrays.
 
-Inputs are checked flat batches, (n, nq) and (n, nv); `urdfkin.robot` checks, reshapes and verifies. A row
-that was broadcast to n is not copied. A kernel is compiled or loaded when it is first needed.
+The inputs are batches of shape (n, nq) and (n, nv). `urdfkin.robot` checks and reshapes them, and verifies
+the results. If a batch is one row that was broadcast to n rows, the row is not copied. A kernel is compiled
+or read from disk when it is first needed.
 """
 
 from __future__ import annotations
@@ -26,9 +27,10 @@ from urdfkin.system.locks import importing
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _PLACES = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
-#: Output size (bytes) from which results are written past the caches, because no near cache could keep them.
+#: From this output size (bytes) on, results are written to memory past the caches, which are too small for
+#: them.
 _STREAMED = 2 << 20
-#: Number of values of a block that fit into half of the nearest cache.
+#: Number of values of a block that fit into half of the first-level cache.
 _MOST_STAGED = 3072
 
 _STRIDES = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V, KernelArgs.STRIDE_A
@@ -44,9 +46,9 @@ class How(TypedDict, total=False):
     """Keyword arguments of every function of this module.
 
     Attributes:
-        base: (n, 24) or (1, 24) the base's state.
+        base: (n, 24) or (1, 24) state of the base (`BaseMotion.state`).
         out: C-contiguous float64 array of the result's size, for the result.
-        threads: Largest number of threads; None: all processors for large batches.
+        threads: Largest number of threads; None uses all processors for large batches.
     """
 
     base: FloatArray
@@ -55,7 +57,7 @@ class How(TypedDict, total=False):
 
 
 def placements(plan: CompiledTree, q: FloatArray, **how: Unpack[How]) -> FloatArray:
-    """Return T_world_frame (n, frames, 4, 4): 7.77 with the rotations."""
+    """Return T_world_frame (n, frames, 4, 4): the positions of 7.77, and the rotations."""
     program = program_of(plan, turned=True)
     return _compute(_cores().placements, plan, program, [q], _ALIGNED, (4, 4), **how)
 
@@ -102,7 +104,7 @@ def jacobian_rates(
 def hessians(
     plan: CompiledTree, q: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]
 ) -> FloatArray:
-    """Return derivatives of the Jacobians (n, frames, 6, nv, nv): [..., i, j] of column i by velocity j."""
+    """Return Hessians (n, frames, 6, nv, nv); [..., i, j]: derivative of column i by joint velocity j."""
     program = program_of(plan, turned=reference.own_axes, columns=True, pairs=True)
     return _compute(_cores().hessians, plan, program, [q], reference, (6, plan.nv, plan.nv), **how)
 
@@ -118,8 +120,8 @@ def imus(
 ) -> FloatArray:
     """Return [proper acceleration; angular velocity] (n, frames, 6) in each frame's own axes.
 
-    For an accelerometer, gravity is the same as an acceleration of the base against gravity. So the base is
-    accelerated by -gravity.
+    An accelerometer cannot distinguish gravity from an acceleration of the base in the opposite direction.
+    The function therefore accelerates the base by -gravity.
     """
     how["base"] = against_gravity(how.get("base", STILL_STATE), gravity)
     program = program_of(plan, turned=True)
@@ -138,7 +140,7 @@ def _compute(
     out: FloatArray | None = None,
     threads: int | None = None,
 ) -> FloatArray:
-    """Return (n, frames, *shape), computed by a kernel from q, or q and v, or q, v and a.
+    """Return (n, frames, *shape), computed by a kernel; `inputs` are q, or q and v, or q, v and a.
 
     Raises:
         NotFiniteError: an input is not finite.
@@ -161,10 +163,10 @@ def _compute(
 
 
 def is_staged(out: FloatArray) -> bool:
-    """Return whether results are collected block by block and then written past the caches, in whole lines.
+    """Return whether results are collected in a buffer and then written past the caches, in whole lines.
 
-    A processor reads a cache line before it writes a part of it. For an output larger than the cache that
-    read is slow.
+    A processor that writes a part of a cache line reads the whole line first. If the output is larger than
+    the cache, this read is slow.
     """
     return out.nbytes >= _STREAMED and LANES * out[0].size <= _MOST_STAGED
 
@@ -172,7 +174,7 @@ def is_staged(out: FloatArray) -> bool:
 def task_of(
     program: Program, reference: Reference, inputs: Sequence[FloatArray], out: FloatArray, *, staged: bool
 ) -> tuple[NDArray[np.int64], object]:
-    """Return a kernel's arguments, and the arrays that must live until it has finished.
+    """Return a kernel's arguments, and the arrays that must stay alive until the kernel has finished.
 
     Args:
         program: The program of the recursion.
@@ -196,7 +198,7 @@ def task_of(
 
 
 def _is_broadcast(x: FloatArray) -> bool:
-    """Return whether all rows are one row that was broadcast."""
+    """Return whether the array is one row that was broadcast to all rows."""
     return len(x) > 1 and x.strides[0] == 0
 
 
@@ -205,7 +207,7 @@ def _is_large(base: FloatArray) -> bool:
 
 
 def _check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """Raise an error for non-finite inputs or results; called only if an input is not ordinary."""
+    """Raise an error for a non-finite input or result; called only if an input is not ordinary."""
     if not all(np.isfinite(x).all() for x in inputs):
         raise NotFiniteError("q, v and a must be finite")
     finite = np.isfinite(out).all(axis=tuple(range(1, out.ndim)))

@@ -13,14 +13,15 @@ from urdfkin.model.tree import FloatArray
 
 #: Bytes of a cache line. A vector across two lines would halve the speed.
 _LINE = 64
-#: The reference frames that the kernels know, with their numbers there; a lookup of another one fails.
+#: The reference frames that the kernels support, each with its number in a kernel. Other frames raise a
+#: KeyError.
 REFERENCES = {
     known: int(known) for known in (Reference.LOCAL, Reference.WORLD, Reference.LOCAL_WORLD_ALIGNED)
 }
 
 
 class KernelArgs(IntEnum):
-    """Indices in the row; those from CORE on are for calls with one configuration (`single`)."""
+    """Indices of the arguments in the row; those from CORE on are for calls with one configuration."""
 
     @staticmethod
     def _generate_next_value_(name: str, start: int, count: int, last_values: list[int]) -> int:
@@ -36,7 +37,8 @@ class KernelArgs(IntEnum):
     A = auto()
     #: Address of the base's state (rows of 24 numbers); 0 for a fixed base at the world's origin.
     BASE = auto()
-    #: Step from one configuration's numbers to the next one's; 0 if all configurations share them.
+    #: Distance between the first numbers of two consecutive configurations; 0 if all configurations share
+    #: them.
     STRIDE_Q = auto()
     STRIDE_V = auto()
     STRIDE_A = auto()

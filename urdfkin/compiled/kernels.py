@@ -1,7 +1,8 @@
 """The compiled recursions, one for each quantity. Each takes the address of its arguments (`kernel_args`).
 
-The same kernel computes a batch, eight configurations at a time, and a single configuration in all eight
-lanes. So the result of a configuration has the same bits at every position of a batch.
+A kernel computes eight configurations at a time, one in each lane. For a single configuration, all eight
+lanes compute that configuration. The result of a configuration therefore has the same bits at every position
+of a batch.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from urdfkin.compiled.recursion import forward_recursion
 
 @core
 def placements(task):
-    """Placements of frames: 7.77 with the rotations."""
+    """Placements of frames: the positions of 7.77, and the rotations."""
     return forward_recursion(task, world_axes, 1, follow_place, keep_none, column_none, emit_place)
 
 
@@ -76,7 +77,7 @@ def jacobian_rates(task):
 
 @core
 def hessians(task):
-    """Derivatives of 7.85 by each joint velocity; a kernel of its own, compiled only when it is needed."""
+    """Derivatives of the Jacobian columns (7.85) by each joint velocity; compiled only when needed."""
     return forward_recursion(task, world_axes, 1, follow_place, keep_axis, column_jacobian, emit_pairs)
 
 

@@ -2,10 +2,11 @@
 
 Scratch memory consists of *rows* of `LANES` doubles, one double for each configuration of a block.
 
-In an array, all numbers of one configuration are adjacent. In scratch memory, one number of all eight
-configurations is adjacent. The transfer is a transposition. Number by number it would take a third of the
-time of a Jacobian; in blocks of eight by eight it takes a few shuffles. The remainder of a width that is not
-a multiple of eight is transferred in blocks of four, two and one.
+In an array, all numbers of one configuration are adjacent. In scratch memory, a row contains the same number
+of all eight configurations. The transfer is therefore a transposition. Transposing one number at a time would
+take a third of the time of a Jacobian. Transposing a block of eight by eight numbers takes only a few shuffle
+instructions. If the number of values is not a multiple of eight, the remainder is transferred in blocks of
+four, two and one.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from urdfkin.compiled.compiling import compiled, helper
 from urdfkin.compiled.numbers import NOTHING, Known, Lanes, as_number, in_all_lanes
 from urdfkin.compiled.plan import LARGE
 
-#: Number of configurations in a row: one AVX-512 register, or two of AVX2.
+#: Number of configurations in a row: their doubles fill one AVX-512 register, or two AVX2 registers.
 LANES = 8
 NUMBER = Lanes(LANES)
 _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
@@ -45,7 +46,7 @@ def number(context: Any, s: Any, row: Any) -> Any:
 
 @intrinsic
 def number_if(context: Any, wanted: Any, s: Any, row: Any) -> Any:
-    """Return the number in a row; nothing if `wanted` is nothing."""
+    """Return the number in a row; return `nothing()` if `wanted` is `nothing()` (`numbers`)."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         if isinstance(wanted, Known):
@@ -57,7 +58,7 @@ def number_if(context: Any, wanted: Any, s: Any, row: Any) -> Any:
 
 @intrinsic
 def put(context: Any, s: Any, row: Any, x: Any) -> Any:
-    """Write a number to a row of scratch memory; for nothing, do nothing."""
+    """Write a number to a row of scratch memory; if the number is `nothing()`, write nothing."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         s, row, value = arguments
@@ -71,7 +72,7 @@ def put(context: Any, s: Any, row: Any, x: Any) -> Any:
 
 @intrinsic
 def constant(context: Any, g: Any, i: Any) -> Any:
-    """Return `g[i]` as a number, the same for all configurations."""
+    """Return `g[i]` as a number with the same value for all configurations."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return in_all_lanes(builder, builder.load(builder.gep(arguments[0], [arguments[1]])), LANES)
@@ -81,7 +82,7 @@ def constant(context: Any, g: Any, i: Any) -> Any:
 
 @intrinsic
 def same(context: Any, x: Any) -> Any:
-    """Return a double as a number, the same for all configurations."""
+    """Return a double as a number with the same value for all configurations."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return in_all_lanes(builder, arguments[0], LANES)
@@ -91,7 +92,7 @@ def same(context: Any, x: Any) -> Any:
 
 @intrinsic
 def numbers_of(context: Any, array: Any) -> Any:
-    """Return a pointer to an array's numbers; access by it has no test for negative indices."""
+    """Return a pointer to an array's numbers; access through it has no test for negative indices."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return context.make_array(signature.args[0])(context, builder, arguments[0]).data
@@ -110,11 +111,11 @@ def _at_address(kind: Any) -> Any:
     return at_address
 
 
-#: Pointers to doubles, or to integers, at an address.
+#: Functions that return a pointer to the doubles, or to the integers, at an address.
 numbers_at, whole_numbers_at = map(_at_address, (NUMBERS, WHOLE_NUMBERS))
 
 
-#: Number of doubles in half of a first-level cache.
+#: Number of doubles that fit into half of a first-level cache.
 _MOST_FETCHED = 3072
 _NUMBERS = types.CPointer(types.float64)
 
@@ -126,7 +127,7 @@ def _piece(builder: Any, vector: Any, start: int, width: int) -> Any:
 
 
 def _concatenate(builder: Any, pieces: Sequence[Any]) -> Any:
-    """Concatenate vectors of equal width; their number is a power of two."""
+    """Concatenate vectors of equal width; the number of vectors is a power of two."""
     while len(pieces) > 1:
         width = 2 * pieces[0].type.count
         mask = ir.Constant(ir.VectorType(ir.IntType(32), width), list(range(width)))
@@ -135,9 +136,10 @@ def _concatenate(builder: Any, pieces: Sequence[Any]) -> Any:
 
 
 def _transpose_blocks(builder: Any, vectors: Sequence[Any]) -> list[Any]:
-    """Transpose square blocks, which are side by side in the vectors.
+    """Transpose the square blocks that the vectors contain side by side.
 
-    For w = 1, 2, 4: in each block of 2w by 2w, exchange the upper right and the lower left w by w block.
+    The function repeats this step for w = 1, 2 and 4: in each block of 2w by 2w, exchange the upper right and
+    the lower left block of w by w.
     """
     x, w = list(vectors), 1
     while w < len(x):
@@ -184,7 +186,7 @@ def _make_reader(width: int) -> Any:
 
 
 def _make_writer(width: int) -> Any:
-    """Return a function that writes `width` rows, with any indices, to the memory of eight configurations."""
+    """Return a function that writes `width` rows, with arbitrary indices, for eight configurations."""
 
     @intrinsic
     def write(context: Any, s: Any, rows: Any, first: Any, to: Any, at: Any, stride: Any) -> Any:
@@ -214,9 +216,10 @@ _write_8, _write_4, _write_2, _write_1 = map(_make_writer, (8, 4, 2, 1))
 
 @compiled
 def read_rows(m, x, at, stride, count, s, row):
-    """Read `count` numbers, from `x[at]` on, of each of eight configurations into rows.
+    """Read `count` numbers of each of eight configurations into rows; the first number is `x[at]`.
 
-    The configurations are `stride` apart. If `m` is 1, read one configuration into all lanes.
+    The numbers of the next configuration begin `stride` numbers later. If `m` is 1, the numbers of one
+    configuration are read into all lanes.
     """
     i = 0
     if m == 1:
@@ -238,7 +241,7 @@ def read_rows(m, x, at, stride, count, s, row):
 
 @compiled
 def write_rows(m, s, rows, first, count, to, at, stride):
-    """Write rows `rows[first]`, ... from `to[at]` on: `count` numbers of eight configurations, or of one."""
+    """Write `count` rows, `rows[first]` and the next, to `to[at]` and after it, for one or eight lanes."""
     i = 0
     if m == 1:
         for i in range(count):
@@ -259,9 +262,9 @@ def write_rows(m, s, rows, first, count, to, at, stride):
 
 @helper(fastmath={"reassoc"})
 def ordinary(x, at, count):
-    """Return whether `count` numbers are ordinary: none is nan or infinite, and sizes are at most `LARGE`.
+    """Return whether `count` numbers are ordinary: none is nan, and no absolute value exceeds `LARGE`.
 
-    The compiler may reorder this sum.
+    The compiler may reorder the additions of this function.
     """
     total = 0.0
     for i in range(count):
@@ -287,7 +290,7 @@ def _fetch(context: Any, x: Any, at: Any) -> Any:
 
 @compiled
 def fetch(x, at, count):
-    """Prefetch the `count` numbers from `x[at]` on: the next block's inputs, during this block."""
+    """Prefetch `count` numbers from `x[at]` on: the inputs of the next block, during this block."""
     if count <= _MOST_FETCHED:
         for number in range(at, at + count, LANES):
             _fetch(x, number)
@@ -295,7 +298,7 @@ def fetch(x, at, count):
 
 @intrinsic
 def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
-    """Copy a cache line of `x` to a line of `to`, past the caches."""
+    """Copy a cache line of `x` to a cache line of `to`; the copy goes to memory past the caches."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         x, i, to, at = arguments
@@ -309,9 +312,9 @@ def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
 
 @compiled
 def stream(x, count, to, at, address):
-    """Copy `count` numbers to `to[at]` and after it, past the caches: a whole line is not read before.
+    """Copy `count` numbers to `to[at]` and after it, past the caches.
 
-    `address` is that of `to[0]`.
+    The processor does not read a cache line that is written as a whole. `address` is the address of `to[0]`.
     """
     edge = -(address // 8 + at) % LANES
     lines = edge + (count - edge) // LANES * LANES

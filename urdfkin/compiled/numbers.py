@@ -1,14 +1,15 @@
 """Number types for compiled code: one double or several doubles as one number.
 
-`Lanes(8)` is eight doubles in one vector register, `Lanes(1)` is one. Both are Numba types over LLVM's
-vectors, so a number stays in a register from one equation to the next. A product is stored as its two factors
-until it is added: x y + z is then one fused multiply-add, rounded once. The code specifies each fusion and
-leaves none to the compiler. So results have the same bits for one lane and for eight, on every machine.
+A number of type `Lanes(8)` is eight doubles in one vector register; `Lanes(1)` is one double. Both are Numba
+types that use LLVM's vectors, so a number stays in a register from one equation to the next. A product is
+kept as its two factors until it is added. The sum x y + z is then one fused multiply-add, which is rounded
+once. This module decides which operations are fused; the compiler decides nothing. Results therefore have the
+same bits for one lane and for eight lanes, on every machine.
 
-`zero()` and `one()` are numbers known at compile time: a product with them, or a sum with zero, is free.
-With z = (0, 0, 1) in this form, the equations of any axis become those of the axis z, and a rotation about x
-leaves x unchanged. `nothing()` is an unused number: everything computed from it is also nothing, and costs
-nothing.
+`zero()` and `one()` are 0 and 1, known at compile time: a product with one of them, or a sum with zero, costs
+no time. If z = (0, 0, 1) is written with these numbers, the equations for any axis simplify to those for the
+axis z. A rotation about x then does not compute the x component. `nothing()` is an unused number: a result
+that is computed from it is also `nothing()` and costs no time.
 """
 
 from __future__ import annotations
@@ -57,7 +58,7 @@ class Product(types.Type):
 
 
 class Known(types.Type):
-    """0 or 1, known when a kernel is compiled; None for an unused number."""
+    """The type of 0 or 1, known when a kernel is compiled; the type for None is that of `nothing()`."""
 
     def __init__(self, value: int | None) -> None:
         self.value = value
@@ -139,7 +140,7 @@ def _known(kind: Any, value: int | None) -> bool:
 
 
 def _ours(*kinds: Any) -> bool:
-    """Return whether all are types of this module; integers are allowed too, as in 2 w x u."""
+    """Return whether all types are types of this module or integers, such as the 2 in 2 w x u."""
     ours = [isinstance(kind, Lanes | Product | Known) for kind in kinds]
     return any(ours) and all(
         mine or isinstance(kind, types.Integer) for mine, kind in zip(ours, kinds, strict=True)
@@ -222,7 +223,7 @@ def _lower_mul(context: Any, builder: Any, signature: Any, arguments: Any) -> An
 
 
 def as_number(context: Any, builder: Any, kind: Any, value: Any, width: int) -> Any:
-    """Return any number except nothing as an LLVM vector."""
+    """Return a number as an LLVM vector; the number must not be `nothing()`."""
     return _Value(context, builder, kind, value).number(width)
 
 
@@ -305,7 +306,7 @@ zero, one, nothing = map(_known_number, (ZERO, ONE, NOTHING))
 
 @intrinsic
 def rounded(context: Any, x: Any) -> Any:
-    """Multiply and round a product; return other numbers unchanged. So two sides are rounded alike."""
+    """Multiply a product and round it, so that it is not fused later; return other numbers unchanged."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         kind = signature.args[0]

@@ -1,8 +1,9 @@
 """Outputs of the forward recursion: placements, velocities, accelerations, Jacobians and their derivatives.
 
-Each output has a function that selects the parts of the state that it needs, and one that writes the result
-of a frame. Velocities and accelerations are computed in the axes of their reference frame (`axes`). Columns
-are computed in the world's axes; for LOCAL they are rotated to the frame's own.
+Each output has one function that selects the needed parts of a link's state, and one function that writes the
+result of a frame. Velocities and accelerations are computed in the axes of their reference frame
+(`urdfkin.compiled.axes`). Jacobian columns are computed in world axes; for LOCAL they are rotated to the axes
+of the frame.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ from urdfkin.compiled.recursion import put_vector, vector
 _LOCAL, _WORLD, _ALIGNED = REFERENCES.values()
 _FRAMES, _NV = int(Head.FRAMES), int(Head.NV)
 
-#: The rows of a 4 by 4 pose, row by row, and those of [linear; angular].
+#: The scratch rows with the numbers of a 4 by 4 pose, row by row, and those with the numbers of
+#: [linear; angular].
 _POSE = np.array([*range(OUT_ROW, OUT_ROW + 12), ZERO_ROW, ZERO_ROW, ZERO_ROW, ONE_ROW])
 _SIX = np.arange(OUT_ROW, OUT_ROW + 6)
 
@@ -47,7 +49,7 @@ def follow_velocity(state):
 
 @compiled
 def follow_acceleration(state):
-    """Keep R, p, w, alpha and acc; 7.130 does not need vel."""
+    """Keep R, p, w, alpha and acc, because 7.130 does not contain vel."""
     return state[0], state[1], state[2], _unused_vector(), state[4], state[5]
 
 
@@ -61,7 +63,7 @@ def _no_vector():
 
 @compiled
 def emit_place(m, s, program, place, sources, b, reference, state, to):
-    """Write the 4 by 4 pose."""
+    """Write the 4 by 4 pose of a frame."""
     R, p = state[0], state[1]
     _pose_row(s, OUT_ROW, R[0], p[0])
     _pose_row(s, OUT_ROW + 4, R[1], p[1])
@@ -97,7 +99,7 @@ def emit_acceleration(m, s, program, place, sources, b, reference, state, to):
 
 @compiled
 def emit_imu(m, s, program, place, sources, b, reference, state, to):
-    """Write accelerometer and gyroscope readings; the base is accelerated against gravity."""
+    """Write accelerometer and gyroscope readings; the base is accelerated by -gravity."""
     _emit_six(m, s, program, place, b, state[5], state[2], to)
 
 
@@ -152,7 +154,7 @@ def keep_moving_axis(s, row, axis, state):
 
 @compiled
 def column_jacobian(s, row, to, how, g, c, reference, state):
-    """Compute [z x d_{i-1,n}; z] of a revolute joint, [z; 0] of a prismatic one (7.85), in a reference."""
+    """Compute [z x d_{i-1,n}; z] (revolute) or [z; 0] (prismatic), eq. 7.85, in a reference frame."""
     z, R = vector(s, row), state[0]
     if how & 1:
         d = eq.minus(_end(reference, state[1]), vector(s, row + 3))
@@ -164,7 +166,7 @@ def column_jacobian(s, row, to, how, g, c, reference, state):
 
 @compiled
 def column_rate(s, row, to, how, g, c, reference, state):
-    """Compute the time derivative of that column (7.126); for LOCAL, of its numbers in the frame's axes."""
+    """Compute the time derivative of a Jacobian column (7.126); for LOCAL, of its components in the frame."""
     R, p, w, vel = state[0], state[1], state[2], state[3]
     z = vector(s, row)
     z_rate = eq.axis_rate(vector(s, row + 6), z)
@@ -185,7 +187,7 @@ def column_rate(s, row, to, how, g, c, reference, state):
 
 @compiled
 def _end(reference, x):
-    """Return the reference point of a column: the frame's origin, or the world's."""
+    """Return the reference point of a column: the frame's origin x, or for WORLD the world's origin."""
     if reference == _WORLD:
         nil = same(0.0)
         x = nil, nil, nil
@@ -194,7 +196,10 @@ def _end(reference, x):
 
 @compiled
 def _put_column(s, to, how, g, c, reference, R, linear, angular):
-    """Write a column in the reference's axes; add that of a mimic joint, scaled, to its mimicked joint's."""
+    """Write a column in the axes of the reference frame.
+
+    The column of a mimic joint is scaled and added to the column of the mimicked joint.
+    """
     if reference == _LOCAL:
         back = eq.transposed(R)
         linear, angular = eq.rotate(back, linear), eq.rotate(back, angular)
@@ -225,7 +230,7 @@ def _add_six(s, to, linear, angular):
 
 @compiled
 def emit_pairs(m, s, program, place, pairs, b, reference, state, to):
-    """Write the derivative of each column by each joint velocity, (6, nv, nv), from the columns."""
+    """Compute and write the derivative of each column by each joint velocity, (6, nv, nv)."""
     count, nv = program[pairs], program[_NV]
     first, end = pairs + 1, pairs + 1 + PAIR_WIDTH * count
     frames, size = program[_FRAMES], nv * nv
@@ -235,7 +240,7 @@ def emit_pairs(m, s, program, place, pairs, b, reference, state, to):
             put_vector(s, program[j + 3], _no_vector())
             put_vector(s, program[j + 3] + 3, _no_vector())
         for i in range(first, end, PAIR_WIDTH):
-            if program[i + 2] == rate:  # a joint's own column, and those of its mimic joints
+            if program[i + 2] == rate:  # the joint's own column, or a mimic joint's
                 _add_changes(s, program, i, first, end, reference)
         for row in range(6):
             at = begin + row * size + rate * nv
@@ -246,9 +251,10 @@ def emit_pairs(m, s, program, place, pairs, b, reference, state, to):
 def _add_changes(s, program, i, first, end, reference):
     """Add the derivatives of column i by each joint velocity.
 
-    A joint before the column rotates the whole column. A joint behind it moves only the frame's origin, the
-    reference point of the column. For WORLD that point is fixed. For LOCAL the frame's axes move with all
-    joints before the column, so these do not change it.
+    Consider the joint of column i. A joint before it on the path rotates the whole column. A joint after it
+    moves only the reference point of the column, which is the frame's origin. For WORLD, the reference point
+    does not move, so a later joint does not change the column. For LOCAL, an earlier joint rotates the column
+    and the axes of the frame together, so it does not change the components of the column.
     """
     v_i, w_i = vector(s, program[i]), vector(s, program[i] + 3)
     for j in range(first, end, PAIR_WIDTH):

@@ -1,8 +1,8 @@
-"""A tree as plain arrays for the recursion: one step for each moving joint, one row for each frame.
+"""A robot's tree as arrays for the recursion: one step for each moving joint, one row for each frame.
 
-Every joint frame is rotated so that its axis is z (`A` below), as in the textbook. Then each revolute joint
-is Rz and each prismatic joint Tz. Fixed joints are folded into the offsets. A plan contains only the joints
-that its frames need.
+As in the textbook, every joint frame is rotated so that the joint's axis is z (`turned` returns this
+rotation). Each revolute joint is then Rz, and each prismatic joint is Tz. Fixed joints are merged into the
+constant offsets between moving joints. A plan contains only the joints that move one of its frames.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 IntArray = NDArray[np.int64]
 
 
-#: If coordinates, velocities, lengths and multipliers are below this, no result overflows. With N joints, a
-#: velocity is below LARGE^2 and the path below N LARGE^2. So w^2 d, the largest product, is below
-#: N^3 LARGE^6.
+#: If all coordinates, velocities, lengths and multipliers are below this, no result overflows. With N joints,
+#: the velocity of a joint is below LARGE^2 and the length of a path is below N LARGE^2. The largest product,
+#: w^2 d, is therefore below N^3 LARGE^6.
 LARGE = 1e45
 
 
@@ -47,7 +47,7 @@ class Motion(IntEnum):
 
 
 class Geometry(IntEnum):
-    """Columns of `CompiledTree.geometry`: R (9), the offset in the previous axes (3), then the mimic rule."""
+    """Columns of `CompiledTree.geometry`: R (9), the offset in the previous step's axes (3), mimic rule."""
 
     R = 0
     OFFSET = 9
@@ -72,7 +72,8 @@ _MOTION = {
     JointKind.FLOATING: Motion.FLOATING,
 }
 
-#: For each joint velocity of a joint: the axis of the moved frame, and whether it is a rotation.
+#: For each joint velocity of a joint: the index of its axis in the joint's frame, and whether it is a
+#: rotation.
 _RATES: dict[Motion, tuple[tuple[int, bool], ...]] = {
     Motion.TURN: ((2, True),),
     Motion.SLIDE: ((2, False),),
@@ -83,7 +84,7 @@ _RATES: dict[Motion, tuple[tuple[int, bool], ...]] = {
 
 @dataclass(frozen=True, eq=False)
 class CompiledTree:
-    """The steps of the recursion from the base outwards, and the frames on the way.
+    """The steps of the recursion, from the base to the ends of the tree, and the frames with results.
 
     Attributes:
         nq: Length of `q`.
@@ -101,10 +102,11 @@ class CompiledTree:
             column to which it is added: its own, or that of the mimicked joint.
         places_q: Indices of the coordinates that the recursion needs.
         parents: (steps,) the step before each step, -1 for the base.
-        lengths: (steps + frames,) metres: sum of the lengths of all URDF offsets, fixed joints' too, from a
-            step's parent to it, then from a frame's step to the frame (in the order of `frames`).
+        lengths: (steps + frames,) metres: sum of the lengths of all URDF offsets, including those of fixed
+            joints. First, for each step, from its parent step to the step. Then, for each frame, from its
+            step to the frame (in the order of `frames`).
         depth: (frames,) in output order: number of URDF joints between a frame and the root.
-        tilts: (frames,) in output order, rad: sum of the `Joint.tilt` of these joints.
+        tilts: (frames,) in output order, rad: sum of the `Joint.tilt` of the joints that `depth` counts.
     """
 
     nq: int
@@ -133,7 +135,7 @@ class CompiledTree:
 
     @cached_property
     def made(self) -> dict[object, Any]:
-        """Cache of objects derived from the plan, such as programs and weights of bounds, by their makers."""
+        """Cache of objects computed from the plan, such as programs and the weights of error bounds."""
         return {}
 
     @cached_property
@@ -193,9 +195,10 @@ def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
 
 
 def _depths(tree: KinematicTree, links: Iterable[int]) -> dict[int, int]:
-    """Return the links on the paths to the given ones, root first, with the number of joints before each.
+    """Return the links on the paths to the given links, root first, with the number of joints before each.
 
-    Each joint is visited once; separate paths for each link would cost time proportional to the tree's depth.
+    Each joint is visited once. A separate path for each link would take time proportional to the tree's
+    depth.
     """
     met = {0}
     for end in links:
@@ -210,7 +213,7 @@ def _depths(tree: KinematicTree, links: Iterable[int]) -> dict[int, int]:
 
 
 class _Anchor(NamedTuple):
-    """A link's step (-1: the base), its pose in that step's rotated frame, and its path length from it."""
+    """A link's step (-1: the base), its pose in the step's rotated frame, and the path length to it."""
 
     step: int
     T: FloatArray
@@ -232,12 +235,12 @@ def _anchors(tree: KinematicTree, step_of_joint: dict[int, int], wanted: Iterabl
 
 
 def _length(joint: Joint) -> float:
-    # hypot does not under- or overflow where squares would: a URDF may contain 1e-200 or 1e200.
+    # A URDF may contain 1e-200 or 1e200, whose squares underflow or overflow; hypot avoids this.
     return math.hypot(*joint.T_parent_joint[:3, 3].tolist())
 
 
 def turned(joint: Joint) -> FloatArray:
-    """Return `A` (4, 4): pose, in the joint's URDF frame, of the frame with the joint's axis as z."""
+    """Return the pose (4, 4), in the joint's URDF frame, of a frame whose z axis is the joint's axis."""
     A = np.eye(4)
     if joint.kind.has_axis:
         A[:3, :3] = axis_aligning(joint.axis)
@@ -245,7 +248,7 @@ def turned(joint: Joint) -> FloatArray:
 
 
 def _flat(T: FloatArray) -> FloatArray:
-    """Return R row by row, then the offset in the previous axes."""
+    """Return the twelve numbers of a pose: R row by row, then the offset in the previous frame's axes."""
     return np.concatenate((T[:3, :3].ravel(), T[:3, 3]))
 
 
@@ -277,7 +280,7 @@ def _columns(steps: IntArray, geometry: FloatArray) -> tuple[IntArray, FloatArra
 
 
 def _leaders(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> IntArray:
-    """For each frame, given its last step, return the columns that move it, and their mimicked columns."""
+    """Return `CompiledTree.leaders`; `ends` is the last step of each frame."""
     leaders = np.full((len(ends), len(columns)), -1, dtype=np.int64)
     rows = columns.tolist()
     for frame, end in enumerate(ends):

@@ -16,8 +16,9 @@ _OTHER_HALF = "jacobians", "jacobian_rates", "local_velocities", "placements"
 def load_kernels() -> None:
     """Compile every kernel, or read it from disk.
 
-    Call it before processes start that would each compile. A process compiles on one processor. So a second
-    process compiles half of the kernels, and this process then reads them from disk.
+    Call this function before you start several processes; otherwise each of them compiles the kernels. A
+    process compiles on one processor only. A second process therefore compiles half of the kernels, and this
+    process then reads that half from disk.
     """
     helper = None if all(map(_on_disk, _OTHER_HALF)) else _compile_elsewhere(_OTHER_HALF)
     try:
@@ -41,7 +42,7 @@ def _on_disk(name: str) -> bool:
 
 
 def _compile_elsewhere(names: Sequence[str]) -> subprocess.Popen[bytes]:
-    """Start another interpreter that compiles; this process compiles all kernels that it fails to compile."""
+    """Start another interpreter that compiles; this process compiles the kernels that it fails to compile."""
     code = f"from urdfkin.compiled import preload; preload._compile({tuple(names)!r})"
     return subprocess.Popen(
         own_python(code),

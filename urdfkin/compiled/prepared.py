@@ -1,8 +1,8 @@
 """Fast calls for one frame and one configuration at a time, for control loops and solvers.
 
-The recursion is that of `Robot`, with the configuration in every lane. Each function is bound to its program
-and its scratch memory, so a call passes only its arrays. If another thread is using the same function, the
-call uses `Robot` instead, with the same result.
+The recursion is the same as for the methods of `Robot`; every lane computes the one configuration. Each
+function is bound to its program and its scratch memory, so a call passes only the arrays. If another thread
+is using the same function, the call uses `Robot` instead, with the same result.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.locks import importing
 
-#: Takes q, or q and v, or q, v and a, then the output array or None; returns the result. It returns None for
-#: arguments that it does not support; `Robot` then computes the result or raises the error.
+#: A function of q, or q and v, or q, v and a, and of the output array or None. It returns the result, or None
+#: for arguments that it does not support. In that case `Robot` computes the result or raises the error.
 Fast = Callable[..., FloatArray | None]
 
 
 class _Robot(Protocol):
-    """The robot that computes if a fast function does not support its arguments."""
+    """The robot that computes a result if a fast function does not support the arguments."""
 
     tree: Any
     verifier: Any
@@ -49,8 +49,8 @@ class PreparedFrame:
     """Fast evaluation of one frame in one reference frame; create it with `Robot.prepare`.
 
     Results have the same bits as those of `Robot` with `verify=False`, and the ledger counts them as not
-    checked. Contiguous float64 arrays are used directly. For other arguments the robot computes, with the
-    same result or the same error. Several threads may share one object, also on free-threaded Python.
+    checked. Contiguous float64 arrays are used directly. For other arguments `Robot` computes the result, or
+    raises the error, as usual. Several threads may share one object, also on free-threaded Python.
 
     Attributes:
         frame: The frame's name.
@@ -82,7 +82,7 @@ class PreparedFrame:
         self._acceleration: Fast = partial(self._first, "acceleration")
 
     def __reduce__(self) -> tuple[Callable[..., PreparedFrame], tuple[str, Reference]]:
-        # The object holds addresses of this process: a copy is prepared again.
+        # The object contains addresses of this process, so a copy is created by `Robot.prepare`.
         return self._robot.prepare, (self.frame, self.reference)
 
     # The functions count their results for the ledger themselves.
@@ -148,11 +148,12 @@ class PreparedFrame:
         return self._robot.acceleration(q, v, a, self.frame, self.reference, out=out, verify=False, threads=1)
 
     def _first(self, quantity: str, q: Given, *others: object) -> FloatArray | None:
-        """Create the function of a quantity, and call it."""
+        """Create the fast function of a quantity at its first call, and call it."""
         with importing:
             from urdfkin.compiled.single import arrays_are_known, single  # noqa: PLC0415  loads Numba
 
-        # The robot handles quaternions, which are normalised first, and trees whose results may overflow.
+        # `Robot` computes for trees with quaternions, which it normalises first, and for trees whose results
+        # may overflow.
         robots = self._robot.tree.floating_joints or self._plan.is_large
         if robots or not (isinstance(q, np.ndarray) and q.ndim == 1 and arrays_are_known()):
             return None

@@ -1,8 +1,9 @@
 """A plan as a program: the instructions that a kernel executes for every block of configurations.
 
-The instructions are chosen for the robot once. A translation along one axis and a rotation about one axis
-have their own instructions, which cost a third of the general ones; a zero translation has none. The state
-passes from one link to the next in registers. At a branch of the tree, the state is saved and resumed later.
+The instructions are chosen once for each robot. There are special instructions for a translation along a
+coordinate axis and for a rotation about a coordinate axis. They take a third of the time of the general
+instructions. A translation by zero needs no instruction. The state of a link stays in registers until the
+next link is computed. At a branch of the tree, the state is saved to memory and read again later.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from urdfkin.model.tree import FloatArray
 
 
 class Op(IntEnum):
-    """The instructions. Those with an axis are in the order x, y, z, any axis."""
+    """The instructions. An instruction with an axis has four forms, in the order x, y, z, any axis."""
 
     END = 0
     CARRY_X = 1  # translation along a rigid link
@@ -42,7 +43,7 @@ class Op(IntEnum):
 
 
 class Head(IntEnum):
-    """The head of the program: numbers before the instructions."""
+    """Indices of the numbers at the beginning of a program, before its instructions."""
 
     CODE = 0  # index of the first instruction
     NQ = 1
@@ -61,12 +62,15 @@ class Head(IntEnum):
 
 #: Length of an instruction: the operation, three operands, and the index of its constants.
 WIDTH = 5
-#: Length of an angle: its row, the row of its sine, the index of a mimic rule, and whether there is one.
+#: Length of an entry in the list of angles: the angle's row, the row of its sine, the index of a mimic rule,
+#: and whether there is a mimic rule.
 ANGLE_WIDTH = 4
-#: Reserved scratch rows: 0, 1, a result before output, an angle.
+#: Reserved scratch rows: the number 0, the number 1, a result before its output, an angle; then the first
+#: free row.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, KEPT_ROWS, COLUMN_ROWS = 24, 12, 6
-#: Length of a column for pairs: its row, its step, its index in v, the first row of the sums of that index.
+#: Length of an entry for a column in a list of pairs: the column's row, its step, its index in v, and the
+#: first scratch row of the sums for that index.
 PAIR_WIDTH = 4
 
 _JOINTS = {
@@ -82,7 +86,7 @@ class Program:
     """The program of a kernel.
 
     Attributes:
-        words: Head, lists and instructions.
+        words: The numbers of `Head`, then lists and instructions.
         constants: The constants of the instructions.
         rows: Number of scratch rows of a run.
     """
@@ -98,13 +102,15 @@ class Program:
 
 
 def program_of(plan: CompiledTree, *, turned: bool, columns: bool = False, pairs: bool = False) -> Program:
-    """Return the program for a plan's frames; it is made once.
+    """Return the program for a plan's frames; the plan stores the program for later calls.
 
     Args:
         plan: The compiled tree.
-        turned: Whether frames are rotated to their own axes: for placements, and for results in these axes.
+        turned: Whether the state is rotated to the axes of each frame: for placements, and for results in the
+            frame's own axes.
         columns: Whether Jacobian columns are needed.
-        pairs: Whether the columns are needed one by one, also those of mimic joints, for pairs of columns.
+        pairs: Whether each column is needed separately, also that of a mimic joint, to compute pairs of
+            columns.
     """
     key = turned, columns, pairs
     made: Program | None = plan.made.get(key)
@@ -175,7 +181,7 @@ class _Writer:
                 f += 1
 
     def _save(self, step: int, last: Mapping[int, int], following: int) -> None:
-        """Save the current state if a later event than the next one starts from it."""
+        """Save the current state if another event than the next one also starts from this state."""
         if last.get(step, -1) > following:
             self._put(Op.SAVE, self._slot(step))
 
@@ -191,7 +197,7 @@ class _Writer:
         return len(self.constants) - len(numbers)
 
     def _rigid(self, R: FloatArray, p: FloatArray, *, turned: bool = True) -> bool:
-        """Write a translation by p, then a rotation by R; return whether there was any."""
+        """Write a translation by p, then a rotation by R; return whether any instruction was needed."""
         before = len(self.code)
         along = np.flatnonzero(p).tolist()
         if along:
@@ -203,12 +209,12 @@ class _Writer:
         return len(self.code) > before
 
     def _rule(self, i: int) -> int:
-        """Return the index of a mimic joint's multiplier and offset; 0 for other joints."""
+        """Return the index of a mimic joint's multiplier and offset in the constants; 0 for other joints."""
         multiplier, constant = self.plan.geometry[i, Geometry.MULTIPLIER :].tolist()
         return 0 if (multiplier, constant) == (1.0, 0.0) else self._constants(multiplier, constant)
 
     def _angles(self) -> list[int]:
-        """Return the rotation angles of the steps."""
+        """Return the list of angles: one entry (`ANGLE_WIDTH` numbers) for each step with a rotation."""
         angles = []
         for i, step in enumerate(self.plan.steps):
             kind, q = Motion(step[Step.KIND]), self.q + int(step[Step.Q])
@@ -229,7 +235,7 @@ class _Writer:
         self._put(op, first, int(step[Step.V]), sine if op is Op.PLANAR else int(rule > 0), at=rule)
 
     def _frame(self, f: int) -> bool:
-        """Move to a frame and output its results; return whether the state has changed."""
+        """Write the instructions that output a frame's results; return whether they change the state."""
         plan, offsets = self.plan, self.plan.offsets[f]
         moved = self._rigid(offsets[:9].reshape(3, 3), offsets[9:], turned=self.turned)
         sources = 0
@@ -251,7 +257,7 @@ class _Writer:
                 self._put(Op.COLUMN, *rows, how, at=follows)
 
     def _sources(self, f: int, row: int) -> list[int]:
-        """Return the scratch row of each number of the frame's (6, nv); `row` is the first row."""
+        """Return the scratch row of each number of the frame's (6, nv) matrix; `row` is the first row."""
         plan = self.plan
         sources = np.full((6, plan.nv), ZERO_ROW, dtype=np.int64)
         for c in np.flatnonzero(plan.leaders[f] == np.arange(len(plan.columns))):
@@ -260,7 +266,7 @@ class _Writer:
         return found
 
     def _pairs(self, f: int) -> list[int]:
-        """Return the number of the frame's columns, each column (`PAIR_WIDTH`), and the row of its sums."""
+        """Return the count of a frame's columns, an entry for each (`PAIR_WIDTH`), and the sums' rows."""
         columns, leaders = self.plan.columns, self.plan.leaders[f]
         own = np.flatnonzero(leaders >= 0)
         rows = self.results + COLUMN_ROWS * own, self.sums + COLUMN_ROWS * leaders[own]

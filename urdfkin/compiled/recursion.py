@@ -4,9 +4,9 @@ The state of a link consists of:
 
 | symbol | quantity | axes |
 |---|---|---|
-| R, p | rotation and origin of its frame | the world's |
-| w, vel | angular velocity, velocity of its origin | of the recursion (`axes`) |
-| alpha, acc | angular acceleration, acceleration of its origin | of the recursion (`axes`) |
+| R, p | rotation and origin of the link's frame | world axes |
+| w, vel | angular velocity, velocity of the origin | world or link axes, as `axes` selects |
+| alpha, acc | angular acceleration, acceleration of the origin | world or link axes, as `axes` selects |
 
 The axes of the recursion are those of the requested result, the world's or the link's own. A rotation at the
 end would add the rounding of a second rotation. The equations are those of `urdfkin.kinematics.equations`;
@@ -64,7 +64,7 @@ _SAVE, _RESUME, _KEEP, _COLUMN = map(int, (Op.SAVE, Op.RESUME, Op.KEEP, Op.COLUM
 
 @compiled
 def carried(axes, state, d):
-    """Move the state along the rigid link by d, in the link's axes: 7.58, 7.128, 7.130."""
+    """Move the state along the rigid link by d; d is given in the link's axes (7.58, 7.128, 7.130)."""
     R, p, w, vel, alpha, acc = state
     lever = seen(axes, R, d)
     return (
@@ -79,7 +79,7 @@ def carried(axes, state, d):
 
 @compiled
 def turned(axes, state, S):
-    """Express the same motion in a frame rotated by S."""
+    """Return the state of the same body with its frame rotated by S."""
     R, p, w, vel, alpha, acc = state
     return (
         eq.product(R, S),
@@ -99,7 +99,7 @@ def _turned_about_z(axes, state, s, row):
 
 @compiled
 def revolute(axes, state, s, row, v, a):
-    """Pass a revolute joint: 7.129, then 7.127, then the rotation itself."""
+    """Compute the state after a revolute joint: 7.129, then 7.127, then the rotation itself."""
     R, p, w, vel, alpha, acc = state
     z = seen(axes, R, (zero(), zero(), one()))
     alpha = eq.angular_acceleration(alpha, w, z, v, a)
@@ -108,7 +108,7 @@ def revolute(axes, state, s, row, v, a):
 
 @compiled
 def prismatic(axes, state, slide, v, a):
-    """Pass a prismatic joint: its displacement is in the interorigin vector (7.64); then 7.130, 7.128."""
+    """Compute the state after a prismatic joint: 7.64 for its displacement, then 7.130 and 7.128."""
     R, p, w, vel, alpha, acc = carried(axes, state, (zero(), zero(), slide))
     z = seen(axes, R, (zero(), zero(), one()))
     return R, p, w, eq.sliding_velocity(vel, z, v), alpha, eq.sliding_acceleration(acc, w, z, v, a)
@@ -116,7 +116,7 @@ def prismatic(axes, state, slide, v, a):
 
 @compiled
 def free(axes, state, o, u, o_rate, u_rate):
-    """Add the joint velocity of a planar or floating joint, in the moved axes, after its displacement."""
+    """Add the velocity of a planar or floating joint, in the child link's axes, after its displacement."""
     R, p, w, vel, alpha, acc = state
     o, u, o_rate, u_rate = seen(axes, R, o), seen(axes, R, u), seen(axes, R, o_rate), seen(axes, R, u_rate)
     return (
@@ -131,7 +131,7 @@ def free(axes, state, o, u, o_rate, u_rate):
 
 @compiled
 def _coordinate(s, row, g, c, follows):
-    """Return a joint's coordinate. That of a mimic joint is rounded in two steps, as Pinocchio's is."""
+    """Return a joint's coordinate; for a mimic joint, product and sum are each rounded, as in Pinocchio."""
     x = number(s, row)
     if follows:
         x = rounded(constant(g, c) * x) + constant(g, c + 1)
@@ -148,13 +148,13 @@ def _rate(wanted, s, row, g, c, follows):
 
 @compiled
 def _vector_if(wanted, s, row):
-    """Return the numbers of three consecutive rows; nothing if `wanted` is nothing."""
+    """Return the numbers of three consecutive rows; return `nothing()` if `wanted` is `nothing()`."""
     return number_if(wanted[0], s, row), number_if(wanted[1], s, row + 1), number_if(wanted[2], s, row + 2)
 
 
 @compiled
 def _planar(axes, state, s, q, row, v, a):
-    """Pass a planar joint: translation along x and y, rotation about z."""
+    """Compute the state after a planar joint: translation along x and y, rotation about z."""
     state = carried(axes, state, (number(s, q), number(s, q + 1), zero()))
     state = _turned_about_z(axes, state, s, row)
     w, alpha = state[2][0], state[4][0]
@@ -165,7 +165,7 @@ def _planar(axes, state, s, q, row, v, a):
 
 @compiled
 def _floating(axes, state, s, q, v, a):
-    """Pass a floating joint: translation along and rotation about all three axes."""
+    """Compute the state after a floating joint: translation along, and rotation about, all three axes."""
     state = carried(axes, state, (number(s, q), number(s, q + 1), number(s, q + 2)))
     x, y, z, w = number(s, q + 3), number(s, q + 4), number(s, q + 5), number(s, q + 6)
     state = turned(axes, state, eq.rotation_of_quaternion(x, y, z, w))
@@ -236,7 +236,7 @@ def _resume(s, row, state):
 
 @compiled
 def _read(m, x, b, width, stride, blocks, begin, end, s, row):
-    """Read the needed blocks of eight numbers of rows `b` to `b + m` of x, or of its only row."""
+    """Read the needed blocks of eight numbers from rows `b` to `b + m - 1` of x, or from its only row."""
     for i in range(begin, end):
         at = blocks[i]
         wide = width - at
@@ -246,7 +246,7 @@ def _read(m, x, b, width, stride, blocks, begin, end, s, row):
 
 @compiled
 def _start(axes, m, s, task, row, b):
-    """Return the initial conditions: the state of the base (the textbook's frame -1 to frame 0)."""
+    """Return the initial conditions: the state of the base (motion of the textbook's frame 0 in -1)."""
     nil, unit = same(0.0), same(1.0)
     R = (unit, nil, nil), (nil, unit, nil), (nil, nil, unit)
     p = w = vel = alpha = acc = nil, nil, nil
@@ -261,7 +261,7 @@ def _start(axes, m, s, task, row, b):
 
 @compiled
 def _sines_and_cosines(s, program, g):
-    """Compute sine and cosine of all joint angles before the recursion, whose state needs all registers."""
+    """Compute sine and cosine of all joint angles in advance, because the recursion needs all registers."""
     for i in range(program[_ANGLES], program[_ANGLES_END], ANGLE_WIDTH):
         angle = _coordinate(s, program[i], g, program[i + 2], program[i + 3])
         sine, cosine = sine_cosine(s, ANGLE_ROW, angle)
@@ -274,7 +274,7 @@ def _sines_and_cosines(s, program, g):
 
 @compiled
 def _along_link(axes, op, state, g, c):
-    """Carry out an instruction with a constant translation or rotation."""
+    """Execute an instruction with a constant translation or rotation."""
     if op == _CARRY_X:
         state = carried(axes, state, (constant(g, c), zero(), zero()))
     elif op == _CARRY_Y:
@@ -296,7 +296,7 @@ def _along_link(axes, op, state, g, c):
 
 @compiled
 def _over_joint(axes, op, state, s, x, v, a, z, g, c):
-    """Carry out a joint's instruction; x, z and c are its operands, v and a the rows of its velocities."""
+    """Execute a joint's instruction; x, z, c are operands, v and a are the rows of velocity, acceleration."""
     if op == _REVOLUTE:
         rate, rate_2 = _rate(state[2][0], s, v, g, c, z), _rate(state[4][0], s, a, g, c, z)
         state = revolute(axes, state, s, x, rate, rate_2)
@@ -376,11 +376,11 @@ def forward_recursion(address, axes, orders, follow, keep, column, emit):
 
     Args:
         address: Address of the kernel's arguments (`kernel_args`).
-        axes: Axes of the recursion (`axes`).
-        orders: How many of q, v, a are read.
-        follow: Replaces the parts of a state that the output does not need by nothing.
-        keep: Stores the data of a joint that its column needs.
-        column: Computes a column.
+        axes: `link_axes` or `world_axes`: the axes in which vectors are expressed.
+        orders: Number of inputs that are read: 1 for q, 2 for q and v, 3 for q, v and a.
+        follow: Replaces the parts of a state that the output does not need by `nothing()`.
+        keep: Stores the data of a joint that are needed to compute the joint's column.
+        column: Computes a column of the Jacobian, or of its derivative.
         emit: Writes the result of a frame.
     """
     task = whole_numbers_at(address)
@@ -391,7 +391,7 @@ def forward_recursion(address, axes, orders, follow, keep, column, emit):
     m = LANES if n >= LANES else 1
     good = True
     for first in range(0, n, m):
-        b = min(first, n - m)  # the last block overlaps the one before
+        b = min(first, n - m)  # the last block may overlap the block before it
         _block(axes, m, task, program, g, s, b, task[_REFERENCE], orders, follow, keep, column, emit)
         good &= _ordinary(m, task, program, b, orders)
     if task[_STAGE]:

@@ -1,10 +1,11 @@
 """Sine and cosine of several angles at once, to 0.65 units in the last place.
 
-The angle is reduced to [-pi/4, pi/4] by Cody and Waite's method, with the rounding error of the reduction.
-The polynomials are those of fdlibm (Sun Microsystems, k_sin.c and k_cos.c). With fused multiply-adds, pi/2 in
-two doubles is enough below 2^20 quarter turns; near a multiple of pi/2, the smaller of the two results has an
-error of up to 1e-27. Beyond 2^20, that lane alone uses the functions of the C library: the result of a
-configuration must not depend on the other lanes.
+The angle is reduced to [-pi/4, pi/4] by Cody and Waite's method; the rounding error of the reduction is
+computed too. The polynomials are those of fdlibm (Sun Microsystems, k_sin.c and k_cos.c). Below 2^20 quarter
+turns it is enough to represent pi/2 by two doubles, because the multiplications and additions are fused. Near
+a multiple of pi/2, the sine or the cosine is near 0; this value has an error of up to 1e-27. For a larger
+angle, its lane uses the functions of the C library. The other lanes do not, because the result of a
+configuration must not depend on the other configurations.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from urdfkin.compiled.numbers import fused
 
 _LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
 _2_PI, _PI_2, _PI_2_REST = 2.0 / math.pi, math.pi / 2.0, 6.123233995736766e-17
-#: Adding it rounds a number below 2^51 to an integer: the last bits of the sum are the nearest integer.
+#: If this constant is added to a number below 2^51, the last bits of the sum are the nearest integer.
 _NO_FRACTION = 1.5 * 2.0**52
 _SINE = (
     -1.66666666666666324348e-01,
@@ -59,7 +60,7 @@ def sine_cosine(s, row, x):
 
 @intrinsic
 def _of_small(context: Any, x: Any) -> Any:
-    """Return sine and cosine for less than 2^20 quarter turns, without a branch."""
+    """Return sine and cosine of angles of less than 2^20 quarter turns, without a branch."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         (x,) = arguments
@@ -81,18 +82,18 @@ def _of_small(context: Any, x: Any) -> Any:
         shifted = fused(builder, x, all_lanes(_2_PI), all_lanes(_NO_FRACTION))
         quarters = builder.bitcast(shifted, whole)
         n = builder.fsub(shifted, all_lanes(_NO_FRACTION))
-        # Exact: both terms are multiples of 2^-53, and their difference is below 1. The rounding error of r
-        # is `lost`, that of z is `z_lost`.
+        # `near` is exact, because both terms are multiples of 2^-53 and their difference is below 1. The
+        # rounding error of r is `lost`, and that of z is `z_lost`.
         near = fused(builder, n, all_lanes(-_PI_2), x)
         r = fused(builder, n, all_lanes(-_PI_2_REST), near)
         lost = fused(builder, n, all_lanes(-_PI_2_REST), builder.fsub(near, r))
         z = builder.fmul(r, r)
         z_lost = fused(builder, r, r, builder.fneg(z))
-        # 1 - z/2, and its rounding error.
+        # `most` is 1 - z/2, and `most_lost` is its rounding error.
         most = fused(builder, z, all_lanes(-0.5), all_lanes(1.0))
         most_lost = fused(builder, z, all_lanes(-0.5), builder.fsub(all_lanes(1.0), most))
         # sin(r + lost) = sin r + lost cos r, cos(r + lost) = cos r - lost sin r. The largest term is added
-        # last; the other terms are small, and so are their rounding errors.
+        # last; the other terms are small, so their rounding errors are small too.
         sine = fused(builder, builder.fmul(r, z), polynomial(z, _SINE), builder.fmul(lost, most))
         sine = builder.fadd(r, sine)
         rest = fused(builder, builder.fmul(z, z), polynomial(z, _COSINE), most_lost)
@@ -104,8 +105,8 @@ def _of_small(context: Any, x: Any) -> Any:
             sign = builder.shl(builder.and_(turns, bits(2)), bits(62))
             return builder.bitcast(builder.xor(builder.bitcast(value, whole), sign), x.type)
 
-        # An odd number of quarter turns exchanges the two. Two or three quarter turns change the sign of the
-        # sine, one or two that of the cosine.
+        # An odd number of quarter turns exchanges sine and cosine. Two or three quarter turns change the sign
+        # of the sine; one or two quarter turns change the sign of the cosine.
         odd = builder.icmp_signed("!=", builder.and_(quarters, bits(1)), bits(0))
         pair = (
             signed(builder.select(odd, cosine, sine), quarters),
@@ -135,7 +136,7 @@ def _any_large(context: Any, x: Any) -> Any:
 
 @intrinsic
 def _with_lane(context: Any, x: Any, lane: Any, value: Any) -> Any:
-    """Return the number with another double in one lane."""
+    """Return a copy of the number x in which one lane contains another double."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         x, lane, value = arguments

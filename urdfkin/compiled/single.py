@@ -1,12 +1,14 @@
 """Fast calls with one configuration: a compiled function that Python calls like a built-in function.
 
-Numba's own call takes as long as the recursion itself: it checks the type of each argument and unpacks every
-array. CPython passes a built-in function the addresses of its arguments without checks. This function reads
-the few words of each array that it needs, at the offsets that CPython and NumPy guarantee to C code. It holds
-the interpreter's lock for about a microsecond. It returns None for arguments that it does not support.
+A call through Numba checks the type of each argument and unpacks every array, which takes as long as the
+recursion itself. CPython calls a built-in function without these checks: it passes the addresses of the
+arguments. The compiled function of this module is such a function. It reads the few words of each array that
+it needs, at the offsets that CPython and NumPy guarantee to C code. It holds the interpreter's lock for about
+a microsecond. It returns None for arguments that it does not support.
 
-A call marks its scratch memory as busy in one atomic operation, with or without the interpreter's lock. If
-another thread is using that memory, the function returns None too, and the caller uses another function.
+A call marks its scratch memory as busy in one atomic operation, which works also without the interpreter's
+lock. If another thread is using the scratch memory, the function also returns None, and the caller computes
+the result in another way.
 """
 
 from __future__ import annotations
@@ -40,15 +42,17 @@ _Q, _OUT, _NQ, _NV, _ORDERS = (
 )
 _AXES, _ROWS, _COLUMNS = int(KernelArgs.AXES), int(KernelArgs.ROWS), int(KernelArgs.COLUMNS)
 
-#: Words (eight bytes) of a Python object: its type, its header, and the items of a tuple.
+#: Numbers of words (eight bytes): the length of a Python object's header, the index of its type, and the
+#: index of the first item of a tuple.
 _OWN = object.__basicsize__ // 8
 _TYPE, _ITEMS = _OWN - 1, tuple.__basicsize__ // 8
-#: Words of NumPy's arrays (PyArrayObject_fields; the numbers of axes and of flags are half a word each), and
-#: of their element types (PyArray_Descr): one word contains the byte order and NumPy's type number.
+#: Indices of words of a NumPy array (PyArrayObject_fields; the number of axes and the flags are half a word
+#: each) and of its element type (PyArray_Descr), in which one word contains the byte order and NumPy's type
+#: number.
 _DATA, _NDIM, _SHAPE, _KIND, _FLAGS = _OWN, _OWN + 1, _OWN + 2, _OWN + 5, _OWN + 6
 _KIND_AND_ORDER, _NATIVE, _DOUBLE = _OWN + 1, ord("="), 12
 _HALF, _BYTE = 0xFFFFFFFF, 0xFF
-#: Flags: C-contiguous and aligned; and writable.
+#: Flags of an input array (C-contiguous and aligned) and of an output array (also writable).
 _READABLE, _WRITABLE = 0x101, 0x501
 
 _incref = types.ExternalFunction("Py_IncRef", types.void(types.int64))
@@ -108,7 +112,7 @@ def _doubles_address(given, ndarray, flags, axes, rows, columns):
 def one_configuration(bound, arguments, count):
     """Compute the result for q, or q and v, or q, v and a, then the output array or None.
 
-    It returns the result, or None if the arguments are not supported or the memory is busy.
+    The function returns the result, or None if it does not support the arguments or if its memory is busy.
 
     Args:
         bound: Address of the bound tuple: kernel arguments, array type, None, the function that creates an
@@ -134,7 +138,7 @@ def one_configuration(bound, arguments, count):
 
 @compiled
 def _compute_into(address, given, to, ndarray):
-    """Compute into an array with the kernel; return whether the array was suitable."""
+    """Write the kernel's result into an array; return whether the array was suitable."""
     task = whole_numbers_at(address)
     orders, rows, columns, width = task[_ORDERS], task[_ROWS], task[_COLUMNS], task[_NQ]
     out = _doubles_address(to, ndarray, _WRITABLE, task[_AXES], rows, columns)
@@ -196,8 +200,8 @@ def arrays_are_known() -> bool:
     )
 
 
-#: For each quantity: its kernel, its kernel for LOCAL, how many of q, v and a they take, and how many axes of
-#: the result have length nv.
+#: For each quantity: its kernel, its kernel for LOCAL, the number of inputs (1 for q, 2 for q and v, 3 for q,
+#: v and a), and how many axes of the result have length nv.
 _HOW: dict[str, tuple[Core, Core, int, int]] = {
     "placement": (kernels.placements, kernels.placements, 1, 0),
     "velocity": (kernels.velocities, kernels.local_velocities, 2, 0),
@@ -215,8 +219,9 @@ def single(
     The function is compiled or read from disk.
 
     Returns:
-        The function, (q, ..., out or None) -> result or None if not supported, and its kernel arguments,
-        which count the results.
+        The function and its kernel arguments. The function takes (q, ..., out or None) and returns the
+        result, or None if it does not support the arguments. The kernel arguments contain the number of
+        results.
     """
     core, local_core, orders, columns = _HOW[quantity]
     local = reference.own_axes
@@ -234,11 +239,11 @@ def single(
 def called(
     core: Any, orders: int, shape: tuple[int, ...], plan: CompiledTree
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    """Return the same for a C function that takes kernel arguments.
+    """Return a fast function, as `single` does, for a C function that takes kernel arguments.
 
     Args:
         core: The function, from `ctypes`.
-        orders: How many of q, v and a it takes.
+        orders: Number of inputs of the function: 1 for q, 2 for q and v, 3 for q, v and a.
         shape: Shape of the result.
         plan: The compiled tree of q and v.
     """

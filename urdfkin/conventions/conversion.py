@@ -49,7 +49,7 @@ class _Column:
 
 @dataclass(frozen=True, slots=True)
 class _Block:
-    """A planar or floating joint whose velocity has other axes, or another point, in the tool."""
+    """A planar or floating joint for which the tool uses a velocity in other axes or of another point."""
 
     joint: Joint
     q: int
@@ -147,7 +147,7 @@ class Conversion:
         tag = "link" if order.endswith("link") else "joint"
         written = {e.get("name", ""): k for k, e in enumerate(plain_xml(self._urdf).iterfind(tag))}
         names = tree.links[1:] if tag == "link" else [joint.name for joint in tree.joints]
-        place = [written.get(name, -1) for name in names]  # a root joint is not in the file: first
+        place = [written.get(name, -1) for name in names]  # a root joint is not in the file and comes first
         if order == "name":
             return sorted(every, key=lambda i: (place[i] >= 0, tree.joints[i].name))
         if order == "file":
@@ -168,7 +168,7 @@ class Conversion:
 
         def below(link: int) -> list[int]:
             found, fixed = list[int](), [link]
-            for one in fixed:  # grows while it is read
+            for one in fixed:  # the loop extends this list
                 for i in children.get(one, []):
                     if self.tree.joints[i].kind.nv or not merged:
                         found.append(i)
@@ -283,7 +283,7 @@ class Conversion:
         self._plain_q = bool((self._q_factor == 1.0).all() and not self._q_zero.any())
         self._plain_q &= not any(c.part for c in columns)
         self._same_q = self._plain_q and np.array_equal(self._q_index, np.arange(self.tree.nq))
-        # For each of our numbers, the first of the tool's columns that has it itself.
+        # For each number of our q, find the first of the tool's columns that is not a copy for a mimic joint.
         self._q_source = [
             next(k for k, c in enumerate(columns) if c.at == at and not c.copy) for at in range(self.tree.nq)
         ]
@@ -326,7 +326,7 @@ class Conversion:
 
     @property
     def permutation(self) -> NDArray[np.intp] | None:
-        """Indices with `q_tool = q[..., permutation]`; None if the conversion is more than that.
+        """Indices with `q_tool = q[..., permutation]`; None if the conversion is no mere permutation.
 
         >>> import urdfkin
         >>> urdfkin.load("a1").convention("mujoco").permutation.tolist()
@@ -336,7 +336,7 @@ class Conversion:
 
     @property
     def rate_permutation(self) -> NDArray[np.intp] | None:
-        """Indices with `v_tool = v[..., rate_permutation]`; None if the conversion is more than that."""
+        """Indices with `v_tool = v[..., rate_permutation]`; None if the conversion is no mere permutation."""
         return self._v_at.copy() if self._plain_v else None
 
     @cached_property
@@ -687,9 +687,9 @@ class Reordering:
 
 
 def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | None:
-    """Return the numbers of "q" or "v" of the tool `end` from those of `start`; None if it is more than that.
+    """Return the numbers of "q" or "v" of the tool `end` from those of `start`; None without a formula.
 
-    It is more if one of the two stores cosine and sine, or if the axes of a base velocity differ.
+    No formula exists if one of the tools stores cosine and sine, or if the axes of a base velocity differ.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("a1", verify=False)
@@ -743,7 +743,7 @@ def _with(array: FloatArray, where: slice, part: FloatArray) -> FloatArray:
 
 
 def _for_frames(M: FloatArray, ndim: int) -> FloatArray:
-    """Return (..., k, l) matrices with an axis for the frames, if the Jacobian has one more axis."""
+    """Return (..., k, l) matrices, with an added axis if the Jacobian has an axis for several frames."""
     return M[..., np.newaxis, :, :] if M.ndim > 2 and ndim == M.ndim + 1 else M
 
 

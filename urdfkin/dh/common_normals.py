@@ -4,30 +4,32 @@
 
     A = Rz(phi) Tz(delta) . Tx(a) Rx(alpha) Ry(beta) . Rz(phi_next) Tz(delta_next)
 
-The outer pairs commute with the two joints' motions, so they become part of the joints' rows. The inner
-triple is the step. With beta = 0 and skew axes the seven numbers are unique up to a half turn of x (Denavit
-and Hartenberg). Then a is the distance of the axes, and delta and delta_next lead to the feet of the common
-normal. Where axes are parallel the feet are undetermined; where they are nearly parallel the feet are far
-away. docs/dh.md explains the choices for these two cases.
+The first pair of factors commutes with the motion of the first joint, and the last pair with the motion of
+the second joint. Each pair therefore becomes part of its joint's row. The three factors in the middle are the
+step. With beta = 0 and skew axes, the seven numbers are unique up to a half turn of the x axis (Denavit and
+Hartenberg). Then a is the distance between the two joint axes. delta and delta_next lead along these axes to
+the feet of their common normal. If the axes are parallel, the feet are undetermined. If they are nearly
+parallel, the feet are far away. docs/dh.md explains the choices for these two cases.
 
-`steps_like` makes the same choices as another table: its feet, its directions of x and its offsets. The pose
-of the tip fixes only the sum of d along a run of parallel axes, and only the sum of theta about a run of
-coinciding axes. Each row of such a run takes the other table's number, except one. That row's number only
-defines a joint's zero: d of a prismatic joint, theta of a revolute joint, or the part of the first row that
-the base absorbs. The URDF defines this zero, and the row takes the remaining offset.
+`steps_like` takes the free choices from another table: the feet, the directions of x and the offsets. The
+pose of the tip fixes only the sum of d along a run of parallel axes, and only the sum of theta about a run of
+coinciding axes. Each row of such a run takes its d or theta from the other table, except one row. The number
+in that row only defines a joint's zero: d of a prismatic joint, theta of a revolute joint, or the part of the
+first row that the base absorbs. The URDF defines this zero, so that row takes the remaining offset.
 
-A Hayati row passes an offset on to the next row, as a row of parallel axes does. Its plane depends on the
-offset that it receives. The joint's zero is therefore computed before the rows after it.
+A Hayati row passes an offset on to the next row, as a row of parallel axes does. The plane in which a Hayati
+row ends depends on the offset that the row receives. The zero of a row's joint is therefore computed before
+the rows that follow.
 
 **Noise.** Two correct programs read the same URDF and compute slightly different constant poses between two
 joint axes. The program that wrote the file may also have rounded each angle to fifteen digits.
-`urdfkin.kinematics.roundings` counts both effects. Angles of fourteen or fifteen digits are therefore treated
-as round: 1.5707963267949 and 3.14159265358979 differ by 15 eps from a multiple of a right angle. An angle of
-twelve digits differs by 900 eps or more and is not treated as round. `snap` makes it round and states the
-effect.
+`urdfkin.kinematics.roundings` takes both effects into account. Angles of fourteen or fifteen digits are
+therefore treated as round: 1.5707963267949 and 3.14159265358979 differ by 15 eps from a multiple of a right
+angle. An angle of twelve digits differs by 900 eps or more and is not treated as round. `snap` makes it round
+and states the effect.
 
-A tilt below the noise is zero in a table. The axes then count as parallel, and no distant foot arises.
-`left_out` adds up these tilts; a table may differ from the URDF by their sum.
+A table contains zero in place of a tilt below the noise. The axes then count as parallel, so that no foot is
+far away. `left_out` adds up these tilts. A table may differ from the URDF by their sum.
 """
 
 from __future__ import annotations
@@ -45,15 +47,17 @@ from urdfkin.kinematics.roundings import ANGLE, AXES, CONSTANT, DIGITS, EPS, SUM
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, Joint
 
-#: Below this tilt (rad) a pair is nearly parallel: its feet would magnify errors of the URDF 100 times.
+#: Below this tilt (rad) two axes are nearly parallel: the position of the feet would magnify errors of the
+#: URDF 100 times.
 NEARLY_PARALLEL = 1e-2
 
-#: Up to this tilt (rad) a pair counts as nearly parallel when a foot lies farther away than the reach.
+#: Up to this tilt (rad) two axes count as nearly parallel if a foot of their common normal lies beyond the
+#: reach.
 FAR_FEET = 0.35
 
 
 class NearParallel(StrEnum):
-    """Row for a nearly parallel pair of axes: a Hayati row, or always the four parameters."""
+    """Kind of row for two nearly parallel axes: a Hayati row, or a row of four parameters."""
 
     HAYATI = "hayati"
     STRICT = "strict"
@@ -91,7 +95,7 @@ class Step:
 
 
 def lifted(A: FloatArray, carry: float) -> FloatArray:
-    """Return Tz(carry) A: the pose A, measured from the origin of the DH frame instead of the joint's."""
+    """Return Tz(carry) A: the pose A, measured from the origin of the DH frame, not of the joint's frame."""
     raised = A.copy()
     raised[2, 3] += carry
     return raised
@@ -110,10 +114,12 @@ def step_between(
     Args:
         A: (4, 4) pose of the next joint's frame in this joint's frame.
         reach: Metres; a foot beyond it is far.
-        near_parallel: Row for nearly parallel axes.
-        phi_free: Value of phi where the axes coincide and every phi is correct.
+        near_parallel: Kind of row for nearly parallel axes.
+        phi_free: Value of phi where the axes coincide
+            and every phi is correct.
         delta_each: Put the offset between parallel axes into `delta` of this step, not into `delta_next`.
-        noise: Tilts and lengths below it are zero; the noise of one joint's constant when None.
+        noise: Tilts and lengths below this noise become zero. None: the noise of the constant pose of one
+            joint.
 
     Returns:
         The step.
@@ -134,7 +140,7 @@ def _is_near(feet: Step, sine: float, reach: float) -> bool:
 
 
 def _skew(A: FloatArray, sine: float, reach: float, noise: Noise) -> Step:
-    """Return the step of two skew axes: x along z cross z_next; a > 0 unless the axes intersect."""
+    """Return the step of two skew axes, with x along z cross z_next, and a > 0 unless the axes intersect."""
     phi = math.atan2(A[0, 2], -A[1, 2])
     along = math.cos(phi) * A[0, 3] + math.sin(phi) * A[1, 3]
     across = math.cos(phi) * A[1, 3] - math.sin(phi) * A[0, 3]
@@ -146,7 +152,10 @@ def _skew(A: FloatArray, sine: float, reach: float, noise: Noise) -> Step:
 
 
 def _parallel(A: FloatArray, reach: float, noise: Noise, phi_free: float, delta_each: bool) -> Step:
-    """Return the step along the perpendicular from this origin; coinciding axes leave phi free."""
+    """Return the step of two parallel axes along their perpendicular through this origin.
+
+    If the axes coincide, every phi is correct, and the step takes `phi_free`.
+    """
     sign = math.copysign(1.0, A[2, 2])
     alpha = 0.0 if sign > 0.0 else math.pi
     offset = cleaned_length(A[2, 3], reach, noise.metres)
@@ -183,12 +192,14 @@ def _remaining_rotation(A: FloatArray, phi: float, alpha: float, beta: float) ->
 def cleaned_length(length: float, reach: float, noise: float = 0.0) -> float:
     """Return a length without rounding noise.
 
-    The result is zero, or the length in twelve digits, if the difference is within rounding.
+    The result is zero or the length rounded to twelve digits, if this changes the length by no more than
+    rounding. Otherwise the length is returned unchanged.
 
     Args:
         length: Metres.
         reach: Metres; the size of the terms that the length is computed from.
-        noise: Metres; a length below it is zero. Used where it exceeds the rounding of `reach`.
+        noise: Metres; a length below it becomes zero. It has an effect only if it exceeds the rounding of
+            `reach`.
 
     Example:
         >>> cleaned_length(-5e-17, 1.0), cleaned_length(0.07599999999999998, 1.0), cleaned_length(-5e-12, 1.0)
@@ -201,7 +212,7 @@ def cleaned_length(length: float, reach: float, noise: float = 0.0) -> float:
 
 
 def cleaned_angle(angle: float) -> float:
-    """Return an angle in (-pi, pi]; one within rounding of a multiple of pi/12 becomes that multiple."""
+    """Return the angle in (-pi, pi]; within rounding of a multiple of pi/12, return that multiple."""
     angle = wrapped(angle)
     twelfth = nearest_twelfth(angle)
     return wrapped(twelfth) + 0.0 if abs(angle - twelfth) <= ANGLE * EPS else angle
@@ -216,7 +227,7 @@ class PairLike:
         row: The other table's row.
         reach: Metres; see `cleaned_length`.
         noise: Noise of the pose.
-        near_parallel: Row for nearly parallel axes.
+        near_parallel: Kind of row for nearly parallel axes.
     """
 
     A: FloatArray
@@ -232,12 +243,12 @@ class PairLike:
 
     @property
     def passes_on(self) -> bool:
-        """Whether the row has no foot of its own, so that the rest of its offset goes to the next row."""
+        """Whether the row does not determine a foot, so that the rest of its offset goes to the next row."""
         return tilt_of(self.A) <= self.noise.radians or self._gets_hayati_row
 
     @property
     def _gets_hayati_row(self) -> bool:
-        """Whether the pair gets a Hayati row; where both forms are possible, the other table decides."""
+        """Whether the pair gets a Hayati row; if both kinds of row are possible, the other table decides."""
         sine = tilt_of(self.A)
         leans_there = not self.row.beta and abs(math.sin(self.row.alpha)) >= NEARLY_PARALLEL
         return self.near_parallel is NearParallel.HAYATI and (
@@ -253,9 +264,10 @@ class PairLike:
     def cut(self) -> float | None:
         """Metres along this axis from its joint's frame to the normal plane of the other table's Hayati row.
 
-        None if no such plane is within reach. In that plane the next axis has the other row's distance a. The
-        direction of the tilt gives the component of a along it, exact to rounding divided by the tilt. For a
-        slight tilt the component across it gives a more accurate value.
+        The result is None if no such plane is within reach. In that plane the next axis passes at the
+        distance a of the other row. The component of a along the direction of the tilt determines the plane,
+        with an error of rounding divided by the tilt. For a slight tilt, the component of a across that
+        direction determines the plane more accurately.
         """
         across, along = -math.sin(self.row.alpha) * math.cos(self.row.beta), math.sin(self.row.beta)
         sine, lean = tilt_of(self.A), math.hypot(along, across)
@@ -270,7 +282,10 @@ class PairLike:
         return cut if abs(cut) <= self.reach else None
 
     def step(self, carry: float, d: float, phi_free: float = 0.0) -> Step:
-        """Return the step of the pair, measured from `carry` before its joint, with `d` where d is free."""
+        """Return the step of the pair, measured from the offset `carry` before the first joint.
+
+        Where d is free, the step uses the argument `d`.
+        """
         if not self.passes_on:
             return step_between(
                 lifted(self.A, carry), self.reach, NearParallel.STRICT, phi_free, noise=self.noise
@@ -283,14 +298,14 @@ class PairLike:
         return replace(step, delta=step.delta + d) if d else step
 
     def passed_back(self, carry: float) -> float:
-        """Return the offset (metres) that a row with d = 0 needs before it, to pass `carry` on."""
+        """Return the offset (metres) that a row with d = 0 must receive to pass `carry` to the next row."""
         return float(carry * self.A[2, 2] - self.A[2, 3])
 
 
 def steps_like(
     pairs: Sequence[PairLike], phi_in: float, carry: float, tip: float | None
 ) -> tuple[list[Step], list[float]]:
-    """Compute the steps that agree with another table.
+    """Compute the steps whose free choices agree with another table.
 
     Args:
         pairs: All pairs of consecutive axes.
@@ -319,7 +334,10 @@ def steps_like(
 
 
 def _offset_without_foot(pairs: Sequence[PairLike], i: int, carry: float, tip: float | None) -> float:
-    """Return d of a row without a foot: the other table's d, or the d that gives later rows theirs."""
+    """Return d of a row without a foot.
+
+    It is the other table's d, or the d with which the later rows get the d of the other table.
+    """
     pair = pairs[i]
     if not pair.passes_on or not (pair.slides or (i == 0 and pair.row.d)):
         return pair.row.d
@@ -329,7 +347,8 @@ def _offset_without_foot(pairs: Sequence[PairLike], i: int, carry: float, tip: f
     target = tip
     if end < len(pairs):
         target = None if pairs[end].slides else pairs[end].row.d - pairs[end].foot
-    if target is None:  # a later prismatic joint or the tool takes the rest; a plane in between may define d
+    if target is None:
+        # A later prismatic joint or the tool takes the rest. A Hayati row before it may define d.
         end = max(range(i, end), key=lambda k: tilt_of(pairs[k].A))
         cut = pairs[end].cut
         if cut is None:
@@ -343,7 +362,10 @@ def _offset_without_foot(pairs: Sequence[PairLike], i: int, carry: float, tip: f
 
 
 def _phi_of_coinciding(pairs: Sequence[PairLike], steps: Sequence[Step], i: int, phi_in: float) -> float:
-    """Return phi of coinciding axes: it gives this row, or the prismatic rows after it, the other's theta."""
+    """Return phi of coinciding axes.
+
+    This phi gives this row, or the prismatic rows after it, the theta of the other table.
+    """
     own = pairs[i].row.theta - phi_in
     if i > 0 and pairs[i].slides:
         return own
@@ -360,7 +382,10 @@ def _phi_of_coinciding(pairs: Sequence[PairLike], steps: Sequence[Step], i: int,
 
 
 def _closer_direction(step: Step, pair: PairLike, phi_in: float = 0.0) -> Step:
-    """Return the step or its reverse: the one closer to the other table's cells, then to its theta."""
+    """Return the step or its reverse.
+
+    The cells of the result are closer to the other table's cells; for equal cells, theta decides.
+    """
     row = pair.row
 
     def unlike(one: Step) -> tuple[float, float]:
@@ -372,12 +397,12 @@ def _closer_direction(step: Step, pair: PairLike, phi_in: float = 0.0) -> Step:
 
 
 def near(theta: float, there: float) -> float:
-    """Return an angle plus the whole turns that bring it nearest another; that one if within rounding."""
+    """Return `theta` in (-pi, pi]; return `there` if it is the same angle within rounding."""
     off = math.remainder(theta - there, 2.0 * math.pi)
     return there if abs(off) <= ANGLE * EPS else cleaned_angle(theta)
 
 
-#: Largest length (metres). The squares of sums of longer ones overflow in common normals and bounds.
+#: Largest length (metres). With longer lengths, the squares of sums overflow in common normals and bounds.
 LONGEST = 1e150
 
 
@@ -451,7 +476,7 @@ def noises(chain: FrameChain, reach: float) -> list[Noise]:
 def left_out(chain: FrameChain) -> float:
     """Return the sum of all tilts of a chain that count as rounding (rad).
 
-    It includes the tilts between consecutive axes, and tilts of x axes such as the tip's.
+    The sum includes the tilts between consecutive z axes, and the tilts of x axes, for example of the tip's.
     """
     found = 0.0
     for A, noise in zip(chain.constants, noises(chain, 0.0), strict=True):

@@ -10,9 +10,9 @@ or a tool of the form Tx(a) Rx(alpha) moves into the free cells of the first or 
 conversions are therefore inverse to each other.
 
 In a tree, each joint's frame is a Denavit-Hartenberg frame. In a standard table z_{i-1} is the axis of joint
-i, so its frame is frame i - 1. S_i X_i with the joint at zero leads to the next frame: d_{i-1,i} = d_i
-z_{i-1} + a_i x_i (7.64). In a modified table z_i is the axis of joint i, so its frame is frame i, and X_{i-1}
-S_i leads to it. The forward recursion uses this tree, and URDFs are written from it.
+i, so the frame of joint i is frame i - 1. S_i X_i with the joint at zero leads to frame i: d_{i-1,i} = d_i
+z_{i-1} + a_i x_i (7.64). In a modified table z_i is the axis of joint i, so the frame of joint i is frame i,
+and X_{i-1} S_i leads to frame i. The forward recursion runs on this tree, and `to_urdf` writes it as a URDF.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from urdfkin.urdf.writer import to_urdf as write_urdf
 
 
 def to_convention(table: DHTable, convention: str) -> DHTable:
-    """Return the same table in this convention; raise InputError for an unknown one."""
+    """Return the same table in the given convention; raise InputError for an unknown convention."""
     wanted = convention_of(convention)
     if wanted is table.convention or not table.rows:
         return replace(table, convention=wanted)
@@ -72,9 +72,9 @@ def to_tree(table: DHTable) -> KinematicTree:
     """Return the table's robot as a tree from the base frame to the tip.
 
     Joint names, senses, limits and mimic rules are those of the rows. A mimicked joint outside the path
-    becomes a separate joint on the base, so that the coordinates are the table's. A revolute joint without
-    limits becomes continuous. A prismatic joint without limits gets -1 km to 1 km, because URDF requires
-    limits.
+    becomes a separate joint on the base, so that the tree has the table's coordinates. A revolute joint
+    without limits becomes continuous. A prismatic joint without limits gets -1 km to 1 km, because URDF
+    requires limits.
 
     Args:
         table: Any table.
@@ -96,7 +96,10 @@ def to_tree(table: DHTable) -> KinematicTree:
 
 
 def to_urdf(table: DHTable) -> str:
-    """Return a URDF of the table's robot without shapes and masses; names and limits as in `to_tree`."""
+    """Return a URDF of the table's robot, with the names and limits of `to_tree`.
+
+    The URDF has no shapes and no masses.
+    """
     return write_urdf(to_tree(table))
 
 
@@ -113,7 +116,10 @@ def free_tree(table: DHTable) -> KinematicTree:
 
 
 def frame_poses(table: DHTable) -> list[FloatArray]:
-    """Return each joint's frame in the frame before it at zero, then the tip in the last joint's frame."""
+    """Return the poses of the frames in the zero configuration.
+
+    Each joint's frame is given in the frame before it. The last pose is the tip in the last joint's frame.
+    """
     S = [row.S for row in table.rows]
     X = [row.X for row in table.rows]
     if table.convention is Convention.STANDARD:

@@ -1,13 +1,14 @@
 """Derive a Denavit-Hartenberg table from a chain of axes, in one pass from base to tip.
 
-docs/dh.md gives the reasons for the canonical choices:
+The derivation makes these choices; docs/dh.md gives the reasons:
 
 - Frame 0 is at the foot of the perpendicular from the base's origin to the first axis. x_0 is the projection
   of the base's x axis.
-- x_i is along the common normal. It is reversed where theta would exceed a right angle.
-- Between parallel axes d = 0. The first row after the run takes the offset.
+- x_i is along the common normal. Its direction is reversed where theta would exceed a right angle.
+- Between parallel axes d = 0. The first row after a run of parallel axes takes the offset along them.
 - The last row reaches the tip if four parameters suffice.
-- A prismatic axis is on the line that the URDF draws, except for the first and the last joint.
+- A prismatic axis is on the line through the joint's origin in the URDF, except for the first and the last
+  joint.
 """
 
 from __future__ import annotations
@@ -41,12 +42,13 @@ from urdfkin.kinematics.roundings import ANGLE, ENTRY, EPS
 from urdfkin.model.chain import ChainJoint, FrameChain
 from urdfkin.model.tree import FloatArray
 
-#: x is reversed if |theta| exceeds a right angle by more than this (rad). 1.5708 and 1.571 do not.
+#: x is reversed if |theta| exceeds a right angle by more than this (rad). The angles 1.5708 and 1.571 do not
+#: exceed this limit.
 RIGHT_ANGLE_SLACK = 1e-3
 
 
 class Last(StrEnum):
-    """Part of the table that reaches the tip: the last row where that is exact, or the tool."""
+    """Part of the table that reaches the tip: the last row if it can do so exactly, or the tool."""
 
     TIP = "tip"
     FLANGE = "flange"
@@ -60,7 +62,7 @@ class First(StrEnum):
 
 
 class Sign(StrEnum):
-    """Direction of x: theta at most a right angle, or a (alpha) not negative."""
+    """Rule for the direction of x: theta is at most a right angle, or a or alpha is not negative."""
 
     THETA = "theta"
     A = "a"
@@ -119,7 +121,7 @@ def choices_of(
     sign: str = "theta",
     slide: str = "drawn",
 ) -> Choices:
-    """Return the options of these names; raise InputError or UnknownNameError for an unknown one."""
+    """Return the options with the given names; raise InputError or UnknownNameError for an unknown name."""
     names = [joint.name for joint in chain.joints]
     for name in flip:
         if name not in names:
@@ -142,8 +144,9 @@ def derive(chain: FrameChain, choices: Choices, like: DHTable | None = None) -> 
     Args:
         chain: The path.
         choices: The options.
-        like: A standard table of the same joints. The result takes its directions of x, its zeros of the
-            first and the last joint, and its offsets along parallel axes. These override `choices`.
+        like: A standard table of the same joints. The result takes from it the directions of x, the zeros of
+            the first and the last joint, and the offsets along parallel axes. These take priority over
+            `choices`.
     """
     constants = _reversed_axes(chain, choices.flip)
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))
@@ -185,7 +188,7 @@ def _table(
     steps: list[Step],
     ends: tuple[FloatArray, FloatArray],
 ) -> DHTable:
-    """Group the factors S_1 X_1 S_2 X_2 ... S_n X_n into rows by the convention."""
+    """Group the factors S_1 X_1 S_2 X_2 ... S_n X_n into rows, as the convention requires."""
     if choices.convention is Convention.MODIFIED and turns:
         first = as_step(ends[0])
         a, alpha = first or (0.0, 0.0)
@@ -262,7 +265,10 @@ def _use_freedom_of_prismatic_axes(
 
 
 def _onto_neighbour(constants: list[FloatArray], k: int, slides: list[bool]) -> bool:
-    """Move joint k's line through the origin of a revolute neighbour (the next one first), so that a = 0."""
+    """Move joint k's line through the origin of a neighbouring revolute joint, so that a = 0.
+
+    The next joint has priority over the previous one.
+    """
     if k + 1 < len(slides) and not slides[k + 1]:
         _shift_before(constants, k, constants[k + 1][:3, 3].copy())
         return True
@@ -273,7 +279,7 @@ def _onto_neighbour(constants: list[FloatArray], k: int, slides: list[bool]) -> 
 
 
 def _meets_neighbour(constants: list[FloatArray], k: int, noise: list[Noise]) -> bool:
-    """Move joint k's line through the origin of a nearly parallel neighbour, if it has one."""
+    """Move joint k's line through the origin of a neighbouring joint with a nearly parallel axis, if any."""
     before, after = constants[k], constants[k + 1]
     if k > 0 and noise[k].radians < tilt_of(before) < NEARLY_PARALLEL:
         _shift_after(constants, k, before[:3, :3].T @ before[:3, 3])
@@ -300,16 +306,16 @@ def _shift_before(constants: list[FloatArray], k: int, offset: FloatArray) -> No
 
 
 def _frame_zero(A: FloatArray, reach: float, noise: Noise) -> tuple[FloatArray, float, float]:
-    """Return T_base_0, and the angle about z_0 and the offset along it to the first joint's frame."""
+    """Return T_base_0, and the angle about z_0 and the offset along z_0 to the first joint's frame."""
     z, p = A[:3, 2], A[:3, 3]
     offset = cleaned_length(float(z @ p), reach, noise.metres)
     base = np.eye(4)
     base[:3, 3] = [cleaned_length(component, reach, noise.metres) for component in p - offset * z]
     if tilt_of(A) <= noise.radians:  # z_0 is the base's z axis or its reverse
         z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
-    # (1, 0, 0) - z_0 z for a unit vector z, without the cancellation of the difference for z close to x.
+    # This is (1, 0, 0) - z_0 z for a unit vector z, in a form that avoids cancellation for z close to x.
     x = np.array([z[1] ** 2 + z[2] ** 2, -z[0] * z[1], -z[0] * z[2]])
-    if np.linalg.norm(x) < NEARLY_PARALLEL:  # the axis is along the base's x: project its y instead
+    if np.linalg.norm(x) < NEARLY_PARALLEL:  # the axis is along the base's x: project the base's y instead
         x = np.array([0.0, 1.0, 0.0]) - z[1] * z
     x /= np.linalg.norm(x)
     base[:3, :3] = np.column_stack([x, np.cross(z, x), z])
@@ -348,7 +354,10 @@ def _steps(
 
 
 def _offset_for_last_row(like: DHTable, A: FloatArray, choices: Choices, noise: Noise) -> float | None:
-    """Return the offset that gives the last row the other table's d; None if d is free or there is a tool."""
+    """Return the offset that gives the last row the d of the other table.
+
+    The result is None if d is free, or if there is a tool.
+    """
     row = like.rows[-1]
     if not row.kind.turns or not _has_no_tool(like) or not _representable(A, choices, noise):
         return None
@@ -362,7 +371,10 @@ def _has_no_tool(table: DHTable) -> bool:
 def _first_like(
     row: DHRow, base: FloatArray, first: tuple[float, float]
 ) -> tuple[FloatArray, tuple[float, float]]:
-    """Give the first row another table's theta, and d = 0 where it has d = 0; the base takes the rest."""
+    """Give the first row the theta of another table, and d = 0 if that table has d = 0.
+
+    The base takes the rest of the rotation and the offset.
+    """
     theta, d = first
     rest = (math.remainder(theta - row.theta, 2.0 * math.pi), 0.0 if row.d else d)
     if abs(rest[0]) > ANGLE * EPS or rest[1]:
@@ -374,7 +386,11 @@ def _first_like(
 def _last_like(
     like: DHTable, theta: float, d: float, last: Step, tool: FloatArray
 ) -> tuple[float, float, Step, FloatArray]:
-    """Return the last row's own numbers if it ends like the other table's; else the other's, and a tool."""
+    """Return the numbers of the last row, and the tool.
+
+    If the row ends like the other table's last row, it keeps its own numbers. Otherwise it takes the numbers
+    of the other table, and the tool takes the difference.
+    """
     row = like.rows[-1]
     as_there = _has_no_tool(like) and np.array_equal(tool, np.eye(4))
     if as_there and abs(math.remainder(theta - row.theta, 2.0 * math.pi)) < RIGHT_ANGLE_SLACK:
@@ -390,7 +406,11 @@ def _last_like(
 
 
 def _needs_reversal(step: Step, theta: float, sign: Sign) -> bool:
-    """Whether x must be reversed. Where a = 0, alpha decides; where alpha is 0 or pi, a decides."""
+    """Whether x must be reversed by the rule `sign`.
+
+    If the cell of the rule cannot decide, the other cell does: where a = 0, alpha decides; where alpha is 0
+    or pi, a decides.
+    """
     by_alpha = 0.0 if step.alpha == math.pi else step.alpha
     if sign is Sign.THETA or (not step.a and not by_alpha):
         return abs(theta) > math.pi / 2.0 + RIGHT_ANGLE_SLACK
@@ -411,7 +431,7 @@ def _representable(A: FloatArray, choices: Choices, noise: Noise) -> bool:
 def _last(
     A: FloatArray, phi_in: float, carry: float, reach: float, choices: Choices, noise: Noise
 ) -> tuple[float, float, Step, FloatArray]:
-    """Return theta, d and the step of the last row, and the tool; `A` is measured from O_{n-1}."""
+    """Return theta, d and the step of the last row, and the tool; `A` is the tip's pose from O_{n-1}."""
     if _representable(A, choices, noise):
         phi = math.atan2(A[1, 0], A[0, 0])
         a = cleaned_length(A[0, 0] * A[0, 3] + A[1, 0] * A[1, 3], reach, noise.metres)
@@ -431,9 +451,9 @@ def _last(
 
 
 def _offsets_first(rows: list[tuple[float, float]], steps: list[Step]) -> list[tuple[float, float]]:
-    """Move the offsets of each run of parallel axes into the run's first row.
+    """Move the offsets along each run of parallel axes into the first row of the run.
 
-    An offset commutes with Tx(a) Rx(0), and changes its sign with Tx(a) Rx(pi).
+    An offset commutes with Tx(a) Rx(0), and changes its sign when it moves past Tx(a) Rx(pi).
     """
     moved = list(rows)
     for i in range(len(steps) - 1, -1, -1):

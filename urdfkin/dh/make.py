@@ -1,10 +1,10 @@
 """Make the Denavit-Hartenberg table of the path between two frames of a robot.
 
-A table may have the frames of a published table. The author of a table chooses the sense of each joint and
-the direction of each x. For every pattern of senses that fits the published table approximately, a table is
-derived. The result is the table closest to the published one: first in its cells, then in its zeros, then in
-base and tool. For Kinova, for example, the first joint has sense -1, and frame 0 is upright as in the data
-sheet.
+You can ask for the frames of a published table. The author of a table chooses the sense of each joint and the
+direction of each x axis. `reversed_like` derives a table for every pattern of senses that fits the published
+table approximately. It selects the pattern of the table closest to the published one. It compares first the
+cells, then the zeros, then base and tool. In the table of a Kinova arm, for example, the first joint has
+sense -1, and frame 0 is upright as in the data sheet.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from urdfkin.errors import InputError, Question
 from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.tree import KinematicTree
 
-#: Differences (relative to the reach, or in rad) of the cells of another robot, and of different zeros.
+#: Differences (relative to the reach, or in rad) from which cells belong to another robot, and zeros differ.
 _ANOTHER, _OTHER = 0.1, 1e-2
 #: Cells with a smaller difference (relative to the reach, or in rad) are equal.
 _ROUNDING = 1e-12
@@ -78,8 +78,10 @@ def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tu
 def _difference_key(found: DHTable, there: DHTable, reach: float) -> tuple[float, int, int, float, int]:
     """Return a key that ranks tables by their difference; the smallest is the best.
 
-    The key compares, in this order: the cells, their power of ten, zeros and signs of d, base and tool,
-    senses. The line of a prismatic joint is free, so cells that depend on it only affect the power of ten.
+    The key has these entries, in this order: the difference of the cells, its power of ten, the number of
+    different zeros and signs of d, the number of different ends (base and tool), and the number of reversed
+    senses. The line of a prismatic joint is free, so cells that depend on this line only affect the power of
+    ten.
     """
     n, cells, lines, zeros = len(found.rows), 0.0, 0.0, 0
     for i, (row, other) in enumerate(zip(found.rows, there.rows, strict=True)):
@@ -129,24 +131,26 @@ def dh_table(
         tip: Name of a link or joint frame.
         base: Name of a link or joint frame; the root link when None.
         convention: "standard" (distal, the textbook's) or "modified" (proximal, Craig's).
-        near_parallel: "hayati" gives nearly parallel axes a fifth parameter beta; "strict" uses the four
-            parameters, with possible offsets of kilometres.
+        near_parallel: "hayati" gives nearly parallel axes a fifth parameter beta; "strict" uses only the four
+            parameters, and may give offsets of kilometres.
         snap: Tolerance in radians. Angles within it of a multiple of 15 degrees become that multiple, and the
             table's `snap` reports the effect. 0 leaves every angle as it is in the file.
-        last: "tip" lets the last row reach the tip where four parameters suffice; "flange" puts the rest into
-            the tool.
-        parallel_offset: Row that takes the offset along a run of parallel axes: the "last" (the first row
-            after the run), the "first", or "each" row its own link's.
+        last: "tip" lets the last row reach the tip where four parameters suffice; "flange" puts the transform
+            from the last axis to the tip into the tool.
+        parallel_offset: Row that takes the offset along a run of parallel axes: "last" is the first row after
+            the run, "first" is the first row of the run; with "each", every row takes the offset of its own
+            link.
         flip: Names of joints to reverse; their rows have sense -1.
         first: "base" puts the transform from the base to the first axis into d_1 and theta_1 where possible;
             "joint" puts it into the base, so that d_1 and theta_1 are zero (Craig's frame 0).
-        sign: Direction of x: "theta" limits theta to a right angle; "a" and "alpha" make that cell not
-            negative.
-        slide: Line of a prismatic joint, of which only the direction is defined: "drawn" as in the URDF, or
-            "minimal", through the origin of the next revolute joint, so that a = 0.
-        like: A published table. The result takes its senses, directions of x, zeros of the first and last
-            joint, and offsets along parallel axes. The lengths, angles, base and tool are the URDF's. `flip`,
-            `first`, `last`, `sign` and `parallel_offset` are then ignored.
+        sign: Direction of x: "theta" keeps theta within a right angle; "a" and "alpha" make the cell of that
+            name not negative.
+        slide: Line of a prismatic joint, because a prismatic joint defines only a direction. "drawn": the
+            line through the joint's origin in the URDF. "minimal": the line through the origin of the next
+            revolute joint, so that a = 0.
+        like: A published table. The result takes from it the senses, directions of x, zeros of the first and
+            last joint, and offsets along parallel axes. The lengths, angles, base and tool are those of the
+            URDF. `flip`, `first`, `last`, `sign` and `parallel_offset` are then ignored.
 
     Raises:
         UnknownNameError: a frame or a joint that does not exist.

@@ -1,8 +1,9 @@
 """Compute velocity, Jacobian and acceleration of a table by the textbook's recursion on the table's frames.
 
-Equations 7.85 and 7.127 to 7.130, with d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64). The forward recursion is
-that of `urdfkin.compiled`. It runs on a tree with its joint frames at the table's frames. In this tree mimic
-joints are free; the coupling values = G q + g is applied outside it: J = J_rows G.
+The module uses equations 7.85 and 7.127 to 7.130, with d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64). The forward
+recursion is that of `urdfkin.compiled`. It runs on a tree with its joint frames at the table's frames. In
+this tree mimic joints move freely. The module applies the coupling, values = G q + g, outside the tree: J =
+J_rows G.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ _TABLES = 64
 
 @lru_cache(_TABLES)
 def plan_of(table: DHTable) -> CompiledTree:
-    """Return the compiled tree of a table's frames, base to tip."""
+    """Return the compiled tree of a table's frames, from base to tip."""
     tree = free_tree(table)
     return compile_tree(tree, [len(tree.links) - 1])
 

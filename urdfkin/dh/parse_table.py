@@ -2,10 +2,11 @@
 
 `urdfkin.dh.rows` defines the content of TOML and JSON files.
 
-A table in text has a line of headings, with a, alpha, d and theta in any order, and below it a line for each
-joint. Commas, semicolons, tabs, bars, ampersands or blanks separate the cells. The lines around the table may
-give the convention, names, base and tool. urdfkin's own printed tables have this form. The result is plain
-data for `urdfkin.dh.rows`. Nothing is guessed: a table without a convention is an error there.
+A table in text has a line of headings, with a, alpha, d and theta in any order. Below the headings it has a
+line for each joint. Commas, semicolons, tabs, bars, ampersands or blanks separate the cells. The lines around
+the table may give the convention, names, base and tool. urdfkin prints its own tables in this form. The
+result is plain data for `urdfkin.dh.rows`. Nothing is guessed: `urdfkin.dh.rows` raises an error for a table
+without a convention.
 
 `references` finds the reference tables in urdfkin: tables of vendors and textbooks, each with its source.
 """
@@ -36,11 +37,12 @@ from urdfkin.kinematics.rotation.matrix import ROUNDED, polar_factor
 from urdfkin.system.files import exists, read_text
 from urdfkin.system.resources import robots_dir
 
-#: Largest difference of a printed rotation (six digits) from a rotation; a larger one is not corrected.
+#: Largest deviation of a printed matrix (six digits) from a rotation matrix; a larger deviation is not
+#: corrected.
 _PRINTED = 1e-5
 #: Number of lines after its heading that contain the three rows of a pose, with fences and blank lines.
 _POSE_LINES = 6
-#: A setting in a line of its own, such as `convention: modified`, with or without a comment mark.
+#: A setting on a separate line, such as `convention: modified`, with or without a comment mark.
 _SETTING = re.compile(r"^\W*(convention|angles|lengths|robot|base_frame|tip_frame)\s*[:=]\s*(.+)$")
 #: In a CSV file each `# key: value` is a setting; `table_from_mapping` rejects an unknown key.
 _KEY = re.compile(r"^#?\s*(\w+)\s*:\s*([^,;\t].*)$")
@@ -73,7 +75,7 @@ def from_sheet(text: str) -> dict[str, Any]:
     """Return the plain data of a table in a text.
 
     Raises:
-        InputError: no line of headings, a row with another number of cells, or an invalid cell.
+        InputError: there is no line of headings, a row has too few or too many cells, or a cell is invalid.
     """
     lines = text.lstrip("\ufeff").splitlines()
     for form in (_latex, _bars, _separated, _aligned):
@@ -103,7 +105,7 @@ def from_sheet(text: str) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class _Column:
-    """A column: its name ("" if unknown), its heading, its unit, and whether the heading has (i-1)."""
+    """A column: its name ("" if unknown), its heading, its unit, and whether its heading has an i-1."""
 
     name: str
     heading: str = ""
@@ -119,7 +121,7 @@ class _Grid:
         columns: The headings.
         rows: The cells of each row.
         around: All lines outside the table.
-        commas: Whether commas in cells are decimal.
+        commas: Whether a comma in a cell is a decimal comma.
         strict: Whether an unknown column is an error.
     """
 
@@ -163,7 +165,7 @@ def _grid(lines: list[str], split: Callable[[str], list[str]], mark: str = "") -
 
 
 def _no_header(lines: list[str]) -> InputError:
-    """Return the error for a text without all four headings, about the line with most of them."""
+    """Return the error for a text without all four headings; it names the line with the most headings."""
     said = [re.split(r"[,;|&\t]|\s{2,}", line.strip()) for line in lines if not line.startswith("#")]
     named = [[cell.strip() for cell in cells if cell.strip()] for cells in said]
     best = max(named, key=lambda cells: sum(_column(cell).name in ORDER for cell in cells), default=[])
@@ -241,7 +243,7 @@ def _aligned(lines: list[str]) -> _Grid | None:
 
 
 def _columns(cells: list[str]) -> tuple[_Column, ...] | None:
-    """Parse a line of headings; None unless each of the four names is there. Names must be unique."""
+    """Parse a line of headings; return None unless it has each of the four names. Names must be unique."""
     columns = tuple(map(_column, cells))
     names = [column.name for column in columns]
     if any(name not in names for name in ORDER):
@@ -285,7 +287,7 @@ def _settings(lines: list[str], pattern: re.Pattern[str]) -> dict[str, Any]:
 
 
 def _convention(around: list[str], columns: tuple[_Column, ...]) -> str | None:
-    """Return the convention that the headings or the text name; None if they name none or both."""
+    """Return the convention that the headings or the text name; None if they name no convention or both."""
     if any(column.previous for column in columns):
         return "modified"
     text = "\n".join(around)
@@ -294,7 +296,7 @@ def _convention(around: list[str], columns: tuple[_Column, ...]) -> str | None:
 
 
 def _pose(end: str, lines: list[str]) -> list[list[float]] | None:
-    """Parse the three rows under `base (metres):`, or the LaTeX matrix, that urdfkin prints."""
+    """Parse a pose as urdfkin prints it: three rows under `base (metres):`, or a LaTeX matrix."""
     matrix = rf"{end.title()} \(m\): \$\\begin{{bmatrix}}(.*?)\\end{{bmatrix}}"
     if found := re.search(matrix, " ".join(lines)):
         return _rigid(
@@ -309,7 +311,7 @@ def _pose(end: str, lines: list[str]) -> list[list[float]] | None:
 
 
 def _rigid(rows: list[list[float]], end: str) -> list[list[float]]:
-    """Return a printed pose with the nearest rotation; raise InputError for infinite numbers."""
+    """Return a printed pose with an exact rotation; raise InputError for numbers that are not finite."""
     pose = np.array(rows)
     if not np.isfinite(pose).all():  # LAPACK may not return for an infinite matrix
         raise InputError(f"the {end} must be a matrix of finite numbers", where=end, found=safe_repr(rows))
@@ -329,11 +331,14 @@ def _named_coordinates(lines: list[str]) -> list[str]:
 
 
 def _row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
-    """Return a row by name, with each cell's unit; leave out empty cells except the four required ones."""
+    """Return a row as a mapping by column name, with each cell's unit.
+
+    Empty cells are left out, except the four required cells.
+    """
     row: dict[str, Any] = {}
     for column, cell in zip(grid.columns, cells, strict=True):
         if not column.name and grid.strict and column.heading not in _COUNTS:
-            row[column.heading] = cell  # an error later: the name may be misspelt
+            row[column.heading] = cell  # rejected later, because the name may be misspelt
         elif not column.name or (not cell and column.name not in ORDER):
             continue
         elif column.name in (*ORDER, "beta", "offset"):
@@ -347,7 +352,7 @@ def _row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
 
 
 def _number(cell: str, column: _Column, where: str, commas: bool) -> str:
-    """Return a cell with its own unit or its heading's; raise InputError for an invalid cell."""
+    """Return a cell with its own unit or the unit of its heading; raise InputError for an invalid cell."""
     text = re.sub(r"(?<=[0-9]),(?=[0-9])", ".", cell) if commas else cell
     try:
         found: Cell = cell_of(text)
@@ -369,7 +374,7 @@ def _unescaped(name: str) -> str:
 
 
 def _nested(row: dict[str, Any]) -> dict[str, Any]:
-    """Nest the columns of mimic rules and limits; without a mimic rule, add `offset` to theta or d."""
+    """Nest the columns of mimic rules and of limits; without a mimic rule, add `offset` to theta or d."""
     leads: dict[str, Any] = {key: row.pop(key) for key in ("leader", "multiplier") if key in row}
     if leads and "offset" in row:
         leads["offset"] = row.pop("offset")
@@ -415,7 +420,7 @@ _T = TypeVar("_T")
 
 
 def is_table_file(source: object) -> TypeGuard[str | os.PathLike[str]]:
-    """Whether a robot's source is the path of a table file, by its suffix.
+    """Whether a robot's source is the path of a table file, judged by its suffix.
 
     >>> is_table_file("arm.toml"), is_table_file("arm.urdf"), is_table_file("<robot/>")
     (True, False, False)
@@ -432,7 +437,8 @@ def read_table(path: str | os.PathLike[str]) -> DHTable:
 
     Raises:
         SourceError: the file cannot be read.
-        InputError: another suffix, invalid syntax, or an error of `table_from_mapping`; with the file's name.
+        InputError: the file has another suffix or invalid syntax, or `table_from_mapping` raises an error.
+            The message contains the file's name.
 
     >>> import urdfkin
     >>> table = urdfkin.read_table("robots/dh/ur5.toml")
@@ -443,13 +449,13 @@ def read_table(path: str | os.PathLike[str]) -> DHTable:
 
 
 def read_table_or_screws(path: str | os.PathLike[str]) -> DHTable | ProductOfExponentials:
-    """Read a table, or screws if the file has an M; errors as for `read_table`."""
+    """Read a table, or screws if the file has the key M; errors as for `read_table`."""
     data = read_mapping(path)
     return _with_place(screws_of_mapping, data, str(path)) if "M" in data else table_of(data, str(path))
 
 
 def read_mapping(path: str | os.PathLike[str]) -> Mapping[str, Any]:
-    """Return the plain data of a table file, with each number's text; errors as for `read_table`."""
+    """Return the plain data of a table file; each number keeps its text. Errors are as for `read_table`."""
     return mapping_from_text(read_text(Path(path), pipes=True), Path(path).suffix.lower(), where=str(path))
 
 
@@ -537,7 +543,7 @@ def reference_path(name: str) -> Path:
     """Return the file of a table, given its path or the name of a reference table.
 
     Raises:
-        UnknownNameError: neither; the message lists the nearest names.
+        UnknownNameError: it is neither a file nor a reference table; the message lists the nearest names.
     """
     path = Path(name)
     if path.suffix or exists(path):

@@ -1,8 +1,8 @@
-"""Compute the error of a printed table, caused by the rounding of its numbers.
+"""Compute the error that rounding of the printed numbers causes in a printed table.
 
 Each rounded angle turns the rest of the chain, with a lever of at most the sum of all later lengths. Each
-rounded length shifts the rest of the chain. The sum is a bound for every configuration within the limits. The
-largest error on samples is measured as well.
+rounded length shifts the rest of the chain. The sum of these effects is a bound for every configuration
+within the limits. The largest error on samples is measured as well.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ class PrintedPrecision:
 
     Attributes:
         digits: Number of digits.
-        metres: Largest distance between the tips of the printed and the exact table, on samples.
-        bound: Guaranteed bound of this distance within the limits (metres); None without a bound.
+        metres: Largest distance between the tips of the printed table and of the exact table, on samples.
+        bound: Guaranteed bound of this distance within the limits (metres); None if there is no bound.
         samples: Number of samples.
     """
 
@@ -51,14 +51,15 @@ def printed(table: DHTable, units: Units, pose_digits: int | None = None) -> Pri
     Args:
         table: The table.
         units: Format of the printed table.
-        pose_digits: Digits of base and tool; those of `units` when None.
+        pose_digits: Significant digits of base and tool; the digits of `units` when None.
     """
     digits = pose_digits or units.digits
     rows = tuple(_row(row, units) for row in table.rows)
     base, tool = (_pose(T, digits) for T in (table.base, table.tool))
     bounds = {row.joint: axis_range(row.kind, row.limit) for row in table.rows if row.mimic is None}
     q = values_within([bounds.get(name, UNKNOWN) for name in table.joint_names], SAMPLES)
-    # The rounded entries of base and tool are not a rotation, so these are multiplied outside the table.
+    # The rounded entries of base and tool do not form a rotation, so base and tool are multiplied outside the
+    # table.
     between = replace(table, rows=rows, base=np.eye(4), tool=np.eye(4)).placement(q)
     off = np.linalg.norm((base @ between @ tool - table.placement(q))[:, :3, 3], axis=-1)
     bound = _bound(table, rows, base, tool)
@@ -70,7 +71,7 @@ def _row(row: DHRow, units: Units) -> DHRow:
     """Return the row as it is printed."""
     a, alpha, d, theta, beta = row.cells
     rule = row.mimic
-    own = row.sense * rule.offset if rule else 0.0  # the printed constant contains it
+    own = row.sense * rule.offset if rule else 0.0  # the printed constant includes the mimic offset
     constant = constant_of(row)
     theta, d = (
         (_angle(constant, units) - own, _length(d, units))
@@ -107,7 +108,7 @@ def _pose(T: FloatArray, digits: int) -> FloatArray:
 
 
 def _bound(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, tool: FloatArray) -> float:
-    """Add up the errors of all numbers, each with its longest lever."""
+    """Add up the errors of all numbers, each multiplied by its longest lever."""
     lever = float(np.linalg.norm(table.tool[:3, 3]))
     total = float(np.linalg.norm((tool - table.tool)[:3, 3]))
     for row, other in zip(reversed(table.rows), reversed(rows), strict=True):

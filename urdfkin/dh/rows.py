@@ -1,4 +1,4 @@
-"""Make tables from handwritten rows: Python, TOML, JSON or CSV, in the units that they name.
+"""Make tables from handwritten rows in Python, TOML, JSON or CSV, in the units that the rows name.
 
 All formats become one mapping:
 
@@ -10,14 +10,15 @@ All formats become one mapping:
     coordinates = ["leader", ...]   # only for mimicked joints that have no row
     rows = [{joint = "j1", kind = "revolute", a = 0, alpha = "-pi/2", d = 0.3, theta = 0}, ...]
 
-A row may also be a list [a, alpha, d, theta, "R" or "P"]. `theta` and `d` are the constant parts. In a
-modified table a and alpha of row i are a_{i-1} and alpha_{i-1}. A row's `mimic` is {leader, multiplier,
-offset}; its `limit` is {lower, upper, velocity, effort}. The units apply to cells, limits, offsets of mimic
-joints, and the positions of base and tool. A multiplier is a ratio of SI values; an effort is in N or N m.
+A row may also be a list [a, alpha, d, theta, "R" or "P"]. `theta` and `d` are the constant parts, without the
+joint's value. In a modified table a and alpha of row i are a_{i-1} and alpha_{i-1}. A row's `mimic` is
+{leader, multiplier, offset}; its `limit` is {lower, upper, velocity, effort}. The units apply to cells,
+limits, offsets of mimic joints, and the positions of base and tool. A multiplier is a ratio of values in SI
+units; an effort is in N or N m.
 
-`last_digits` returns the precision of the numbers as they are written: half a unit of the last digit. A data
-sheet's 311.1 mm is uncertain by 0.05 mm. A number without a decimal point is exact (90 degrees, zero), and so
-is a multiple of pi. A whole number of millimetres is a rounded length.
+`last_digits` returns the precision of each number as it is written: half a unit of its last digit. For
+example, 311.1 mm in a data sheet is uncertain by 0.05 mm. A number without a decimal point (90 degrees, zero)
+and a multiple of pi are exact. A whole number of millimetres is an exception: it counts as a rounded length.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ class Literal(float):
 
 
 def last_digits(data: Mapping[str, Any]) -> tuple[dict[str, float], ...]:
-    """Return for each row half a unit of the last digit of each cell, in metres and radians.
+    """Return half a unit of the last digit of each cell, for each row, in metres and radians.
 
     Args:
         data: A valid table's mapping from `urdfkin.dh.parse_table.mapping_from_text`.
@@ -91,7 +92,7 @@ def half_a_digit(value: object, whole_is_rounded: bool = False) -> float:
     return 0.5 * 10.0 ** min(exponent, 0)
 
 
-#: Order of the cells in a list; "R" or "P" may follow. beta needs a mapping.
+#: Order of the cells in a row given as a list; "R" or "P" may follow. A row with beta must be a mapping.
 ORDER = ("a", "alpha", "d", "theta")
 _KINDS = {
     "r": JointKind.REVOLUTE,
@@ -113,7 +114,7 @@ def written_row(row: Any, index: int, units: Units) -> DHRow:
         units: Units of its numbers.
 
     Raises:
-        InputError: anything else, with the row and the column.
+        InputError: the row is anything else; the message names the row and the column.
     """
     if isinstance(row, DHRow):
         return row
@@ -140,7 +141,7 @@ def refuse_other_order(rows: Sequence[Any]) -> None:
     if all numbers in the first and fourth columns are such multiples and none in the second column is.
 
     Raises:
-        InputError: the columns look exchanged; the message names both orders.
+        InputError: the columns look like the other order; the message names both orders.
     """
     lists = [row for row in rows if isinstance(row, Sequence) and not isinstance(row, str)]
     if len(lists) < len(rows) or not all(_has_order(row) for row in lists):
@@ -157,7 +158,7 @@ def refuse_other_order(rows: Sequence[Any]) -> None:
 
 
 def name_of(value: Any, where: str) -> str:
-    """Return a name; raise InputError unless it is a text that is not empty."""
+    """Return a name; raise InputError unless the name is a non-empty text."""
     if not isinstance(value, str) or not value.strip():
         raise InputError("a name must be text", where=where, found=repr(value), remedy="write it in quotes")
     return value
@@ -210,7 +211,7 @@ def _check_keys(given: Mapping[str, Any], keys: Sequence[str], what: str, where:
 
 
 def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mapping[str, Any]:
-    """Replace a cell such as "q3 + pi" with its constant, a kind and a sense."""
+    """Replace a cell such as "q3 + pi" with its constant, and add the kind and the sense of the joint."""
     written = {name: fields[name] for name in ORDER if isinstance(fields.get(name), str)}
     cells = {name: _read(value, f"{where}, {name}") for name, value in written.items()}
     own = [name for name, cell in cells.items() if cell.times is not None]
@@ -238,7 +239,7 @@ def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mappin
 
 
 def units_in(cell: Cell, units: Units) -> Units:
-    """Return the units of a cell: its own unit where it has one."""
+    """Return the units of a cell: the table's units, replaced by the cell's own unit if it has one."""
     if cell.unit in ("m", "mm"):
         return units_of(units.angles, cell.unit, units.digits)
     return units_of(cell.unit or units.angles, units.lengths, units.digits)
@@ -348,7 +349,7 @@ _TABLE_KEYS = (
     *("convention", "angles", "lengths", "robot", "base_frame", "tip_frame", "base", "tool"),
     *("coordinates", "rows"),
 )
-#: Keys for information only: the source of the numbers and the URDF that they describe.
+#: Keys for information only, for example the source of the numbers and the URDF that they describe.
 NOTES = ("source", "source_kind", "note", "name", "urdf", "snap", "last", "fit_sign", "checked")
 
 
@@ -381,7 +382,8 @@ def table_from_rows(
         coordinates: Names of mimicked joints that have no row because they are elsewhere on the robot.
 
     Raises:
-        InputError: an unknown convention or unit, an invalid row, no rows, or two rows for one joint.
+        InputError: the convention or a unit is unknown, a row is invalid, there are no rows, or one joint has
+            two rows.
         UnknownNameError: a mimicked joint that has no row and is not in `coordinates`.
 
     Example:
@@ -415,10 +417,10 @@ def table_from_rows(
 
 
 def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
-    """Make a table from a mapping in the form of the module's docstring.
+    """Make a table from a mapping in the form that the module's docstring shows.
 
     Raises:
-        InputError: no convention, an unknown key, or an error of `table_from_rows`.
+        InputError: the mapping has no convention or an unknown key, or `table_from_rows` raises an error.
     """
     if "convention" not in data:
         raise InputError(

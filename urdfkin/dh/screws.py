@@ -2,10 +2,11 @@
 
     T(q) = exp([S_1] q_1) ... exp([S_n] q_n) M = M exp([B_1] q_1) ... exp([B_n] q_n)    (Modern Robotics, 4.1)
 
-M is the tip's pose in the zero configuration. A screw is (w, v), **angular first** as in that book and in its
-code. For a revolute joint through p, w is the unit axis and v = p x w. For a prismatic joint, w = 0 and v is
-the unit direction. Space screws S are in the base frame, body screws B = Ad(M^-1) S in the tip frame. Unlike
-the frames of a Denavit-Hartenberg table, screws leave no choice: base, tip and zeros define all numbers.
+M is the tip's pose in the zero configuration. A screw is (w, v), with the **angular part first**, as in that
+book and in its code. For a revolute joint through p, w is the unit axis and v = p x w. For a prismatic joint,
+w = 0 and v is the unit direction. Space screws S are in the base frame, body screws B = Ad(M^-1) S in the tip
+frame. The frames of a Denavit-Hartenberg table leave choices. Screws leave none: the base frame, the tip
+frame and the joint zeros define all numbers.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from urdfkin.model.path import Motion, Path
 from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, build_tree, frozen
 
-#: Tolerances of a handwritten screw: its axis' length from 1, and its pitch from 0 (m/rad).
+#: Tolerances of a handwritten screw: deviation of its axis' length from 1, and of its pitch from 0 (m/rad).
 _WRITTEN = 1e-4
 
 
@@ -118,7 +119,7 @@ class ProductOfExponentials(Displayable):
 
     @property
     def points(self) -> FloatArray:
-        """(n, 3) point of each revolute axis nearest to the base; a prismatic joint: the previous point.
+        """(n, 3) point of each revolute axis nearest to the base; a prismatic joint has the previous point.
 
         >>> import urdfkin
         >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
@@ -148,7 +149,7 @@ class ProductOfExponentials(Displayable):
 
     @cached_property
     def path(self) -> Path:
-        """The same product with elementary motions; the amounts are the joints' values.
+        """The same product of exponentials as elementary motions; their amounts are the joints' values.
 
         exp([S] q) = A Rz(q) A^-1, or A Tz(q) A^-1, where z of the pose A is along the joint's axis. The
         constant between two motions is A_i^-1 A_{i+1}; the last one is A_n^-1 M.
@@ -169,7 +170,7 @@ class ProductOfExponentials(Displayable):
     def roundings(self) -> float:
         """Bound of the rotation error of `placement` by rounding, in eps, without the rounding of q.
 
-        It counts the rounding of two table rows for each exponential.
+        The bound counts each exponential as two rows of a table.
 
         >>> import urdfkin
         >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
@@ -196,8 +197,8 @@ class ProductOfExponentials(Displayable):
     def to_tree(self) -> KinematicTree:
         """Return the robot as a tree.
 
-        In the zero configuration each link frame is parallel to the base frame. Its origin is on its joint's
-        axis.
+        In the zero configuration each link frame is parallel to the base frame. The origin of the link frame
+        is on the axis of the link's joint.
 
         >>> import urdfkin
         >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
@@ -220,7 +221,7 @@ class ProductOfExponentials(Displayable):
         return build_tree(self.robot, self.base_frame, [*joints, (end, links[-1], self.tip_frame)])
 
     def as_mapping(self) -> dict[str, Any]:
-        """Return plain data for `screws_of_mapping`; mimic rules and limits are not part of it.
+        """Return plain data for `screws_of_mapping`, without mimic rules and limits.
 
         >>> import urdfkin
         >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
@@ -250,7 +251,7 @@ def screws_of(path: FrameChain) -> ProductOfExponentials:
 
 
 def _rigid(M: FloatArray) -> FloatArray:
-    """Return the nearest rigid transform of a handwritten zero pose; keep one that is exact to rounding."""
+    """Return the rigid transform nearest to a handwritten zero pose; leave an exact pose unchanged."""
     T = np.eye(4)
     T[:3] = M[:3]
     R = T[:3, :3]
@@ -284,8 +285,8 @@ def screws_from(
         tip_frame: Name of the tip frame.
 
     Raises:
-        InputError: a wrong shape, an axis without length 1, or a pitch (w . v is not 0). URDF has no joint
-            with a pitch.
+        InputError: an array has a wrong shape, the length of an axis is not 1, or a screw has a pitch (w . v
+            is not 0). URDF has no joint with a pitch.
     """
     S = np.array(screws, dtype=np.float64)
     S = S.T if S.ndim == 2 and S.shape[0] == 6 != S.shape[1] else S
@@ -328,10 +329,10 @@ def screws_from(
 
 
 def screws_of_mapping(data: Mapping[str, Any]) -> ProductOfExponentials:
-    """Make screws from a file's plain data: M, and space or body; errors as for `screws_from`.
+    """Make screws from a file's plain data, with the keys M and space or body; errors as for `screws_from`.
 
     Raises:
-        InputError: an unknown key, or neither space nor body.
+        InputError: the data has an unknown key, or neither space nor body.
     """
     known = ("robot", "base_frame", "tip_frame", "joints", "M", "space", "body")
     for key in data:

@@ -10,9 +10,10 @@ snapped, from base to tip:
 Positions stay as they are in the file, so each change only turns the rest of the chain about a joint's
 origin. `urdfkin.dh.table` derives the bound from this.
 
-`snap_hint` finds cells that look like angles rounded by the file (1.5708, 3.14159265359). A tilt of 5e-12 rad
-is larger than the rounding of the computation (`urdfkin.dh.common_normals`). A table therefore contains it,
-and the offsets of about 1e-12 m that it causes. The hint states that these numbers come from the file.
+`snap_hint` finds cells that look like angles rounded by the file (1.5708, 3.14159265359). A tilt of 5e-12
+rad, for example, is larger than the rounding of the computation (`urdfkin.dh.common_normals`). A table
+therefore contains this tilt, and the offsets of about 1e-12 m that the tilt causes. The hint states that
+these numbers come from the file.
 """
 
 from __future__ import annotations
@@ -32,14 +33,15 @@ from urdfkin.model.chain import FrameChain, chain, steps_between
 from urdfkin.model.ranges import axis_range, values_within
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, frozen
 
-#: Largest tolerance (rad): 5 degrees. Beyond 7.5 degrees the nearest multiple of 15 degrees changes.
+#: Largest tolerance (rad): 5 degrees. A change of more than 7.5 degrees would lead to another multiple of 15
+#: degrees.
 LARGEST_TOLERANCE = math.pi / 36.0
 #: Number of configurations at which a snapped table is compared with the exact chain.
 SAMPLES = 500
 
 
 def checked_tolerance(snap: float) -> float:
-    """Return the tolerance as a float; raise InputError unless it is between 0 and 5 degrees."""
+    """Return the tolerance (rad) as a float; raise InputError unless it is between 0 and 5 degrees."""
     tolerance = real_number(snap, "snap")
     if not 0.0 <= tolerance <= LARGEST_TOLERANCE:
         raise InputError("snap must be an angle in radians between 0 and 0.087 (5 degrees)", found=repr(snap))
@@ -49,7 +51,7 @@ def checked_tolerance(snap: float) -> float:
 def snap_chain(
     tree: KinematicTree, tip: str, base: str | None, tolerance: float
 ) -> tuple[FrameChain, list[tuple[int, SnapChange]]]:
-    """Return the chain with its angles snapped, and each change with the index of its constant."""
+    """Return the chain with its angles snapped, and the list of changes, each with its constant's index."""
     exact = chain(tree, tip, base)
     rounder, moved = _snap_origins(tree, tolerance)
     path = chain(rounder, tip, base)
@@ -141,7 +143,7 @@ def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
     """Factor R into Rz(yaw) Ry(pitch) Rx(roll), and snap each angle to a multiple of pi/12."""
     level = math.hypot(R[0, 0], R[1, 0])
     pitch = math.atan2(-R[2, 0], level)
-    if level <= tolerance:  # roll and yaw have the same axis: use yaw alone
+    if level <= tolerance:  # roll and yaw turn about the same axis: use yaw alone
         roll, yaw = 0.0, math.atan2(-R[0, 1], R[1, 1])
     else:
         roll, yaw = math.atan2(R[2, 1], R[2, 2]), math.atan2(R[1, 0], R[0, 0])
@@ -149,7 +151,10 @@ def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
 
 
 def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
-    """Factor a rotation into Rz(phi) Rx(tilt) Rz(psi) and snap each angle; the position stays."""
+    """Factor the rotation of a pose into Rz(phi) Rx(tilt) Rz(psi), and snap each angle.
+
+    The position of the pose is unchanged. The result also contains the angle by which the rotation changed.
+    """
     R = A[:3, :3]
     sine = math.hypot(R[0, 2], R[1, 2])
     tilt = math.atan2(sine, R[2, 2])
@@ -167,14 +172,14 @@ def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
 
 
 def _product(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray:
-    """Multiply rotations about coordinate axes, with each angle snapped within the tolerance."""
+    """Multiply rotations about coordinate axes, with each angle snapped if it is within the tolerance."""
     R = np.eye(3)
     for axis, angle in turns:
         twelfth = nearest_twelfth(angle)
         is_round = abs(angle - twelfth) <= max(tolerance, TURN * EPS)
         turn = coordinate_rotation(axis, np.asarray(twelfth if is_round else angle))
         if is_round:
-            turn[np.abs(turn) < EPS] = 0.0  # the cosine of a right angle
+            turn[np.abs(turn) < EPS] = 0.0  # rounding in the cosine of a right angle
         R = R @ turn
     return R
 
@@ -204,13 +209,16 @@ def _changes_of_origins(
 
 
 def _change(exact: FrameChain, k: int, what: str, angle: float) -> SnapChange:
-    """Return a change about the origin of joint k (from 1; n + 1 is the tip), with its effect at the tip."""
+    """Return the record of a change about the origin of joint k, with its lever to the tip.
+
+    Joints are counted from 1; n + 1 is the tip.
+    """
     sliders = tuple(joint.name for joint in exact.joints[max(k - 1, 0) :] if not joint.kind.turns)
     return SnapChange(0, what, angle, float(exact.lengths[k:].sum()), sliders)
 
 
 def row_of_constant(table: DHTable, k: int) -> int:
-    """Return the index of the row that contains the chain's constant A_k; -1: the base, n: the tool."""
+    """Return the index of the row that contains the chain's constant A_k; -1 is the base, n is the tool."""
     n = len(table.rows)
     if k == 0:
         return -1
@@ -219,7 +227,7 @@ def row_of_constant(table: DHTable, k: int) -> int:
     return k - 1 if table.convention is Convention.STANDARD else k
 
 
-#: Range of a coordinate whose own joint is not on the path (rad or metres).
+#: Range of the coordinate of a mimicked joint that is not on the path (rad or metres).
 UNKNOWN = (-1.0, 1.0)
 
 
@@ -228,14 +236,18 @@ def travel(limit: Limit | None) -> float:
     return 1.0 if limit is None else max(abs(limit.lower), abs(limit.upper))
 
 
-#: Largest difference that looks rounded: radians from a multiple of 15 degrees; metres per metre of span.
+#: Largest deviation from a round value in a cell that looks rounded: radians from a multiple of 15 degrees,
+#: or metres per metre of span.
 LARGEST = 1e-4
 #: Tolerances to try, in radians, in ascending order.
 TOLERANCES = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
 
 
 def noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
-    """Return (joint, cell, distance from a round value in radians or metres), the smallest first."""
+    """Return (joint, cell, distance from a round value in rad or m) of cells that look rounded.
+
+    The cell with the smallest distance is first.
+    """
     found = []
     for row in table.rows:
         for name, angle in (("alpha", row.alpha), ("theta", row.theta), ("beta", row.beta)):
@@ -249,7 +261,7 @@ def noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
 
 
 def snap_hint(table: DHTable, snapped: Callable[[float], DHTable]) -> str | None:
-    """Return a line that names a cell that looks rounded, and the tolerance that snaps most such cells.
+    """Return a line of text with a cell that looks rounded, and the tolerance that snaps most such cells.
 
     Args:
         table: An exact table.

@@ -1,27 +1,29 @@
 """Find the structure of an arm and export it for closed-form inverse kinematics solvers.
 
-`structure` reports which axes are parallel or intersect, how nearly, and which closed-form solutions exist.
-The distance and the angle of two consecutive axes are the same in every configuration. The screws at the zero
-configuration therefore suffice (`urdfkin.dh.screws`, checked by Pinocchio). Pieper (1968): six revolute
-joints have a closed-form solution if three consecutive axes are parallel or intersect in one point. A
-calibrated robot has such a property only nearly; the deviation is given in radians and metres.
+`structure` reports which axes are parallel or intersect, with the deviation from this property, and which
+closed-form solutions exist. The distance and the angle of two consecutive axes are the same in every
+configuration. It is therefore enough to compute them in the zero configuration, from the screws
+(`urdfkin.dh.screws`, checked by Pinocchio). Pieper (1968): six revolute joints have a closed-form solution if
+three consecutive axes are parallel or intersect in one point. A calibrated robot has such a property only
+approximately. The deviation is given in radians and metres.
 
 `opw_of` returns the seven parameters of an ortho-parallel arm with a spherical wrist (OPW, Brandstoetter et
 al., 2014). An OPW arm is the standard table
 
     a1 -90 c1 q1    c2 0 0 q2-90    a2 90 b q3+90    0 -90 c3 q4    0 90 0 q5    0 0 c4 q6
 
-with cells in the order a, alpha, d, theta. Its parameters are the URDF's numbers in the frames of this table
-(`urdfkin.dh.make`), with this table's zeros and senses. OPW has no parameter for a tilt from
-calibration, so the tilt is dropped. `Opw.placement` is the solver's own forward kinematics; it measures the
-resulting error.
+with cells in the order a, alpha, d, theta. `opw_of` derives the URDF's table in the frames, zeros and senses
+of this table (`urdfkin.dh.make`), and reads the parameters from it. OPW has no parameter for a tilt from
+calibration, so `opw_of` drops the tilt. `Opw.placement` computes the solver's forward kinematics, which show
+the resulting error.
 
 `axes_and_steps` returns H and P, the input of solvers by subproblem decomposition (IK-Geo, EAIK):
 
     T(q) = P_0 + R(h_1, q_1) (P_1 + R(h_2, q_2) (P_2 + ... + P_n)),    R(q) = R(h_1, q_1) ... R(h_n, q_n) R_6T
 
-This product is correct for any point on each axis. The solvers detect intersecting axes by a zero step
-between their points. Intersecting axes therefore share their point here.
+P_i is the step from a point on one axis to a point on the next axis. The formula is correct for any choice of
+these points. The solvers detect two intersecting axes by a zero step between their points. This module
+therefore uses the intersection as the point of both axes.
 """
 
 from __future__ import annotations
@@ -44,11 +46,12 @@ from urdfkin.model.path import elementary
 from urdfkin.model.ranges import axis_range, values_within
 from urdfkin.model.tree import FloatArray, JointKind
 
-#: Largest deviation of a reported kind (rad, metres), and of one that is exact (both units).
+#: Largest deviation of a property that is reported (rad, metres), and of one that counts as exact (both
+#: units).
 NEAR_ANGLE, NEAR_LENGTH, EXACT = 0.02, 0.005, 1e-9
-#: Singular values below this are zero: far above rounding, far below a lever arm.
+#: Singular values below this limit count as zero. The limit is far above rounding and far below a lever arm.
 _RANK = 1e-6
-#: Number of random configurations within the limits that estimate the reach; mimic rules are ignored.
+#: Number of random configurations within the limits for the estimate of the reach; mimic rules are ignored.
 _SAMPLES = 2000
 
 
@@ -98,11 +101,11 @@ class Structure:
         base_frame: Name of the base frame.
         tip_frame: Name of the tip frame.
         joints: R or P for each joint.
-        freedoms: Degrees of freedom of the tip: the Jacobian's rank at a general configuration.
+        freedoms: Degrees of freedom of the tip: the Jacobian's rank at a random configuration.
         pairs: Angle and distance of each pair of consecutive axes.
-        kinds: Properties that the path has exactly or nearly; the smallest deviation first.
+        kinds: Properties that the path has exactly or approximately, in ascending order of the deviation.
         reach: Upper bound of the tip's distance from the point of the first axis nearest to the second (m).
-        reached: Largest such distance on samples (metres).
+        reached: Largest distance from the same point on samples (metres).
         solvers: Closed-form solutions, with libraries that implement them.
     """
 
@@ -173,7 +176,7 @@ def _pair(screws: ProductOfExponentials, i: int) -> Pair:
 
 
 def meeting(screws: ProductOfExponentials, at: tuple[int, ...]) -> tuple[FloatArray, float]:
-    """Return the least-squares nearest point of some axes, and its largest distance from them (metres)."""
+    """Return the least-squares nearest point to some axes, and its largest distance from an axis (metres)."""
     A, b = np.zeros((3, 3)), np.zeros(3)
     for i in at:
         across = np.eye(3) - np.outer(_axis(screws, i), _axis(screws, i))
@@ -217,7 +220,10 @@ def _arm_kinds(screws: ProductOfExponentials, letters: str, pairs: tuple[Pair, .
 
 
 def _solvers(letters: str, kinds: list[Kind], pairs: tuple[Pair, ...]) -> list[str]:
-    """Return the known closed-form solutions; a nearly exact kind gives a nearly exact solution."""
+    """Return the known closed-form solutions.
+
+    A property with a small deviation gives a solution with a small error.
+    """
     named = {kind.name for kind in kinds}
     spherical = [kind for kind in kinds if kind.name in ("spherical wrist", "spherical shoulder")]
     if letters == "R" * 7:
@@ -253,7 +259,7 @@ def _solvers(letters: str, kinds: list[Kind], pairs: tuple[Pair, ...]) -> list[s
 def _origin(screws: ProductOfExponentials) -> FloatArray:
     """Return the point of the first axis nearest to the second axis, if both joints are revolute.
 
-    Otherwise the result is the point in `screws.points`.
+    For other joints the result is the first point in `screws.points`.
     """
     if not screws.joints:
         return np.zeros(3)
@@ -268,7 +274,7 @@ def _origin(screws: ProductOfExponentials) -> FloatArray:
 
 
 def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
-    """Return an upper bound of the tip's distance: the path length over the feet of perpendiculars."""
+    """Return an upper bound of the tip's distance: the path length along axes and their perpendiculars."""
     here, total = origin, 0.0
     for i, joint in enumerate(screws.joints):
         if not joint.kind.turns:
@@ -354,7 +360,7 @@ def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
         tolerance: Largest error of the tip on `SAMPLES` configurations, in metres and in radians.
 
     Raises:
-        InputError: other joints, or no OPW arm; the message gives the error of the tip.
+        InputError: the path has other joints, or is no OPW arm; the message gives the error of the tip.
     """
     where = f"{path.robot}, {path.base} to {path.tip}"
     if [joint.kind.turns for joint in path.joints] != [True] * 6:
@@ -404,7 +410,7 @@ def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
 
 
 def _read(table: DHTable) -> Opw:
-    """Return the OPW parameters in a table that has an OPW table's frames; ignore its other numbers."""
+    """Return the OPW parameters of a table with the frames of an OPW table; ignore its other numbers."""
     rows = table.rows
     lengths = {"a1": rows[0].a, "a2": rows[2].a, "b": rows[1].d + rows[2].d}
     lengths |= {"c1": rows[0].d, "c2": rows[1].a, "c3": rows[3].d, "c4": rows[5].d}
@@ -430,7 +436,8 @@ def axes_and_steps(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArra
 def _points(screws: ProductOfExponentials) -> FloatArray:
     """Return an (n, 3) array with a point of each axis; intersecting axes share their point.
 
-    Three intersecting axes have priority over two, and the wrist has priority over the shoulder.
+    A point of three intersecting axes has priority over a point of two. The wrist has priority over the
+    shoulder.
     """
     points, taken, n = screws.points.copy(), set[int](), len(screws.joints)
     for size in (3, 2):

@@ -10,14 +10,14 @@ Both conventions have the same factors, grouped differently:
     standard   T_base_tip = base . S_1 X_1 . S_2 X_2 ... S_n X_n . tool        (X_i from row i)
     modified   T_base_tip = base . X_0 S_1 . X_1 S_2 ... X_{n-1} S_n . tool    (X_{i-1} from row i)
 
-The variable of row i is theta_i for a revolute joint and d_i for a prismatic one. It is the constant in the
-row plus `sense` times the joint's value. The standard convention is the textbook's: z_{i-1} is the axis of
-joint i, and d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
+The variable of row i is theta_i for a revolute joint and d_i for a prismatic joint. The variable is the
+constant in the row plus `sense` times the joint's value. The standard convention is the textbook's: z_{i-1}
+is the axis of joint i, and d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
 
 `SnapReport` states the effect of snapping: a guaranteed bound, and the largest effect on samples. A rotation
 by a small angle about a joint's origin moves the tip by at most that angle times the tip's distance from the
-origin. This distance is at most the path length: the sum of the constant offsets between them, plus the
-travel of the prismatic joints. The bounds of all changes are added. The result is valid for every
+origin. This distance is at most the path length: the sum of the constant offsets from that origin to the tip,
+plus the travel of the prismatic joints. The sum of the bounds of all changes is valid for every
 configuration.
 """
 
@@ -53,7 +53,7 @@ class Convention(StrEnum):
 
 
 def convention_of(name: str) -> Convention:
-    """Return the convention of this name; raise InputError for an unknown one."""
+    """Return the convention of this name; raise InputError for an unknown name."""
     try:
         return Convention(name)
     except (ValueError, TypeError):
@@ -79,7 +79,7 @@ class DHRow:
         sense: +1, or -1 if the row subtracts the joint's value.
         beta: Rotation about y, after alpha; 0 except in a Hayati row.
         mimic: The mimic rule; None if the joint has a coordinate.
-        limit: The joint's limits, or None.
+        limit: The joint's limits; None if it has no limits.
 
     >>> import urdfkin
     >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -117,7 +117,7 @@ class DHRow:
 
     @property
     def cells(self) -> tuple[float, float, float, float, float]:
-        """(a, alpha, d, theta, beta).
+        """The numbers of the row: (a, alpha, d, theta, beta).
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -130,8 +130,9 @@ class DHRow:
     def foot(self) -> float:
         """Distance of the foot of this row's common normal, for a row of four parameters (metres).
 
-        In a Hayati row, x reaches the next axis at the distance `a`. There the axis is tilted by `beta` along
-        x and by `alpha` across x. The foot of the common normal is at a sin(beta) / sin^2(tilt).
+        In a Hayati row, the x axis meets the next joint's axis at the distance `a`. There this joint axis is
+        tilted by `beta` along x and by `alpha` across x. The foot of the common normal is at a sin(beta) /
+        sin^2(tilt).
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -200,7 +201,7 @@ def as_step(T: FloatArray) -> tuple[float, float] | None:
         >>> as_step(between_axes(0.5, math.pi))
         (0.5, 3.141592653589793)
     """
-    tilt = max(abs(T[0, 1]), abs(T[0, 2]))  # of the x axis; the first column has the same size
+    tilt = max(abs(T[0, 1]), abs(T[0, 2]))  # tilt of the x axis; in the first column it has the same size
     if tilt > ANGLE * EPS or T[0, 0] < 0.0 or T[1, 3] or T[2, 3]:
         return None
     alpha = math.atan2(T[2, 1], T[2, 2])
@@ -209,7 +210,7 @@ def as_step(T: FloatArray) -> tuple[float, float] | None:
 
 
 def wrapped(angle: float) -> float:
-    """Return the equal angle in (-pi, pi]; -pi becomes pi, also within rounding.
+    """Return the equivalent angle in (-pi, pi]; an angle within rounding of -pi becomes pi.
 
     Example:
         >>> wrapped(-math.pi) == math.pi, wrapped(7.0) == 7.0 - 2 * math.pi
@@ -241,7 +242,8 @@ class SnapChange:
         row: Index of the row that contains it, from 0; -1 for the base, the number of rows for the tool.
         what: The joint and the quantity.
         angle: Rotation of the rest of the chain (rad).
-        lever: Largest distance of the tip from the pivot with the prismatic joints at zero (metres).
+        lever: Largest distance of the tip from the pivot of the rotation, with the prismatic joints at zero
+            (metres).
         sliders: Names of the prismatic joints after the pivot; their travel adds to the lever.
     """
 
@@ -266,7 +268,7 @@ class SnapReport:
         changes: The snapped rotations, base to tip.
         metres: Guaranteed bound of the tip's displacement within the limits of prismatic joints.
         radians: Guaranteed bound of the tip's rotation.
-        per_metre: Increase of the bound for each metre of travel of each prismatic joint (metres per metre).
+        per_metre: For each prismatic joint, the increase of the bound per metre of travel (metres per metre).
         measured_metres: Largest displacement on samples.
         measured_radians: Largest rotation on samples.
         samples: Number of samples.
@@ -287,7 +289,7 @@ class SnapReport:
         return tuple(sorted({change.row for change in self.changes}))
 
     def bound(self, values: Mapping[str, FloatArray]) -> FloatArray:
-        """Return the (...,) guaranteed bound (metres) at these values of the prismatic joints, by name."""
+        """Return the (...,) guaranteed bound (metres) at given values of the prismatic joints, by name."""
         at_zero = sum(change.tip for change in self.changes)
         travel = [np.abs(values[name]) * rate for name, rate in self.per_metre.items()]
         return np.asarray(at_zero + sum(travel, np.zeros(())), dtype=np.float64)
@@ -299,9 +301,9 @@ _TYPED = 1e-6
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DHTable(Displayable):
-    """A Denavit-Hartenberg table, with the placements that its matrices give.
+    """A Denavit-Hartenberg table: it stores the rows and computes the pose of the tip.
 
-    `urdfkin.load` makes a robot from it. `urdfkin.dh` computes its motion and exports it.
+    `urdfkin.load` makes a robot from a table. `urdfkin.dh` computes the motion of a table and exports it.
 
     Attributes:
         convention: Standard or modified.
@@ -451,7 +453,7 @@ class DHTable(Displayable):
 
     @cached_property
     def span(self) -> float:
-        """Sum of all |a| and |d| and of the tool's length, with all joints at zero (metres).
+        """Sum of all |a|, all |d| and the tool's length, with all joints at zero (metres).
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -464,7 +466,8 @@ class DHTable(Displayable):
     def rounding(self, q: Given) -> FloatArray:
         """Return the (...,) bound of the rounding of `placement(q)` in metres; divided by `span`, in radians.
 
-        It is the rounding of the rows (`urdfkin.kinematics.roundings`) and of their angles, times the lever.
+        The bound adds the rounding of the rows (`urdfkin.kinematics.roundings`) and of their angles, and
+        multiplies the sum by the lever.
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -480,7 +483,8 @@ class DHTable(Displayable):
     def tolerance(self, q: Given) -> tuple[FloatArray, FloatArray]:
         """Return the (...,) bounds of the difference from the URDF's placement, in metres and in radians.
 
-        For an exact table this is the bound of rounding. For a snapped table its snapping bound is added.
+        For an exact table these are the bounds of rounding. For a snapped table the bounds of its snapping
+        are added.
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -520,9 +524,10 @@ class DHTable(Displayable):
 
     @cached_property
     def _path(self) -> Path:
-        """The base, then a motion and a constant for each row; in a modified table the constant is first.
+        """The table as a path: the base, then a motion and a constant for each row, then the tool.
 
-        The amount of a motion is the row's variable, theta or d. The constant contains the row's other cells.
+        In a modified table the constant of a row is before its motion. The amount of a motion is the row's
+        variable, theta or d. The constant contains the row's other cells.
         """
         steps: list[FloatArray | Motion] = [self.base]
         for row in self.rows:

@@ -1,14 +1,14 @@
 """Compute Khalil and Kleinfinger's parameters: one table for a whole tree.
 
 W. Khalil and J.-F. Kleinfinger, "A new geometric notation for open and closed-loop robots", ICRA 1986. Each
-link j has one frame. Its z_j is along the axis of the link's own joint (proximal, as in the modified
-convention). Its antecedent i = a(j) is the nearest moving link before it. The pose in the antecedent's frame
-is
+link j has one frame. The axis z_j of this frame is along the axis of the link's own joint (proximal, as in
+the modified convention). The antecedent i = a(j) of link j is the nearest moving link towards the root. The
+pose of frame j in the antecedent's frame is
 
     T(i, j) = Rz(gamma) Tz(b) . Tx(d) Rx(alpha) Ry(beta) . Rz(theta) Tz(r)
 
-The common normal to the first moving child of link i defines x_i, so gamma and b of this child are zero.
-Along a chain without branches the table is the modified one, with a(i-1) = d and d(i) = r. sigma is the
+The common normal to the first moving child of link i defines x_i, so gamma and b of this child are zero. For
+a chain without branches, the rows are those of the modified table, with a(i-1) = d and d(i) = r. sigma is the
 joint's kind: 0 revolute (theta), 1 prismatic (r), 2 fixed. A fixed joint uses all six numbers, so every frame
 of the robot is exact. beta is not part of the original notation. It is zero except between nearly parallel
 axes (Hayati), where the other numbers would need offsets of kilometres.
@@ -67,7 +67,7 @@ class TreeRow:
         beta: Rotation about y after alpha; 0 except between nearly parallel axes.
         theta: Rotation about the joint's own z; the joint's value is added if sigma is 0.
         r: Offset along the joint's own z; the joint's value is added if sigma is 1.
-        leader: Name of the mimicked joint; of a joint that mimics no other, its own name.
+        leader: Name of the mimicked joint; the joint's own name if it mimics no other joint.
         multiplier: Factor of the mimic rule: the joint's value is multiplier * q_leader + offset.
         offset: Offset of the mimic rule.
     """
@@ -95,8 +95,9 @@ class TreeParameters:
     Attributes:
         robot: The robot's name.
         root: The root link.
-        rows: One row for each joint, fixed joints included, in the tree's order.
-        ways: (joints,) path length from the root to each joint: the sum of the URDF's offsets (metres).
+        rows: One row for each joint, including fixed joints, in the tree's order.
+        ways: (joints,) path length
+            from the root to each joint: the sum of the URDF's offsets (metres).
         T_frame_link: (joints, 4, 4) pose of the URDF's link frame in the row's frame. The row's frame has z
             along the joint's axis and x along the common normal.
         left_out: Largest sum, over all paths, of the tilts that count as rounding (rad;
@@ -117,10 +118,10 @@ class TreeParameters:
 
     @property
     def roundings(self) -> float:
-        """Rounding of the deepest link's rows and of its own frame, in eps of the reach.
+        """Rounding of the rows on the longest path, and of the last link's frame, in eps of the reach.
 
-        Pinocchio's rounding is not added. The value is smaller than the worst case, and larger than every
-        measured error.
+        This number does not include Pinocchio's rounding. It is smaller than the worst case, and larger than
+        every measured error.
         """
         deepest = max((len(self._way(j)) for j in range(len(self.rows))), default=0)
         return of_rows(1 + deepest) + self.left_out / EPS
@@ -128,7 +129,7 @@ class TreeParameters:
     def reach(self, q: FloatArray) -> FloatArray:
         """Return the (..., joints) path length from the root to each link at `q`, in metres.
 
-        It is the larger of the URDF's and the table's path length.
+        The result is the larger of the path lengths in the URDF and in the table.
         """
         values = np.abs(self._values(q))
         own = np.array([abs(row.b) + abs(row.d) + abs(row.r) for row in self.rows])
@@ -220,10 +221,10 @@ class _Link:
     """The axis frame of a link.
 
     Attributes:
-        antecedent: Index of the nearest moving link before it; -1 is the root.
+        antecedent: Index of the nearest moving link towards the root; -1 is the root.
         T_antecedent_axis: (4, 4) pose of the axis frame in the antecedent's axis frame.
         T_link_axis: (4, 4) pose of the axis frame in the link's URDF frame.
-        noise: Noise of the pose in the antecedent.
+        noise: Noise of `T_antecedent_axis`.
         left_out: Sum of the tilts from the root to this link that count as rounding (rad).
     """
 
@@ -237,8 +238,8 @@ class _Link:
 def _links(tree: KinematicTree) -> list[_Link]:
     """Return the axis frame of each joint: z along the axis; the link's own frame for a fixed joint."""
     links = list[_Link]()
-    # For each link: its nearest moving link, its frame in that link's axis frame, and the number of joints
-    # between the two links.
+    # For each link: the nearest moving link towards the root, the pose of the link in the axis frame of that
+    # moving link, and the number of joints between the two links.
     carriers = [(-1, np.eye(4), 0)]
     for j, (joint, way) in enumerate(zip(tree.joints, _path_lengths(tree), strict=True)):
         antecedent, T, folded = carriers[joint.parent]
@@ -255,7 +256,8 @@ def _links(tree: KinematicTree) -> list[_Link]:
 def _steps(tree: KinematicTree, links: list[_Link]) -> tuple[list[Step], dict[int, tuple[float, float]]]:
     """Return the step to each axis, and the rotation and offset from each axis frame to its row's frame.
 
-    The first moving child of a link defines its x. A link without a moving child has the x with theta = 0.
+    The first moving child of a link defines the link's x axis. For a link without a moving child, x is chosen
+    so that theta = 0.
     """
     ways = _path_lengths(tree)
     steps, own = list[Step](), {-1: (0.0, 0.0)}
@@ -334,7 +336,7 @@ def document(table: TreeParameters, units: Units) -> TextDocument:
 
 
 def as_csv(table: TreeParameters) -> str:
-    """Return a line for each row, in metres and radians: its numbers, then T_frame_link from T11 to T34."""
+    """Return a CSV line for each row, in metres and radians: its numbers, then T11 to T34 of T_frame_link."""
     places = [f"T{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3, 4)]
     lines: list[list[object]] = [[*(field.name for field in fields(TreeRow)), *places]]
     for row, T in zip(as_mapping(table)["rows"], table.T_frame_link[:, :3].tolist(), strict=True):
@@ -353,7 +355,7 @@ def _headings(table: TreeParameters, units: Units) -> list[str]:
 def _cells(table: TreeParameters, j: int, units: Units) -> list[str]:
     row = table.rows[j]
     theta, r = units.angle(row.theta), units.length(row.r)
-    # The offset of a mimic joint is part of its constant, as in the other tables.
+    # The offset of a mimic joint is part of the constant of its cell, as in the other tables.
     own = f"q({row.leader})" if row.leader == row.joint else f"{row.multiplier:.10g} q({row.leader})"
     if row.sigma == 0:
         theta = added(own, units.angle(row.theta + row.offset))

@@ -2,10 +2,10 @@ r"""Convert a table's numbers from and to text: fractions of pi, degrees, millim
 
 A table itself is always in metres and radians. Other units exist only in its input and output.
 
-A cell is parsed from a text such as `q1 + pi/2`, `90 deg`, `107 mm`, `-θ₂*`, `\frac{\pi}{2}` or `180°`.
-It is a sum. At most one term is the joint's variable; the others are numbers or multiples of pi, with or
-without a unit. Invalid cells are rejected here. `urdfkin.dh.rows` supplies a missing unit, and decides which
-cells may have a variable.
+A cell is parsed from text such as `q1 + pi/2`, `90 deg`, `107 mm`, `-θ₂*`, `\frac{\pi}{2}` or `180°`. The
+text is a sum. At most one term is the joint's variable; the other terms are numbers or multiples of pi, with
+or without a unit. This module rejects invalid cells. `urdfkin.dh.rows` supplies a missing unit, and decides
+which cells may have a variable.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Units:
 
     @property
     def counts_millimetres(self) -> bool:
-        """Whether lengths are millimetres."""
+        """Whether lengths are in millimetres."""
         return self.lengths is Lengths.MILLIMETRES
 
     @property
@@ -107,7 +107,7 @@ _SHORT = {"rad": "radians", "deg": "degrees", "m": "metres", "mm": "millimetres"
 
 
 def units_of(angles: str = "radians", lengths: str = "metres", digits: int = 10) -> Units:
-    """Return units by name (also rad, deg, m and mm); raise InputError for an unknown name."""
+    """Return units from their names (also rad, deg, m and mm); raise InputError for an unknown name."""
     try:
         angles, lengths = (_SHORT.get(name, name) for name in (angles, lengths))
         return Units(Angles(angles), Lengths(lengths), digits)
@@ -121,7 +121,7 @@ def units_of(angles: str = "radians", lengths: str = "metres", digits: int = 10)
 
 
 def pi_fraction(radians: float) -> Fraction | None:
-    """Return an angle as a fraction of pi if it is exactly a multiple of pi/12; else None.
+    """Return the factor of pi in an angle that is exactly a multiple of pi/12; None for any other angle.
 
     Example:
         >>> pi_fraction(math.pi / 2), pi_fraction(1.5708)
@@ -143,7 +143,7 @@ def read_number(value: object, where: str) -> float:
     """Parse a number, a number in text, or a multiple of pi such as "-pi/2" or "3*pi/4".
 
     Raises:
-        InputError: anything else; the message names `where`.
+        InputError: the value is anything else; the message names `where`.
 
     Example:
         >>> read_number("-pi/2", "alpha") == -math.pi / 2
@@ -178,7 +178,7 @@ def cell_in_si(name: str, number: float, units: Units) -> float:
     return number if units.angles is Angles.RADIANS else in_radians(number)
 
 
-#: Characters of web pages, PDFs and LaTeX -> plain text.
+#: Characters that occur in web pages, PDFs and LaTeX -> the same in plain text.
 _SAME = str.maketrans(
     {
         **dict.fromkeys("\u2212\u2013\u2010\u2011\ufe63", "-"),
@@ -223,11 +223,11 @@ class Cell:
     """The content of a cell.
 
     Attributes:
-        number: The constant part, in `unit`, or in the table's unit if that is None.
+        number: The constant part, in `unit`; in the table's unit if `unit` is None.
         unit: "rad" (also for a multiple of pi), "deg", "m" or "mm"; None without a unit.
         times: Factor of the joint's variable; None without a variable.
         variable: Number of the variable (3 for q3); None without a number.
-        text: The constant's text if it is a single number; "" if it is computed.
+        text: The constant's text if the constant is a single number; "" if it is computed from several.
     """
 
     number: float
@@ -252,7 +252,7 @@ def cell_of(written: str) -> Cell:
     """Parse a cell.
 
     Raises:
-        NoCellError: an invalid cell; the message names the invalid part.
+        NoCellError: the cell is invalid; the message names the invalid part.
 
     Example:
         >>> cell_of("-q2 + 90°")

@@ -2,8 +2,8 @@
 
 Every message has four parts: what is wrong, where, what was found and what to do. The same four parts are
 attributes of the exception, so a program does not have to parse the message. A message may end with a
-`Question`: the command that prints a section of docs/questions.md. `nearest` suggests names for a misspelt
-one.
+`Question`: the command that prints a section of docs/questions.md. The function `nearest` suggests existing
+names for a misspelt name.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from urdfkin.errors.escape import log_line
 #: Number of leading characters of a name that `nearest` compares.
 _COMPARED = 128
 
-#: Default limit of `nearest`: pairs of characters to compare for one word. Quick rejections do not count.
+#: Default limit of `nearest`: number of pairs of characters to compare for one word. A name that is rejected
+#: without a comparison does not count.
 WORK = 1_000_000
 #: Largest number of suggested names.
 _OFFERED = 3
@@ -34,7 +35,8 @@ def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6, work: int =
         word: The misspelt name.
         known: The existing names.
         cutoff: Least similarity, from 0 to 1.
-        work: Pairs of characters to compare. When they are used up, the names found so far are returned.
+        work: Largest number of pairs of characters to compare. When it is reached, `nearest` returns the
+            names found so far.
 
     >>> nearest("pandahand", ["panda_hand", "elbow", "base"])
     ['panda_hand']
@@ -129,11 +131,13 @@ class UrdfkinError(Exception):
         remedy = f"; {self.remedy}" if self.remedy else ""
         apart = " " if remedy.endswith("?") else "; "
         question = f"{apart}{self.question}" if self.question else ""
-        # The message contains names from files. They must not add lines or terminal commands.
+        # The message contains names from files. Such a name must not add lines or terminal commands to the
+        # output.
         return log_line(f"{place}{self.what}{found}{remedy}{question}")
 
     def __reduce__(self) -> tuple[Callable[..., Self], tuple[Any, ...]]:
-        # `validate --jobs` pickles errors between processes; the default would lose the keyword fields.
+        # `validate --jobs` sends errors between processes by pickle. Python's default `__reduce__` would lose
+        # the keyword arguments.
         return _rebuild, (type(self), self.__dict__)
 
 
@@ -224,9 +228,9 @@ class SourceError(UrdfkinError, OSError):
 
 
 class RepresentationSingularityError(InputError):
-    """Euler angles are at their representational singularity, where their rates do not exist (7.56).
+    """Euler angles are at their representational singularity, where their derivatives do not exist (7.56).
 
-    The motion itself is regular; only its description by these angles fails.
+    The motion itself is regular. Only its description by these angles fails.
 
     Attributes:
         sequence: The Euler sequence.

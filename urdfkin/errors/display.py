@@ -1,8 +1,8 @@
 """Display of objects as text, HTML, Markdown and LaTeX.
 
 A class derives from `Displayable` and returns a `TextDocument` from `_sheet`: a title, sentences and tables.
-`Displayable` derives the output of `print` and of notebooks from it. Names come from files and may contain
-any characters, so each format escapes them.
+`Displayable` makes the output of `print` and of notebooks from this document. Names come from files and may
+contain any characters, so each format escapes them.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from html import escape
 
 from urdfkin.errors.escape import latex_text, log_line, markdown_cell, markdown_code, markdown_text, printable
 
-#: Characters that draw the lines of a tree before a name, and their ASCII replacements.
+#: Characters that draw the branches of a tree before a name. `ASCII` has their replacements.
 LINES = "├│└ "
 ASCII = str.maketrans("├│└", "+|`")
-#: A number below this fraction of a table's largest number is rounding error and is displayed as 0. This
-#: affects display only: machine-readable output has all digits, and no check uses the displayed value.
+#: A number below this fraction of a table's largest number counts as a rounding error and is displayed as 0.
+#: This affects display only: machine-readable output has all digits, and no check uses the displayed value.
 NOISE = 1e-15
 
 
@@ -28,9 +28,9 @@ class Table:
     Attributes:
         heads: Titles of the columns.
         rows: Cells of each row. Numbers are displayed with six digits.
-        left: Left-aligned columns: the number of first columns, or the column indices. Leading blanks in
-            these columns are kept.
-        names: Indices of columns with names, which are code in Markdown.
+        left: Left-aligned columns, either as a number (so many columns, from the first) or as column indices.
+            Leading blanks in these columns are kept.
+        names: Indices of columns with names. Markdown displays names as code.
     """
 
     heads: Sequence[str]
@@ -50,7 +50,7 @@ class Table:
         ]
 
     def _split_cells(self) -> list[list[tuple[str, str]]]:
-        """Split each cell, including the heads, into the lines of a tree and the text after them."""
+        """Split each cell and heading into the line characters of a tree and the text after them."""
         return [
             [(cell[: len(cell) - len(words)], words) for cell in row for words in (cell.lstrip(LINES),)]
             for row in (self.heads, *self.cells())
@@ -167,7 +167,7 @@ class Strong(str):
 
 
 class Code(str):
-    """A formula or another sentence of code."""
+    """A formula or another line of code."""
 
     __slots__ = ()
 
@@ -185,7 +185,7 @@ class TextDocument:
     parts: Sequence[str | Table | Matrix] = ()
 
     def written(self, form: str) -> str:
-        """Return the file in the format "terminal" (or "table"), "markdown", "html" or "latex"."""
+        """Return the text in the format "terminal" (or "table"), "markdown", "html" or "latex"."""
         text: str = self.text() if form in ("terminal", "table") else getattr(self, form)()
         return text + "\n"
 

@@ -1,8 +1,7 @@
 """Escaping of names from files: one function for each output format.
 
 A name in a URDF may contain line ends, terminal escape sequences, bidirectional control characters, HTML or
-spreadsheet formulas. Each function replaces the active characters by readable escapes. No character is
-removed.
+spreadsheet formulas. Each function replaces the active characters by readable escapes. No character is lost.
 """
 
 from __future__ import annotations
@@ -16,12 +15,14 @@ from typing import Any
 
 #: First characters that make a spreadsheet interpret a cell as a formula.
 FORMULA = ("=", "+", "-", "@")
-#: Commands to a CI service: of Azure and TeamCity anywhere in a line, of GitHub at its beginning. The group
-#: is the character to escape. JSON and TOML parsers turn the escape back into the character.
+#: Patterns of commands to a CI service. Commands of Azure and TeamCity may be anywhere in a line, commands of
+#: GitHub at its beginning. The group of a pattern is the character to escape. JSON and TOML parsers turn the
+#: escape back into the character.
 COMMAND_ANYWHERE = re.compile(r"##(?:vso|teamcity)?(\[)")
 COMMANDS = (re.compile(r"\A\s*:(:)"), COMMAND_ANYWHERE)
 _NUMBER = re.compile(r"[-+]?[0-9.]+(?:e[-+]?[0-9]+)?")
-#: An invisible character (word joiner). It prevents that text becomes a link, a mention or an issue number.
+#: An invisible character (word joiner). It keeps Markdown from turning text into a link, a mention or an
+#: issue number.
 _JOINER = "&#8288;"
 
 
@@ -63,7 +64,7 @@ def markdown_text(words: str) -> str:
 
 
 def markdown_cell(words: str) -> str:
-    """Escape text for a cell of a table in Markdown, where no list and no horizontal rule can begin."""
+    """Escape text for a cell of a Markdown table. A list or horizontal rule cannot begin in a cell."""
     flat = printable(re.sub(r"\s+", " ", words)).replace("&", "&amp;")
     flat = flat.replace("<", "&lt;").replace(">", "&gt;")
     flat = re.sub(r"([\\`*_{}\[\]()|~!#$])", r"\\\1", flat.strip())
@@ -118,7 +119,7 @@ def json_text(data: Any) -> str:
 
 
 def escape(c: str) -> str:
-    """Return the escape of a character in Python and TOML; up to U+FFFF also in JSON."""
+    """Return the escape of a character in Python and TOML. Up to U+FFFF it is also valid in JSON."""
     return f"\\u{ord(c):04x}" if ord(c) < 0x10000 else f"\\U{ord(c):08x}"
 
 
@@ -145,5 +146,5 @@ def csv_value(text: str) -> str:
 
 
 def from_csv_cell(cell: str) -> str:
-    """Return the name that `csv_cell` wrote, if the name contained no character to escape."""
+    """Return the name that `csv_cell` wrote. It is exact if `csv_cell` escaped no character."""
     return cell[1:] if cell.startswith("'") and cell.lstrip("' ").startswith(FORMULA) else cell

@@ -53,7 +53,7 @@ def parse_int(text: str) -> int | None:
 
 
 def remedy(text: str) -> str | None:
-    """Return the remedy for a text that is no number; None if its intended meaning is unknown."""
+    """Return the remedy for a text that is no number; None if the intended number is unclear."""
     text = text.strip(" \t\r\n")
     found = (words for pattern, words in _REMEDIES if re.fullmatch(pattern, text, re.IGNORECASE | re.DOTALL))
     return next(found, None)
@@ -81,7 +81,8 @@ class Measured(NamedTuple):
     Attributes:
         value: The number, in radians or metres if a unit is given, otherwise as written.
         unit: "rad" or "m"; None without a unit. A multiple of pi without a unit is in radians.
-        per: Power of seconds in the denominator: 1 for a velocity, 2 for an acceleration.
+        per: Power of seconds in the denominator of the unit: 0 for a position, 1 for a velocity, 2 for an
+            acceleration.
     """
 
     value: float

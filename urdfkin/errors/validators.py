@@ -73,7 +73,7 @@ def as_choice(value: str | None, default: str, name: str) -> str:
 
 
 def as_names(value: Any, name: str) -> tuple[str, ...]:
-    """Return `value` as a tuple. Its entries should be names; the later lookup checks them."""
+    """Return `value` as a tuple. Whether its entries are names is checked later, when they are looked up."""
     if isinstance(value, str):
         raise InputError(
             f"{name} must be a list of names", found=safe_repr(value), remedy=f"write [{safe_repr(value)}]"

@@ -1,4 +1,4 @@
-"""Export the kinematics of a robot's frame as code that runs without urdfkin, with its proof in the file."""
+"""Export the kinematics of a robot's frame as code that runs without urdfkin and contains its own proof."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ LANGUAGES: dict[str, tuple[str, str, str]] = {
     "matlab": ("urdfkin.export.matlab", "_kinematics.m", "MATLAB and Octave"),
     "latex": ("urdfkin.export.latex", ".tex", "formulas of a document, in the textbook's symbols"),
 }
-#: Default quantities.
+#: Quantities that are exported by default.
 QUANTITIES = ("placement", "jacobian", "acceleration")
 
 
 def write(code: Code, to: str) -> str:
-    """Return the text of a file in a language, with its seal.
+    """Return the text of a file in the language `to`, with its seal.
 
     Raises:
         UnknownNameError: the language is unknown.

@@ -1,9 +1,9 @@
-"""Write C99 in double or single precision, for one configuration and for batches.
+"""Write C99 code in double or single precision, for one configuration and for batches.
 
-The code has no allocation and no global variables. A function is straight-line code on numbers that are `L`
-apart in memory. For one configuration L is 1. For a batch L is the number of lanes, and a compiler makes one
-vector instruction of each line. The parts of a file that do not depend on the robot are templates in
-`frames/`.
+The code has no allocation and no global variables. A function is straight-line code. Consecutive numbers of
+one configuration are `L` elements apart in memory. For one configuration L is 1. For a batch L is the number
+of configurations that are computed together, and a compiler turns each line of code into one vector
+instruction. The parts of a file that do not depend on the robot are templates in `frames/`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _PLACE = re.compile(r"@(\w+)@")
 
 
 def write(code: Code, to: str = "c") -> str:
-    """Return a translation unit; with `NAME_DECLARATIONS` defined it only declares the functions."""
+    """Return a translation unit; if `NAME_DECLARATIONS` is defined, it only declares the functions."""
     return unit(code, comment(_head(code)), "\n".join([*vectors(code), main(code, "check_one.c")]))
 
 
@@ -40,13 +40,13 @@ def unit(code: Code, head: str = "", main: str = "") -> str:
 
 
 def framed(name: str, /, **parts: str | int) -> str:
-    """Return a template with its `@name@` places filled once; the inserted text is not searched again."""
+    """Return a template with each `@name@` replaced; inserted text is not searched for further names."""
     text = (_FRAMES / name).read_text(encoding="utf-8")
     return _PLACE.sub(lambda found: str(parts[found[1]]), text)
 
 
 def literal(x: float) -> str:
-    """Return a constant in the precision of the file."""
+    """Return a constant as text in the number type of the file."""
     return f"R({x!r})"
 
 
@@ -129,7 +129,7 @@ def _function(code: Code, function: Function) -> str:
 
 
 def spare(code: Code, function: Function) -> int:
-    """Return the number of rows that are at least eight numbers, in every input and in the result."""
+    """Return how many rows make up at least eight numbers, in every input and in the result."""
     widths = (*code.widths(function).values(), len(function.results))
     return max(-(-8 // width) if width else 0 for width in widths)
 
@@ -142,7 +142,7 @@ def advance(code: Code, function: Function) -> str:
 class Layout:
     """Layout of a function's inputs, angles, sines and cosines in the array `in`.
 
-    The angles are contiguous: first those that are inputs, then those that are computed.
+    The angles are contiguous: first the angles that are inputs, then the angles that are computed.
     """
 
     def __init__(self, function: Function) -> None:
@@ -213,7 +213,7 @@ def _lane_sines(writer: Writer, layout: Layout) -> Iterator[str]:
 
 
 def vectors(code: Code) -> Iterator[str]:
-    """Yield the test vectors as arrays: inputs, true values and tolerances."""
+    """Yield the test vectors as C arrays: inputs, true values and tolerances."""
     found, n = code.proof.vectors, len(code.proof.vectors)
     yield "/* True values at fifty digits, and the tolerance of each number, in eps of its precision. */"
     for k, (letter, width) in enumerate(

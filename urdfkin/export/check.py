@@ -1,7 +1,8 @@
 """Check an exported file: compile or import it, and run its test vectors.
 
-The file is run as code. A file from someone else needs the same care as any other program. A copy of it runs
-in a separate folder, so that no other file beside it is run.
+The check runs the file as code. A file from another person therefore needs the same care as any other
+program. The check runs a copy in a separate folder, so that it does not run other files from the original
+folder.
 """
 
 from __future__ import annotations
@@ -24,9 +25,9 @@ _MARK = "straight-line code for this robot and frame"
 _MAIN = re.compile(r"^#ifdef (\w+)_MAIN$", re.MULTILINE)
 _FUNCTION = re.compile(r"^function f = ([A-Za-z]\w*)\(\)", re.MULTILINE | re.ASCII)
 _STRICT = ("-Wall", "-Wextra", "-pedantic", "-Werror")
-#: Number of characters that are searched as the head of a file.
+#: Number of characters at the start of a file that are searched for `_MARK` and for the word UNVERIFIED.
 _HEAD = 2000
-#: Time limit, seconds; a robot of a thousand joints compiles in one minute.
+#: Time limit of a command, seconds. The code of a robot with a thousand joints compiles in one minute.
 _TIME_LIMIT = 600.0
 
 
@@ -72,7 +73,7 @@ def check(file: Path) -> Checked:
             )
         lines = tuple(
             line for words in run(file, text, Path(folder)) for line in words
-        )  # a copy, alone in its folder
+        )  # a copy in a separate folder
     if not lines:
         raise InputError("the file has no test vectors", where=str(file))
     return Checked(lines, all(line.startswith("good ") for line in lines), tuple(_doubts(text)))
@@ -89,7 +90,7 @@ def _doubts(text: str) -> Iterator[str]:
 
 
 def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
-    """Compile and run in both precisions, with the system's compiler and all warnings as errors."""
+    """Compile and run the file in both precisions, with the system's compiler and all warnings as errors."""
     found = _MAIN.search(text)
     if found is None:
         raise InputError("the file has no test vectors", where=str(file))
@@ -135,7 +136,7 @@ def _program(name: str, file: Path) -> str:
 
 
 def _run(command: Sequence[str], file: Path, cwd: Path | None = None) -> list[str]:
-    """Run a command and return the verdicts that it prints."""
+    """Run a command, and return the lines with verdicts that it prints."""
     try:
         done = subprocess.run(
             command,

@@ -21,7 +21,7 @@ from urdfkin.model.tree import KinematicTree
 from urdfkin.verify.quantities import Quantity, quantity, walked
 from urdfkin.verify.verifier import Verifier
 
-#: Precedence of a sum, a change of sign, a product, and an operand that needs no brackets.
+#: Precedence levels: a sum, a change of sign, a product, and an operand that needs no brackets.
 _SUM, _SIGN, _PRODUCT, _ATOM = range(4)
 _LEVEL = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT}
 
@@ -32,14 +32,14 @@ class Code:
 
     Attributes:
         name: Prefix of the names of functions.
-        robot: The robot's name, safe in a comment, as are all other names here.
+        robot: The robot's name. All names in this class are safe in a comment.
         frame: The frame's name.
         reference: The reference frame.
         functions: One function for each quantity.
         coordinates: Names of the coordinates of q.
         rates: Names of the coordinates of v and a.
         joints: Names of the path's moving joints.
-        words: Identifiers for the numbers of each input, by its letter, and for the path's joints.
+        words: Identifiers for the numbers of each input, by the input's letter, and for the path's joints.
         vouched: The proof; None for code that urdfkin compiles for itself.
     """
 
@@ -72,12 +72,12 @@ class Code:
         return len(self.rates)
 
     def widths(self, function: Function) -> dict[str, int]:
-        """Return the length of each input of a function, by its letter."""
+        """Return the length of each input of a function, by the input's letter."""
         return {letter: self.nq if letter == "q" else self.nv for letter in function.inputs}
 
     @property
     def head(self) -> list[str]:
-        """The head of a file, without comment marks; the verdict is its first line if it is UNVERIFIED."""
+        """The lines of a file's header, without comment marks; the verdict is first if it is UNVERIFIED."""
         verdict, *rest = self.proof.lines
         lines = [verdict] if not self.proof.certificate.verified else []
         lines += [
@@ -109,7 +109,7 @@ def code_of(
 
     Raises:
         UnknownNameError: the frame, a quantity or the reference is unknown.
-        InputError: there is no quantity, or one that cannot be exported.
+        InputError: no quantity is given, or a quantity cannot be exported.
         VerificationError: Pinocchio computes another result.
     """
     tree, reference = verifier.tree, Reference.of(reference)
@@ -178,7 +178,7 @@ class Writer:
         code: The code with the names to use.
         function: One of its functions.
         literal: Function that writes a constant.
-        sine: Whether to write sine and cosine as operations; else they are inputs.
+        sine: Whether to write sine and cosine as operations; if not, they are inputs.
     """
 
     def __init__(
@@ -241,12 +241,13 @@ class Writer:
         else:
             own = _LEVEL[x.op]
             left, right = x.of
-            # a + (b + c) keeps its brackets, so that it rounds as in the comparison with Pinocchio.
+            # a + (b + c) keeps its brackets, so that it rounds in the same way as in the comparison with
+            # Pinocchio.
             text = f"{self.text(left, own)} {x.op} {self.text(right, own + 1)}"
         return text if own >= level else f"({text})"
 
     def whole(self, x: Number, given: Callable[[Node], str], level: int = _SUM) -> str:
-        """Return an expression without names of statements: for an angle, computed before them."""
+        """Return an expression that uses no statements, for an angle computed before the statements."""
         if not isinstance(x, Node):
             return self.literal(float(x))
         if x.op in self.code.words:

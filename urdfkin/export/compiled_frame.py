@@ -1,10 +1,10 @@
-"""Compile one frame of one robot to machine code: the fastest form, for configurations and batches.
+"""Compile one frame of one robot to machine code, the fastest form, for one configuration or a batch.
 
 The first call of a quantity compiles the C of `export` with the system's compiler. The result is compared
-with Pinocchio before it is used. Without a compiler, Numba's forward recursion computes.
+with Pinocchio before it is used. Without a C compiler, the forward recursion that Numba compiles is used.
 
-The machine code is stored in a checksummed cache, under a key of text, compiler and processor. It is loaded
-from memory, because a file could be changed after its checksum was tested.
+The machine code is stored in a cache with checksums. The key consists of the C code, the compiler and the
+processor. The code is loaded from memory, because a file could be changed after its checksum was tested.
 """
 
 from __future__ import annotations
@@ -43,14 +43,15 @@ from urdfkin.verify.sampling import draw
 from urdfkin.verify.verifier import Verifier
 
 _FLAGS = ("-std=c99", "-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fPIC", "-shared")
-#: By default GCC uses half registers on many processors where whole registers are as fast.
+#: By default GCC uses only half of each vector register on many processors, although the whole register is as
+#: fast.
 _WHOLE_REGISTERS = {"x86_64": ("-mprefer-vector-width=512",)}
 _TIME_LIMIT = 600.0
 _names = count()
 
 
 class NoCompilerError(Exception):
-    """Error for a missing C compiler, or one that rejects the code; the message is the compiler's."""
+    """Error if there is no C compiler, or if the compiler rejects the code; the message is the compiler's."""
 
 
 def library(code: Code) -> ctypes.CDLL:
@@ -140,7 +141,7 @@ def _load(data: bytes) -> ctypes.CDLL:
     with os.fdopen(descriptor, "wb") as file:
         file.write(data)
         file.flush()
-        # The loader identifies a library by its name, so every library gets another name.
+        # The loader identifies a library by its name, so every library gets a different name.
         return ctypes.CDLL(f"/proc/self/fd/{'./' * next(_names)}{descriptor}")
 
 
@@ -164,7 +165,8 @@ def _processor() -> str:
 
 #: Number of random configurations compared with Pinocchio, besides the neutral one and the limits.
 CHECKED = 100
-#: Largest number of results; those of eight configurations are on the stack, at most half a megabyte.
+#: Largest number of results of one configuration. The results of eight configurations are on the stack and
+#: take at most half a megabyte.
 _MOST_RESULTS = 8192
 _PLACES = KernelArgs.Q, KernelArgs.V, KernelArgs.A
 _compiling = lock_over_forks()
@@ -186,10 +188,11 @@ class _Robot(Protocol):
 class CompiledFrame:
     """One frame of a robot in one reference frame, compiled; the result of `Robot.compiled`.
 
-    Results agree with those of `Robot` within the bound, not to the last bit. A batch and its single
-    configurations give equal bits. Inputs are checked: a wrong shape or a number that is not finite is an
-    error. Pinocchio does not check each call, and the ledger counts calls as unchecked. Pinocchio checks the
-    machine code once, on a hundred configurations, unless the robot is loaded with `verify=False`.
+    Results agree with those of `Robot` within the error bound, but not to the last bit. A batch gives the
+    same bits as its configurations one by one. Inputs are checked: a wrong shape or a number that is not
+    finite is an error. Pinocchio does not check each call, and the ledger counts the calls as unchecked.
+    Pinocchio checks the machine code once, on a hundred configurations, unless the robot is loaded with
+    `verify=False`.
 
     Attributes:
         frame: The frame's name.
@@ -216,7 +219,7 @@ class CompiledFrame:
         self._acceleration: Fast = partial(self._first, "acceleration")
 
     def __reduce__(self) -> tuple[Callable[..., CompiledFrame], tuple[str, Reference]]:
-        # The object contains addresses of this process, so it is made again.
+        # The object contains memory addresses of this process, so unpickling makes the object again.
         return self._robot.compiled, (self.frame, self.reference)
 
     def placement(self, q: Given, out: FloatArray | None = None, *, threads: int | None = None) -> FloatArray:
@@ -372,7 +375,8 @@ class CompiledFrame:
         def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
             task = np.zeros(len(KernelArgs), dtype=np.int64)
             task[KernelArgs.N], task[KernelArgs.OUT] = len(part), part.ctypes.data
-            # The last row may be shorter than a register; the register is then written past the row's end.
+            # The last row may be shorter than a vector register. A register is then written past the end of
+            # the row.
             stage = lines(LANES * part[0].size + LANES) if row.columns and is_staged(found) else None
             task[KernelArgs.STAGE] = 0 if stage is None else stage.ctypes.data
             for place, x in zip(_PLACES, parts, strict=False):

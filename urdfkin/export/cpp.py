@@ -10,7 +10,7 @@ from urdfkin.export.function import Function
 
 
 def write(code: Code, to: str = "cpp") -> str:
-    """Return a header; with `NAME_MAIN` defined it is a program that runs its check."""
+    """Return a header; if `NAME_MAIN` is defined, it is a program that checks the header."""
     name, up = code.name, code.name.upper()
     first = code.functions[0]
     head = [

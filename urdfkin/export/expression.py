@@ -1,9 +1,9 @@
-"""Symbolic numbers: arithmetic on them builds a graph of expressions for code generation.
+"""Define symbolic numbers; arithmetic on these numbers builds a graph of expressions for code generation.
 
 The textbook's equations (`urdfkin.kinematics.equations`) run on these numbers as on any others. The graph
-simplifies expressions at once. Constants are Python's floats and are folded. Products with 0 and 1 and sums
-with 0 are removed. A minus is moved out of products and into differences. Equal expressions are one node, so
-each joint's sine and cosine occur once.
+simplifies each expression when it is made. Constants are Python floats, and operations on constants are
+computed. Products with 0 and 1 and sums with 0 are removed. A minus sign is moved out of products, and turns
+a sum into a difference. Equal expressions are one node, so each joint's sine and cosine occur once.
 
 >>> graph = Graph()
 >>> x, y = graph.input("q", 0), graph.input("q", 1)
@@ -21,7 +21,7 @@ from typing import Any
 
 from urdfkin.kinematics.arithmetic import bound
 
-#: A number of an equation on the graph: a constant or an expression.
+#: A number in an equation: a constant or an expression of a graph.
 Number = Any
 _EQUATIONS = re.compile(r"(?:7\.\d+(?:, )?)+")
 
@@ -80,7 +80,8 @@ class Graph:
     Attributes:
         place: Index of the current step of the recursion.
         equation: Numbers of the current equation.
-        chapter: The textbook's equations; each writes its numbers on the nodes that it creates.
+        chapter: The textbook's equations. Each equation records its equation numbers in the nodes that it
+            creates.
     """
 
     def __init__(self) -> None:
@@ -145,7 +146,10 @@ class Graph:
         return self.made("*", *_in_order(x, y))
 
     def _record_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
-        """Return an equation that writes its numbers on new nodes, unless another equation called it."""
+        """Return an equation that records its equation numbers in new nodes.
+
+        If another equation calls it, the numbers of the outer equation are recorded.
+        """
         found = _EQUATIONS.match(equation.__doc__ or "")
         if found is None:
             return equation

@@ -1,8 +1,8 @@
-"""One quantity of one frame as a function: its inputs, its statements and its results.
+"""Define one quantity of one frame as a function with inputs, statements and results.
 
-An expression is a statement if it is used more than once or is a number of a link's state. Sines, cosines,
-roots and quotients are statements, too. A long expression is split into statements. Other expressions are
-written where they are used.
+An expression becomes a statement with a name if it is used more than once or is a number of a link's state.
+Sines, cosines, roots and quotients also become statements. A long expression is split into several
+statements. All other expressions are written where they are used.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Function:
     """Straight-line code for one quantity.
 
     Attributes:
-        quantity: The quantity's row of the table.
+        quantity: The quantity's row in the table of quantities.
         reference: The reference frame.
         plan: The compiled tree of the path.
         results: The results, constants and expressions, row by row.
@@ -98,7 +98,7 @@ class Function:
         return found
 
     def within(self, leaves: Collection[str]) -> set[Node]:
-        """Return the nodes of the results, without the operands of the operations in `leaves`."""
+        """Return the nodes that the results need, without the operands of the operations in `leaves`."""
         waiting, found = [x for x in self.results if isinstance(x, Node)], set[Node]()
         while waiting:
             if (node := waiting.pop()) not in found:
@@ -134,7 +134,7 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
 
 
 def _without_minus(node: Node) -> Node:
-    """Return the node without its minus: -x is written where it is used."""
+    """Return the node without its minus sign, because -x is written where it is used."""
     return node.of[0] if node.op == "neg" else node
 
 

@@ -1,6 +1,7 @@
 r"""Write a LaTeX document: the straight-line code as formulas, in the textbook's symbols.
 
-A joint has its number on the path as its index. A list at the beginning gives the joints' names.
+The index of a joint's symbols is the joint's number on the path. A list at the beginning of the document
+gives the joints' names.
 """
 
 from __future__ import annotations

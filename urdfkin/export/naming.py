@@ -26,7 +26,7 @@ def safe(name: str) -> str:
 
 
 def all_safe(names: Iterable[str]) -> list[str]:
-    """Return safe names for several, all different even in a language that ignores case.
+    """Return a safe name for each name; all are different even in a language that ignores case.
 
     >>> all_safe(["a b", "a/b", "A_b_2"])
     ['a_b', 'a_b_2', 'A_b_2_2']
@@ -60,7 +60,7 @@ def shown(name: str) -> str:
 
 
 def quiet(text: str) -> str:
-    r"""Return printable ASCII that cannot end a comment in any language, also not by C's trigraphs.
+    r"""Return the text as printable ASCII that cannot end a comment in any language, even with C's trigraphs.
 
     >>> quiet("*/ int x; ??/")
     '_/ int x; __/'

@@ -1,10 +1,10 @@
-"""The proof in an exported file: a comparison with Pinocchio, and test vectors at fifty digits.
+"""Make the proof in an exported file: a comparison with Pinocchio, and test vectors at fifty digits.
 
-The printed expressions are evaluated as they are and compared with Pinocchio's results. The test vectors then
-check the file wherever it is used, with its language, compiler and library. They contain true values at fifty
-digits, computed from the URDF's decimals. For each number they also contain the error bound of a correct
-computation, in eps of its precision. The inputs are single-precision numbers, so they are equal in both
-precisions.
+The expressions are evaluated exactly as they are printed, and the results are compared with Pinocchio's. The
+test vectors then check the file wherever it is used, together with the language, compiler and library there.
+They contain true values at fifty digits, computed from the URDF's decimals. For each number they also contain
+the error bound of a correct computation, in eps of the precision used. The inputs are single-precision
+numbers, so they are equal in both precisions.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ class Vector:
 
     Attributes:
         inputs: q, v and a.
-        results: By quantity, the true values as decimals, row by row.
-        within: By quantity, the error bound of each number, in eps.
+        results: For each quantity, the true values as decimal numbers, row by row.
+        within: For each quantity, the error bound of each number, in eps.
     """
 
     inputs: tuple[list[float], ...]

@@ -1,4 +1,4 @@
-"""Write Python for NumPy, Numba, JAX, CasADi and SymPy: equal expressions in different functions."""
+"""Write Python code for NumPy, Numba, JAX, CasADi and SymPy; the expressions are the same for all."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ class Dialect:
 
     Attributes:
         about: Description of a function's inputs and results.
-        imports: Import lines, with a place for the used functions among `cos`, `sin` and `sqrt`.
+        imports: Import lines, with a placeholder for those of `cos`, `sin` and `sqrt` that are used.
         result: Function that yields the lines that return numbers in a shape.
         values: Body of `_values(function, inputs)`, which returns the results for a list of configurations.
         decorator: Line before each function; "" for none.
         entering: Function that returns the first lines of a function from its inputs.
         index: Format of an element of an input.
-        before: Line that the file's own check runs first; "" for none.
+        before: First line of the check in the file; "" for none.
     """
 
     about: str
@@ -57,7 +57,7 @@ def _nested(
 ) -> Callable[[list[str], tuple[int, ...]], Iterator[str]]:
     """Return the writer of results in one call, row by row.
 
-    The rows of a Hessian are stacked unless `deeper` reshapes them.
+    The rows of a Hessian are written as one matrix unless `deeper` reshapes them.
     """
 
     def result(values: list[str], shape: tuple[int, ...]) -> Iterator[str]:

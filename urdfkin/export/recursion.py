@@ -1,10 +1,11 @@
-"""The forward recursion of section 7.7 along one path, for any kind of number.
+"""Apply the forward recursion of the textbook's section 7.7 to one path, for any kind of number.
 
-The compiled tree of a frame is a row of steps. Each step is a translation along a rigid link, a constant
-rotation and the motion of a joint about or along z. Placements and Jacobians are computed in the world's
-axes, as in the textbook. Velocities and accelerations are computed in each link's own axes, where joint axes
-are (0, 0, 1) and links are constant. Results in the world's axes are then rotated back joint by joint. This
-takes a third fewer operations than R itself.
+The compiled tree of a frame is a sequence of steps. Each step is a translation along a rigid link, a constant
+rotation and the motion of a joint about or along z. Placements and Jacobians are computed in the axes of the
+world frame, as in the textbook. Velocities and accelerations are computed in the axes of each link's frame,
+where joint axes are (0, 0, 1) and link vectors are constant. To express a result in the axes of the world
+frame, it is then rotated joint by joint. This takes a third fewer operations than a computation of the
+rotation matrix R.
 
 `urdfkin.model.recursion` contains the recursion; this module applies it to a compiled tree.
 """
@@ -30,8 +31,8 @@ class Kind:
 
     Attributes:
         chapter: The textbook's equations for this kind of number.
-        sine_cosine: Returns sine and cosine of an angle.
-        root: Returns the square root.
+        sine_cosine: Function that returns sine and cosine of an angle.
+        root: Function that returns the square root.
         entering: Callback before each step, before the frame (after the last step) and before its results.
         reached: Callback for each state, with the number of steps.
     """
@@ -50,7 +51,7 @@ class TreeRecursion(Recursion):
         plan: The compiled tree of one frame.
         kind: The kind of number.
         inputs: q, v and a; zeros where they are not needed.
-        own: Whether to compute motion in each link's own axes.
+        own: Whether to compute the motion of each link in the axes of the link's frame.
 
     Attributes:
         states: The state after each step.
@@ -124,8 +125,8 @@ class TreeRecursion(Recursion):
 def _without_rounding(x: Sequence[float]) -> Vector:
     """Return a constant vector; entries below the rounding of its largest entry become 0.
 
-    For example, the cosine of the double nearest to pi/2 is 6e-17 and would only add useless products. The
-    error is counted in `urdfkin.kinematics.roundings`.
+    For example, the cosine of the double nearest to pi/2 is 6e-17, and would only add useless products. The
+    bound of `urdfkin.kinematics.roundings` includes the error of this change.
     """
     least = EPS / 2.0 * max(map(abs, x))
     first, second, third = (c if abs(c) > least else 0.0 for c in x)
@@ -177,7 +178,7 @@ def hessian(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -
 
 
 def _recursion(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> TreeRecursion:
-    # The reference WORLD needs p, which is computed in the world's axes.
+    # The reference WORLD needs the position p, which is computed in the axes of the world frame.
     return TreeRecursion(plan, kind, inputs, own=not reference.at_world)
 
 
@@ -186,7 +187,7 @@ def _six_vector(path: TreeRecursion, reference: Reference, linear: Vector, angul
         case Reference.LOCAL_WORLD_ALIGNED:
             for S in reversed(path.turns):
                 linear, angular = path.eq.rotate(S, linear), path.eq.rotate(S, angular)
-        case Reference.LOCAL | Reference.WORLD:  # computed in these axes
+        case Reference.LOCAL | Reference.WORLD:  # the vectors are already in the axes of this frame
             pass
         case _:
             assert_never(reference)

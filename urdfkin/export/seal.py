@@ -1,4 +1,4 @@
-"""The seal of an exported file: a digest of the whole text in its own head.
+"""Write and test the seal of an exported file: a digest of the whole text in the file's header.
 
 It detects changes of the file's numbers, test vectors and statements. It is a digest, not a signature: it
 does not prove who wrote the file.
@@ -10,7 +10,7 @@ import hashlib
 import re
 
 _ZEROS = "0" * 64
-#: The line of a file's head that `seal` completes.
+#: The line of a file's header that `seal` completes.
 SEAL = f"Seal sha256 {_ZEROS}"
 _LINE = re.compile(r"^([ %*]*Seal sha256 )([0-9a-f]{64})$", re.MULTILINE)
 
@@ -21,7 +21,7 @@ def seal(text: str) -> str:
 
 
 def is_sealed(text: str) -> bool | None:
-    """Return whether a file is unchanged, except for line ends; None if it has no seal."""
+    """Return whether a file's text is unchanged, except for line ends; None if the text has no seal."""
     text = text.replace("\r\n", "\n")
     if (found := _LINE.search(text)) is None:
         return None

@@ -1,7 +1,7 @@
-"""The equations with other basic operations: for compilers, NumPy arrays, lengths or LaTeX expressions.
+"""Copies of the equations with other basic operations, for compilers, NumPy arrays, lengths or LaTeX.
 
-`urdfkin.kinematics.equations` computes with triples of numbers. `bound` makes copies of its functions that
-use other basic operations than `plus`, `cross` and so on. This module needs no NumPy.
+The functions of `urdfkin.kinematics.equations` compute with triples of numbers. `bound` copies these
+functions and replaces their basic operations, such as `plus` and `cross`. This module needs no NumPy.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def bound(
     """Return a namespace with a copy of every function of `equations` that uses other basic operations.
 
     Args:
-        made: A decorator for each copied function, for example a compiler's.
+        made: A decorator for each copied function, for example the decorator of a compiler.
         vectors: Basic operations to use instead of those of `equations`.
 
     >>> lengths = bound(plus=lambda x, y: x + y, cross=lambda x, y: x * y)

@@ -13,10 +13,10 @@
 them, expressed in frame 1. Results are measured and expressed in frame 0. Six-vectors are [linear; angular].
 `z` is a joint's axis z_{i-1} in frame 0; `turns` is True for a rotary joint and False for a prismatic one.
 
-There are two Jacobians, which are often confused, as the textbook warns. The velocity Jacobian J_v gives
-linear and angular velocity. The manipulator (or analytical) Jacobian J gives the rates of x = (position,
-orientation). The orientation is either three Euler angles in any sequence ("ZYZ" is the textbook's) or a unit
-quaternion ("quaternion").
+There are two Jacobians; the textbook warns that they are often confused. The velocity Jacobian J_v gives the
+linear and the angular velocity. The manipulator (or analytical) Jacobian J gives the time derivatives of
+x = (position, orientation). The orientation is either three Euler angles in any sequence (the textbook uses
+"ZYZ") or a unit quaternion ("quaternion").
 
 Every function accepts any leading batch shape.
 """
@@ -75,8 +75,9 @@ def turned(R: FloatArray, p: FloatArray) -> FloatArray:
 def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
     """Return the motion of frame 2 in frame 0, from frame 1 in frame 0 and frame 2 in frame 1 (7.60, 7.61).
 
-    The origin O_2 is a point that moves in frame 1. Its motion follows from 7.58, 7.124 and 7.125. Angular
-    velocities add (7.49), and the rate of their sum contains the term w_01 x w_12.
+    The origin O_2 is a point that moves in frame 1. Its motion follows from 7.58, 7.124 and 7.125. The
+    angular velocity of frame 2 is w_01 + w_12 (7.49). The time derivative of this sum contains the term w_01
+    x w_12.
 
     Args:
         outer: Frame 1 in frame 0.
@@ -338,7 +339,7 @@ def planar_rotation(theta: ArrayLike) -> FloatArray:
 
 
 def planar_rotation_derivative(theta: ArrayLike) -> FloatArray:
-    """Return dR/dtheta, whose columns are y1 and -x1: the axes turned by 90 degrees (7.4, figure 7.2).
+    """Return dR/dtheta; its columns y1 and -x1 are x1 and y1 turned by 90 degrees (7.4, figure 7.2).
 
     Args:
         theta: (...) radians.
@@ -375,7 +376,7 @@ def link_endpoint(theta: ArrayLike, length: ArrayLike) -> FloatArray:
 
 
 def link_endpoint_velocity(theta: ArrayLike, rate: ArrayLike, length: ArrayLike) -> FloatArray:
-    """Return d-dot_01 = a theta-dot y1, along the tangent with the speed v = r w (7.2, 7.4, 7.7).
+    """Return d-dot_01 = a theta-dot y1, tangential to the circle, with the speed v = r w (7.2, 7.4, 7.7).
 
     Args:
         theta: (...) joint angle, radians.
@@ -459,8 +460,8 @@ def orientation_of(representation: str, R: ArrayLike) -> FloatArray:
 def representation_matrix(representation: str, R: ArrayLike) -> FloatArray:
     """Return the matrix C with [d-dot; w] = C x-dot (7.119, 7.120).
 
-    C is block diagonal, with the identity and Omega. For a quaternion, Omega is 4 E^T (3 by 4) with E of
-    7.57.
+    C is block diagonal; its blocks are the identity and Omega. For a quaternion, Omega is 4 E^T (3 by 4),
+    with the matrix E of 7.57.
 
     Args:
         representation: SciPy's name of an Euler sequence, or "quaternion".
@@ -481,7 +482,8 @@ def representation_matrix(representation: str, R: ArrayLike) -> FloatArray:
 def representation_inverse(representation: str, R: ArrayLike, nearest: float = NEAREST) -> FloatArray:
     """Return C^-1 with x-dot = C^-1 [d-dot; w] (7.122).
 
-    For a quaternion it is the right inverse that keeps the quaternion's length; it has no singularity.
+    For a quaternion, C^-1 is the right inverse of C whose x-dot keeps the quaternion's length constant. This
+    inverse has no singularity.
 
     Args:
         representation: SciPy's name of an Euler sequence, or "quaternion".
@@ -527,7 +529,7 @@ def analytical_jacobian(
 
 
 def velocity_jacobian(representation: str, R: ArrayLike, J: ArrayLike) -> FloatArray:
-    """Return J_v = C J, the velocity Jacobian from the manipulator Jacobian (7.121); never singular.
+    """Return J_v = C J, the velocity Jacobian from the manipulator Jacobian (7.121), for every orientation.
 
     Args:
         representation: SciPy's name of an Euler sequence, or "quaternion".
@@ -549,7 +551,7 @@ def velocity_jacobian(representation: str, R: ArrayLike, J: ArrayLike) -> FloatA
 def pose_rates(
     representation: str, R: ArrayLike, velocity: ArrayLike, nearest: float = NEAREST
 ) -> FloatArray:
-    """Return x-dot = C^-1 [d-dot; w], the rates of position and orientation representation of a frame.
+    """Return x-dot = C^-1 [d-dot; w], the time derivatives of a frame's position and orientation.
 
     Args:
         representation: SciPy's name of an Euler sequence, or "quaternion".

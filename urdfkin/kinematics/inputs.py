@@ -13,8 +13,8 @@ from urdfkin.errors.validators import is_real, safe_repr
 
 FloatArray = NDArray[np.float64]
 
-#: Largest deviation of a unit vector's norm from 1. Normalised doubles deviate by 4e-16 at most. A vector
-#: typed with six digits deviates by more and would not give a rotation matrix.
+#: Largest deviation of a unit vector's norm from 1. A vector that is normalised in double precision deviates
+#: by 4e-16 at most. A vector typed with six digits deviates by more and would not give a rotation matrix.
 UNIT_TOLERANCE = 1e-12
 #: Largest deviation of R R^T from the identity for a rotation. If the entries of R are rounded to nine
 #: decimals, each has an error of 5e-10 at most. R R^T then deviates by 1e-9 times the sum of the absolute
@@ -42,14 +42,14 @@ def floats(value: ArrayLike, name: str) -> FloatArray:
 
 
 def _is_masked(value: object) -> bool:
-    """Return whether a number is masked; NumPy would ignore the mask without an error."""
+    """Return whether a number is masked (`numpy.ma`); NumPy would ignore the mask without an error."""
     if isinstance(value, np.ma.MaskedArray):
         return bool(np.ma.is_masked(value))
     return isinstance(value, list | tuple) and any(map(_is_masked, value))
 
 
 def scalars(value: ArrayLike, name: str) -> FloatArray:
-    """Return `value` as finite float64 of any shape; otherwise raise InputError with its name."""
+    """Return `value` as finite float64 of any shape; otherwise raise InputError with the argument's name."""
     array = floats(value, name)
     if not np.isfinite(array).all():
         raise InputError(f"{name} must be finite", found=str(array[~np.isfinite(array)][0]))
@@ -57,7 +57,7 @@ def scalars(value: ArrayLike, name: str) -> FloatArray:
 
 
 def vectors(value: ArrayLike, name: str, size: int = 3) -> FloatArray:
-    """Return `value` as finite (..., size) float64; otherwise raise InputError with its name."""
+    """Return `value` as finite (..., size) float64; otherwise raise InputError with the argument's name."""
     array = scalars(value, name)
     if array.ndim < 1 or array.shape[-1] != size:
         raise InputError(f"{name} must have the shape (..., {size})", found=str(array.shape))
@@ -65,7 +65,7 @@ def vectors(value: ArrayLike, name: str, size: int = 3) -> FloatArray:
 
 
 def matrices(value: ArrayLike, name: str, rows: int = 3, columns: int = 3) -> FloatArray:
-    """Return `value` as finite (..., rows, columns) float64; otherwise raise InputError with its name."""
+    """Return `value` as finite (..., rows, columns) float64; otherwise raise InputError with `name` in it."""
     array = scalars(value, name)
     if array.ndim < 2 or array.shape[-2:] != (rows, columns):
         raise InputError(f"{name} must have the shape (..., {rows}, {columns})", found=str(array.shape))
@@ -88,7 +88,7 @@ def unit_vectors(value: ArrayLike, name: str) -> FloatArray:
 
 
 def rotations(value: ArrayLike, name: str) -> FloatArray:
-    """Return `value` as (..., 3, 3) rotation matrices; otherwise raise InputError with its name."""
+    """Return `value` as (..., 3, 3) rotations; otherwise raise InputError with the argument's name."""
     array = matrices(value, name)
     defect = rotation_defect(array).max(initial=0.0)
     if defect > ROTATION_TOLERANCE:
@@ -105,9 +105,10 @@ def rotations(value: ArrayLike, name: str) -> FloatArray:
 def rotation_defect(R: FloatArray) -> FloatArray:
     """Return the largest entry (...,) of R R^T - I for matrices (..., 3, 3); inf for a reflection.
 
-    It is 0 for a rotation. Each caller has its own tolerance, because it knows how the matrix was written.
+    The result is 0 for an exact rotation. Each caller compares it with a tolerance of its own, which depends
+    on the number of digits with which its matrix was written.
     """
-    with np.errstate(over="ignore", invalid="ignore"):  # an overflow is no rotation
+    with np.errstate(over="ignore", invalid="ignore"):  # a matrix that overflows is no rotation
         defect = np.abs(R @ R.swapaxes(-1, -2) - np.eye(3)).max(axis=(-2, -1))
         return np.where((defect >= 0.0) & (determinant(R) > 0.0), defect, np.inf)
 

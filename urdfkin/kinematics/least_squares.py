@@ -13,15 +13,16 @@ from urdfkin.kinematics.roundings import EPS, FloatArray
 State = TypeVar("State")
 
 _ROUNDS = 100
-#: Damping relative to the largest singular value: at the start, least and most.
+#: Damping relative to the largest singular value: the initial, the smallest and the largest damping.
 _DAMPING, _LEAST, _MOST = 1e-3, 1e-14, 1e3
-#: Factors of the damping after a success and after a failure.
+#: Factors by which the damping is multiplied after a step that reduces the error, and after one that does
+#: not.
 _EASING, _HARDER = 0.03, 10.0
-#: A step is slow if it leaves more than this fraction of the error.
+#: A step is slow if the error after the step is more than this fraction of the error before it.
 _SLOW = 0.99
-#: Share of the squared error below which a step is no gain.
+#: The iteration ends if a full step can reduce the squared error by at most this fraction.
 _NOTHING = 1e-13
-#: Change of the sum of squares by rounding, in eps for each residual.
+#: Rounding error of the sum of squares, in multiples of eps for each residual.
 _ROUNDED = 4.0
 
 
@@ -37,13 +38,13 @@ def least_squares(
     """Return a state with the smallest residuals near the start, and the norm of its residuals.
 
     Args:
-        start: The start.
-        linearized: Returns the residuals (rows,) of a state, and the columns (rows, parameters) by which a
-            step of the parameters reduces them.
+        start: The state from which the iteration starts.
+        linearized: Returns the residuals (rows,) of a state and the negative derivatives (rows, parameters)
+            of the residuals by the parameters.
         size: Returns the norm of the residuals of a state.
         moved: Returns the state after a step (parameters,).
         longest: Largest component of a step.
-        patience: The descent ends after this many slow steps; 0 is no limit.
+        patience: The iteration ends after this many slow steps; 0 means no limit.
     """
     state, now, damping, slow = start, size(start), _DAMPING, 0
     for _ in range(_ROUNDS):

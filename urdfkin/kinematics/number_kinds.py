@@ -1,17 +1,18 @@
 """The equations for NumPy arrays and for lengths (`urdfkin.kinematics.arithmetic.bound`).
 
-`array_equations` computes with NumPy arrays: the last axis contains the three components of a vector, so
-whole batches are computed at once.
+`array_equations` computes with NumPy arrays. The last axis of an array contains the three components of a
+vector, so one call computes a whole batch.
 
-`length_equations` computes the scale of a result: an upper bound of the terms that are summed. Each vector is
-replaced by its length or by a bound of it. A difference becomes a sum, a cross product becomes the product of
-two lengths, and a rotation changes nothing. No term, no partial sum and no result of the equation exceeds the
-scale. Rounding errors are proportional to the scale. They are not proportional to the result, which may be
-small because large terms cancel.
+`length_equations` computes the scale of a result, which is an upper bound on the sum of the absolute values
+of its terms. Each vector is replaced by its length or by an upper bound on its length. A difference becomes a
+sum, a cross product becomes the product of two lengths, and a rotation changes nothing. No term, no partial
+sum and no result of the equation exceeds the scale. Rounding errors are proportional to the scale. They are
+not proportional to the result, because the result is small where large terms cancel.
 
-A scale that is not zero is at least `SMALLEST`, the smallest normal number. A product below it has an error
-of half the smallest subnormal number, as much as a product of the size `SMALLEST`. A product of two small
-numbers may also underflow to zero and later be multiplied by a large number.
+A scale that is not zero is at least `SMALLEST`, the smallest normal number, for two reasons. A product
+smaller than `SMALLEST` has an error of half the smallest subnormal number, the same error as a product of the
+size `SMALLEST`. And a product of two small numbers may underflow to zero and later be multiplied by a large
+number.
 """
 
 from __future__ import annotations
@@ -61,8 +62,8 @@ def norm(x: FloatArray) -> FloatArray:
     return counted(np.hypot.reduce(x, axis=-1))
 
 
-#: The equations on lengths: each number or vector is an array of sizes that broadcasts; a unit vector has
-#: size 1.
+#: The equations on lengths. Each number or vector is replaced by an array of absolute values or lengths; the
+#: arrays broadcast. A unit vector has length 1.
 length_equations = bound(
     plus=np.add,
     minus=np.add,

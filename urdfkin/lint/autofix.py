@@ -1,19 +1,19 @@
-"""Apply automatic fixes, and check that the robot does not change.
+"""Apply automatic fixes, and check that the robot does not change. Write the changes as a patch.
 
 A fix is accepted under three conditions:
 
 - The new file has fewer findings of its code.
 - It has no new findings.
-- It describes the same robot. Every name, number and limit with a meaning is equal. The direction of an axis
-  may differ by rounding, and the angles of an origin by at most `Fix.turns`.
+- It describes the same robot. Every name, number and limit that has a meaning is equal. The direction of an
+  axis may differ by rounding, and the angles of an origin by at most `Fix.turns`.
 
 
 Write the changes of `--fix` as a patch for `git apply` that is safe to print.
 
 A patch contains whole lines of the file. A line can contain text that controls a terminal or a CI service:
-a mark for the writing direction, an escape sequence, a workflow command. Escaped text would change the line,
-and `git apply` would refuse the patch. For such a file the output is git's binary patch (ASCII characters
-only), below the readable patch as a comment.
+a mark for the writing direction, an escape sequence, a workflow command. If such text were escaped, the line
+would change and `git apply` would refuse the patch. For such a file the output is therefore git's binary
+patch, which has ASCII characters only. The readable patch stands above it as a comment.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ from urdfkin.urdf.findings import Finding, Severity, apply
 from urdfkin.urdf.records import AXIAL, FURTHER_LIMITS, JointRecord, RobotRecord
 from urdfkin.urdf.sources import Text
 
-#: Largest number of passes over a file: one for each code, and further ones for overlapping fixes.
+#: Largest number of passes over a file. Each code needs one pass, and overlapping fixes need further ones.
 PASSES = 100
 
-#: Bound (rad) on the change of direction when the numbers of a unit vector are rounded: twice 2**-53.
+#: Bound (rad) on the change of a unit vector's direction when its numbers are rounded. It is twice 2**-53.
 TILT = Fraction(1, 2**52)
 
 
@@ -48,7 +48,7 @@ class Mended:
     Attributes:
         text: The fixed file.
         fixed: The fixed findings.
-        kept: Code -> the reason why its fixes are not applied.
+        kept: Code -> the reason why the fixes of this code are not applied.
     """
 
     text: Text
@@ -63,8 +63,8 @@ def mend(
 
     Args:
         text: The file.
-        look: A function that examines a text and returns all findings.
-        choose: A function that returns the filter of the findings to fix; called once for each pass.
+        look: A function that checks a text and returns all findings.
+        choose: A function that returns a filter for the findings to fix. It is called once for each pass.
     """
     now, fixed, kept = look(text), list[Finding](), dict[str, str]()
     for _ in range(PASSES):
@@ -91,7 +91,8 @@ def mend(
 def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> Iterator[str]:
     """Yield the reasons against a fix."""
     code = fixable[0].code
-    # Skip kinds beyond the limit of complete findings: others replace the fixed ones.
+    # Skip kinds with more findings than the limit of complete ones. When some of those are fixed, others take
+    # their place in the list.
     many = {finding.code for finding in before.findings if finding.also}
     old, new = (
         Counter((f.code, f.element, f.name) for f in seen.findings if f.code not in many)
@@ -112,7 +113,7 @@ def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> It
 
 
 def differences(a: RobotRecord, b: RobotRecord, turns: Mapping[str, float]) -> Iterator[str]:
-    """Yield the differences of two robots, except those without a meaning.
+    """Yield the differences between two robots. Differences without a meaning are left out.
 
     Args:
         a: The first robot.
@@ -129,7 +130,7 @@ def differences(a: RobotRecord, b: RobotRecord, turns: Mapping[str, float]) -> I
 
 def _difference(a: JointRecord, b: JointRecord, turns: float) -> str | None:
     """Return the first property in which two joints differ, or None."""
-    # A change of one of the three angles rotates the frame by no more than this change.
+    # If one of the three angles changes, the frame rotates by at most the same angle.
     rotation = sum(abs(Fraction(y) - Fraction(x)) for x, y in zip(a.rpy, b.rpy, strict=True))
     equal = {
         "name, type, parent or child": (a.name, a.kind, a.parent, a.child)
@@ -143,7 +144,7 @@ def _difference(a: JointRecord, b: JointRecord, turns: float) -> str | None:
     return next((what for what, same in equal.items() if not same), None)
 
 
-#: Allowance for rounding: `Fix.turns` is a sum of doubles.
+#: Factor that allows for the rounding of `Fix.turns`, which is a sum of doubles.
 _SLACK = 1 + Fraction(1, 2**50)
 
 
@@ -182,7 +183,7 @@ def patch(file: str, before: bytes, after: bytes, shown: Callable[[str], str]) -
         file: The name of the file, relative to the current folder.
         before: The bytes of the file, in UTF-8 (`--fix` changes no other file).
         after: The new bytes.
-        shown: A function that escapes text that controls a terminal or a log, line by line.
+        shown: A function that escapes, in one line, text that controls a terminal or a log.
     """
     if before == after:
         return ""
@@ -195,7 +196,7 @@ def patch(file: str, before: bytes, after: bytes, shown: Callable[[str], str]) -
 
 
 def _relative(file: str) -> str:
-    """Return a name for `git apply`: relative to the current folder if the file is in it."""
+    """Return a file name for `git apply`. It is relative if the file is in the current folder."""
     below = os.path.relpath(file)
     return file if below.startswith(os.pardir) else Path(below).as_posix()
 

@@ -106,7 +106,7 @@ def _region(finding: Finding) -> dict[str, int]:
 
 
 def _uri(file: str) -> str:
-    """Return a file name as a URI reference: a relative name stays relative; `stdin` for standard input.
+    """Return a file name as a URI reference; `stdin` for standard input. A relative name stays relative.
 
     Bytes that a URI does not allow are written as %XX.
     """
@@ -154,8 +154,9 @@ def as_json(
     """Return the findings as one JSON document.
 
     `{"schema": "urdfkin-findings", "version": 1, "urdfkin": "...", "files": [...], "findings": [...],
-    "silenced": [...]}`. A finding has the fields of `Finding`, and `title`, the title of its code. A silenced
-    finding also has the comment's `reason`. The positions of a `fix` count bytes after a byte order mark.
+    "silenced": [...]}`. An entry of "findings" has the fields of `Finding`, and `title`, the title of its
+    code. An entry of "silenced" also has `reason`, the reason in the comment. The positions in a `fix` are in
+    bytes and do not count a byte order mark.
     """
     document = {
         "schema": "urdfkin-findings",

@@ -1,10 +1,10 @@
 """The rules by code, and the page of each rule, as data and as text.
 
-A topic is a module with rules: the parser, or one of `lint.rules`. Its pages are in the TOML file beside it,
-which has the same name and is read on demand.
-At its top, `cure`, `others` and `question` are defaults for all pages of the file. `parts` defines `{name}`
-for examples: a text, or [text, times] for a repeated text, in which `{i}` is the index. Line breaks in prose
-have no meaning.
+A topic is a module that defines rules: the parser, or a module of `lint.rules`. The pages of a topic are in a
+TOML file with the module's name, beside the module. The file is read on demand. The entries `cure`, `others`
+and `question` at the top of a TOML file are defaults for all its pages. The table `parts` defines texts that
+replace `{name}` in examples. Each is a text, or [text, times] for a repeated text, in which `{i}` is the
+index of the repetition. Line breaks in prose have no meaning.
 """
 
 from __future__ import annotations
@@ -36,7 +36,8 @@ RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lambda r
 #: Code -> rule, for the findings of `load` about MJCF files, which `check` does not read.
 OF_MJCF = {rule.id: rule for rule in (left_out.LEFT_OUT_MOTION, left_out.LEFT_OUT)}
 
-#: Names of a rule in lower case (code, number, short name) -> code.
+#: Name of a rule in lower case -> code. Each rule has three names: its code, the digits of the code, and its
+#: short name.
 CODES = {word: rule.id for rule in RULES.values() for word in (rule.id.lower(), rule.id[4:], rule.slug)}
 
 _TOPIC = {rule.id: topic for topic, own in TOPICS.items() for rule in own} | dict.fromkeys(
@@ -49,8 +50,8 @@ class Page:
     """The documentation of a rule.
 
     Attributes:
-        title: The claim in one line, for tables.
-        why: The consequences for a user.
+        title: The problem in one line, for tables of rules.
+        why: The consequences of the problem for a user.
         example: A minimal example with the problem: a whole document, or the content of `<robot>`. If it
             begins with a joint or a comment, the links `base` and `tip` are added.
         cure: The corrected example.
@@ -131,7 +132,7 @@ def find_rules(word: str) -> tuple[Rule, ...]:
     return family if family and prefix[4:] else (find_rule(word),)
 
 
-#: Characters of an example's line; a longer one is cut.
+#: Largest number of characters in a line of an example. Longer lines are cut.
 _WIDEST = 100
 #: Width of prose on a terminal, in characters.
 WIDTH = 88

@@ -38,8 +38,8 @@ def check(
 ) -> Findings:
     """Check a URDF and return the findings by line.
 
-    The check uses the text. It also searches the packages and mesh files that the text names, but opens no
-    mesh.
+    The function checks the text. It also checks that the packages and mesh files that the text names exist,
+    but opens no mesh.
 
     Args:
         source: A path, a catalogue name, URDF text, bytes, an open file, or `-` for standard input.
@@ -48,8 +48,8 @@ def check(
             True, except for catalogue robots whose mimic rules are known to be invalid.
         root_joint: `"floating"` or `"planar"` if you will load the robot with such a joint.
         xacro_args: Arguments for a .xacro file, which is expanded first. Lines refer to the expanded text.
-        fold: Whether to combine many warnings of one kind into one that lists the lines. Errors are combined
-            from the hundredth of a kind on.
+        fold: Whether to combine many warnings of one kind into one that lists the lines. Errors of one kind
+            are combined from the hundredth on.
 
     Returns:
         The findings that no comment silences, as a list that displays as a table in notebooks. It is empty if
@@ -81,7 +81,7 @@ class Examined:
 
     Attributes:
         text: The text.
-        data: The bytes after a byte order mark; lines, columns and fixes refer to them.
+        data: The bytes without a byte order mark. Lines, columns and fixes refer to these bytes.
         robot: The records of the robot; None if the text is not a URDF.
         findings: The findings by line.
         silenced: The findings that a comment silences, each with the reason.
@@ -126,7 +126,7 @@ def examine(
 
 
 def file_of(text: Text) -> Path | None:
-    """Return the file of a text, from which the search for packages begins; None if there is none."""
+    """Return the file that a text comes from; None if there is none. The search for packages begins there."""
     path = Path(text.source if text.entry is None else text.label)
     return None if text.source in ("-", "<text>", "<bytes>") or not path.is_file() else path
 
@@ -155,8 +155,8 @@ def read_urdf(report: Reporter, *, mimic: bool = True, root_joint: str | None = 
     Args:
         report: The name, the bytes and the limits of the file; it receives the findings.
         mimic: Whether mimic joints follow their mimicked joints. False: problems with them are notes.
-        root_joint: `"floating"` or `"planar"` if the robot gets such a joint. Then the names of this joint
-            are errors in the file.
+        root_joint: `"floating"` or `"planar"` if the robot gets such a joint. Then the file must not use the
+            names of this joint and of its parent link.
 
     Returns:
         The records, or None if the file is not a URDF.

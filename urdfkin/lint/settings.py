@@ -12,8 +12,8 @@ Files and patterns are relative to the folder of pyproject.toml. A finding is re
 and neither the baseline nor the older version of the file contains it.
 
 A baseline is a file of known findings. A finding is known if its file, code, severity, element, name and
-found text are in the baseline. The line does not count: an edit elsewhere does not make a finding new, but a
-change of its value does.
+found text are in the baseline. The line number does not count. So an edit of other lines does not make a
+finding new, but a change of the found text does.
 """
 
 from __future__ import annotations
@@ -57,9 +57,9 @@ class Baseline:
     """The number of known findings of each key.
 
     Attributes:
-        counts: The known findings that have no match yet, by key.
+        counts: Key -> number of known findings that no reported finding has matched yet.
         root: The folder that file names are relative to.
-        met: The number of matches.
+        met: The number of findings that matched a known one.
     """
 
     counts: Counter[Key]
@@ -76,7 +76,7 @@ class Baseline:
         return True
 
     def gone(self, files: Iterable[str]) -> int:
-        """Return the number of known findings without a match, in the files that were checked."""
+        """Return the number of known findings of the checked files that no longer occur."""
         checked = {relative(file, self.root) for file in files}
         return sum(count for (file, *_), count in self.counts.items() if count > 0 and file in checked)
 
@@ -116,7 +116,7 @@ def read_baseline(path: Path) -> Baseline:
 
 
 def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path) -> str:
-    """Return the text of a baseline that contains some findings.
+    """Return the text of a baseline file with the given findings.
 
     If the path has an older baseline, its entries for other existing files are copied.
 
@@ -152,7 +152,8 @@ _WORDS = {
     str: "a string",
 }
 
-#: Patterns of robot files in a folder. A .xacro file is not among them: most are only a part of a robot.
+#: Patterns of robot files in a folder. Files with the suffix .xacro are not included, because most of them
+#: contain only a part of a robot.
 INCLUDE = ("*.urdf",)
 
 
@@ -182,9 +183,10 @@ class Settings:
 
 
 def find_settings(start: Path) -> Settings:
-    """Return the settings of the repository of a folder; empty settings without a table [tool.urdfkin].
+    """Return the settings that apply in a folder; empty settings if there is no table [tool.urdfkin].
 
-    The search goes from the folder upwards, to the first folder that contains .git.
+    The function looks for the table in pyproject.toml of this folder and of the folders above it, up to the
+    first folder that contains .git.
 
     Raises:
         SourceError: a pyproject.toml cannot be read.
@@ -248,7 +250,7 @@ def _is_list_of_strings(value: Any) -> bool:
 
 
 def codes(words: Iterable[str]) -> frozenset[str]:
-    """Return the codes for some words, each as in `find_rules`.
+    """Return the codes that `find_rules` finds for each of some words.
 
     Raises:
         UnknownNameError: a word is neither a code nor a short name.
@@ -287,8 +289,8 @@ class Choice:
     Attributes:
         codes: The selected codes.
         notes: Whether notes are reported.
-        settings: The settings, for the codes that are ignored in some files.
-        baseline: The known findings, or None. Each match is counted in it.
+        settings: The settings, which contain the codes that are ignored in certain files.
+        baseline: The known findings, or None. It counts its matches.
     """
 
     codes: frozenset[str]
@@ -314,7 +316,7 @@ class Choice:
         return is_reported
 
     def again(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
-        """Do the same as `of` with copies of the baselines, so that a file can be checked more than once."""
+        """Return the function of `of` with copies of the baselines, so that a file can be checked again."""
         copies = [
             None if known is None else replace(known, counts=Counter(known.counts))
             for known in (self.baseline, before)
@@ -325,18 +327,20 @@ class Choice:
 def known_before(text: Text, version: Version, look: Callable[[Text], Examined]) -> Baseline | None:
     """Return the findings of an older version of a file; None if all its findings are the same.
 
-    If a deleted file has the name of one of the text's meshes, a missing mesh is a new finding.
+    If a file with the name of a mesh was deleted since then, the finding that the mesh is missing counts as
+    new.
 
     Args:
         text: The present file.
         version: The older version of the repository.
-        look: A function that examines a text and returns all findings.
+        look: A function that checks a text and returns all findings.
     """
     path = Path(text.source) if is_xacro(text.source) else file_of(text)
     if path is None:
         return Baseline(Counter())
     if is_xacro(text.source):
-        # The older expansion is not available. If any part may have changed, every finding counts as new.
+        # The expansion of the older xacro file is not available. If a file that it may include has changed,
+        # every finding counts as new.
         return Baseline(Counter()) if version.changed(_PARTS) else None
     same = version.holds(text.data)
     old = text.data if same else version.read(path)
@@ -348,7 +352,7 @@ def known_before(text: Text, version: Version, look: Callable[[Text], Examined])
     return Baseline(Counter(key_of(finding, relative(finding.file, Path())) for finding in found))
 
 
-#: Marker files of ROS's build tools: a folder with one of them is skipped.
+#: Marker files of ROS's build tools. A folder that contains such a file is skipped.
 LEFT_ALONE = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
 
 

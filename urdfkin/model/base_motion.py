@@ -16,8 +16,8 @@ from urdfkin.model.tree import FloatArray, frozen
 class BaseMotion:
     """Motion of the robot's root link in the world, which is the textbook's frame -1.
 
-    Every field may have leading batch axes, which broadcast with those of the configuration. The fields
-    store the numbers as given, because Pinocchio is compared at exactly these numbers.
+    Every field may have leading batch axes, which broadcast with the batch axes of the configuration. The
+    fields store the numbers without changes, because Pinocchio receives the same numbers in a comparison.
 
     Attributes:
         placement: (..., 4, 4) T_world_base. Its rotation may be rounded, with as few as one digit; the
@@ -102,7 +102,8 @@ STILL_STATE = frozen(STILL.state(()))
 def against_gravity(state: FloatArray, gravity: FloatArray) -> FloatArray:
     """Return the base state (1 or n, 24) in a world that is accelerated by -gravity (3,).
 
-    An accelerometer measures the same in both cases: a fixed base under gravity, and this accelerated base.
+    An accelerometer on a fixed base under gravity measures the same as one on this accelerated base without
+    gravity.
     """
     lifted = state.copy()
     lifted[:, -3:] -= gravity

@@ -1,10 +1,10 @@
 """A path between two frames as a sequence of joint axes, from which Denavit-Hartenberg tables are made.
 
-Section 7.5 of the textbook: joint i rotates about, or translates along, z_{i-1} at O_{i-1}. The vector
-d_{i-1,i} leads from O_{i-1} to O_i. The path may run down the tree, up, or through a
-common ancestor (left foot to right hand). Fixed joints are folded into the constants. If the path passes a
-joint backwards, from child to parent, the axis is reversed, so the coordinate has the sign of the URDF:
-(Rz(q))^-1 about z is Rz(q) about -z.
+As in section 7.5 of the textbook, joint i rotates about, or translates along, z_{i-1} at O_{i-1}. The vector
+d_{i-1,i} leads from O_{i-1} to O_i. The path may lead from parent to child, from child to parent, or through
+a common ancestor (left foot to right hand). Fixed joints are merged into the constant poses. If the path
+passes a joint backwards, from child to parent, the joint's axis is reversed. The sign of the joint's
+coordinate then stays that of the URDF, because (Rz(q))^-1 about z equals Rz(q) about -z.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ from urdfkin.model.path import Motion, Path
 from urdfkin.model.pose import inverse, pose
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, frozen
 
-#: Smallest size (m) of a robot, so that a robot whose frames all coincide has a size to divide by.
+#: Smallest size (m) of a robot. A robot whose frames all coincide has this size, which avoids a division by
+#: 0.
 LEAST_SIZE = 1e-9
 
 
@@ -65,9 +66,10 @@ class FrameChain(Displayable):
         tip: Name of the last frame.
         joints: The moving joints in path order.
         T_last_tip: (4, 4) pose of the tip in the last joint's frame (in the base if no joint moves).
-        lengths: (n + 1,) path lengths between joint origins, m, summed over the folded fixed joints. Entry k
-            bounds the distance from joint k's origin to the next, for any rotations.
-        folded: (n + 1,) number of URDF joint poses, fixed joints' too, that are multiplied in each constant.
+        lengths: (n + 1,) path lengths between joint origins, m, including the merged fixed joints. Entry k is
+            an upper bound on the distance from joint k's origin to the next origin, for any rotations.
+        folded: (n + 1,) number of URDF joint poses, including those of fixed joints, whose product is each
+            constant.
 
     >>> import urdfkin
     >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
@@ -148,7 +150,7 @@ class FrameChain(Displayable):
 
     @cached_property
     def path(self) -> Path:
-        """The constants and motions A_0, M_1, A_1 ... M_n, A_n; the amounts are the joint values.
+        """The path A_0, M_1, A_1 ... M_n, A_n of constants and motions; the joint values are the amounts.
 
         >>> import urdfkin
         >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
@@ -261,7 +263,8 @@ def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
             joints.append(ChainJoint(joint.name, joint.kind, backwards, frozen(A), joint.limit, joint.mimic))
             lengths.append(length)
             folded.append(count)
-            # The constant of a backward joint comes after its motion, that of a forward joint before it.
+            # The constant pose of a joint that the path passes backwards comes after the joint's motion; that
+            # of any other joint comes before the motion.
             A, length, count = np.eye(4), 0.0, int(backwards)
         A = A @ from_joint
         length += _norm(joint) if backwards else 0.0

@@ -111,7 +111,7 @@ def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
 
 
 def _other_lengths(tree: KinematicTree, what: str) -> dict[int, Hint]:
-    """Return Pinocchio's lengths where they differ from urdfkin's, each with a hint for the message."""
+    """Return Pinocchio's lengths of q or v that differ from urdfkin's, each with a hint for the message."""
     follow = any(joint.mimic for joint in tree.joints)
     free = Hint(
         "leave out the mimic joints, which have no coordinate, or load with mimic=False (--no-mimic)",
@@ -150,8 +150,8 @@ def neutral(tree: KinematicTree) -> FloatArray:
 def poses(tree: KinematicTree) -> dict[str, FloatArray]:
     """Return the named configurations (nq,): `neutral`, `ready` and the tree's own named poses.
 
-    `ready` is within the limits. The catalogue defines it for some robots. For the others it is `neutral`,
-    but with every joint whose limits exclude 0 in the middle of its range.
+    `ready` is within the limits. The catalogue defines `ready` for some robots. For any other robot, a joint
+    whose limits exclude 0 is in the middle of its range, and every other joint is as in `neutral`.
     """
     ready = neutral(tree)
     for name, (lower, upper) in coordinate_ranges(tree).items():
@@ -243,7 +243,8 @@ def limit_violations(tree: KinematicTree, q: FloatArray) -> list[str]:
     for joint, values in zip(tree.joints, _own_values(tree, q), strict=True):
         if values is None or joint.limit is None or not values.size:
             continue
-        # A limit printed in decimal is rounded: one unit in the last place is not a violation.
+        # A limit that is printed in decimal is rounded, so an excess of one unit in the last place is no
+        # violation.
         lower, upper = np.nextafter(joint.limit.lower, -np.inf), np.nextafter(joint.limit.upper, np.inf)
         outside = np.maximum(lower - values, values - upper)
         if outside.max() > 0.0:
@@ -256,7 +257,8 @@ def limit_violations(tree: KinematicTree, q: FloatArray) -> list[str]:
 def _degrees(joint: Joint, value: float) -> str:
     """Return the hint "degrees?" if the value looks like degrees, else "".
 
-    It looks like degrees if it exceeds one turn, has at most six digits, and is within the limits as degrees.
+    A value looks like degrees if it exceeds one turn in radians, has at most six digits, and is within the
+    limits when it is read as degrees.
     """
     typed = f"{value:.6g}"
     if not (joint.kind.turns and joint.limit and abs(value) > math.tau and float(typed) == value):

@@ -33,7 +33,7 @@ Given = ArrayLike | Mapping[str, ArrayLike]
 
 #: Largest number of names in a message.
 _LISTED = 8
-#: The blank between a number and its unit.
+#: Matches the blank between a number and its unit.
 _UNIT_APART = re.compile(r" (?=(?:deg\w*|rad\w*|mm|m|°)(?: |/|$))")
 _AROUND_SIGNS = re.compile(r" ?([=*/]) ?")
 
@@ -53,8 +53,8 @@ class CoordinateLayout:
         what: "q", "v" or "a".
         names: The name of each number.
         units: "rad", "m", "" for a number without a unit (such as a quaternion's), or None if unknown.
-        spans: For each joint with several numbers: the first index and the count.
-        poses: Returns the named values. It and the next two functions are called only when needed.
+        spans: For each joint with several numbers: the index of the first number, and the count of numbers.
+        poses: Returns the named poses. `poses`, `otherwise` and `lengths` are called only when needed.
         otherwise: Returns a hint for each name that is not a coordinate, such as a fixed joint.
         lengths: Returns a hint for each wrong length that users often pass, such as Pinocchio's.
     """
@@ -200,7 +200,7 @@ keeps: 'neutral, elbow=...'
 
 
 def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
-    """Return `value` if it names its numbers, a table with labels as a mapping; None for numbers in order.
+    """Return a text or mapping as it is, a table with labels as a mapping, and None for numbers in order.
 
     Raises:
         InputError: a label occurs twice, or `value` is a list of tables with labels.
@@ -259,7 +259,7 @@ def wrong_count(
 
 
 def listed(names: Sequence[str]) -> str:
-    """Return names for a message, at most eight and the total count."""
+    """Return names for a message: all of them, or the first eight and the total count."""
     more = f", ... ({len(names)} in all)" if len(names) > _LISTED else ""
     return ", ".join(map(str, names[:_LISTED])) + more
 

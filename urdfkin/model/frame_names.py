@@ -6,10 +6,11 @@ from typing import ClassVar, Self
 
 
 class FrameName(str):
-    """`link:NAME` or `joint:NAME`. It means that link or joint even if something else is named `link:NAME`.
+    """`link:NAME` or `joint:NAME`: the link or joint NAME, even if another frame is named `link:NAME`.
 
-    Reports and messages print it as an ordinary name. A plain `str` with the same text is first looked up
-    as a name without a prefix (`KinematicTree.frame_link`).
+    Reports and messages print a `FrameName` like an ordinary name. A plain `str` with the same text has
+    another meaning: `KinematicTree.frame_link` first looks for a link or joint with exactly that text as its
+    name.
 
     >>> LinkFrame.of("hand"), LinkFrame.of("hand").own
     ('link:hand', 'hand')

@@ -1,10 +1,10 @@
 """Integrate joint velocities, and find the joint velocities between two configurations.
 
-The two functions replace + and - where q holds orientations. They agree with Pinocchio's `integrate` and
-`difference`. For a joint with one coordinate they add and subtract numbers. Planar and floating joints move
-along the screw of their joint velocity (w, s), which is in the moving frame:
-R = R_0 exp(w), p = p_0 + R_0 V(w) s,
-with V(w) = I + (1 - cos|w|)/|w|^2 [w] + (|w| - sin|w|)/|w|^3 [w]^2.
+`integrate` and `difference` replace + and - for configurations q that contain orientations. They agree with
+Pinocchio's functions of the same names. For a joint with one coordinate they add and subtract numbers. For a
+planar or floating joint, the joint velocity (w, s) is constant in the moving frame, so the joint makes a
+screw motion: R = R_0 exp(w), p = p_0 + R_0 V(w) s, with V(w) = I + (1 - cos|w|)/|w|^2 [w] + (|w| -
+sin|w|)/|w|^3 [w]^2.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
 def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> FloatArray:
     """Return the joint velocities (..., nv) that lead from `start` to `end` (..., nq) in one second.
 
-    Angles take the shorter of the two ways round.
+    For an angle without limits, the result is the shorter of the two rotations from `start` to `end`.
     """
     shape = _common_shape(start, end)
     start, end = (np.broadcast_to(q, (*shape, tree.nq)) for q in (start, end))

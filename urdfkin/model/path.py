@@ -77,7 +77,7 @@ class Path:
         frames = self.frames(amounts)
         T = frames[..., -1, :, :]
         motions = [(i, step) for i, step in enumerate(self.steps) if isinstance(step, Motion)]
-        # A motion leaves its own axis where it is, so the frame after it has the axis too.
+        # A motion does not move its own axis, so the axis can be read from the frame after the motion.
         columns = np.zeros((*T.shape[:-2], 6, len(motions)))
         for k, (i, step) in enumerate(motions):
             axis = frames[..., i, :3, step.axis]

@@ -23,7 +23,7 @@ class NarrowedRange:
         joint: Name of the mimicked joint.
         own: Its own range.
         kept: The part of it in which all mimic joints are within their limits; None if there is no such part.
-        by: Names of these mimic joints.
+        by: Names of the mimic joints whose limits make the range smaller.
         unit: Unit of the ranges, "rad" or "m".
     """
 
@@ -72,7 +72,7 @@ def own_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
 
 
 def coordinate_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Return the same ranges, narrowed to where mimic joints are within their limits, if possible."""
+    """Return the ranges of `own_ranges`, narrowed to keep mimic joints within their limits, if possible."""
     ranges = own_ranges(tree)
     narrowed = {one.joint: one.kept for one in narrowed_ranges(tree)}
     return {name: narrowed.get(name) or own for name, own in ranges.items()}
@@ -115,7 +115,7 @@ def kept_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tuple[f
         own = rule.multiplier * leader + rule.offset
         return bool(np.nextafter(limit.lower, -np.inf) <= own <= np.nextafter(limit.upper, np.inf))
 
-    if keeps(lower) and keeps(upper):  # every value between keeps them too
+    if keeps(lower) and keeps(upper):  # every value between the two ends is then within the limits too
         return lower, upper
     if rule.multiplier == 0.0:
         return math.inf, -math.inf

@@ -1,7 +1,7 @@
 """The forward recursion of section 7.7, and the quantities of a frame, for any kind of number.
 
-`eq` holds the textbook's equations for one kind of number (`urdfkin.kinematics.number_kinds.bound`). The
-compiled recursion is `urdfkin.compiled.recursion`.
+The attribute `eq` contains the textbook's equations for one kind of number
+(`urdfkin.kinematics.number_kinds.bound`). The compiled recursion is `urdfkin.compiled.recursion`.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ IDENTITY: Matrix = (1, 0, 0), (0, 1, 0), (0, 0, 1)
 class State:
     """State of a link's frame.
 
-    R and p are in the world's axes; w, vel, alpha and acc are in the axes of the recursion.
+    R and p are expressed in world axes. The vectors w, vel, alpha and acc are expressed in the link's own
+    axes if `Recursion.own` is True, else in world axes.
     """
 
     R: Matrix = IDENTITY
@@ -70,7 +71,7 @@ class Recursion:
     own: bool = False
 
     def seen(self, s: State, x: Vector) -> Vector:
-        """Express a vector of the link in the axes of the recursion."""
+        """Express x, given in the link's own axes, in the link's axes (`own`) or in world axes."""
         return x if self.own else self.eq.rotate(s.R, x)
 
     def carried(self, s: State, d: Vector) -> State:
@@ -80,7 +81,7 @@ class Recursion:
         return replace(s, p=eq.point_position(s.p, s.R, d), vel=vel, acc=acc)
 
     def turned(self, s: State, S: Matrix) -> State:
-        """Express the same motion in a frame rotated by S."""
+        """Return the state of the same body with its frame rotated by S."""
         R = self.eq.product(s.R, S)
         if not self.own:
             return replace(s, R=R)
@@ -88,20 +89,20 @@ class Recursion:
         return State(R, s.p, *(self.eq.rotate(back, x) for x in (s.w, s.vel, s.alpha, s.acc)))
 
     def revolute(self, s: State, axis: Vector, S: Matrix, v: Number, a: Number) -> State:
-        """Pass a revolute joint: 7.129, then 7.127, then the rotation itself."""
+        """Return the state after a revolute joint: 7.129, then 7.127, then the rotation itself."""
         z = self.seen(s, axis)
         alpha = self.eq.angular_acceleration(s.alpha, s.w, z, v, a)
         return self.turned(replace(s, alpha=alpha, w=self.eq.angular_velocity(s.w, z, v)), S)
 
     def prismatic(self, s: State, axis: Vector, x: Number, v: Number, a: Number) -> State:
-        """Pass a prismatic joint: its displacement is in the interorigin vector (7.64); then 7.130, 7.128."""
+        """Return the state after a prismatic joint: 7.64 for its displacement, then 7.130 and 7.128."""
         s = self.carried(s, self.eq.times(x, axis))
         z = self.seen(s, axis)
         acc = self.eq.sliding_acceleration(s.acc, s.w, z, v, a)
         return replace(s, vel=self.eq.sliding_velocity(s.vel, z, v), acc=acc)
 
     def free(self, s: State, slide: Vector, S: Matrix, rates: Sequence[Vector]) -> State:
-        """Pass a planar or floating joint; its velocities and accelerations are in the moved axes."""
+        """Return the state after a planar or floating joint; `rates` are given in the child link's axes."""
         eq, s = self.eq, self.turned(self.carried(s, slide), S)
         u, o, u_rate, o_rate = (self.seen(s, x) for x in rates)
         return replace(

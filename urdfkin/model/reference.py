@@ -11,7 +11,7 @@ from urdfkin.errors.validators import safe_repr
 class Reference(IntEnum):
     """The three reference frames, with Pinocchio's names.
 
-    Each has a number, which the kernels know, and two properties: its axes and its point.
+    Each member has the number that the kernels use, and two properties: its axes and its point.
 
     * `LOCAL`: the frame's own origin, in the frame's axes.
     * `WORLD`: the point of the moving body that is now at the world's origin, in the world's axes.
@@ -27,7 +27,7 @@ class Reference(IntEnum):
     at_world: bool  #: The point: True: the one at the world's origin. False: the frame's origin.
 
     def __new__(cls, number: int, own_axes: bool, at_world: bool) -> Reference:
-        """Make a member; one without axes and point is an error."""
+        """Create a member; a member without axes and point is an error."""
         member = int.__new__(cls, number)
         member._value_, member.own_axes, member.at_world = number, own_axes, at_world
         return member

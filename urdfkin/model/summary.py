@@ -13,7 +13,7 @@ from urdfkin.model.tree import Joint, KinematicTree
 COLUMNS = ("kind", "axis", "q", "v", "lower", "upper", "speed", "follows")
 #: Indices of the text columns; link and joint are columns 0 and 1.
 WORDS = (0, 1, 2, 3, 4, 5, 9)
-#: The same for a table with a joint, its parent link and its child link first.
+#: The indices of the text columns in a table that begins with the joint, its parent link and its child link.
 _AFTER_JOINT = (1, 2, *(i + 1 for i in WORDS[2:]))
 
 

@@ -46,15 +46,15 @@ def frozen(array: ArrayLike) -> FloatArray:
 class JointKind(Enum):
     """The joint types of the URDF specification; each value is the word used in the file."""
 
-    nq: int  #: Number of coordinates of such a joint in `q`.
-    nv: int  #: Number of entries of such a joint in `v` and `a`.
+    nq: int  #: Number of coordinates of a joint of this kind in `q`.
+    nv: int  #: Number of entries of a joint of this kind in `v` and `a`.
     nq_pinocchio: int  #: Number of its coordinates in Pinocchio's layout, with (cos, sin) for a free angle.
     has_axis: bool  #: Whether the joint moves about or along its axis.
     turns: bool  #: Whether the joint rotates about its axis.
     bounded: bool  #: Whether a URDF gives such a joint a lower and an upper limit.
 
     def __new__(cls, word: object, *properties: Any) -> JointKind:
-        """Make a member; one without all six properties is an error."""
+        """Create a member; a member without all six properties is an error."""
         member = object.__new__(cls)
         member._value_ = word
         member.nq, member.nv, member.nq_pinocchio, member.has_axis, member.turns, member.bounded = properties
@@ -162,7 +162,7 @@ class KinematicTree:
         poses: Named poses: a value for some of the joints. They do not affect the motion.
 
     Raises:
-        InputError: the order, a name or a mimic rule breaks these rules.
+        InputError: the joint order is wrong, a name is not unique, or a mimic rule is invalid.
     """
 
     name: str

@@ -1,7 +1,7 @@
 """The motion of one frame along a trajectory, compared with Pinocchio, for plots and viewers.
 
-Sections 7.5 to 7.7 of the textbook. The methods of `Robot` raise an error on a disagreement; here a
-disagreement is a result.
+The equations are in sections 7.5 to 7.7 of the textbook. If urdfkin and Pinocchio disagree, the methods of
+`Robot` raise an error; this module returns the disagreement as a result.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Check:
 
     Attributes:
         units: (n,) the largest difference of each sample, in units of eps * scale.
-        share: (n,) this difference divided by its bound; a value above 1 is a failure.
+        share: (n,) `units` divided by `bound`; a value above 1 is a failure.
         bound: (n,) the largest difference that rounding can cause, in units of eps * scale.
     """
 
@@ -51,7 +51,7 @@ class FrameMotion:
         jacobian: (n, 6, nv).
         movable: (6, nv) entries of the Jacobian that are not 0 for every q.
         parts: The acceleration, split by joint and term.
-        checks: Name of a quantity -> its comparison with Pinocchio; empty if Pinocchio cannot check the
+        checks: Comparison with Pinocchio, by the name of the quantity; empty if Pinocchio cannot check the
             robot.
         not_verified: The reason why Pinocchio cannot check the robot; None if it can.
     """
@@ -74,7 +74,7 @@ class FrameMotion:
 
     @property
     def singular_values(self) -> FloatArray:
-        """(n, min(6, nv)) singular values of the Jacobian, largest first; they mix metres and radians."""
+        """(n, min(6, nv)) singular values of the Jacobian, largest first; its rows mix metres and radians."""
         return self.singular_values_of(slice(0, 6))
 
     def singular_values_of(self, rows: slice) -> FloatArray:
@@ -120,7 +120,7 @@ def frame_motion(
         reference: Reference frame of velocity, acceleration and Jacobian.
 
     Raises:
-        InputError: wrong lengths, or numbers that are not finite.
+        InputError: an array has a wrong length, or contains a number that is not finite.
         UnknownNameError: the frame does not exist.
     """
     call = Call(robot.tree, robot.plan, as_str(frame, "frame"), reference, None, (q, v, a))

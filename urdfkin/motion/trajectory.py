@@ -1,12 +1,13 @@
-"""Trajectories: a line between two configurations, or samples from a CSV or .npz file.
+"""Make a trajectory from a line between two configurations, or from samples in a CSV or .npz file.
 
 A line is parameterised by s = 10 u^3 - 15 u^4 + 6 u^5 with u = t / duration. It starts and ends at rest, and
 its acceleration is continuous. If a file has no joint velocities, they are computed by central differences of
 the configurations, after the angles are unwrapped.
 
-A log often wraps the angle of a wheel to [-pi, pi] or [0, 2 pi]. The jump from one end to the other is not a
-motion, but its difference quotient would be a huge joint velocity. The angle of a planar joint wraps in the
-same way. The quaternion of a floating joint may change its sign, which is the same orientation.
+A log often wraps the angle of a wheel to [-pi, pi] or [0, 2 pi]. The jump from one end of this range to the
+other is not a motion. Its difference quotient, however, would be a huge joint velocity. The angle of a planar
+joint wraps in the same way. The quaternion of a floating joint may change its sign without a change of
+orientation.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
 
-#: Name of an array -> its shape without the first axis, which is the sample index.
+#: Shape of each array, by its name, without the first axis, which is the sample index.
 Shapes = Mapping[str, tuple[int, ...]]
 
 
@@ -109,7 +110,7 @@ def _check_names(path: Path, names: Sequence[str], shapes: Shapes, required: Seq
         )
 
 
-#: Least number of samples: a second difference needs three.
+#: Smallest number of samples, because a second difference needs three samples.
 _FEWEST = 3
 #: Names of the arrays for the fields of `BaseMotion`, in an .npz file.
 _BASE = "base_placement", "base_velocity", "base_acceleration"
@@ -148,8 +149,8 @@ def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) 
     Args:
         robot: The robot.
         start: (nq,) rad, m.
-        end: (nq,). Continuous joints make every whole turn between start and end; planar and floating joints
-            make none.
+        end: (nq,). Continuous joints make all whole turns between start and end; planar and floating joints
+            make no whole turn.
         duration: Seconds.
         samples: Number of samples, including both ends.
 
@@ -194,8 +195,8 @@ def read_trajectory(robot: Robot, path: Path, *, with_base: bool = False) -> Tra
     | joint velocities | `v:NAME` | v (n, nv) |
     | joint accelerations | `a:NAME` | a (n, nv) |
 
-    Without t, the samples are one second apart. v and a must be given together. Without them, the angles of
-    continuous, planar and floating joints are unwrapped, and v and a are central differences.
+    Without t, the samples are one second apart. v and a must be given together. Without v and a, the angles
+    of continuous, planar and floating joints are unwrapped, and v and a are computed by central differences.
 
     Args:
         robot: The robot.
@@ -234,7 +235,7 @@ def read_trajectory(robot: Robot, path: Path, *, with_base: bool = False) -> Tra
 
 
 def _table(robot: Robot, path: Path) -> dict[str, FloatArray]:
-    """Return t, q, v and a of a CSV file, as far as they are present."""
+    """Return the arrays t, q, v and a that a CSV file contains."""
     columns = {x: [f"{x}:{name}" for name in robot.rate_names] for x in "va"}
     optional = ["t", *columns["v"], *columns["a"]]
     text = read_text(path, MOST_DATA, pipes=True)
@@ -248,7 +249,7 @@ def _table(robot: Robot, path: Path) -> dict[str, FloatArray]:
 
 
 def _arrays(robot: Robot, path: Path, *, with_base: bool) -> dict[str, FloatArray]:
-    """Return t, q, v, a and the base's motion of an .npz file, as far as they are present."""
+    """Return the arrays t, q, v, a and of the base's motion that an .npz file contains."""
     shapes = {"t": (), "q": (robot.nq,), "v": (robot.nv,), "a": (robot.nv,)}
     base = dict(zip(_BASE, ((4, 4), (6,), (6,)), strict=True)) if with_base else {}
     data = read_arrays(path, shapes | base, ["q"])
@@ -264,7 +265,7 @@ def _arrays(robot: Robot, path: Path, *, with_base: bool) -> dict[str, FloatArra
 
 
 def _rates(tree: KinematicTree, q: FloatArray, t: FloatArray) -> FloatArray:
-    """Return central differences (n, nv); those of planar and floating joints are in the moving frame."""
+    """Return central differences (n, nv); for planar and floating joints they are in the moving frame."""
     slopes = _gradient(q, t)
     v = np.empty((len(q), tree.nv))
     for joint, at, to in zip(tree.joints, tree.q_index, tree.v_index, strict=True):
@@ -307,8 +308,8 @@ def read_columns(
 ) -> Mapping[str, FloatArray]:
     r"""Parse CSV text into columns of finite numbers.
 
-    Empty lines and lines that begin with # are skipped. The first other line may contain the names of the
-    columns, in any order. Without names, the columns are the required ones in their order.
+    Empty lines and lines that begin with # are skipped. The first line that is not skipped may contain the
+    names of the columns, in any order. Without names, the columns are those in `required`, in this order.
 
     Args:
         text: The content of the file.
@@ -397,12 +398,13 @@ def _check_columns(
         )
 
 
-#: Largest span of a column of wrapped angles: one turn, plus the rounding of angles to two digits.
+#: Largest span of a column of wrapped angles: one turn, plus a margin for angles rounded to two digits.
 _ONE_TURN = math.tau + 0.02
-#: A larger step than this is ambiguous: the step in the other direction is less than twice as long.
+#: A step larger than this is ambiguous, because the step in the other direction is less than twice as long.
 _AMBIGUOUS = math.tau / 3.0
 
-#: Radians or metres: a smaller shift of a mimic joint by a whole turn of the mimicked joint is rounding.
+#: A whole turn of the mimicked joint shifts a mimic joint. A shift below this number (radians or metres) is
+#: rounding.
 _ROUNDING = 1e-9
 
 
@@ -458,7 +460,7 @@ def _turning(joint: Joint, own: FloatArray) -> tuple[FloatArray, list[str]]:
 
 
 def _without_jumps(angle: FloatArray) -> FloatArray:
-    """Add whole turns after each step of more than half a turn; all other numbers stay bit for bit.
+    """Add whole turns after each step of more than half a turn; leave all other numbers unchanged.
 
     >>> _without_jumps(np.array([3.0, -3.0, -2.5])).round(4).tolist()
     [3.0, 3.2832, 3.7832]
@@ -469,7 +471,7 @@ def _without_jumps(angle: FloatArray) -> FloatArray:
 
 
 def _floating(joint: Joint, own: FloatArray) -> tuple[FloatArray, list[str]]:
-    """Unwrap a floating joint: choose the sign of each quaternion that is nearer to the previous sample."""
+    """Unwrap a floating joint: give each quaternion the sign that brings it nearer to the previous one."""
     along = np.sum(own[1:, 3:] * own[:-1, 3:], axis=1)
     new = own.copy()
     new[1:, 3:] *= np.cumprod(np.where(along < 0.0, -1.0, 1.0))[:, np.newaxis]

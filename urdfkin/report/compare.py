@@ -11,7 +11,7 @@ A change is a regression in these cases:
   applies to its ratio to the bound, above a tenth.
 
 A changed model is not a regression: its joints are listed with their axes, placements, limits and mimic
-rules. Neither is another file name: the robot is recognized by the name in its text.
+rules. A new file name is not a regression either: robots are matched by the name in their text.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ def _cut(text: str) -> str:
 
 
 def document(old: Document, new: Document, found: Comparison) -> TextDocument:
-    """Return the changes."""
+    """Return the changes between two reports as a document."""
     parts: list[str | Table] = [
         f"{title}: {one['started']}, {summary(one)}" for title, one in (("old", old), ("new", new))
     ]
@@ -167,7 +167,7 @@ def _cell(value: Units | str) -> str:
 
 #: A worst disagreement may grow by this factor without a regression: the maximum of random samples varies.
 FACTOR = 2.0
-#: A worst disagreement up to this many eps * scale is no regression: a single rounding gives as much.
+#: A worst disagreement up to this many eps * scale is no regression. A single rounding can be as large.
 FLOOR = 2.0
 #: A ratio to the bound up to this value is no regression.
 _SHARE_FLOOR = 0.1
@@ -312,7 +312,7 @@ def _robots(old: Document, new: Document, factor: float) -> Iterator[Change]:
 
 
 def _by_source(document: Document) -> dict[str, Robot]:
-    """Return robots by their source. A repeated source gets a number."""
+    """Return robots by their source. If a source occurs several times, a number is added to it."""
     named: dict[str, Robot] = {}
     for robot in document["robots"]:
         source, count = robot["source"], 1

@@ -15,7 +15,7 @@ HEADS = ("element", "what", "old", "new", "alone")
 
 
 def headline(found: Changes) -> str:
-    """Return the number of changes, and how far all together move a frame, in one line."""
+    """Return one line: the number of changes, and how far all of them together move a frame."""
     if not found:
         return "nothing changed"
     head = counted(len(found.changes), "change")
@@ -32,7 +32,7 @@ def _by_element(found: Changes) -> dict[str, list[Change]]:
 
 
 def lines_of(found: Changes) -> list[str]:
-    """Return a line for each change by element, with the effect of each joint's changes alone."""
+    """Return a line for each change, and for each joint how far its changes alone move a frame."""
     lines = [f"{found.sources[0]} -> {found.sources[1]}"]
     for element, changes in _by_element(found).items():
         lines += [f"  {change}" for change in changes]

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from urdfkin.view.figure import Axes
 
 
-#: Disagreements below this value, a hundredth of a rounding, are drawn as exact.
+#: Left end of the axis in eps * scale. Smaller disagreements are drawn as exact.
 _LEFT = 1e-2
 _HEIGHT = 0.82
 
@@ -91,7 +91,7 @@ def _row(axes: Axes, base: int, checks: Sequence[Check], edges: np.ndarray) -> N
     )
     _bound(axes, base, checks)
     largest = worst(check["worst"] for check in checks)
-    if largest is None:  # not a number or infinite: a mark of its own, at the right end
+    if largest is None:  # NaN or infinity: draw a separate mark at the right end
         axes.annotate(
             "✗ not finite",
             (1.0, base + 0.13),

@@ -50,8 +50,8 @@ if TYPE_CHECKING:
 _OPEN = 1
 #: Number of failed robots (listed first) that are unfolded at the start.
 _FAILURES_OPEN = 20
-#: With more robots than this, histograms are drawn only for robots that are not verified (each takes a
-#: second).
+#: With more robots than this, histograms are drawn only for robots that are not verified. A histogram
+#: takes a second.
 _DRAWN = 100
 #: Maximum length of all details, characters. Beyond it each robot's details are in their own file.
 MOST = 5_000_000

@@ -81,7 +81,7 @@ def fits(out: Console, table: Table) -> bool:
 
 
 def _cells(table: Table) -> tuple[list[list[str]], list[list[str]], list[int]]:
-    """Return the lines of the heads, the rows, and the width of each column."""
+    """Return the heading lines of the columns, the rows, and the width of each column."""
     from rich.cells import cell_len  # noqa: PLC0415
 
     lines = zip_longest(*(head.split("\n") for head in table.heads), fillvalue="")

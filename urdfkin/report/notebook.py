@@ -48,7 +48,7 @@ class Cell:
         )
 
     def _repr_html_(self) -> str:
-        # The frame may run its scripts but cannot access the notebook.
+        # The HTML frame may run its own scripts but cannot access the notebook.
         return (
             f'<iframe sandbox="allow-scripts" title="{escape(self._name)}" srcdoc="{escape(self.page())}"'
             f' style="width:100%;height:{self._height}px;border:0"></iframe>'

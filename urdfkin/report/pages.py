@@ -99,7 +99,7 @@ def joint_rows(model: Model) -> list[dict[str, Any]]:
 
 
 def _remaining_range(joint: Joint) -> str:
-    """Return a sentence on the range that the limits of mimic joints leave; empty if they leave all of it."""
+    """Return a sentence on the range that the limits of mimic joints leave; empty for the whole range."""
     kept = joint.get("kept")
     if kept is None:
         return ""
@@ -179,7 +179,7 @@ def _share(check: Check, subject: int) -> float:
     It uses the tightest bound, and is at most the largest ratio of the check.
     """
     value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["share_of_bound"]
-    if not value:  # equal results lie within every bound
+    if not value:  # a disagreement of 0 lies within every bound
         return math.inf if value is None else 0.0
     if not tightest:
         return math.inf

@@ -243,7 +243,7 @@ def _share(check: Check) -> Iterator[str]:
     if (share > 1.0) != (check["failed"] > 0) or check["failed"] > check["results"]:
         yield f"failed: {check['failed']} of {check['results']}, but the largest share is {share:g}"
     if low > high:
-        if share or largest or check["worst_case"]:  # no numbers to compare: no bound
+        if share or largest or check["worst_case"]:  # nothing was compared, so there is no bound
             yield f"bound: {check['bound']}, but something was compared"
         return
     ends = (largest / high if high else math.inf, largest / low if low else math.inf)

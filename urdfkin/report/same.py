@@ -26,18 +26,18 @@ from urdfkin.report.words import counted
 from urdfkin.robot import Robot
 from urdfkin.verify.oracles import versions
 
-#: Number of lines of a kind that are shown without --all.
+#: Number of lines that are shown for each kind of difference without --all.
 SHOWN = 12
 #: First line where models differ and joints were not matched by name.
 GUESSED = "joints are matched by their axes, since names do not match; use --map to match other pairs"
 HEADS = ("frame", "at least", "at most", "turned at most")
 #: Attributes of an interval: the attained and the proven angle.
 TURNED = ("radians_seen", "radians")
-#: The default question.
+#: The default question: are both robots equivalent?
 EQUIVALENT = Question()
-#: Factor on the rounding up to which a bound counts as rounding: sums round too.
+#: A bound up to this factor times the rounding counts as rounding, because sums add rounding errors.
 DUST = 1.001
-#: Head of the lines about joints whose mimic joints leave their limits.
+#: Heading of the list of joints whose mimic joints leave their limits.
 NARROWED = "limits of mimic joints, which intervals ignore"
 
 
@@ -61,7 +61,7 @@ def headline(found: Sameness, question: Question = EQUIVALENT) -> str:
 
 
 def _within(found: Sameness, most: float) -> str:
-    """Return the answer to --within: whether all frames stay within a distance, and which one does not."""
+    """Return the answer to --within: do all frames stay within a distance? If not, which one leaves it?"""
     limit = f"WITHIN {most:g} m and rad: as written, "
     if found.within(most):
         return f"{limit}no frame is ever off by more than {_both(*found.written)}"
@@ -246,7 +246,7 @@ def markdown_of(found: Sameness, question: Question = EQUIVALENT) -> str:
     return "\n".join([*lines, text(str(found.checked)), ""])
 
 
-#: Half the side of a picture, in its own units, and the share of it that the robots fill.
+#: Half the side of a picture in units of the SVG, and the share of the picture that the robots fill.
 HALF, FILLED = 150.0, 0.9
 #: Largest length of the scale bar as a share of the picture's side, and its distance from the lower edge.
 SCALE, FOOT = 0.3, 6.0
@@ -365,7 +365,7 @@ def _draw(
 ) -> dict[str, Any]:
     """Return one view: lines projected along a direction and scaled to the picture."""
     c, s, up, down = np.cos(turn), np.sin(turn), np.cos(tip), np.sin(tip)
-    seen = np.array([[-s, c, 0.0], [down * c, down * s, -up]])  # right, and down the page
+    seen = np.array([[-s, c, 0.0], [down * c, down * s, -up]])  # the directions right and down on the page
     flat = [x @ seen.T for x in (*lines, np.zeros((0, 2, 3)) if gap is None else gap)]
     points = np.concatenate([x.reshape(-1, 2) for x in flat])
     low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(2), np.ones(2))

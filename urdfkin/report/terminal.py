@@ -38,7 +38,7 @@ from urdfkin.validation.document import Check, Document, Judgement, Robot, outco
 if TYPE_CHECKING:
     from rich.console import Console
 
-#: Minimum width for a table with a column for each quantity.
+#: Minimum width of a terminal for a table with a column for each quantity.
 _WIDE = 100
 
 

@@ -76,7 +76,7 @@ def quantities(robots: Sequence[Robot]) -> list[str]:
 
 
 def of_quantity(robot: Robot, quantity: str) -> list[Check]:
-    """Return a robot's checks of one quantity, one for each reference frame."""
+    """Return a robot's checks of one quantity: one check for each reference frame."""
     return [check for check in robot["checks"] if check["quantity"] == quantity]
 
 

@@ -1,11 +1,12 @@
 """The cache on disk: one folder for each state of the sources, with a checksum in each file.
 
-Cached files are executed or unpickled later. A folder is therefore used only if no other user can have
+urdfkin later executes or unpickles cached files. It therefore uses a folder only if no other user can have
 written to it. Folders of older versions are deleted after a month without use.
 
 `put` writes a file with a checksum, and `get` verifies it. A truncated or corrupted file could crash the
 process or compute a wrong result, so it is reported and replaced. The checksum includes the names of the file
-and of its folder, which identify the sources: a renamed file could belong to another robot.
+and of its folder, which identify the sources. So `get` detects a renamed file, which could belong to another
+robot.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ import platformdirs
 from urdfkin.errors import SourceError
 from urdfkin.system.files import MOST_DATA, read_bytes, read_if_there
 
-#: Version of the checksum. It is part of the folder's digest, so another version uses other folders.
+#: Version of the checksum. It is part of the digest in a folder's name, so each version of the checksum uses
+#: folders of its own.
 _CHECKSUM_VERSION = "sealed with its name"
 _A_MONTH = 30 * 24 * 3600.0
 _USED = ".used"
@@ -44,7 +46,7 @@ def kept_folder(kind: str, sources: Iterable[Path], *texts: str, root: Path | No
     """Return a cache folder that only this user can write to; create it if it does not exist.
 
     Args:
-        kind: Kind of the cached files; the folder's name begins with it.
+        kind: Kind of the cached files. The folder's name begins with this word.
         sources: Files that the cached files depend on. Their contents are part of the folder's digest.
         texts: Other texts that the cached files depend on.
         root: The parent folder; None for the user's cache folder.
@@ -67,7 +69,7 @@ def kept_folder(kind: str, sources: Iterable[Path], *texts: str, root: Path | No
         reason = getattr(error, "strerror", None) or str(error)
         say_once(f"the cache cannot be written in {root}: {reason}; set XDG_CACHE_HOME to another folder")
         return None
-    with contextlib.suppress(OSError):  # on a full or read-only disk existing files can still be read
+    with contextlib.suppress(OSError):  # existing files of a full or read-only disk are still readable
         (folder / _USED).touch()
         _delete_unused(root, kind)
     return folder
@@ -162,5 +164,5 @@ def _checksum(place: Path, data: bytes) -> bytes:
 
 
 def report_damaged(place: Path, reason: str) -> None:
-    """Warn that a file cannot be used; its content is computed and written again."""
+    """Warn that a cached file cannot be used. The caller computes and writes its content again."""
     say_once(f"{place} is damaged and is computed again: {reason}")

@@ -1,4 +1,4 @@
-"""JSON documents as types: the header that all share, their schemas, and one way to write and read them.
+"""Types of JSON documents, their common header, their schemas, and functions that read and write them.
 
 A `Layout` is a kind of document. Its type (a `TypedDict`) defines the entries; the JSON Schema is generated
 from it, and a document from a file is checked against it. `plain` turns results into documents.
@@ -32,7 +32,7 @@ def of_length(n: int) -> Meta:
     return Meta(min_length=n, max_length=n)
 
 
-#: A number of things.
+#: A count: an integer that is 0 or larger.
 Count = Annotated[int, Meta(ge=0)]
 #: A number that is 0 or larger.
 Size = Annotated[float, Meta(ge=0)]
@@ -79,7 +79,8 @@ class Layout(Generic[_T]):
         type: The type of the document.
         verdicts: The possible verdicts; empty for a document without a header.
         made_by: The command that writes such a document.
-        is_open: Whether a document may have entries that the type lacks, from a later version of urdfkin.
+        is_open: Whether a document may have entries that the type lacks. A later version of urdfkin may write
+            such entries.
     """
 
     name: str
@@ -184,12 +185,12 @@ def _unknown_entry(data: Any, document: Any, place: str = "$") -> tuple[str, str
 
 
 def as_data(value: Any) -> Any:
-    """Return a result as objects, lists and numbers: `typed` reads it back. Infinity stays infinity."""
+    """Return a result as objects, lists and numbers, which `typed` converts back. Infinity is kept."""
     return msgspec.to_builtins(value, enc_hook=lambda x: str(x) if isinstance(x, str) else x.tolist())
 
 
 def typed(data: object, type_: type[_T]) -> _T:
-    """Return data as an object of a type; raise ValueError with the place of an entry that does not fit."""
+    """Return data as an object of a type; raise ValueError with the path of an entry that does not fit."""
     try:
         return msgspec.convert(data, type_)
     except msgspec.ValidationError as error:
@@ -199,8 +200,8 @@ def typed(data: object, type_: type[_T]) -> _T:
 def plain(value: Any) -> Any:
     """Return a result as plain data for JSON.
 
-    Data classes become objects, enums their values, arrays and tuples lists; infinity and NaN, which JSON
-    lacks, become None.
+    Data classes become objects, enums become their values, and arrays and tuples become lists. Infinity and
+    NaN do not exist in JSON and become None.
 
     >>> plain({"worst": math.inf, "frames": ("a", "b")})
     {'worst': None, 'frames': ['a', 'b']}

@@ -1,4 +1,4 @@
-"""Safe reading and writing of files, and replacing parts of a text.
+"""Read and write files safely, and replace parts of a text.
 
 The functions read a whole file, up to a size limit, or raise a `SourceError`. By default they accept regular
 files only: an untrusted folder may contain a link to an endless device, or a named pipe without a writer.
@@ -24,7 +24,10 @@ from urdfkin.errors import InputError, SourceError
 
 @dataclass(frozen=True, slots=True)
 class Edit:
-    """Replacement of the bytes from `start` up to `end` by `text`; an insertion if `start` equals `end`."""
+    """Replacement of the bytes from `start` up to, but without, `end` by `text`.
+
+    If `start` equals `end`, the edit is an insertion.
+    """
 
     start: int
     end: int
@@ -68,7 +71,7 @@ def read_bytes(path: Path, most: int = MOST, *, pipes: bool = False) -> bytes:
     Args:
         path: A regular file, or a link to one.
         most: Largest size in bytes.
-        pipes: Whether to read pipes and devices too; for paths that the caller named.
+        pipes: Whether to read pipes and devices too. Set it only for a path that the user named.
 
     Raises:
         SourceError: the file cannot be read, is not a regular file, or is larger than `most`.
@@ -103,7 +106,7 @@ def read_start(path: Path, count: int, *, pipes: bool = False) -> bytes:
 
 
 def demand_regular(path: Path) -> None:
-    """Reject a pipe, a socket or a device. A path that does not exist is accepted here; reading it fails.
+    """Reject a pipe, a socket or a device. A path that does not exist is not rejected; reading it fails.
 
     Raises:
         SourceError: the path is neither a regular file nor a folder.
@@ -173,7 +176,10 @@ def read_start_of_standard_input(count: int) -> bytes:
 
 
 def exists(path: Path) -> bool:
-    """Return whether a path exists; True if the name is too long, so that reading it reports the error."""
+    """Return whether a path exists.
+
+    The result is True if the name is too long. Reading the file then reports the error.
+    """
     try:
         return path.exists()
     except OSError:
@@ -181,7 +187,10 @@ def exists(path: Path) -> bool:
 
 
 def is_folder(path: Path) -> bool:
-    """Return whether a path is a folder; False if the name is too long, so that reading reports the error."""
+    """Return whether a path is a folder.
+
+    The result is False if the name is too long. Reading the file then reports the error.
+    """
     try:
         return path.is_dir()
     except OSError:
@@ -224,7 +233,10 @@ def _read_up_to(count: int, descriptor: int, first: bytes) -> bytes:
 
 
 def _first_of_pipe(descriptor: int, path: Path) -> bytes:
-    """Return the first available bytes of a pipe; b"" if a writer wrote none; an error without a writer."""
+    """Return the first available bytes of a pipe, or b"" if a writer has connected but written nothing.
+
+    Raise a SourceError if no process opens the pipe for writing in time.
+    """
     events = select.poll()
     events.register(descriptor, select.POLLIN)
     end = time.monotonic() + PATIENCE

@@ -1,7 +1,7 @@
 """Files of an older version of a git repository.
 
-Only git commands that read objects are used. Commands that read the working tree (`diff`, `status`) would run
-programs that the settings of an untrusted repository name.
+The module uses only git commands that read git objects. Commands that read the working tree (`diff`,
+`status`) would run programs, and the settings of an untrusted repository could name these programs.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class Version:
     Attributes:
         root: The repository's root folder; names are relative to it.
         files: Name -> digest of the file's content in this version.
-        digests: All these digests.
+        digests: The digests of all files of this version.
         gone: Base names of the files that no longer exist in the working tree.
     """
 

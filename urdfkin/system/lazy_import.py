@@ -1,8 +1,8 @@
 """Lazy imports, versions of installed packages, and hooks.
 
-`lazy_import` imports a function's module at the first call, so `--help` does not load NumPy. The version
-functions read the metadata of a package without importing it. A hook lets a lower package call a function of
-a higher one by name, without importing it; `urdfkin/__init__.py` registers the hooks.
+`lazy_import` imports a function's module when the function is first called, so `--help` does not load NumPy.
+The version functions read the metadata of a package without importing it. A hook lets a lower package call a
+function of a higher one by name, without importing it; `urdfkin/__init__.py` registers the hooks.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def lazy_import(home: str) -> Callable[..., Any]:
 
 @cache
 def installed_version(package: str) -> str | None:
-    """Return the installed version of a package, or None. It is cached: a lookup takes milliseconds."""
+    """Return the installed version of a package, or None. The version is cached, because a lookup is slow."""
     from importlib import metadata  # noqa: PLC0415  it imports modules that a folder may replace
 
     try:

@@ -1,6 +1,7 @@
-"""Locks that a forked child finds unlocked.
+"""Locks that are unlocked in a child process after a fork.
 
-`import urdfkin` imports this module first. It imports nothing that a folder of strangers could replace.
+`import urdfkin` imports this module first. This module imports nothing that an untrusted current folder could
+replace.
 """
 
 from __future__ import annotations
@@ -10,15 +11,16 @@ import threading
 
 
 def lock_over_forks() -> threading.RLock:
-    """Return a lock that a fork waits for, and that is unlocked in parent and child after the fork.
+    """Return a lock that a fork waits for. After the fork it is unlocked in the parent and the child.
 
-    Use it for modules only, not for objects: the lock stays registered until the process ends.
+    Use this function for locks of modules only. A lock of an object would stay registered after the object is
+    deleted, until the process ends.
     """
     lock = threading.RLock()
     os.register_at_fork(before=lock.acquire, after_in_parent=lock.release, after_in_child=lock.release)
     return lock
 
 
-#: Held during lazy imports. Without it, a child that another thread forks during an import would wait for
-#: ever for the end of that import.
+#: The lock that a thread holds during a lazy import. Without this lock, another thread could fork a child
+#: during the import. The child would wait for ever for the end of that import.
 importing = lock_over_forks()

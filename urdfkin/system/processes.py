@@ -2,14 +2,14 @@
 
 Child processes of urdfkin do not import from the current folder. urdfkin runs in folders with untrusted
 robots, and `python -c` and `python -m` search the current folder first: a file `json.py` beside a robot would
-be run. Libraries search it for settings files too.
+be run. Libraries also search the current folder for settings files.
 
 A fork copies all locks but only the forking thread. A lock that another thread holds at that moment would
-stay locked in the child for ever. `lock_over_forks` prevents this.
+stay locked in the child for ever. `urdfkin.system.locks.lock_over_forks` prevents this.
 
 `with_stack` runs a function on a thread with a large stack. Pinocchio and its parser traverse a robot
-recursively: a chain of about 3,000 links overflows a stack of 8 MiB, a few hundred links overflow a smaller
-one.
+recursively: a chain of about 3,000 links overflows a stack of 8 MiB, and a few hundred links overflow a
+smaller stack.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from urdfkin.system.locks import lock_over_forks
 
 #: Environment variables that a Python interpreter may need to start.
 _NEEDED = ("LD_LIBRARY_PATH",)
-#: One thread for linear algebra: more threads need address space, which is limited in a confined process.
+#: Linear algebra uses one thread, because each thread needs address space and a confined process has little.
 _ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1"}
 
 
@@ -43,14 +43,14 @@ def own_python(code: str, *, options: Sequence[str] = ()) -> list[str]:
 
 
 def _path() -> list[str]:
-    # An empty or relative entry means the current folder or one below it. urdfkin may have been imported
-    # through such an entry, so its own folder is added.
+    # An empty or relative entry means the current folder or a folder relative to it, and is left out. urdfkin
+    # may have been imported through such an entry, so the folder of urdfkin is added.
     home = str(Path(__file__).resolve().parents[2])
     return [*(entry for entry in sys.path if Path(entry).is_absolute() and not _is_scratch(entry)), home]
 
 
 def _is_scratch(entry: str) -> bool:
-    """Return whether Dask added an entry: other users can write to this shared temporary folder."""
+    """Return whether an entry is Dask's temporary folder, to which other users can write."""
     return any(part.startswith("dask-scratch-space") for part in Path(entry).parts)
 
 

@@ -7,5 +7,5 @@
 | Tree | `reader` | `KinematicTree` |
 | Writer | `writer` | URDF text |
 
-Robots in other forms: `mjcf` reads MJCF, and `foreign` reads objects of other libraries.
+Two modules read robots in other formats: `mjcf` reads MJCF, and `foreign` reads objects of other libraries.
 """

@@ -1,13 +1,13 @@
 """Robots and packages by name: the catalogue, robot_descriptions, and `package://name/...` without ROS.
 
-The catalogue has the robots of example-robot-data and urdfkin's own. robot_descriptions is a Python package.
-It clones the repository of a robot into its own cache at the first use. Only modules that it lists as
-descriptions are imported.
+The catalogue has the robots of example-robot-data and urdfkin's own. robot_descriptions is a Python package
+that clones the repository of a robot into its own cache at the first use. urdfkin imports only those of its
+modules that it lists as descriptions.
 
 The search for a package uses the first of these folders that exists:
 
-1. `ROS_PACKAGE_PATH`: an entry called `name`, a folder `name` in an entry, or one level further down
-   (`src/repository/name`).
+1. `ROS_PACKAGE_PATH`: an entry called `name`, a folder `name` in an entry, or a folder `name` one level below
+   that (`src/repository/name`).
 2. `AMENT_PREFIX_PATH`: `share/name` below an entry.
 3. The folders above the file: one called `name`, one whose `package.xml` has this name, or a folder `name`
    in one of them.
@@ -42,10 +42,10 @@ class Entry:
         family: arm, hand, humanoid, quadruped, ...
         relative_path: The path of the URDF below the folder of its collection.
         limbs: (base frame, tip frame) of each arm, leg or finger; the first pair is the default.
-        mimic: Whether the mimic rules are valid and can be used.
+        mimic: Whether the mimic rules of the URDF are valid and can be used.
         reason: The reason, if `mimic` is False.
         poses: Named poses: joint values (rad, m) by joint name; the other joints are at 0.
-        own: Whether it is one of urdfkin's own robots instead of example-robot-data's.
+        own: True for a robot of urdfkin, False for a robot of example-robot-data.
     """
 
     name: str

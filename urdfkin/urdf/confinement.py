@@ -1,9 +1,9 @@
-"""Confine the current process: it can compute and read allowed files, and nothing else.
+"""Confine the current process, so that it can only compute and read allowed files.
 
-The kernel's limits bound memory, time, files and processes. A Python audit hook refuses other events: Python
-raises one for each opened file, new process, socket and import. Neither can be undone. This is a second
-defence behind `expressions`. A program with full control of the interpreter may evade the hook, but not the
-limits.
+The kernel's limits bound memory, time, files and processes. Python raises an audit event for each opened
+file, new process, socket and import. An audit hook refuses every event that is not allowed. The process can
+remove neither the limits nor the hook. This is a second defence behind `expressions`. A program with full
+control of the interpreter may evade the hook, but not the limits.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ class Ground:
     Attributes:
         roots: Folders and files that may be read, except hidden ones below them. The target of a symbolic
             link must also lie in one of them.
-        installed: Folders in which a symbolic link may lead to a package elsewhere, for example the install
-            folder of `colcon build --symlink-install`.
+        installed: Folders whose symbolic links may lead to packages in other folders. An example is the
+            install folder of `colcon build --symlink-install`.
     """
 
     roots: list[str] = field(default_factory=list)
@@ -76,7 +76,7 @@ def _package_of(path: str) -> list[str]:
 
 
 def _lies_in(root: str, path: str) -> bool:
-    """Return whether a path is a root, or below it without a hidden folder in between."""
+    """Return whether a path is `root`, or lies below it without a hidden file or folder on the way."""
     if path == root:
         return True
     above = root.rstrip(os.sep) + os.sep
@@ -102,7 +102,7 @@ def limit(seconds: int) -> None:
         resource.RLIMIT_NOFILE: 64,
         resource.RLIMIT_CORE: 0,
     }
-    if sys.platform == "darwin":  # refuses a limit of the address space
+    if sys.platform == "darwin":  # macOS refuses a limit of the address space
         del bounds[resource.RLIMIT_AS]
     for kind, most in bounds.items():
         hard = resource.getrlimit(kind)[1]

@@ -22,7 +22,8 @@ from urdfkin.urdf.xacro import arguments_of
 #: Functions of xacro that give an expression access to more than values.
 _NEVER = ("type", "vars")
 
-#: An expression that xacro's own guard does not stop. If it is evaluated, the replacement had no effect.
+#: An expression that xacro's own function would evaluate. If xacro evaluates it after the replacement of that
+#: function, the replacement had no effect.
 _PROBE = "${(lambda: 1)()}"
 
 _TOO_MUCH = f"it takes more than {MEMORY / 1024**3:g} GiB of memory"
@@ -111,7 +112,10 @@ def _finder(path: Path, search: Mapping[str, str], ground: Ground) -> Callable[[
     """Return the function that finds packages for xacro's $(find name)."""
 
     def is_package(folder: Path) -> bool:
-        """Outside the allowed folders a package needs a package.xml: `$(find etc)` is not a package."""
+        """Return whether a folder is a package.
+
+        A folder outside the allowed ones needs a package.xml. So `$(find etc)` does not find /etc.
+        """
         return ground.holds(str(folder)) or (folder / "package.xml").is_file()
 
     def get_path(name: str) -> str:

@@ -1,9 +1,9 @@
 """Evaluate the expressions `${...}` of a xacro file without Python's `eval`.
 
-xacro itself passes them to `eval` and searches forbidden names in the outermost code object only. A lambda,
-a comprehension or a chain of attributes can therefore run any program. This module interprets the syntax tree
-and compiles nothing. It allows values, operators, the functions of xacro and the methods listed below, and
-refuses everything else.
+xacro itself passes expressions to `eval`. It searches for forbidden names only in the outermost code object.
+A lambda, a comprehension or a chain of attributes can therefore run any program. This module interprets the
+syntax tree and compiles nothing. It allows values, operators, the functions of xacro and the methods listed
+below, and refuses everything else.
 """
 
 from __future__ import annotations
@@ -191,7 +191,7 @@ class _Evaluation:
 class _Scope(Mapping[str, Any]):
     """The names of a loop, then those of the scope around it.
 
-    The outer names are not copied, because access may evaluate them.
+    The outer names are not copied, because reading a name of xacro may evaluate an expression.
     """
 
     def __init__(self, outer: Mapping[str, Any], own: Mapping[str, Any]) -> None:

@@ -1,8 +1,9 @@
 """Findings: problems in a URDF, with a stable code, their position, the found text and a remedy.
 
-The parser and the rules of `urdfkin.lint` add findings to the `Reporter` of a file. It locates them in the
-bytes, and applies the comments that silence findings. A finding is plain data: it can be printed, compared,
-converted to JSON or SARIF and sent to another process. Positions count in the bytes after a byte order mark.
+The parser and the rules of `urdfkin.lint` add findings to the `Reporter` of a file. The reporter finds the
+position of each finding in the bytes, and applies the comments that silence findings. A finding is plain
+data: it can be printed, compared, converted to JSON or SARIF and sent to another process. A byte order mark
+does not count in positions.
 
 A comment in a URDF names the codes that it silences, and gives a reason.
 
@@ -47,7 +48,7 @@ def quoted(text: str, limit: int = QUOTED) -> str:
     return '"' + shortened(text, limit).replace('"', '\\"') + '"'
 
 
-#: Characters of a line in an excerpt, and how many of them are before the marked text.
+#: Number of characters of a line in an excerpt, and the number of these before the marked text.
 SHOWN, BEFORE = 100, 60
 
 _TAB = "    "
@@ -65,7 +66,7 @@ class Excerpts:
         self.number, self.text = 0, ""
 
     def of(self, finding: Finding) -> str | None:
-        """Return two lines, the file's and one with carets; None for a finding about the whole file.
+        """Return two lines, the file's line and one with carets; None for a finding about the whole file.
 
         >>> from urdfkin.urdf.findings import Severity
         >>> finding = Finding("URDF503", Severity.NOTE, "", column=7, width=11)
@@ -102,7 +103,7 @@ def _cells(text: str) -> int:
     )
 
 
-#: Largest change (rad) of an angle of one revolution when it is rounded to a double.
+#: Bound on the change (rad) of an angle of up to one revolution when it is rounded to a double.
 ROUNDING = 2.0**-50
 
 
@@ -112,7 +113,8 @@ class Fix:
 
     Attributes:
         edits: The edits of the text, in file order, without overlap.
-        turns: Bound on the rotation (rad) of the joint frame by the fix; 0: the robot does not change.
+        turns: Bound on the angle (rad) by which the fix rotates the joint frame. 0: the robot does not
+            change.
     """
 
     edits: tuple[Edit, ...]
@@ -120,7 +122,7 @@ class Fix:
 
     @property
     def is_safe(self) -> bool:
-        """Whether the fix rotates no joint frame by more than the rounding of one number."""
+        """Whether the fix rotates the joint frame by at most `ROUNDING`."""
         return self.turns <= ROUNDING
 
 
@@ -143,8 +145,8 @@ class Severity(Enum):
     """The severity of a finding.
 
     An error makes the file unusable: it has no meaning, or two readers would read two different robots. A
-    warning is legal, but almost certainly a mistake, or read differently by some readers. A note is
-    information.
+    warning is about legal content that is almost certainly a mistake, or that some readers read differently.
+    A note is information.
     """
 
     ERROR = "error"
@@ -179,8 +181,8 @@ class Finding:
         column: Column in characters, from 1.
         element: The tag of the element (`joint`, `link`, `origin`, ...); None for the whole file.
         name: The name of the link, joint or material, or None.
-        oracle: Set if Pinocchio refuses the file for this reason or reads it differently. Then no result
-            from the file can be verified with Pinocchio.
+        oracle: Pinocchio's behaviour, if Pinocchio refuses the file for this reason or reads it differently;
+            otherwise None. If it is set, no result of this robot can be verified with Pinocchio.
         also: The lines of further findings of the same kind, combined into this one.
         width: Number of marked characters from `column` on; 0: no position in the text.
         fix: The automatic fix, or None.
@@ -294,7 +296,7 @@ def _lines(lines: tuple[int, ...], shown: int = 4) -> str:
 
 
 class UrdfError(UrdfkinError, ValueError):
-    """A URDF with errors; its message lists them like a linter.
+    """A URDF has errors. The message of this exception lists the errors like a linter.
 
     Attributes:
         findings: All findings of the file by line, warnings and notes included.
@@ -307,7 +309,7 @@ class UrdfError(UrdfkinError, ValueError):
     URDF402
     """
 
-    #: Number of errors in the message; further errors are counted.
+    #: Number of errors that the message lists. It only counts further errors.
     SHOWN = 5
 
     def __init__(self, findings: Iterable[Finding]) -> None:
@@ -362,7 +364,7 @@ class Rule:
     oracle: PinocchioReading | None = None
 
 
-#: The beginning of a comment for urdfkin, after spaces.
+#: The first word of a comment for urdfkin. Spaces may precede it.
 MARK = "urdfkin:"
 
 
@@ -374,7 +376,7 @@ class Comment:
         text: The text between `<!--` and `-->`.
         line: The line, from 1.
         column: The column, from 1.
-        behind: Whether other text precedes it on its line.
+        behind: Whether other text precedes the comment on the same line.
         element: The next element, or None.
     """
 
@@ -393,7 +395,7 @@ class Silence:
         comment: The comment.
         codes: The codes.
         reason: The reason.
-        used: The codes that silenced at least one finding.
+        used: Those of the codes that silenced at least one finding.
     """
 
     comment: Comment
@@ -460,17 +462,18 @@ class Silences:
         return silence.reason
 
 
-#: Limits of the suggestions for misspelt names: names per file, candidates per name, work per comparison.
+#: Limits of the search for suggestions: misspelt names per file, known names compared with each, and `work`
+#: of `nearest`.
 SEARCHES, CANDIDATES, WORK = 20, 5_000, 250_000
 
-#: Number of warnings or notes of one kind from which they are combined into one. The second number is for
-#: URDF7xx, which kinematics does not use.
+#: From this number on, warnings or notes of one kind are combined into one. The second number is for the
+#: codes URDF7xx, which concern content that kinematics does not use.
 FOLDED, FOLDED_EXTRAS = 4, 2
 
 #: Number of errors of one kind that are not combined.
 ERRORS_SHOWN = 100
 
-#: Number of complete findings of one kind; for further ones only the lines are stored.
+#: Largest number of findings of one kind that are stored completely. Of further ones only the line is stored.
 WRITTEN_OUT = 10_000
 
 
@@ -480,7 +483,7 @@ class _Kind:
 
     Attributes:
         severity: The severity.
-        found: The findings, each with its weight.
+        found: The findings, each with its weight (see `Reporter.add`).
         lines: The lines of the findings beyond the limit `WRITTEN_OUT`.
     """
 
@@ -586,7 +589,7 @@ class Reporter:
         return self.silences.reason(code, line if at is None else self._place(at, attribute)[0], at)
 
     def silence(self, silences: Silences) -> None:
-        """Apply the comments to later findings, and to those that parsing has already added."""
+        """Apply comments to the findings that are already in the reporter, and to all later ones."""
         self.silences = silences
         for (code, severity), kind in self._kinds.items():
             if severity is not Severity.ERROR:
@@ -595,14 +598,14 @@ class Reporter:
                 kind.found = [pair for pair, reason in reasons if reason is None]
 
     def nearest(self, word: str, known: Iterable[str]) -> list[str]:
-        """Return up to three known names similar to `word`; none after `SEARCHES` calls, which are slow."""
+        """Return up to three known names similar to `word`; none after `SEARCHES` slow calls."""
         self._searches += 1
         if self._searches > SEARCHES:
             return []
         return nearest(word, islice(known, CANDIDATES), work=WORK)
 
     def is_full(self, rule: Rule) -> bool:
-        """Return whether a rule has `WRITTEN_OUT` findings, so that no more are stored completely."""
+        """Return whether a rule has `WRITTEN_OUT` findings. Further ones are not stored completely."""
         kind = self._kinds.get((rule.id, rule.severity))
         return kind is not None and len(kind.found) >= WRITTEN_OUT
 
@@ -617,8 +620,8 @@ class Reporter:
         """Return the findings by line.
 
         Args:
-            fold: Whether to combine many warnings of one kind, and the errors of a kind from the hundredth
-                on.
+            fold: Whether to combine many warnings of one kind into one finding. The errors of one kind are
+                combined from the hundredth on.
             wanted: A filter, called once for each finding, in file order; None: all findings.
         """
         kinds = [kind for kind in self._kinds.values() if kind.found]
@@ -648,7 +651,7 @@ class Reporter:
         return None if span is None else self.data[slice(*span.value)].decode("utf-8", "replace")
 
     def _spans(self, at: Element) -> dict[str, _AttributeSpan]:
-        """Return the positions of an element's attributes; those of the last element are cached."""
+        """Return the positions of an element's attributes. The last result is cached."""
         if self._element is not at:
             self._element, self._attributes = at, dict(_attributes(self.data, at))
         return self._attributes
@@ -675,7 +678,7 @@ class Reporter:
         )
 
     def without_element(self, at: Element) -> Fix | None:
-        """Return the fix that removes an empty element, and its line if it is alone on it."""
+        """Return the fix that removes an empty element. If its line has nothing else, the line is removed."""
         tag = START_TAG.match(self.data, at.offset)
         if tag is None:
             return None
@@ -708,7 +711,8 @@ class _AttributeSpan:
     value: tuple[int, int]
 
 
-#: A value with a tab, a line end or a reference, all of which XML replaces. Possessive matching: linear time.
+#: An attribute value with a tab, a line end or a reference. An XML parser replaces each of them. Possessive
+#: quantifiers keep the matching time linear.
 _RAW_BLANK = re.compile(rb"""=\s*+(?:"[^"<\t\r\n&]*+[\t\r\n&]|'[^'<\t\r\n&]*+[\t\r\n&])""")
 
 _NEWLINE = re.compile(rb"\r\n|\r|\n")
@@ -729,7 +733,7 @@ def _attributes(data: bytes, at: Element) -> Iterator[tuple[str, _AttributeSpan]
 
 
 def _blanks_before(data: bytes, start: int, blanks: bytes = b" \t\r\n") -> int:
-    """Return the index of the first of the white-space characters that end at an index."""
+    """Return the index at which the white space directly before `start` begins."""
     while start > 0 and data[start - 1] in blanks:
         start -= 1
     return start
@@ -740,7 +744,7 @@ def _place_in_file(finding: Finding) -> tuple[int, int, int, str, str]:
 
 
 def _combine(kind: _Kind, *, fold: bool) -> list[Finding]:
-    """Return the findings of a kind; the last one, or the one of greatest weight, lists the other lines."""
+    """Return the findings of a kind. A combined finding lists the lines of the others."""
     kind.found.sort(key=lambda pair: _place_in_file(pair[0]))
     found = [finding for finding, _ in kind.found]
     into_one = fold and kind.severity is not Severity.ERROR

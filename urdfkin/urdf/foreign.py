@@ -71,8 +71,8 @@ def text_of(source: Any) -> tuple[str, str] | None:
 def lost_quaternions(source: Any, file: str) -> tuple[Finding, ...]:
     """Return a finding for a yourdfpy robot whose rotations may be lost; none for any other source.
 
-    yourdfpy (0.0.60) ignores the attribute quat_xyzw and does not store the text. A rotation that the file
-    writes as quat_xyzw is therefore lost without a trace.
+    yourdfpy (0.0.60) ignores the attribute quat_xyzw and does not store the text. If the file writes a
+    rotation as quat_xyzw, the yourdfpy robot does not contain this rotation.
 
     Args:
         source: The object.
@@ -135,7 +135,7 @@ def _record(joint: yourdf.Joint) -> JointRecord:
 
 
 def _text(root: Any) -> str:
-    """Write elements, attributes and text; skip comments, whose tag is not a string."""
+    """Write elements, attributes and text. Comments are skipped; their tag is not a string."""
     if not isinstance(root.tag, str):
         raise InputError("the root of this ElementTree is not an element", found=safe_repr(root.tag))
     try:
@@ -153,7 +153,8 @@ def _text(root: Any) -> str:
 
 
 _ROOT = "universe"
-#: Joints about (R, RUB: unbounded) or along (P) an axis of their frame. The others are in `_KINDS`.
+#: Class names of joints that rotate about (R, or RUB without limits) or slide along (P) an axis of their own
+#: frame. The class names of all other joints are in `_KINDS`.
 _ALIGNED = re.compile(r"JointModel(R|RUB|P)([XYZ])")
 _KINDS = {
     "R": JointKind.REVOLUTE,
@@ -165,7 +166,7 @@ _KINDS = {
     "JointModelFreeFlyer": JointKind.FLOATING,
     "JointModelPlanar": JointKind.PLANAR,
 }
-#: A larger limit is none: Pinocchio writes the largest double.
+#: A larger limit counts as no limit. Pinocchio stores the largest double for a missing limit.
 _ENDLESS = 1e300
 
 
@@ -175,8 +176,8 @@ class Modelled:
 
     Attributes:
         tree: The kinematic tree.
-        joints: For a link that coincides with a joint: the index of this joint in the model.
-        frames: For every other link: the index of its frame in the model.
+        joints: Link -> index in the model of the joint that coincides with the link.
+        frames: Link -> index in the model of the link's frame, for every other link.
     """
 
     tree: KinematicTree
@@ -218,7 +219,7 @@ class _ModelReader:
         self.rows: list[tuple[Joint, str, str]] = []
 
     def _bodies_on_joints(self) -> Iterator[tuple[int, int]]:
-        """Yield each joint with the frame of the first body that coincides with it."""
+        """Yield each joint with the frame of the first body that coincides with the joint."""
         for i in reversed(range(len(self.frames))):
             if self.kinds[i] == "BODY" and (self.places[i] == np.eye(4)).all():
                 yield int(self.frames[i].parentJoint), i

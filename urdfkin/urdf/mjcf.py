@@ -5,13 +5,13 @@ MuJoCo compiles the file, which resolves defaults and classes. The tree is built
 - A body becomes a link with the body's frame. A named site becomes a link on a fixed joint.
 - The joints of a body move one after the other, each about its anchor p_k: F <- F Trans(p_k) J_k Trans(-p_k).
   A body with several joints becomes several joints and links; the last link is the body's own.
-- A joint's reference value (`ref`) becomes part of its origin, so that q equals MuJoCo's qpos. The exception
-  is the quaternion of a free joint: MuJoCo writes its scalar part first.
+- A joint's reference value (`ref`) becomes part of the joint's origin, so that q equals MuJoCo's qpos. The
+  exception is the quaternion of a free joint: MuJoCo writes its scalar part first.
 
 Parts of the file that a tree cannot represent are listed in the result.
 
-MuJoCo can align the frame of a free body with its inertial frame (`align`, `alignfree`). That frame depends
-on the shapes, so such a file must be compiled with its meshes.
+MuJoCo can align the frame of a free body with its inertial frame (`align`, `alignfree`). The inertial frame
+depends on the shapes, so MuJoCo needs the meshes to compile such a file.
 """
 
 from __future__ import annotations
@@ -33,9 +33,10 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limi
 from urdfkin.system.files import at_home, read_start
 from urdfkin.urdf.mujoco import compiled, library
 
-#: Limit (m) in both directions of a slide joint without limits: a URDF requires limits.
+#: Position limit, +- m, that the URDF gets for a slide joint without limits. URDF requires limits of such a
+#: joint.
 UNBOUNDED = 1000.0
-#: Possessive matching: linear time in the length of the text.
+#: Pattern of the beginning of an MJCF text. Possessive quantifiers keep the matching time linear.
 _ROOT = re.compile(r"(?>\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*+>)*+<mujoco[\s/>]", re.DOTALL)
 _ENDINGS = (".xml", ".mjcf")
 #: Bytes of a file that are read to recognize MJCF.
@@ -49,7 +50,7 @@ class Listed:
     Attributes:
         what: A description in one clause.
         where: The element, or None for the file.
-        moves: Whether the motion depends on it.
+        moves: Whether this part affects the motion.
     """
 
     what: str
@@ -67,10 +68,12 @@ class Mjcf:
         fused: The compiled model with fused static bodies if the file sets `fusestatic`; otherwise None.
         frames: For each link: "body" or "site", and its index in MuJoCo's model.
         coordinates: For each moving joint, mimic joints included: its index in MuJoCo's qpos.
-        rules: The equalities that are mimic rules: index in the model and name of the mimic joint.
-        apart: Indices of the other active joint equalities, which the tree does not represent.
+        rules: The equalities that are mimic rules. Each has its index in the model and the name of the mimic
+            joint.
+        apart: Indices in the model of the other active equalities between joints. The tree does not represent
+            them.
         listed: The parts of the file that the tree does not represent.
-        whole: Whether the model contains the shapes and inertias of the file.
+        whole: Whether `model` contains the shapes and inertias of the file.
         aligns: Whether MuJoCo aligns the frame of a free body with its inertial frame.
     """
 
@@ -105,7 +108,8 @@ class Mjcf:
     def placements(self, q: FloatArray) -> FloatArray:
         """Return the placements (n, frames, 4, 4) of `frames` for q (n, nq), by `mj_kinematics`.
 
-        They come from the fused model if there is one. A frame that it does not contain comes from `model`.
+        The placements are those of the fused model if there is one. A frame that the fused model does not
+        contain has its placement in `model`.
         """
         qpos = self.qpos(q)
         out = _placements(self.model, qpos, dict(enumerate(self.frames.values())))
@@ -157,7 +161,10 @@ class Mjcf:
             yield j, words.get(int(m.jnt_type[j]), "hinge"), int(m.jnt_qposadr[j])
 
     def _of_frames(self, at_body: FloatArray, own: FloatArray) -> FloatArray:
-        """Return values (n, frames): those of the bodies (n, bodies), plus `own` for each site."""
+        """Return the value of each frame (n, frames): that of its body, plus `own` for a site.
+
+        `at_body` has the values of the bodies (n, bodies).
+        """
         columns = [
             at_body[:, i] if kind == "body" else at_body[:, self.model.site_bodyid[i]] + own[i]
             for kind, i in self.frames.values()
@@ -186,8 +193,8 @@ class Mjcf:
     def rule_sizes(self, q: FloatArray) -> FloatArray:
         """Return the size (n, equalities) of the terms of each mimic rule, for error bounds.
 
-        The size of y = y0 + c0 + c1 (x - x0) is |y0| + |c0| + |c1| (size of x + |x0|). It is multiplied by
-        the number of rules in the chain, plus one.
+        The size of y = y0 + c0 + c1 (x - x0) is |y0| + |c0| + |c1| (size of x + |x0|). This size is
+        multiplied by the number of rules in the chain plus one.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         by_joint = {int(m.eq_obj1id[i]): i for i in self.rules}
@@ -225,7 +232,7 @@ def _placements(model: Any, qpos: FloatArray, frames: dict[int, tuple[str, int]]
 
 
 def is_mjcf(source: object) -> TypeGuard[str | bytes | os.PathLike[str]]:
-    """Return whether a source is MJCF: text, bytes, or a .xml or .mjcf file, with the root <mujoco>.
+    """Return whether a source has the root element <mujoco>: text, bytes, or a .xml or .mjcf file.
 
     >>> is_mjcf("<mujoco/>"), is_mjcf(b"<mujoco/>"), is_mjcf("<robot/>"), is_mjcf("panda")
     (True, True, False, False)
@@ -307,7 +314,7 @@ def _spec(mujoco: Any, source: str | os.PathLike[str]) -> Any:
 
 
 def _aligned_bodies(mujoco: Any, spec: Any) -> Iterator[Any]:
-    """Yield the free bodies that MuJoCo aligns with their inertial frame; they have no moving descendants."""
+    """Yield the free bodies without moving descendants that MuJoCo aligns with their inertial frame."""
     kinds, choices = mujoco.mjtJoint, mujoco.mjtAlignFree
     for joint in spec.joints:
         if joint.type != kinds.mjJNT_FREE:
@@ -397,7 +404,7 @@ def _strip(mujoco: Any, spec: Any) -> None:
     for site in spec.sites:
         site.material = ""
     for joint in spec.joints:
-        joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE  # the inertias below are not the file's
+        joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE  # it would use inertias that are not the file's
     for body in spec.bodies[1:]:
         body.explicitinertial, body.mass, body.ipos = True, 1.0, (0.0, 0.0, 0.0)
         body.inertia, body.iquat, body.fullinertia = (1.0,) * 3, (1.0, 0.0, 0.0, 0.0), (np.nan,) * 6

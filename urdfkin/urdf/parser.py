@@ -57,7 +57,8 @@ DECLARED_ASCII = Rule("URDF104", "declared-encoding-unused", WARNING)
 XML_VERSION = Rule("URDF111", "xml-version", WARNING)
 BYTE_ORDER_MARK = Rule("URDF113", "byte-order-mark", NOTE)
 
-#: Byte order marks of encodings other than UTF-8; the longer ones first.
+#: Byte order marks of encodings other than UTF-8. Longer marks come first, because a shorter one may be their
+#: beginning.
 _MARKS = (
     (codecs.BOM_UTF32_LE, "UTF-32"),
     (codecs.BOM_UTF32_BE, "UTF-32"),
@@ -65,14 +66,14 @@ _MARKS = (
     (codecs.BOM_UTF16_BE, "UTF-16"),
 )
 
-#: First bytes of '<' in wide encodings without a byte order mark.
+#: The bytes with which a file in UTF-16 or UTF-32 begins if it starts with '<' and has no byte order mark.
 _WIDE = ((b"<\0\0\0", "UTF-32"), (b"\0\0\0<", "UTF-32"), (b"<\0", "UTF-16"), (b"\0<", "UTF-16"))
 
 _DECLARATION = re.compile(rb"""<\?xml(?=\s)[^>]*?\?>""")
 _ENCODING = re.compile(rb"""\sencoding\s*=\s*["']([^"']*)["']""")
 _XML_VERSION = re.compile(rb"""\sversion\s*=\s*["']([^"']*)["']""")
 
-#: Encodings that contain ASCII: a text of ASCII characters is the same in each.
+#: Encodings in which ASCII characters have the same bytes as in UTF-8.
 _ASCII_SUPERSETS = re.compile(r"(iso8859|windows125|cp125|latin|koi8|mac)")
 
 
@@ -189,17 +190,17 @@ NAME_TOO_LONG = Rule("URDF117", "name-too-long", ERROR)
 INSTRUCTION = Rule("URDF118", "processing-instruction", WARNING, REFUSES)
 MARKUP_TOO_LONG = Rule("URDF119", "markup-too-long", ERROR)
 
-#: Older versions of libxml2, and the readers built on it, refuse deeper nesting.
+#: Largest nesting that older versions of libxml2, and the programs built on them, accept.
 COMMON_DEPTH = 256
 _COMMON = ("older readers built on libxml2 refuse", COMMON_DEPTH)
 
 #: Bytes per call of the parser.
 _PIECE = 1_000_000
 
-#: Characters of an element's text that are stored: more than a message quotes.
+#: Number of characters of an element's text that are stored. A message quotes fewer.
 _STORED = 2 * QUOTED
 
-#: Attributes with names of links and joints.
+#: Attributes whose value is the name of a link or joint.
 _NAMES = frozenset({"name", "link", "joint"})
 
 
@@ -469,7 +470,7 @@ WHITESPACE = Rule("URDF303", "whitespace-in-number", WARNING, REFUSES)
 UNDERFLOW = Rule("URDF304", "underflow", WARNING)
 NUMBER_TOO_LONG = Rule("URDF305", "number-too-long", ERROR)
 
-#: White space; the pattern is unambiguous, so splitting takes linear time.
+#: White space between numbers. Splitting at this pattern takes time linear in the length of the text.
 _BLANKS = re.compile(r"[ \t\r\n]+")
 
 
@@ -479,8 +480,9 @@ class NumberReader:
 
     Attributes:
         report: The reporter, which receives the findings.
-        bad_number: The rule for invalid numbers; another one where kinematics does not use the number.
-        bad_vector: The rule for a wrong count.
+        bad_number: The rule for an invalid number. It is a different rule for numbers that kinematics does
+            not use.
+        bad_vector: The rule for an attribute with too few or too many numbers.
     """
 
     report: Reporter
@@ -561,7 +563,7 @@ class NumberReader:
         return None
 
     def _is_too_long(self, element: Element, attribute: str, written: str, most: int) -> bool:
-        """Return whether a text is too long for numbers; their conversion takes quadratic time."""
+        """Return whether a text is too long to be converted to numbers, which takes quadratic time."""
         if len(written) <= most:
             return False
         self.report.add(
@@ -588,7 +590,7 @@ class NumberReader:
     def _report_refused(self, element: Element, attribute: str, what: str) -> None:
         needed = self.bad_number is BAD_NUMBER
         self.report.add(
-            # If kinematics does not use the number, urdfdom ignores it and accepts the file.
+            # If kinematics does not use the number, urdfdom ignores the number and accepts the file.
             WHITESPACE if needed else self.bad_number,
             f"{attribute} has {what}, which urdfdom {'refuses' if needed else 'does not read'}",
             element,
@@ -603,13 +605,13 @@ class NumberReader:
 
 _NOT_ZERO = "123456789"
 
-#: Elements whose tag is not named in messages.
+#: Elements whose tag messages omit.
 _PLAIN = ("origin", "axis", "limit")
 
-#: Leading zeros of a character reference; Python's conversion refuses thousands of them.
+#: Leading zeros of a character reference. Python cannot convert a reference with thousands of them.
 _LEADING_ZEROS = re.compile(r"(&#[xX]?)0+")
 
-#: Pattern for an invalid number -> remedy; the first match counts.
+#: Pattern for an invalid number -> remedy. The remedy of the first matching pattern is used.
 _REMEDIES = (
     (r"[+-]?(nan|inf|infinity)", "write a finite number"),
     (r".*\$[({].*", "expand the xacro first"),
@@ -654,7 +656,7 @@ JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "planar", "floati
 NEWEST = (1, 2)
 _VERSION = re.compile(r"\s*\+?([0-9]+)\.\+?([0-9]+)")
 
-#: Range of lengths whose square neither underflows nor overflows.
+#: Shortest and longest length whose square neither underflows nor overflows.
 SHORTEST, LONGEST = 1e-150, 1e150
 
 
@@ -867,7 +869,7 @@ class JointReader:
         if axis is None:
             return
         if joint.kind in ("fixed", "floating"):
-            # No reader uses this axis, so a bad number in it is only URDF510.
+            # No reader uses the axis of such a joint. An invalid number in it is reported only as URDF510.
             numbers = NumberReader(self.report, IGNORED, IGNORED)
             numbers.vector(axis, "xyz")
             return
@@ -875,7 +877,7 @@ class JointReader:
             joint.axis = self.numbers.vector(axis, "xyz")
             return
         if not axis.attributes and (axis.text or any(x.tag == "xyz" and x.text for x in axis.children)):
-            return  # an error already: the value is written as text (URDF212)
+            return  # URDF212 already reports a value between the tags
         self.report.add(
             EMPTY_AXIS,
             "<axis> without xyz is 1 0 0 to some readers and 0 0 0 to urdfdom",

@@ -1,8 +1,8 @@
 """Parse XML like urdfdom: names as written, with undeclared namespace prefixes allowed.
 
-ElementTree's own parser refuses an undeclared prefix, which urdfdom accepts. This second parser is
-independent of `urdfkin.urdf.parser` and serves to check its results. It also
-compares the order of the moving joints in a URDF with their order in q.
+ElementTree's own parser refuses an undeclared prefix, which urdfdom accepts. The parser of this module is
+independent of `urdfkin.urdf.parser`, so it can check that parser's results. The module also compares the
+order of the moving joints in a URDF with their order in q.
 """
 
 from __future__ import annotations

@@ -79,7 +79,7 @@ def _joint(joint: JointRecord, rule: Mimic | None) -> Joint:
     kind = JointKind(joint.kind)
     quaternion = joint.quaternion
     roll, pitch, yaw = np.array(joint.rpy) if quaternion is None else rpy_of_quaternion(quaternion)
-    # The parser has checked the numbers, which `rotation_from_rpy` would do again for each joint.
+    # The parser has already checked the numbers. `rotation_from_rpy` would check them again for each joint.
     T = np.eye(4)
     T[:3, :3] = coordinate_rotation(2, yaw) @ coordinate_rotation(1, pitch) @ coordinate_rotation(0, roll)
     T[:3, 3] = joint.xyz
@@ -124,7 +124,8 @@ def _rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
     """Return the mimic rule of each mimic joint, in terms of a joint that is not a mimic joint.
 
     A chain of rules is composed into one: y = m2 (m1 x + b1) + b2. The composition begins at the joint that
-    is not a mimic joint. So each joint is visited once, and the rounding is the same as in the oracle.
+    is not a mimic joint. Each joint is visited once. The order of operations is the oracle's, so both sides
+    round equally.
     """
     named = {joint.name: joint for joint in joints}
     resolved: dict[str, Mimic] = {}

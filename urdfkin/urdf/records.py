@@ -10,8 +10,8 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-#: Deepest nesting that Pinocchio accepts. Its XML parser, tinyxml2, has a limit of 500, in which it counts
-#: the document and the refused level.
+#: Largest number of nested elements that Pinocchio accepts. Its XML parser, tinyxml2, stops at level 500.
+#: That count includes the document itself and the level that the parser refuses.
 ORACLE_DEPTH = 498
 
 
@@ -26,7 +26,8 @@ class Limits:
         attributes: Number of attributes of one element.
         name: Characters in the name of an element, an attribute, a link or a joint.
         number: Characters in one number.
-        markup: Bytes of one tag, comment or processing instruction, within 10 %; libxml2 has the same limit.
+        markup: Bytes of one tag, comment or processing instruction; accurate within 10 %. libxml2 has the
+            same limit.
     """
 
     bytes: int = 100_000_000
@@ -41,7 +42,7 @@ class Limits:
 DEFAULT_LIMITS = Limits()
 
 
-#: A start tag, matched from an element's offset. A quoted value may contain '>'.
+#: Pattern of a start tag, to be matched at an element's offset. A quoted value may contain '>'.
 START_TAG = re.compile(rb"""<(?:[^<>"']++|"[^"]*+"|'[^']*+')*+>""")
 ATTRIBUTE = re.compile(rb"""([^\s=<>/"']++)\s*+=\s*+("[^"]*+"|'[^']*+')""")
 
@@ -59,7 +60,7 @@ class Element:
         offset: The position of the start tag in bytes.
         above: The child of `<robot>` that contains this element; None for the children of `<robot>`.
         children: The child elements, in file order.
-        text: The beginning of the element's text.
+        text: The first characters of the text between the element's tags.
     """
 
     tag: str
@@ -73,7 +74,7 @@ class Element:
     text: str = ""
 
     def append(self, child: Element) -> None:
-        """Add a child. An element without children has no list, which halves its size."""
+        """Add a child. An element gets its list of children with the first child, which saves memory."""
         if isinstance(self.children, list):
             self.children.append(child)
         else:
@@ -84,7 +85,7 @@ class Element:
         return [child for child in self.children if child.tag == tag]
 
     def first(self, tag: str) -> Element | None:
-        """Return the first child with a tag, or None. Every URDF reader uses the first."""
+        """Return the first child with a tag, or None. All URDF readers ignore later ones."""
         return next((child for child in self.children if child.tag == tag), None)
 
     def walk(self) -> Iterator[Element]:
@@ -113,7 +114,7 @@ class Element:
 
 Vector = tuple[float, ...]
 
-#: Limits that URDF defines from version 1.2 on.
+#: Attributes of `<limit>` that URDF defines from version 1.2 on.
 FURTHER_LIMITS = ("acceleration", "deceleration", "jerk")
 
 #: Joint types with an axis.

@@ -28,9 +28,9 @@ class Origin:
         mimic: The argument `mimic`.
         root_joint: The argument `root_joint`.
         xacro_args: Names and values of the xacro arguments.
-        oracle: The argument `oracle`: a further or another oracle, or None.
-        table: Whether the robot comes from a Denavit-Hartenberg table. Then the table's convention places
-            the frames between base and tip.
+        oracle: The argument `oracle`, the name of an oracle; None for the default.
+        table: Whether the robot comes from a Denavit-Hartenberg table. If so, the table's convention
+            determines the frames between base and tip.
         sha256: The digest of the MJCF file behind the URDF; empty if the source is a URDF.
 
     Raises:
@@ -53,7 +53,7 @@ class Origin:
 
     @property
     def again(self) -> str:
-        """The source for a second call of `load`; `-` (standard input) for text."""
+        """The source to pass to `load` to get the same robot again; `-` (standard input) for text."""
         return "-" if self.source.startswith("<") else self.source
 
     @property
@@ -133,8 +133,8 @@ def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, objec
 
     Args:
         source: One of the sources in the module docstring.
-        most: Size limit in bytes (in characters, for text files). One more is read, so that the checks detect
-            a longer source. A device may have no end.
+        most: Size limit in bytes; for an open text file, in characters. At most one byte or character more is
+            read. So the checks detect a source that is too long, and reading a device without an end stops.
         xacro_args: Arguments for a .xacro file, which is expanded.
 
     Raises:
@@ -255,13 +255,13 @@ def _read_file(path: Path, most: int) -> Text:
 
 
 def as_word(path: Path) -> str:
-    """Return a path as a word that is no catalogue name, option, `-` or text: add `./` if necessary."""
+    """Return a path as a word for `load`, with `./` before it where it could be taken for something else."""
     word = str(path)
     return f"./{word}" if word.startswith(("-", "<")) or _entry(word) is not None else word
 
 
 def _entry(word: str) -> Entry | None:
-    """Return the catalogue entry of a name; None for a path, which has a point or a separator."""
+    """Return the catalogue entry of a name; None for a path, that is, a word with a dot or a separator."""
     return None if "." in word or os.sep in word else catalogue().get(word)
 
 

@@ -1,10 +1,10 @@
 """Write a `KinematicTree` as URDF text, and insert attributes and elements into an existing text.
 
-Numbers read back bit for bit. A joint's rotation is written as roll, pitch and yaw, which reproduce it up to
-rounding.
+A reader of the text gets the same numbers bit for bit. A joint's rotation is written as roll, pitch and yaw,
+which reproduce it up to rounding.
 
-An insertion is an `Edit` of the bytes after a byte order mark. Its position comes from `Element.offset`, and
-it uses the indentation and line ends of the surrounding text.
+An insertion is an `Edit`. Its position is computed from `Element.offset`, which does not count a byte order
+mark. The inserted text has the indentation and line ends of the text around it.
 """
 
 from __future__ import annotations

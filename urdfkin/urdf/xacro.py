@@ -5,8 +5,9 @@ process. docs/xacro.md lists the operations that a file may do. `urdfkin.urdf.ca
 without ROS.
 
 xacro ignores an argument that the file does not declare; urdfkin raises an error. To find the declared
-arguments, the separate process reads the file and its includes. Some includes cannot be read: their name is
-computed, the file is not found, or the file is not allowed. Then no argument is refused.
+arguments, the separate process reads the file and its includes. An include cannot be read if its name is
+computed, if the file is not found, or if the file is not allowed. In this case urdfkin accepts every
+argument.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ def check_arguments(path: Path, given: Iterable[str], known: Collection[str] | N
     Args:
         path: The file.
         given: Names of arguments.
-        known: The names from `arguments_of`; None: no argument is refused.
+        known: The names that `arguments_of` returned. None: every argument is accepted.
 
     Raises:
         UnknownNameError: an argument is not among the known names, which the message lists.
@@ -108,7 +109,7 @@ def _included_file(name: str, beside: Path, find: Find) -> Path | None:
     return None if _COMPUTED.search(name) or not name else folder / name
 
 
-#: Time limit of an expansion in seconds: a macro may call itself without end.
+#: Time limit of an expansion in seconds. It is needed because a macro may call itself without end.
 PATIENCE = 60.0
 
 #: Size limit of the answer in bytes.

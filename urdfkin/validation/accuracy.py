@@ -41,7 +41,7 @@ from urdfkin.verify.verifier import bound_of, theirs_of, urdfkins
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _FIFTY_DIGITS = np.vectorize(mp.mpf, otypes=[object])
-#: The representations of an orientation, by the name that a line has for them.
+#: Name of a line of the study -> the representations of an orientation that it covers.
 _REPRESENTATIONS = {
     "euler angles": tuple(name for name in SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
@@ -256,7 +256,7 @@ def _line(quantity: str, reference: str | None, compared: Sequence[_Compared]) -
     for ours, theirs, true, scale in compared:
         counted = scale > 0.0
         units = np.maximum(EPS * scale[counted], LEAST_UNIT)
-        # The difference of two close doubles is exact. The remaining digits are subtracted next.
+        # Subtract the true value's leading double (exact for close doubles), then its other digits.
         high = true[counted].astype(float)
         low = (true[counted] - high).astype(float)
         for errors, side in zip(sides, (ours, theirs), strict=True):

@@ -37,8 +37,8 @@ class Failure:
         reason: The reason as text.
         portrait: Summary of the robot, as far as it could be read.
         error: The traceback of an unexpected error; None otherwise.
-        passing: Whether the process or the cluster failed and not the robot. Such a failure is not stored;
-            the chunk is computed again.
+        passing: Whether the process or the cluster caused the failure, not the robot. Such a failure is not
+            stored; the chunk is computed again.
     """
 
     verdict: Verdict

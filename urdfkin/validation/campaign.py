@@ -71,9 +71,9 @@ def validate(
         mimic: As in `load`.
         root_joint: As in `load`.
         xacro_args: As in `load`, for each .xacro file among the robots.
-        oracle: "mujoco": also compare every frame with MuJoCo. The report states which one disagrees where
-            two of the three agree (needs the extra `mujoco`).
-        isolate: Run each robot in its own process, `jobs` at a time. If a process crashes, its robot is
+        oracle: "mujoco": also compare every frame with MuJoCo. If two of the three libraries
+            agree, the report names the third one. This needs the extra `mujoco`.
+        isolate: Run each robot in its own process, `jobs` processes at a time. If one crashes, its robot is
             reported as not verified with the reason; the other robots continue.
         executor: Runs the chunks instead of local processes: an executor with the interface of
             `concurrent.futures`, or a cluster (`urdfkin.validation.cluster.connected`).
@@ -118,7 +118,7 @@ def validate(
     collector = ResultCollector(found, cut, shares(len(found), cut, shard), progress)
     memory_limit = (
         memory.share(jobs) if executor is None else None
-    )  # executors: each machine has its own limit
+    )  # with an executor, each machine computes its own memory limit
     campaign = _Campaign(found, cut, seed, memory_limit, collector)
     interrupted, open_store, begin = False, None, time.perf_counter()
     with contextlib.ExitStack() as stack:
@@ -130,7 +130,7 @@ def validate(
             if open_store is not None:
                 campaign.use(open_store)
             for i, error in unread.items():
-                for index in collector.missing(i):  # only the first: after it the robot counts as failed
+                for index in collector.missing(i):  # one failed chunk fails the robot
                     campaign.enter(campaign.task(i, index), failure(found[i], error))
             missing = [robot for i, robot in enumerate(found) if any(True for _ in collector.missing(i))]
             if missing and (isolate or any(map(_is_robot, missing))):
@@ -142,7 +142,7 @@ def validate(
             interrupted = True
         except UrdfkinError as error:
             collector.give_up(Failure(Verdict.NOT_VERIFIED, str(error)))
-        except Exception as error:  # finished results stay
+        except Exception as error:  # finished results stay in the report
             collector.give_up(
                 Failure(Verdict.NOT_VERIFIED, unexpected_error(error), error=format_traceback(error))
             )

@@ -4,8 +4,8 @@ The samples depend on the seed and on their index only. Inputs and results of a 
 chunk can run in this process, in another one or on another machine. Samples 0, 1 and 2 of a robot are the
 neutral configuration and the two ends of the limits.
 
-Samples are drawn 25 at a time, each draw with its own seed. A chunk compares several draws together. Their
-number changes no result, only the cost of distributing and storing chunks.
+Samples are drawn 25 at a time, each draw with its own seed. A chunk compares several draws together. The
+number of draws in a chunk changes no result, only the cost of distributing and storing chunks.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ class Cut:
 
     @property
     def _draws(self) -> int:
-        """Number of draws in a chunk."""
+        """Number of draws in each chunk of a robot."""
         return min(_DRAWS, max(1, -(-self.samples // DRAWN) // _CHUNKS))
 
     def __len__(self) -> int:

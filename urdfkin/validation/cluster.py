@@ -30,15 +30,15 @@ from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.verify.oracles import version
 
-#: Chunks in flight: this number for each thread of the workers, so that no thread waits, and this many
-#: more.
+#: Maximum number of chunks in flight: the first number for each thread of the workers, plus the second
+#: number. So no thread waits for a chunk.
 _FOR_EACH, _MORE = 2, 4
 #: Maximum number of times a chunk is sent when Dask loses its worker. A robot cannot kill Dask's worker,
 #: only the process beside it.
 _TRIES = 20
 #: Seconds between two counts of the workers.
 _COUNT = 1.0
-#: Packages whose versions must be the same on the scheduler, where it has them.
+#: Packages that must have the same version on the scheduler, if they are installed there.
 _COMPARED = ("urdfkin", "pin")
 _NOBODY = RobotInput(b"", Origin(""))
 
@@ -99,7 +99,7 @@ def _client(scheduler: str) -> Iterator[Client]:
 
 
 class _Portless:
-    """Part of a cluster without web pages. All users of the machine could open them."""
+    """Part of a cluster without web pages. All users of the machine could open such pages."""
 
     def start_http_server(self, *_: object, **__: object) -> None:
         """Start no server (overrides Dask's method)."""
@@ -216,7 +216,7 @@ class Cluster:
                         continue
                     try:
                         landed.add(self._send(_Flight(task)))
-                    except (UrdfkinError, OSError) as error:  # its text cannot be read
+                    except (UrdfkinError, OSError) as error:  # the text of the robot cannot be read
                         failed.add(task.robot)
                         enter(task, failure(task.chunk.subject, error))
                 if not self._flying:
@@ -268,7 +268,7 @@ class Cluster:
         if future.status == "finished":
             try:
                 result = future.result()
-            except OSError as gone:  # results come through the scheduler, which is gone
+            except OSError as gone:  # results come through the scheduler, so its connection is lost
                 raise self._lost() from gone
             return self._answer(result, flight.task)
         if self._client.status != "running":

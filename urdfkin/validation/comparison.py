@@ -117,7 +117,7 @@ class _Block(_Work):
         tree = robot.tree
         self.frames = robot.all_frames[frames]
         links = tuple(tree.frame_link(frame) for frame in self.frames)
-        # The robot caches the compiled tree of all its frames. That of a block is compiled each time.
+        # The robot caches the compiled tree of all its frames. The tree of a block is compiled each time.
         whole = len(links) == len(robot.all_frames)
         self.plan = robot.plan(links) if whole else compile_tree(tree, links)
         self.size = magnitudes(self.plan, x.q, x.v, x.a, STILL_STATE)
@@ -169,7 +169,7 @@ class _Block(_Work):
 
 
 class _Screws(_Work):
-    """The whole `data.J`: each column is a column of its own joint's Jacobian in WORLD."""
+    """Comparison of Pinocchio's `data.J`: each column belongs to the WORLD Jacobian of its own joint."""
 
     def tallies(self) -> Iterator[Tally]:
         robot, x = self.robot, self.x
@@ -200,7 +200,7 @@ class _Screws(_Work):
 
 
 def _expand_mimic(tree: KinematicTree, free: KinematicTree, q: FloatArray) -> FloatArray:
-    """Return the configuration of the freed tree, with each mimic joint at the value that its rule gives."""
+    """Return the configuration of the freed tree, with each mimic joint at the value from its mimic rule."""
     spread = np.empty((len(q), free.nq))
     for joint, at, free_at in zip(tree.joints, tree.q_index, free.q_index, strict=True):
         own = q[:, at : at + joint.kind.nq]

@@ -7,8 +7,8 @@ that has failed, and nothing else. Tasks are created lazily, so that a million o
 The engines here run in this process, or on an executor with the interface of `concurrent.futures`.
 `urdfkin.validation.worker_processes` has an engine of local processes.
 
-Each worker gets its own robot, which no other worker has to read. If no robot is waiting, a free worker takes
-chunks of the robot with the most chunks left.
+Each worker gets a robot of its own, so that only one worker has to read this robot. If no robot
+is waiting, a free worker takes chunks of the robot with the most chunks left.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Row:
         return task
 
     def put_back(self, task: Task) -> None:
-        """Put a task back, so that it is the next one."""
+        """Put a task back, so that it is the next task of this row."""
         self._tasks = chain([task], self._tasks)
 
 
@@ -66,7 +66,7 @@ class WorkQueue:
         self._ended = set[int]()
 
     def first(self) -> tuple[Task, Row] | None:
-        """Return a task for a worker without a robot, and its row. None: no task is left."""
+        """Return a task for a worker without a robot, and the row of this task. None: no task is left."""
         for row in self._waiting:
             self._begun.append(row)
             if (task := self.next(row)) is not None:

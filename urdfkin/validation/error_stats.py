@@ -204,7 +204,7 @@ class Tally:
         )
 
     def beside(self, other: Tally) -> Tally:
-        """Return the tally of the same samples with the frames of both."""
+        """Return one tally for the frames of this tally and of another one of the same samples."""
         joined = replace(self, by_frame=()) + replace(other, by_frame=())
         return replace(joined, by_frame=self.by_frame + other.by_frame)
 

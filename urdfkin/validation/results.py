@@ -261,7 +261,7 @@ class ValidationReport(Displayable):
 
     def as_dict(self) -> Document:
         """Return the JSON document. Infinity in a disagreement stands for NaN; it becomes None."""
-        judgements = iter(self.judgements)  # only compared robots have one
+        judgements = iter(self.judgements)  # only compared robots have an accuracy result
         document = {
             "schema": VALIDATION.name,
             "versions": self.made_by or versions(robot.origin.oracle for robot in self.robots),

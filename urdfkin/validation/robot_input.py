@@ -143,7 +143,7 @@ def subject(
     if isinstance(robot, Robot):
         return RobotInput.of(robot)
     if is_xacro(robot):
-        text = read_source(robot, xacro_args=xacro_args)  # expanded once, here
+        text = read_source(robot, xacro_args=xacro_args)  # the .xacro file is expanded once, here
         return _text(text.data, Origin(text.source, mimic, root_joint, text.xacro_args), text.label)
     source = as_word(Path(robot)) if isinstance(robot, os.PathLike) else robot
     if isinstance(source, str) and source != "-":

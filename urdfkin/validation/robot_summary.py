@@ -173,7 +173,7 @@ class RobotSummary:
 
     @property
     def disagreements(self) -> tuple[str, ...]:
-        """A message for each chain with tables outside their bound, and for a different tree of yourdfpy."""
+        """Messages on chains with tables outside their bound, and on another tree of yourdfpy."""
         found = [text for chain in self.chains if (text := chain_disagreement(chain)) is not None]
         if self.second_reader and (text := reader_disagreement(self.second_reader)) is not None:
             found.append(text)

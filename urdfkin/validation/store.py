@@ -7,7 +7,7 @@
 
 Files are written atomically, so a file is complete or absent. The answer of a chunk is stored under the
 chunk's key and does not depend on the engine. A damaged file is reported and moved to `damaged/`, and its
-chunk is computed again. A file with a name that no chunk of the campaign has is reported and moved too.
+chunk is computed again. A file whose name belongs to no chunk of the campaign is also reported and moved.
 """
 
 from __future__ import annotations
@@ -273,12 +273,12 @@ def opened(
 
 
 def _is_ours(path: Path) -> bool:
-    """Whether a file may exist before the manifest, because other parts start at the same time."""
+    """Whether another shard that starts at the same time may have made this file before the manifest."""
     return path.name in (_WRITING, _CHUNKS) or path.name.startswith(_LOCK)
 
 
 def _check_or_write_manifest(store: Store, *, retry_failed: bool) -> Store:
-    """Return the store, with its existing manifest if it has one. That one has the start time."""
+    """Return the store. An existing manifest is kept, because it has the original start time."""
     if not (store.folder / _MANIFEST).exists():
         store.write_manifest()
         return store
@@ -349,7 +349,7 @@ def _lock(file: IO[bytes], how: int, folder: Path) -> None:
     for _ in range(_TRIES):
         if _try_lock(file, how):
             return
-        time.sleep(0.1)  # a process that only checks the lock holds it for a moment
+        time.sleep(0.1)  # another process may hold the lock for a moment, only to check it
     raise InputError(
         "another process uses this store",
         where=str(folder),

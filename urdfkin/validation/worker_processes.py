@@ -1,12 +1,13 @@
 """Engine that runs chunks on processes of this machine. A crash of a process affects only its robot.
 
-A worker process runs one chunk after another. It ends with its parent process, however that ends. It is a new
-Python interpreter that does not import the parent's main module, so a script needs no `__main__` guard. It
+A worker process runs one chunk after another. It ends when its parent process ends. It is a new Python
+interpreter that does not import the parent's main module, so a script needs no `__main__` guard. It
 imports nothing from the current folder.
 
 One thread distributes the chunks and receives the answers. Each worker has its own robot as long as robots
 are waiting, and one chunk at a time, so a crash can be assigned to a robot. That robot is tried once more,
-alone, after all others. With `isolate` it was alone from the start, and the crash is its result at once.
+alone, after all others. With `isolate`, each robot runs alone from the start, so its first crash is
+reported as its result.
 """
 
 from __future__ import annotations
@@ -190,7 +191,7 @@ class _Crew:
             try:
                 worker = worker or self._start()
             except Exception as error:
-                if self._workers:  # no further process can start: continue with the running ones
+                if self._workers:  # no other process can be started, so continue with the running ones
                     self._queue.put_back(task, row)
                     return
                 self._enter_answer(task, lost("no process could be started", error))

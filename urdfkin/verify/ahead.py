@@ -7,7 +7,10 @@ from urdfkin.verify import comparison, mimic_columns
 
 
 def load_kernels() -> None:
-    """Compile each kernel or read it from disk, before worker processes start that would each compile it."""
+    """Compile each kernel or read it from disk. Call this before worker processes start.
+
+    Otherwise each worker process would compile the kernels again.
+    """
     load_cores()
     comparison.load_kernel()
     mimic_columns.load_kernel()

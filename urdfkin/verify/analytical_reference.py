@@ -4,8 +4,8 @@ This is an independent computation of eq. 7.122, for the check. It shares no cod
 `urdfkin.kinematics.rotation` and `urdfkin.kinematics.bodies`.
 
 An Euler sequence rotates about i, then j, then k, so that R = R_i R_j R_k. The first axis is e_i and the
-third is R e_k. The middle axis, the line of nodes, is perpendicular to both: n / |n| with n = e_i x R e_k.
-The range of the middle angle b determines its sign:
+third is R e_k. The middle axis, the line of nodes, is perpendicular to both of these axes. It is +- n / |n|
+with n = e_i x R e_k. The range of the middle angle b determines the sign:
 
 - k = i: b is in [0, pi], the sign is +1, and |n| = |sin b|.
 - k != i: b is in [-pi/2, pi/2], the sign is (e_j x e_i) . e_k, and |n| = |cos b|.
@@ -51,7 +51,9 @@ def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Number
 
 
 def quaternion_jacobian(quat: Numbers, J_v: Numbers) -> Numbers:
-    """Return the derivatives of position and unit quaternion; the latter are half of (w, 0) times quat.
+    """Return the derivatives of position and unit quaternion.
+
+    The derivative of the quaternion is half of the quaternion product (w, 0) times `quat`.
 
     Args:
         quat: (..., 4) unit quaternion, scalar last.

@@ -35,7 +35,7 @@ class Part(NamedTuple):
         q: (n, nq).
         rates: (n, nv) v, or v and a, according to the quantity.
         state: (n or 1, 24) state of the moving base.
-        asked: The same configurations, converted independently from the user's arguments.
+        asked: The same configurations for the oracle, converted independently from the user's arguments.
         options: Other arguments of the method, by name.
     """
 
@@ -58,7 +58,7 @@ class Call:
         reference: A `Reference` or its name.
         base: Motion of the root link; None: fixed at the world origin.
         given: The inputs that the quantity needs, of q, v and a.
-        also: Additional frames after the others; they are computed but not returned.
+        also: Additional frames, which are computed after the frames of `frame` but not returned.
         options: Other arguments of the method, by name.
 
     Raises:
@@ -111,7 +111,7 @@ class Call:
             raise InputError("the batch shapes of q, v, a and base do not broadcast", found=found) from None
 
     def _flat_input(self, array: FloatArray) -> FloatArray:
-        """Return (n, width); a single row is broadcast without a copy."""
+        """Return an input as an array (n, width). A single row is broadcast without a copy."""
         width = array.shape[-1]
         if array.shape[:-1] == self.shape:
             return np.ascontiguousarray(array.reshape(self.n, width))
@@ -151,7 +151,7 @@ class Call:
         return out.reshape(self.n, len(self.links), *own)
 
     def in_shape(self, result: FloatArray) -> FloatArray:
-        """Return an (n, frames, ...) result in the caller's batch shape; one frame has no axis of its own."""
+        """Return a result (n, frames, ...) in the caller's batch shape. A single frame has no axis."""
         return result.reshape(*self.shape, *result.shape[1 if self.several else 2 :])
 
     def compute(self, evaluate: Callable[..., T], *arguments: Any, **options: Any) -> T:

@@ -1,6 +1,6 @@
 """Certificates: the checked results of a robot, their agreement with the oracle, and the unchecked results.
 
-Also the comparison of results within a bound, its error, and the command that reproduces one case.
+The module also compares results within a bound, and defines the exception `VerificationError`.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class VerificationError(UrdfkinError):
         ours: urdfkin's value of that sample.
         theirs: The oracle's value.
         bound: Largest allowed difference of each number.
-        units: The difference, in eps * scale.
+        units: The difference in multiples of eps * scale.
         reproduce: A command or a line of Python that computes the case again.
 
     >>> import urdfkin
@@ -83,7 +83,7 @@ class Comparison:
 
     Attributes:
         results: Number of results (matrices or six-vectors).
-        worst: Largest difference, in eps * scale.
+        worst: Largest difference, in multiples of eps * scale.
         share: Largest ratio of a difference to its bound; above 1 is a failure.
         index: Index of the largest ratio in the results' leading axes.
     """
@@ -120,7 +120,7 @@ def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> Co
     Args:
         ours: urdfkin's results. The first `axes` axes count results, the others belong to one result.
         theirs: The oracle's results, of the same shape.
-        bound: Bound of the difference; `scale` and `k` broadcast against the results.
+        bound: Bound of the difference; its arrays `scale` and `k` broadcast against the results.
         axes: Number of leading axes that count results.
     """
     units = worst_of_each(ours, theirs, bound.scale, axes)
@@ -299,8 +299,8 @@ class Account:
     """The entries of a ledger about one quantity.
 
     Attributes:
-        checked: Comparison of all results that the oracle confirmed.
-        unchecked: Number of results that the oracle could not check, or that a sample left out.
+        checked: Comparison of all results that the oracle confirmed, combined into one.
+        unchecked: Number of results that the oracle could not check, or that `verify="sample"` left out.
         not_asked_for: Number of results of calls with verify=False.
         counters: Arrays and indices of additional counters of unchecked results, which fast evaluators use.
     """
@@ -312,7 +312,7 @@ class Account:
 
     @property
     def unwanted(self) -> int:
-        """Number of all results of calls without a check, those of the counters included."""
+        """Number of all results of calls with verify=False, including those in the counters."""
         return self.not_asked_for + sum(int(counts[place]) for counts, place in self.counters)
 
     def line(self, quantity: str) -> Line:

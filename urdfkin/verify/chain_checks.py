@@ -24,10 +24,10 @@ from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
 def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | None:
     """Compare a chain with Pinocchio; return a line about the agreement.
 
-    Pinocchio's frame of a joint is the frame of its child link. It comes after the joint's motion if the
-    chain passes the joint forwards, and before it if backwards. Pinocchio computes from the root to both
-    ends, the chain from one end to the other. The bound uses the joints and lengths of both paths from the
-    root, which neither computation exceeds.
+    Pinocchio's frame of a joint is the frame of its child link. This frame comes after the joint's motion if
+    the chain passes the joint forwards, and before the motion if it passes the joint backwards. Pinocchio
+    computes from the root to both ends of the chain; urdfkin computes from one end to the other. The bound
+    uses the joints and lengths of both paths from the root. Neither computation uses more joints or lengths.
 
     Args:
         verifier: Verifier of the robot.
@@ -109,7 +109,7 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
     own = screws.coupling.select(verifier.tree, q)
     off = np.abs(base @ screws.placement(own) - tip)[:, :3]
     path = chain(verifier.tree, screws.tip_frame, screws.base_frame)
-    # Pinocchio computes from the root to both ends, the product from one end to the other.
+    # Pinocchio computes from the root to both ends. The product goes from one end to the other.
     lever = np.linalg.norm(base[:, :3, 3], axis=-1) + path.reach + float(path.lengths[0])
     joints = sum(len(verifier.tree.path(verifier.tree.frame_link(end))) for end in (path.base, path.tip))
     unit = EPS * (of_joints(joints) + np.abs(own).sum(axis=-1)) + left_out(path)

@@ -1,6 +1,7 @@
 """Kernel for the largest difference of each result, in one pass over the numbers.
 
-`bounds.disagreement` defines the difference. As NumPy expressions it took as long as Pinocchio itself.
+`bounds.disagreement` defines the difference. An implementation with NumPy expressions took as long as
+Pinocchio's computation of the results.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
 
 @helper(fastmath={"reassoc"})
 def _finite(x, i):
-    """Return whether a row is finite: 0 * x is NaN if x is not, and NaN remains in a sum in any order."""
+    """Return whether a row is finite. If x is not finite, 0 * x is NaN, and so is every sum with it."""
     total = 0.0
     for j in range(x.shape[1]):
         total += 0.0 * x[i, j]
@@ -47,7 +48,7 @@ def _finite(x, i):
 
 @helper(fastmath={"nnan", "nsz"})
 def _largest(ours, theirs, scale, i):
-    """Return the largest difference in a row of finite numbers; the compiler may reorder the comparisons."""
+    """Return the largest difference in a row. The numbers are finite, so any order gives the same result."""
     largest = 0.0
     for j in range(ours.shape[1]):
         size, difference = scale[i, j], abs(ours[i, j] - theirs[i, j])

@@ -6,8 +6,9 @@
 | relative placement | placements of both frames in the world |
 | IMU reading | acceleration, placement and velocity |
 
-The forward recursion includes gravity as an acceleration of the base. The check of an IMU reading subtracts
-gravity at the end, in the sensor's axes, so a wrong sign or a wrong order cannot agree on both sides.
+urdfkin's forward recursion includes gravity as an acceleration of the base. The check of an IMU reading
+subtracts gravity at the end, in the sensor's axes. An error of sign or order in one of these two computations
+therefore leads to a disagreement.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ def check_analytical_jacobian(
         bound_of: Function for the bound of the velocity Jacobian.
         oracle: The oracle's model of the robot.
         x: The configurations.
-        ours: urdfkin's results; they determine the sign of a quaternion where rounding hides it.
+        ours: urdfkin's results. They determine the sign of a quaternion where rounding hides the sign.
         by: The oracle.
     """
     aligned = Reference.LOCAL_WORLD_ALIGNED
@@ -50,7 +51,8 @@ def check_analytical_jacobian(
         quat = oracle.quaternions(q, frames, base)
         bound = bounds.quaternion_jacobian_bound(bound)
         theirs, hidden = quaternion_jacobian(quat, J_v), bounds.hidden_scalar(bound, quat.shape[:-1])
-        # q and -q are the same rotation. The one with qw >= 0 is used, or either if rounding hides the sign.
+        # q and -q are the same rotation. The quaternion with qw >= 0 is used. If rounding hides the sign of
+        # qw, both are accepted.
         with_other = (ours * theirs)[..., 3:, :].sum(axis=(-2, -1)) < 0.0
         turned = with_other & (np.abs(quat[..., 3]) <= hidden)
         theirs[..., 3:, :] *= np.where(turned, -1.0, 1.0)[..., np.newaxis, np.newaxis]
@@ -68,13 +70,13 @@ def check_relative_placement(
     Let a be the other frame and b the frame. Let s_a and s_b be the lengths of their paths, and k_a and k_b
     their roundings. The position is R_a^T (p_b - p_a). Its error is k_b s_b + k_a s_a from the positions and
     k_a |p_b - p_a| from R_a. Since |p_b - p_a| <= s_a + s_b, the sum is at most (2 k_a + k_b) (s_a + s_b).
-    The error of the product of rotations is k_a + k_b. The difference and the products round about 5 eps
-    more, which the additional joint in each k covers.
+    The error of the product of rotations is k_a + k_b. The difference and the products add rounding errors of
+    about 5 eps. Each k counts one additional joint, which covers them.
 
     Args:
         bound_of: Function for the bound of placements in the world.
         oracle: The oracle's model of the robot.
-        x: The configurations; the last frame of its compiled tree is the other frame.
+        x: The configurations. The last frame of the compiled tree of `x` is the other frame.
         ours: urdfkin's results; not used.
         by: The oracle.
     """

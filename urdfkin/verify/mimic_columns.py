@@ -1,7 +1,7 @@
 """Kernel that adds the columns of mimic joints to those of the mimicked joints, in one pass.
 
-NumPy expressions read all Jacobians from memory once for each column. On robots with mimic joints that took
-longer than Pinocchio's own computation.
+NumPy expressions would read all Jacobians from memory once for each column. On robots with mimic joints this
+took longer than Pinocchio's computation of the Jacobians.
 """
 
 from __future__ import annotations

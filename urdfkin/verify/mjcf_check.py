@@ -1,9 +1,10 @@
 """Read an MJCF file in a confined process, and compare the resulting robot with MuJoCo's model of the file.
 
-Pinocchio checks every result with the URDF text that urdfkin writes for the tree. That does not check the
-conversion from the file to the tree. Therefore `load` compares the tree with MuJoCo's own model: the
-placements of bodies and sites, and the equalities that became mimic rules. Pinocchio's MJCF reader is
-compared too. It is known to read some files differently, so its result is reported only.
+Pinocchio checks every result with the URDF text that urdfkin writes for the tree. Such a check does not cover
+the conversion from the MJCF file to the tree. Therefore `load` compares the tree with MuJoCo's own model: the
+placements of bodies and sites, and the equalities that became mimic rules. The placements by Pinocchio's MJCF
+reader are compared too. This reader is known to read some files differently, so a difference is reported and
+is not an error.
 """
 
 from __future__ import annotations
@@ -53,7 +54,8 @@ class MjcfReading:
         listed: Elements of the file that the tree does not contain.
         path: The file; None for a text.
         answer: The process's answer about the robot: frames, and MuJoCo's results.
-        not_whole: Reason why MuJoCo compiled the file without shapes and inertias; None if with them.
+        not_whole: Reason why MuJoCo compiled the file without shapes and inertias; None if MuJoCo compiled
+            the complete file.
         pinocchio: The answer about Pinocchio's reader; None if there is none.
     """
 
@@ -121,7 +123,7 @@ def _text(source: str | bytes | os.PathLike[str], name: str) -> str:
 
 
 def _ask(request: Mapping[str, Any], patience: float) -> tuple[list[dict[str, Any]], str]:
-    """Return the process's answers, and the reason why they end."""
+    """Return the answers of the process, and the reason why there are no further ones."""
     command = own_python(
         "from urdfkin.verify.mjcf_process import serve; serve()", options=("-B", "-X", "utf8")
     )
@@ -135,7 +137,10 @@ def _ask(request: Mapping[str, Any], patience: float) -> tuple[list[dict[str, An
 
 
 def _is_answer(line: bytes) -> bool:
-    """Return whether a line is a complete answer; libraries may print, and a killed process leaves a part."""
+    """Return whether a line is a complete answer.
+
+    Other lines are text that a library printed, or the first part of an answer of a killed process.
+    """
     return line.startswith(b"{") and line.endswith(b"}\n")
 
 
@@ -158,7 +163,7 @@ def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
     frames = [LinkFrame.of(name) for name, _ in answer["frames"]]
     plan = compile_tree(tree, [tree.frame_link(frame) for frame in frames])
     ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
-    # Both computations round, and so do the angles of the URDF: twice MuJoCo's bound.
+    # Both computations round, and the URDF's angles are rounded too. So the bound is twice MuJoCo's.
     size = about_the_root(magnitudes(plan, q, None, None, STILL_STATE))
     bound = PLACEMENT.bound(plan, size, None)
     bound = Bound(bound.scale, 2.0 * bound.k)
@@ -215,7 +220,7 @@ def _error(where: str, found: str) -> OracleError:
 
 
 def _whole(found: Mapping[str, Any]) -> FloatArray:
-    """Return (n, frames, 4, 4) from the three rows in an answer."""
+    """Return matrices (n, frames, 4, 4) from the upper three rows, which an answer contains."""
     rows = unpacked(found)
     T = np.zeros((*rows.shape[:2], 4, 4))
     T[..., :3, :], T[..., 3, 3] = rows, 1.0

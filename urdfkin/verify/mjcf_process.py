@@ -1,14 +1,15 @@
 """Program of the confined process that compiles an MJCF file with MuJoCo and with Pinocchio's MJCF reader.
 
 A few lines of MJCF can require any time and memory (nested `<replicate>`, `nuser_body`), and a defect of a
-parser can crash the process. Therefore the caller's process receives plain data only. The request comes on
-standard input. Each answer is a line of JSON on standard output:
+parser can crash the process. Therefore a separate process compiles the file, and the caller's process
+receives only plain data from it. The request comes on standard input. Each answer is a line of JSON on
+standard output:
 
 1. the robot without its shapes
 2. the robot of the complete file
 3. the placements of the bodies by Pinocchio's reader
 
-If the process ends early, the answers before that remain valid.
+If the process ends early, the answers that it has already written remain valid.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ from urdfkin.verify.sampling import sample
 
 #: Number of coordinates of a free joint.
 _CARTESIAN = 7
-#: Most names that an error lists.
+#: Largest number of names that an error lists.
 _NAMED = 5
 
 TOO_MUCH = f"it takes more than {MEMORY / 1024**3:g} GiB of memory"
@@ -46,7 +47,7 @@ def serve() -> None:
     """Read a request from standard input and write the answers to standard output."""
     request = json.load(sys.stdin)
     try:
-        library().set_mju_user_warning(lambda message: None)  # else MuJoCo writes a log file
+        library().set_mju_user_warning(lambda message: None)  # without it MuJoCo writes a log file
         if request["path"] is not None and request["samples"]:
             with suppress(InstallationError):
                 pinocchio()
@@ -197,7 +198,7 @@ def _numbered(model: Any, names: Sequence[str]) -> Iterator[tuple[str, tuple[int
     """Yield the name of each joint with its index in q and its number of coordinates.
 
     Pinocchio combines several joints of a body into one with the name `Composite_` plus the first joint's
-    name. It has one number for each of them.
+    name. This joint has one coordinate for each of the combined joints.
     """
     for j, name in list(enumerate(map(str, model.names)))[1:]:
         joint, first = model.joints[j], name.removeprefix("Composite_")

@@ -1,4 +1,4 @@
-"""Check a robot that was made of a `pinocchio.Model`: compare its placements with the model's own."""
+"""Check a robot that was made of a `pinocchio.Model`: compare the placements of both."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
 
     Args:
         verifier: Verifier of the robot.
-        made: The tree that was read from the model, and its names.
+        made: The tree that was read from the model, with the model's index of each link.
         source: The model, or a RobotWrapper of it.
 
     Returns:
@@ -40,14 +40,14 @@ def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
         OracleError: a placement differs by more than the bound.
     """
     model, tree = getattr(source, "model", source), verifier.tree
-    if model.nv > MOST_RATES:  # the workspace grows with the cube of nv
+    if model.nv > MOST_RATES:  # Pinocchio's memory grows with the cube of nv
         return f"not compared with the model itself: nv is {model.nv}, more than {MOST_RATES}"
     q = np.vstack((neutral(tree), sample(tree, _SAMPLES, np.random.default_rng(0))))
     names = [*made.joints, *made.frames]
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in names])
     ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
     theirs = _placements(model, _configurations(model, tree, q), made)
-    # Both computations round, and so do the angles of the URDF: twice the bound.
+    # Both computations round, and the URDF's angles are rounded too. So twice the bound is allowed.
     bound = PLACEMENT.bound(plan, magnitudes(plan, q, None, None, STILL_STATE), None)
     found = compare(ours, theirs, Bound(bound.scale, 2.0 * bound.k), 2)
     if not found.agrees:

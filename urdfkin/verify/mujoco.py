@@ -1,19 +1,20 @@
 """The oracle MuJoCo.
 
-MuJoCo reads the positions and axes of links and joints from the URDF text with its own parser. It computes
-with unit quaternions and stores six-vectors for a centre of mass; urdfkin and Pinocchio do neither. Before
-MuJoCo reads the text, this module changes the following:
+MuJoCo reads the positions and axes of links and joints from the URDF text with its own parser. MuJoCo
+computes with unit quaternions, and stores six-vectors at a centre of mass. urdfkin and Pinocchio use neither
+method. Before MuJoCo reads the text, this module makes these changes:
 
 - Meshes and inertials are removed. Each link becomes a body. Only the root has a mass, so that the centre of
   mass, MuJoCo's point of reference, is the root's origin.
 - Links and joints get numbers as names, because MuJoCo reserves some names.
 - Floating and planar joints become slides with a ball or a hinge, because MuJoCo's free joint can connect a
   body to the world only.
-- Mimic joints are coupled by `rules_of_text`. MuJoCo would make constraints of them, which its kinematics
-  ignores.
+- The rules of `rules_of_text` couple the mimic joints. MuJoCo would turn the mimic rules into constraints,
+  and its kinematics ignores constraints.
 
-MuJoCo's inputs are qpos(q), qvel = S v and qacc = S a + S' v, and the robot's Jacobian is J S. S contains the
-factors of mimic joints, and the rotation from a floating joint's own axes to the axes of its slides.
+MuJoCo's inputs are qpos(q), qvel = S v and qacc = S a + S' v. With MuJoCo's Jacobian J, the robot's Jacobian
+is J S. S contains the factors of mimic joints, and the rotation from a floating joint's own axes to the axes
+of its slides.
 """
 
 from __future__ import annotations
@@ -38,9 +39,10 @@ from urdfkin.verify.pinocchio_inputs import BaseNumbers, nearest_quaternion, rul
 
 #: Parent of a root joint or of a moving base.
 WORLD = "universe"
-#: Mass (kg) and moments of inertia (kg m^2) of each link while MuJoCo reads it.
+#: Mass (kg) and moments of inertia (kg m^2) that each link has while MuJoCo reads the text.
 _MASS = "1"
-#: Longest chain of links. MuJoCo refuses more than 1,023, after a time that grows with their square.
+#: Longest chain of links that is accepted. MuJoCo refuses more than 1,023 links, after a time that grows with
+#: the square of their number.
 _DEEPEST = 1_000
 #: MuJoCo's joints for a planar or floating joint, in the order of its coordinates.
 _PARTS = {"planar": ("slide x", "slide y", "hinge"), "floating": ("slide x", "slide y", "slide z", "ball")}
@@ -185,7 +187,7 @@ class MujocoOracle:
                 raise OracleError(
                     "the mimicked joint does not exist", where=f"joint {joint.name}", found=rule.leader
                 )
-            at = leaders.get(rule.leader, (-1, -1))  # the carrier's numbers come from the base's motion
+            at = leaders.get(rule.leader, (-1, -1))  # the moving base has no numbers in q
             yield _Place(
                 joint.kind, int(own.qposadr[0]), int(own.dofadr[0]), *at, rule.multiplier, rule.offset
             )
@@ -311,7 +313,7 @@ class MujocoOracle:
             for rows in (slice(0, 3), slice(3, 6)):
                 rate[..., rows, :] -= np.cross(w, J[..., rows, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         out = _referred(reference, poses, rate, columns=True)
-        if which.at_world:  # p x J_angular changes with p, too
+        if which.at_world:  # the term p x J_angular also changes with p
             out[..., :3, :] += np.cross(vel, J[..., 3:, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         return out
 
@@ -398,7 +400,7 @@ class MujocoOracle:
     def _states(
         self, q: FloatArray, v: FloatArray | None, a: FloatArray | None, base: BaseNumbers | None
     ) -> tuple[FloatArray, FloatArray | None, FloatArray | None]:
-        """Return MuJoCo's qpos, qvel and qacc (n, ...)."""
+        """Return MuJoCo's inputs qpos, qvel and qacc (n, ...)."""
         n = len(q)
         qpos = np.zeros((n, self._model.nq))
         for place in self._places:
@@ -425,7 +427,7 @@ class MujocoOracle:
             second = (S @ a[..., None] + self._spread_rate(q, v) @ v[..., None])[..., 0]
         rates = np.array(np.broadcast_to(rates, (n, self._model.nv)))
         if self._moving_base and base is not None:
-            # The slides are along world axes; the ball is in the base's own axes.
+            # Velocities of the slides are in world axes, that of the ball in the base's own axes.
             at, back = self._places[0].their_v, np.swapaxes(_rotation(qpos[:, 3:7]), -1, -2)
             velocity, acceleration = np.asarray(base.velocity), np.asarray(base.acceleration)
             rates[:, at : at + 3] = velocity[..., :3]
@@ -477,7 +479,8 @@ class MujocoOracle:
 def _weighing_its_root(model: Any, root: str) -> Any:
     """Set all masses to zero except that of the root, so that the root's origin is the centre of mass.
 
-    MuJoCo computes velocities for that point. Lever arms that should be zero are then exactly zero.
+    MuJoCo computes velocities at the centre of mass. When this point is the root's origin, lever arms that
+    should be zero are exactly zero.
     """
     body = model.body(root).id
     for mass in (model.body_mass, model.body_subtreemass):

@@ -1,10 +1,11 @@
 """Convert the arguments of a call to flat batches for the oracle, independently of `urdfkin.verify.call`.
 
-`urdfkin.verify.call` converts the same arguments for the recursion. The two modules share no code. A wrong
-broadcast, order or name in one of them therefore leads to a disagreement.
+`urdfkin.verify.call` converts the same arguments for the recursion. Apart from the exceptions below, the two
+modules share no code. A wrong broadcast, order or name in one of them therefore leads to a disagreement.
 
-Names are looked up here a second time, among the joints in their order. The oracle compares that order with
-its own. Only the numbers of a pose and the parser of units (`urdfkin.errors.numbers`) are shared.
+Names are looked up here a second time, among the joints in their order. The oracle compares that order of the
+joints with its own. Both modules use the same numbers of named poses and the same parser of units
+(`urdfkin.errors.numbers`).
 """
 
 from __future__ import annotations
@@ -136,7 +137,7 @@ class OracleQuery:
         self._given, self._named, self._joints = inputs, named or [None] * len(inputs), joints
 
     def read(self) -> None:
-        """Convert the inputs now, before `out` is written, of which they may be views."""
+        """Convert the inputs now. They may be views of `out`, which the computation overwrites."""
         _ = self._inputs
 
     @cached_property

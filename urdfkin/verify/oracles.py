@@ -28,8 +28,10 @@ class Witness:
         title: Its name in sentences.
         package: Name of its Python package.
         version: Function that returns the installed version without importing the library.
-        oracle: Function that makes its model of a robot, (text, tree, mimic=, moving_base=, root_joint=).
-        size: Function that converts magnitudes to those of its bound (`urdfkin.verify.bounds`).
+        oracle: Function (text, tree, mimic=, moving_base=, root_joint=) that returns the oracle's model of a
+            robot.
+        size: Function that converts magnitudes to those of the bound for this oracle
+            (`urdfkin.verify.bounds`).
     """
 
     name: WitnessName
@@ -83,7 +85,7 @@ def witness_of(name: object) -> Witness:
     if oracle is None:
         raise UnknownNameError("oracle", wanted, WITNESSES)
     if oracle is not PINOCCHIO:
-        oracle.version()  # raises now, not at the first check
+        oracle.version()  # an error is raised now, not at the first check
     return oracle
 
 

@@ -1,7 +1,7 @@
 """Check roll-pitch-yaw angles and quaternions: Pinocchio converts them back to rotation matrices.
 
 The matrices are compared, not the numbers. Two correct programs may return different numbers for the same
-rotation, at gimbal lock or with a quaternion of the other sign.
+rotation: at gimbal lock, or if their quaternions have opposite signs.
 """
 
 from __future__ import annotations
@@ -15,16 +15,17 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.certificate import VerificationError
 from urdfkin.verify.pinocchio_module import pinocchio
 
-#: Roundings of both sides, less than 8 eps each, like a joint's constant (`roundings`). For angles: arctan2,
-#: sines, cosines and products of three. For quaternions: a square root, a quotient and products of two.
+#: Rounding error of both sides in eps, less than 8 eps each, counted as for a joint in `roundings`. For
+#: angles, the operations are arctan2, sines, cosines and products of three numbers. For quaternions, they are
+#: a square root, a quotient and products of two numbers.
 _ROUNDINGS = 16.0
 
 
 def check_orientations(numbers: FloatArray, R: FloatArray, frame: str, again: Callable[[int], str]) -> None:
     """Compare Pinocchio's rotations of some numbers with the rotations they were computed from.
 
-    The bound includes the distance of `R` from the nearest rotation, because no angles or quaternion can
-    represent `R` more closely.
+    The bound includes the distance of `R` from the nearest rotation matrix. Angles and quaternions can only
+    represent exact rotations, so they cannot be closer to `R` than that.
 
     Args:
         numbers: (n, 3) roll, pitch, yaw in rad, or (n, 4) quaternions, scalar last.

@@ -1,12 +1,13 @@
 """The oracle Pinocchio.
 
-The oracle shares no code with urdfkin's computation. It reads the URDF text with its own parser. The frame of
-a name, the joint of each number of q, and the motion of the base are determined a second time
-(`urdfkin.verify.pinocchio_inputs`), from Pinocchio's model and the user's original numbers.
+The oracle shares no code with urdfkin's computation. It reads the URDF text with its own parser.
+`urdfkin.verify.pinocchio_inputs` determines the frame of a name, the joint of each number of q, and the
+motion of the base a second time, from Pinocchio's model and the user's original numbers.
 
 Pinocchio's model is built without mimic joints, because Pinocchio 4.1 with mimic joints refuses four of the
 robots it ships with. `urdfkin.verify.pinocchio_inputs` reads the mimic rules from the text a second time.
-They give q_full = G q + g_0, v_full = G v and J = J_full G.
+The rules define a matrix G and a vector g_0, with q_full = G q + g_0, v_full = G v and J = J_full G. The
+index "full" marks Pinocchio's vectors, in which mimic joints have numbers of their own.
 """
 
 from __future__ import annotations
@@ -35,14 +36,16 @@ from urdfkin.verify.pinocchio_module import pinocchio, version
 
 __all__ = ["MOST_RATES", "Oracle", "OracleError", "depth_of", "version"]
 
-#: Bytes of stack for each link. Pinocchio recurses over links; 4.1.0 needs less than 4 kB for each.
+#: Bytes of stack for each link. Pinocchio processes links recursively; version 4.1.0 needs less than 4 kB for
+#: each.
 _STACK_FOR_A_LINK = 16_384
 #: A chain of fewer links fits into any stack.
 _SHALLOW = 100
-#: Largest nv. Pinocchio 4.1.0 needs about 64 bytes * nv^3 (measured); this limits it to 2 GB.
+#: Largest nv that is accepted. Pinocchio 4.1.0 needs about 64 bytes * nv^3 (measured), so the memory stays
+#: below 2 GB.
 MOST_RATES = 315
 
-#: Most names that an error lists.
+#: Largest number of names that an error lists.
 _NAMED = 5
 #: Name of the free-flyer of a moving base.
 _BASE = "base"
@@ -55,7 +58,7 @@ def build_model(text: str, tree: KinematicTree, root_joint: str | None = None, *
 
     Args:
         text: The URDF text.
-        tree: urdfkin's tree of it, for the size.
+        tree: urdfkin's tree of the text, which gives the size of the robot.
         root_joint: "floating" or "planar" to connect the root to the world by such a joint.
         mimic: True: the model couples its mimic joints.
 
@@ -84,7 +87,7 @@ def _parse(text: str, tree: KinematicTree, root_joint: str | None, mimic: bool) 
             return pin.buildModelFromXML(text, roots[root_joint](), mimic=mimic)
         return pin.buildModelFromXML(text, mimic=mimic)
     except (ValueError, RuntimeError) as error:
-        # `check` reports the known reasons before this point, so it has overlooked this one.
+        # `check` reports all known reasons for a refusal before this point. So this reason is a new one.
         raise OracleError(
             "Pinocchio does not accept this robot",
             where=tree.name,
@@ -149,10 +152,12 @@ class Oracle:
         """Put the model on a free-flyer for the base's motion; a root joint of the robot remains.
 
         Returns:
-            The new indices of the joints and of the frames; the world's becomes the base's.
+            The new indices of the joints and of the frames. The frame of the world becomes the frame of the
+            base.
         """
         pin, model, nowhere = self._pin, self._model, self._pin.SE3.Identity()
-        # appendModel rejects equal names of a link and a joint or the free-flyer, so use numbers as names.
+        # appendModel rejects a link with the name of a joint or of the free-flyer. Numbers as names avoid
+        # that.
         for j in joints:
             model.names[j] = f"joint {j}"
         for i in range(1, model.nframes):
@@ -277,9 +282,10 @@ class Oracle:
 
         Two errors of Pinocchio 4.1 are corrected:
 
-        - Python receives the numbers in Eigen's order, first index fastest, in an array marked as C order.
-        - In LOCAL, entries [i, j] with i and j of the same joint are not 0 if another joint comes before it.
-          They must be 0, because the joint moves the frame together with its own axes.
+        - Pinocchio returns the numbers in Eigen's order (the first index varies fastest), but in a NumPy
+          array with C order (the last index varies fastest).
+        - In LOCAL, entries [i, j] with i and j of the same joint are not 0 if another joint precedes this
+          joint. They must be 0, because the joint moves its own axes together with the frame.
         """
         pin, model, data = self._pin, self._model, self._data
         ids, wanted, nv = self._ids(frames), self._reference(reference), model.nv
@@ -333,7 +339,7 @@ class Oracle:
     ) -> FloatArray:
         """Return (n, ids, ...): call `compute` for each configuration, then `get` for each frame or joint.
 
-        The loop for one frame is separate, because its time beyond Pinocchio's own is the cost of a check.
+        The loop for one frame is separate from the loop for several, to make the check of one frame fast.
         """
         model, data, n, wanted = self._model, self._data, len(inputs[0]), self._reference(reference)
         own = (6, model.nv) if compute is not self._pin.forwardKinematics else (6,)
@@ -363,14 +369,14 @@ class Oracle:
         return full
 
     def rates(self, v: FloatArray, base: BaseNumbers | None = None) -> FloatArray:
-        """Return Pinocchio's joint velocities; those of a free-flyer are in the base's own axes."""
+        """Return Pinocchio's joint velocities. The velocity of a free-flyer is in the base's own axes."""
         full = self._layout.rates(v)
         if self._moving_base and base is not None:
             full[:, :6] = free_flyer_rates(base)
         return full
 
     def second_rates(self, a: FloatArray, base: BaseNumbers | None = None) -> FloatArray:
-        """Return Pinocchio's joint accelerations; a free-flyer's are spatial, in the base's own axes."""
+        """Return Pinocchio's joint accelerations. A free-flyer's is spatial and in the base's own axes."""
         full = self._layout.rates(a)
         if self._moving_base and base is not None:
             full[:, :6] = free_flyer_second_rates(base)

@@ -1,7 +1,8 @@
 """Convert a user's arguments to Pinocchio's, independently of urdfkin's own conversion.
 
-Everything here is determined from the URDF text, Pinocchio's model and the user's numbers, a second time. A
-mistake in urdfkin's conversion therefore leads to a disagreement.
+urdfkin converts the same arguments for its own computation. This module repeats the conversion from the URDF
+text, Pinocchio's model and the user's numbers. A mistake in one of the two conversions therefore makes the
+results disagree.
 
 | Part | Here | urdfkin's own |
 |---|---|---|
@@ -10,8 +11,8 @@ mistake in urdfkin's conversion therefore leads to a disagreement.
 | frame of a name | `Frames` | `KinematicTree.frame_link` |
 | moving base | `free_flyer` and others | `BaseMotion` |
 
-Mimic rules: Pinocchio's model has no mimic joints (`urdfkin.verify.pinocchio`), so the rules come from here.
-The text is parsed again at the first check.
+Mimic rules: Pinocchio's model has no mimic joints (`urdfkin.verify.pinocchio`), so this module reads the
+rules. It parses the text again at the first check.
 
 Layout of q: joints in Pinocchio's order; one number for a revolute, continuous or prismatic joint, three for
 a planar joint, seven for a floating joint, none for a mimic joint.
@@ -68,8 +69,8 @@ def resolved_rules(rules: dict[str, Mimic]) -> dict[str, Mimic]:
 def _resolved(joint: str, rules: dict[str, Mimic], known: dict[str, Mimic]) -> Mimic:
     """Return the resolved rule q_mimic = m_1 (m_2 (... q_independent ...) + o_2) + o_1.
 
-    It is multiplied out from the independent joint. Results are stored in `known`, so each rule of a chain is
-    resolved once.
+    The product is computed from the independent joint on. Results are stored in `known`, so each rule of a
+    chain is resolved once.
     """
     chain = [joint]
     while (leader := rules[chain[-1]].leader) in rules and leader not in known and len(chain) <= len(rules):
@@ -82,7 +83,7 @@ def _resolved(joint: str, rules: dict[str, Mimic], known: dict[str, Mimic]) -> M
     return known[joint]
 
 
-#: Number of urdfkin's coordinates of a joint, by Pinocchio's (nq, nv) of it.
+#: Pinocchio's (nq, nv) of a joint -> number of urdfkin's coordinates of this joint.
 _CONTINUOUS, _PLANAR, _FLOATING = (2, 1), (4, 3), (7, 6)
 _COORDINATES = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 
@@ -113,7 +114,8 @@ class Layout:
         nv: Length of v.
         joint_ids: Pinocchio's indices of the moving joints, mimic joints included.
         coordinates: Names of the joints with coordinates.
-        rate_columns: Pinocchio's columns of the moving joints, in that order.
+        rate_columns: Indices of Pinocchio's Jacobian columns of the moving joints, in the order of
+            `joint_ids`.
     """
 
     def __init__(
@@ -145,7 +147,7 @@ class Layout:
         self._same_v &= bool((self._index == np.arange(model.nv)).all())
 
     def _rates(self) -> tuple[Places, FloatArray]:
-        """Return index in v and factor in G of each Pinocchio joint velocity; factor 0 for the base."""
+        """Return the index in v and the factor in G of each joint velocity of Pinocchio; 0 for the base."""
         index, factor = np.zeros(self._model.nv, dtype=np.int64), np.zeros(self._model.nv)
         for place in self._places:
             for c in range(place.sizes[1]):
@@ -154,7 +156,7 @@ class Layout:
         return index, factor
 
     def configurations(self, q: FloatArray) -> FloatArray:
-        """Return Pinocchio's configurations (n, model.nq) for (n, nq); quaternions are normalized."""
+        """Return Pinocchio's configurations (n, model.nq) for q (n, nq); quaternions are normalized."""
         if self._same_q:
             return np.array(q)
         full = np.zeros((len(q), self._model.nq))
@@ -174,14 +176,14 @@ class Layout:
         return full
 
     def rates(self, v: FloatArray) -> FloatArray:
-        """Return v_full = G v, (n, model.nv) for (n, nv)."""
+        """Return v_full = G v, Pinocchio's joint velocities (n, model.nv) for v (n, nv)."""
         if not self.nv:
             return np.zeros((len(v), self._model.nv))
         full: FloatArray = v[:, self._index] * self._factor
         return full
 
     def couple(self, full: FloatArray) -> FloatArray:
-        """Return J_full G: add the columns of mimic to mimicked joints, and omit those of the base."""
+        """Return J_full G: add each mimic joint's column to its mimicked joint's; omit the base's columns."""
         if self._same_v:
             return full
         return coupled(full, np.array(self.rate_columns, dtype=np.int64), self._index, self._factor, self.nv)
@@ -198,7 +200,7 @@ class Frames:
     Args:
         model: Pinocchio's model, as its parser returned it.
         pin: The module of Pinocchio.
-        stands_on_world: The robot has a root joint; the world then counts as a link.
+        stands_on_world: Whether the robot has a root joint. If it has one, the world counts as a link.
     """
 
     def __init__(self, model: Any, pin: Any, *, stands_on_world: bool) -> None:
@@ -243,7 +245,7 @@ class Frames:
 
 
 class BaseNumbers(Protocol):
-    """Motion of the base in the user's numbers, each with one leading batch axis or none."""
+    """Motion of the base in the user's numbers. Each array has at most one leading batch axis."""
 
     @property
     def placement(self) -> FloatArray:
@@ -280,7 +282,8 @@ def nearest_quaternion(M: FloatArray) -> FloatArray:
     """Return the unit quaternion (..., 4), scalar last, of the rotation nearest to M (..., 3, 3)."""
     K = davenport(M)
     q = np.linalg.eigh(K).eigenvectors[..., -1:]
-    # For a rotation, K + I = 4 q q^T. One more multiplication removes the parts of other eigenvectors.
+    # For a rotation, K + I = 4 q q^T. Multiplying q by K + I once more removes the parts of the other
+    # eigenvectors.
     q = (K @ q + q)[..., 0]
     unit: FloatArray = q / np.linalg.norm(q, axis=-1, keepdims=True)
     return unit
@@ -299,7 +302,10 @@ def davenport(M: NDArray[Any]) -> NDArray[Any]:
 
 
 def _in_own_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
-    """Return R^T times both halves, from the quaternion (u, w): x + 2 w (x x u) + 2 (x x u) x u."""
+    """Return R^T times both halves of a six-vector.
+
+    For a quaternion (u, w) and a half x, this is x + 2 w (x x u) + 2 (x x u) x u.
+    """
     u, w = quaternion[..., np.newaxis, :3], quaternion[..., np.newaxis, 3:]
     x = six.reshape(*six.shape[:-1], 2, 3)
     aside = 2.0 * np.cross(x, u)

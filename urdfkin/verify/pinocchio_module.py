@@ -1,8 +1,8 @@
 """Import Pinocchio, and detect a different project of the same name.
 
-No other module imports Pinocchio. Its wheels on PyPI have the name `pin`. The PyPI project `pinocchio` is a
-different one, with plugins for the test runner nose and a module of the same name. If both are installed,
-Python finds that module first.
+No other module imports Pinocchio. On PyPI, Pinocchio has the name `pin`. The PyPI project `pinocchio` is a
+different one: plugins for the test runner nose, in a module that is also called `pinocchio`. If both projects
+are installed, Python finds the module of the plugins first.
 """
 
 from __future__ import annotations

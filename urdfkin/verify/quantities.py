@@ -1,7 +1,8 @@
 """The table of quantities: names, shapes, functions that compute and check them, bounds and help texts.
 
-Methods of `Robot`, checks, validation, the accuracy study, plots, reports, replay lines and the command line
-use this table. A new quantity is a row here, plus the functions that the row names and a page in docs.
+Many parts of urdfkin use this table: methods of `Robot`, checks, validation, the accuracy study, plots,
+reports, replay lines and the command line. A new quantity is a row here, plus the functions that the row
+names and a page in docs.
 
 Functions are given by name and imported at first use, so that `--help` does not import NumPy.
 
@@ -77,13 +78,13 @@ class Quantity:
         validated: True if `validate`, the accuracy study and plots include it. A Hessian is left out. It has
             nv times as many numbers as a Jacobian, and consists of products of the Jacobian's columns.
         referred: True if it depends on a reference frame; a placement does not.
-        of: Objects that a validation compares: "frames", "joints" or "columns".
-        head: Column in reports; rows with the same head share it.
+        of: What the quantity belongs to, and a validation compares: "frames", "joints" or "columns".
+        head: Heading of the column in reports. Quantities with the same heading share a column.
         labels: Names of a result's rows, if any.
         units: Unit of each group of three numbers, by the group's name.
         command: Command that computes one case again, if there is one.
         summary: Line in the list of commands, if it has a command of its own.
-        page: The rest of the command's help.
+        page: The help text of the command after its summary.
         example: Example command line.
     """
 

@@ -11,7 +11,7 @@ from urdfkin.urdf.sources import Origin
 def replay_line(
     origin: Origin, command: str, frame: str, reference: str | None, values: Mapping[str, Sequence[float]]
 ) -> str:
-    """Return the command that computes one case again; its numbers read back exactly.
+    """Return the command that computes one case again. Its numbers have enough digits to be exact.
 
     Args:
         origin: Source of the robot. A robot given as text must be passed on standard input.

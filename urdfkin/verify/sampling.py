@@ -90,9 +90,9 @@ def draw_base(n: int, rng: np.random.Generator) -> BaseMotion:
 def draw(tree: KinematicTree, n: int, rng: np.random.Generator, *, with_special: bool) -> Samples:
     """Return samples for a validation: `n` random ones, and those of `special` if requested.
 
-    They cover the limits of each joint, even where a mimic joint is then outside its own: the equations hold
-    there too. Joint velocities and accelerations are standard normal. In every eighth sample they are a
-    hundred times larger, so that the quadratic terms of eq. 7.129 and 7.130 dominate.
+    The samples cover the full range of each joint, even where a mimic joint then exceeds its own limits. The
+    equations also hold there. Joint velocities and accelerations are standard normal. In every eighth sample
+    they are a hundred times larger, so that the quadratic terms of eq. 7.129 and 7.130 dominate.
     """
     q = _uniform(tree, n, rng, own_ranges(tree))
     if with_special:
@@ -103,14 +103,16 @@ def draw(tree: KinematicTree, n: int, rng: np.random.Generator, *, with_special:
     return Samples(q, v, a)
 
 
-#: True: check all results. False: none. "sample": those of `SAMPLE` configurations of a call.
+#: True: check all results of a call. False: check none. "sample": check the results of `SAMPLE`
+#: configurations.
 Verify = bool | Literal["sample"]
 
 #: Number of configurations of a call that `verify="sample"` checks.
 SAMPLE = 100
 
-#: Largest number of values and of configurations compared at a time. Large enough for efficient array
-#: expressions, small enough for the cache; the memory does not grow with the batch.
+#: Largest number of values, and of configurations, that are compared at a time. It is large enough for
+#: efficient array expressions and small enough for the processor's cache. It also limits the memory for large
+#: batches.
 _AT_A_TIME = 131_072
 _MOST = 4096
 
@@ -137,7 +139,8 @@ def parts(verify: Verify, n: int, numbers: int) -> Iterator[slice | IntArray]:
         numbers: Number of values in the results of one configuration.
 
     Yields:
-        Slices or arrays of indices. A sample is random, because batches are often ordered, with a fixed seed.
+        Slices or arrays of indices. A sample is random with a fixed seed. A regular choice could be biased,
+        because batches are often ordered.
     """
     step = min(_MOST, max(1, _AT_A_TIME // max(1, numbers)))
     if verify == "sample" and n > SAMPLE:

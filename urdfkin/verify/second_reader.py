@@ -1,14 +1,16 @@
 """A second reader of a robot's URDF: yourdfpy reads the same text, and its tree is compared with ours.
 
-Pinocchio checks numbers. This check compares the data behind them: links, joint kinds, origins, axes, limits
-and mimic rules. The two readers share no code.
+Pinocchio checks the computed results. This check compares the data of the robot itself: links, joint kinds,
+origins, axes, limits and mimic rules. The two readers share no code.
 
-yourdfpy (0.0.60) is known to differ from the URDF specification in two ways. They are named, not counted:
+yourdfpy (0.0.60) is known to differ from the URDF specification in two ways. The report names them as known
+faults and does not count them as differences:
 
 - It ignores the attribute `quat_xyzw` of an origin.
 - It does not normalise an axis.
 
-yourdfpy returns None for a missing number. The specification's default replaces it before the comparison.
+yourdfpy returns None for a missing number. The default of the specification replaces this None before the
+comparison.
 """
 
 from __future__ import annotations
@@ -34,18 +36,20 @@ from urdfkin.verify.pinocchio_inputs import resolved_rules
 if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf
 
-#: Largest error of an entry of two rotations from the same angles: on each side a sine and cosine of one eps,
-#: two products and a sum of half an eps each, and terms whose sum is at most 1.
+#: Largest difference of an entry of two rotation matrices that are computed from the same angles. On each
+#: side, a sine and a cosine have an error of one eps, and two products and a sum have half an eps each. The
+#: sum of the terms is at most 1.
 _ROTATION = 9.0 * EPS
-#: Largest error of an entry of two normalised axes: on each side a length of 2 eps and a quotient.
+#: Largest difference of an entry of two normalised axes. On each side, the length has an error of 2 eps, and
+#: the quotient rounds once.
 _AXIS = 5.0 * EPS
-#: An axis whose length differs by more counts as not normalised, and is named.
+#: If the length of an axis differs from 1 by more than this, the axis counts as not normalised.
 _UNIT = 1e-6
 #: Largest number of differences, or of joints with a known fault, in a report.
 _LISTED = 8
 #: Longest reason why yourdfpy cannot read a text, in characters.
 _QUOTED = 200
-#: Kinds of joints with bounds; the specification ignores those of others.
+#: Kinds of joints with position limits. The specification ignores position limits of other kinds.
 _BOUNDED = ("revolute", "prismatic")
 _LOWER_UPPER = ("lower", "upper")
 _VELOCITY_EFFORT = ("velocity", "effort")
@@ -88,7 +92,7 @@ def second_reading(
     Args:
         text: The URDF text.
         tree: Our tree of the same text.
-        mimic: Whether our tree couples the mimic joints; if not, the rules are not compared.
+        mimic: Whether our tree couples the mimic joints; if it does not, the mimic rules are not compared.
         root_joint: Whether `load` has added the first joint and link, which the text does not contain.
     """
     by = f"yourdfpy {installed_version('yourdfpy') or 'not installed'}"
@@ -96,7 +100,7 @@ def second_reading(
         return SecondReading(by, unread="the file has a document type")
     try:
         robot = read(text)
-    except Exception as error:  # lxml and yourdfpy raise many kinds; all mean that the text is not read
+    except Exception as error:  # lxml and yourdfpy raise many kinds of exceptions
         words = " ".join(str(error).split()) or "no message"
         return SecondReading(by, unread=printable(f"{type(error).__name__}: {words}")[:_QUOTED])
     ours = {

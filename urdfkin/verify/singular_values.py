@@ -1,16 +1,17 @@
 """Singular values of Jacobians with guaranteed lower and upper bounds; condition and manipulability.
 
-By Weyl's inequality, |s_k(J + E) - s_k(J)| <= |E| in any norm that is at least the spectral norm. The
-Frobenius norm is used here. E has two parts: the error of J (its bound, `urdfkin.verify.bounds`) and the
-residual of the decomposition, J - U S V^T.
+By Weyl's inequality, |s_k(J + E) - s_k(J)| <= |E|. It holds for every norm that is at least the spectral
+norm; this module uses the Frobenius norm. E has two parts: the error of J (its bound,
+`urdfkin.verify.bounds`) and the residual of the decomposition, J - U S V^T.
 
 U and V are not assumed to be orthogonal. Let |U^T U - I| <= a and |V^T V - I| <= b. By Ostrowski's theorem
 the singular values of U S V^T are those of S times a factor between (1 - a)^(1/2) (1 - b)^(1/2) and
 (1 + a)^(1/2) (1 + b)^(1/2).
 
-The residuals round too: a sum of m products has an error of at most m eps times the sum of their sizes. Norms
-are computed after division by the largest number, and products with mantissas and exponents separated. So no
-intermediate value leaves the range of doubles.
+The residuals themselves have rounding errors. The error of a sum of m products is at most m eps times the sum
+of the absolute values of the products. Two measures keep every intermediate value in the range of doubles.
+Norms are computed after division by the largest number, and products are computed with mantissas and
+exponents separated.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ class Between(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SingularValues(Displayable):
-    """The singular values of some rows of a Jacobian, without columns that are always 0.
+    """The singular values of some rows of a Jacobian. Columns that are always 0 are left out.
 
     `print` and notebooks show them as a table, and explain a singularity.
 
@@ -131,7 +132,7 @@ class SingularValues(Displayable):
 
     @cached_property
     def manipulability(self) -> Between:
-        """(...) product of the singular values: sqrt(det J J^T) (Yoshikawa); sqrt(det J^T J) if J is tall.
+        """(...) product of the singular values: sqrt(det J J^T) (Yoshikawa), or sqrt(det J^T J) if J is tall.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -173,8 +174,9 @@ class SingularValues(Displayable):
     def manipulability_gradient(self, H: FloatArray) -> FloatArray:
         """Return the gradient of the manipulability (..., nv), from the frame's Hessian.
 
-        The derivative of a singular value is u^T J' v. The product rule needs no division. If the smallest
-        singular value may be 0, the manipulability may not be differentiable there, and the gradient is NaN.
+        The derivative of a singular value is u^T J' v, with its singular vectors u and v. The product rule
+        gives the derivative of the product of all singular values without a division. If the smallest
+        singular value may be 0, the manipulability may not be differentiable. The gradient is then NaN.
 
         Args:
             H: (..., 6, nv, nv) Hessian of the frame, from `Robot.hessian`.
@@ -260,13 +262,13 @@ def _product(x: FloatArray) -> FloatArray:
 
 
 def _up(x: FloatArray) -> FloatArray:
-    """Return a number at least as large as `x` before its rounding."""
+    """Return an upper bound of the exact value that was rounded to `x`."""
     with np.errstate(over="ignore", under="ignore"):
         return np.nextafter(x + np.abs(x) * _OUTWARD, np.inf)
 
 
 def _down(x: FloatArray) -> FloatArray:
-    """Return a number at most as large as `x` before its rounding; the largest double if `x` is inf."""
+    """Return a lower bound of the exact value that was rounded to `x`; the largest double for inf."""
     with np.errstate(under="ignore", invalid="ignore"):
         inside = np.nextafter(x - np.abs(x) * _OUTWARD, -np.inf)
     return np.where(np.isposinf(x), np.finfo(np.float64).max, inside)

@@ -1,8 +1,9 @@
 """Explain a singular Jacobian: its rank, the lost directions, and the joints that cause the loss.
 
 A left null vector u of J is a direction without velocity: u^T J v = 0 for every v. A right null vector is a
-null motion: joint velocities that do not move the frame. A smallest set of dependent columns names the
-joints. Its geometric reason is stated only if the columns satisfy the condition within the error bound of J.
+null motion: joint velocities that do not move the frame. A smallest set of linearly dependent columns shows
+which joints cause the loss. A geometric reason, such as parallel axes, is stated only if the columns satisfy
+its condition within the error bound of J.
 
 A column of a revolute joint is [a x z; z], where z is the axis and a leads from the frame's origin to a point
 of the axis. So two axes are collinear if their columns are equal up to sign, and an axis passes through the
@@ -22,11 +23,13 @@ from urdfkin.errors.display import Displayable, TextDocument, six_digits
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import FloatArray, KinematicTree
 
-#: Largest set of dependent columns that is searched, and the largest number of columns for the search.
+#: Largest size of the sets in the search for dependent columns, and the largest number of columns for which
+#: this search is done.
 _LARGEST_SET, _MOST_COLUMNS = 4, 16
-#: Roundings of a small decomposition, per row or column.
+#: Rounding error of the decomposition of a small matrix, in eps for each row or column.
 _ROUNDINGS = 16.0
-#: Smallest singular value of a regular sample, relative to the size of its Jacobian.
+#: A singular value counts as 0 at a random configuration if it is smaller than this, relative to the size of
+#: the Jacobian.
 _USUAL = 1e-9
 
 
@@ -43,7 +46,8 @@ class FrameColumns:
             column that is not the axis of a single joint.
         active: (6, nv) False for numbers that are 0 for every q.
         samples: Return (n, 6, nv) Jacobians at random configurations on a fixed base.
-        moving_base: Whether the base is given, so that the samples' axes are not those of the result.
+        moving_base: Whether the user gives the base's motion. Then directions at the samples, which have a
+            fixed base, cannot be compared with those of the result.
     """
 
     J: FloatArray
@@ -93,7 +97,7 @@ class Singularity(Displayable):
     """The rank of a Jacobian in one configuration, and the reason for a loss.
 
     Attributes:
-        rank: Number of singular values that are provably not 0.
+        rank: Number of singular values with a lower bound above 0.
         full: Largest possible rank: the smaller of the numbers of rows and columns.
         least: Upper bound of the smallest singular value.
         lost: (d, 6) lost directions [linear; angular] in world axes, at the frame's origin; empty if the
@@ -189,7 +193,8 @@ class _Explanation:
         usual, never = self._of_samples()
         directions = U[:, self._rank :].T
         directions = _basis(directions - directions @ never @ never.T)
-        # On an arm with fewer joints than rows, other directions are unreachable in each configuration.
+        # An arm with fewer joints than rows has unreachable directions in every configuration. They differ
+        # from one configuration to another.
         known = len(directions) == usual - self._rank and not (self._columns.moving_base and never.size)
         lost = np.zeros((len(directions) if known else 0, 6))
         if known:
@@ -213,7 +218,7 @@ class _Explanation:
         return usual, U[:, int((s > _USUAL * s[0]).sum()) :]
 
     def _without_noise(self, rows: FloatArray) -> FloatArray:
-        """Return vectors with a 0 for each number that the error of the Jacobian does not tell from 0."""
+        """Return vectors with 0 for each number that is not larger than the error of the Jacobian."""
         return np.where(np.abs(rows) <= self._noise, 0.0, rows)
 
     def _directions(self, lost: FloatArray) -> Iterator[str]:
@@ -262,7 +267,7 @@ class _Explanation:
                     yield one
 
     def _joined(self, sets: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
-        """Join pairs of one row of collinear or parallel axes: dependency of two columns is transitive."""
+        """Join pairs of dependent columns that have a column in common, such as those of parallel axes."""
         joined: list[set[int]] = []
         if self._linear_only:
             return sets
@@ -308,7 +313,7 @@ class _Explanation:
         return None
 
     def _of_revolute_axes(self, one: tuple[int, ...]) -> str | None:
-        """Return the reason why the axes of a smallest dependent set are dependent; None if none is found."""
+        """Return the reason why the axes of a smallest dependent set are dependent; None if it is unknown."""
         indices = self._moving[list(one)]
         z, v = self._J[3:, indices].T, self._J[:3, indices].T
         size = 1.0 + float(np.abs(v).max())
@@ -319,18 +324,19 @@ class _Explanation:
         signs = np.sign(z @ z[0])[:, None]
         if parallel and np.abs(v - signs * v[0]).max() <= off:
             return f"{axes} are collinear."
-        if parallel:  # three dependent parallel lines lie in one plane; four are always dependent
+        if parallel:  # 3 dependent ones lie in a plane; 4 always depend
             return f"{axes} are parallel{' and lie in one plane' if len(one) == 3 else ''}."
-        # a x z = v for each axis, if they all pass through the point a.
+        # If all axes pass through one point a, each satisfies a x z = v with its direction z and its linear
+        # rows v.
         crosses = np.concatenate([_cross_matrix(-axis) for axis in z])
         a, *_ = np.linalg.lstsq(crosses, v.ravel(), rcond=None)
         if np.abs(crosses @ a - v.ravel()).max() > off * float(np.linalg.cond(crosses)):
             return None
-        # Three dependent lines through one point lie in one plane.
+        # If three lines through one point are linearly dependent, they lie in one plane.
         return f"{axes} intersect in one point{' and lie in one plane' if len(one) == 3 else ''}."
 
     def _line(self, u: FloatArray) -> str | None:
-        """Return the line that all axes meet, if the lost direction is a line; None otherwise."""
+        """Return the line that all axes intersect, if the lost direction defines one; None otherwise."""
         f, m = u[:3], u[3:]
         if self._linear_only or self._angular_only or not f.any():
             return None
@@ -366,7 +372,7 @@ class _Explanation:
 
 
 def _sparse(rows: FloatArray) -> FloatArray:
-    """Return a basis of the same space with many zeros, by elimination."""
+    """Return another basis of the space of some rows, with many zeros, by elimination."""
     basis, n = rows.copy(), len(rows)
     free = list(range(basis.shape[1])) if n > 1 else []
     for i in range(n if n > 1 else 0):
@@ -380,9 +386,9 @@ def _sparse(rows: FloatArray) -> FloatArray:
 
 
 def _basis(rows: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of the space of some rows, which are orthonormal up to a projection."""
+    """Return an orthonormal basis of the space of some rows, which are projected orthonormal rows."""
     _, s, Vt = np.linalg.svd(rows, full_matrices=False)
-    return Vt[: int((s > 0.5).sum())]  # a projection leaves lengths 1 or 0
+    return Vt[: int((s > 0.5).sum())]  # each singular value is 1 or 0
 
 
 def _cross_matrix(z: FloatArray) -> FloatArray:

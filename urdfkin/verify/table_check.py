@@ -1,8 +1,8 @@
 """Check the URDF that urdfkin writes for a Denavit-Hartenberg table.
 
 Pinocchio checks a robot's results with its URDF text. For a robot made of a table, urdfkin writes that text.
-This module checks it once: it compares Pinocchio's placements of the tip with the products of the table's
-own matrices (eq. 7.64).
+This module checks the text itself. It compares Pinocchio's placements of the tip with the products of the
+table's own matrices (eq. 7.64).
 """
 
 from __future__ import annotations
@@ -38,7 +38,8 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
     own = table.coupling.select(verifier.tree, q)
     theirs = verifier.oracle().placements(q, [LinkFrame.of(link_names(table)[-1])])[:, 0]
     off = np.abs(theirs - table.placement(own))[:, :3]
-    # Base and tool may be rotations to six digits only; the URDF contains exact rotations.
+    # The matrices of base and tool may be rotations to six digits only, but the URDF contains exact
+    # rotations.
     rows, metres, defect = len(table.rows), table.rounding(own), _defect(table)
     turn = EPS * of_rows_read_back(rows) + defect
     allowed = metres * (of_rows_read_back(rows) / of_rows(rows) + defect / (EPS * ROW))

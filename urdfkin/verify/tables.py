@@ -1,25 +1,26 @@
 """Compare a Denavit-Hartenberg table with Pinocchio: placement, Jacobian and acceleration of its tip.
 
-Pinocchio computes frames in the world. A table's numbers are relative to its base, which may move too (a
-chain from the left foot to the right hand). With R, w, v, alpha, a of base b and tip t in the world, and
-r = p_t - p_b:
+Pinocchio computes frames in the world. A table's numbers are relative to the table's base. This base may move
+too, for example in a chain from the left foot to the right hand. With R, w, v, alpha, a of base b and tip t
+in the world, and r = p_t - p_b:
 
     w    = R_b^T (w_t - w_b)
     vel  = R_b^T (v_t - v_b - w_b x r)
     alpha= R_b^T (alpha_t - alpha_b - w_b x (w_t - w_b))
     acc  = R_b^T (a_t - a_b - alpha_b x r - w_b x (w_b x r) - 2 w_b x (v_t - v_b - w_b x r))
 
-These are eq. 7.124 and 7.125, solved for the motion relative to the moving frame. They are written here a
-second time, because `urdfkin.kinematics.equations` computes the table itself. The bound is the rounding of
-both sides, plus the declared deviation of a snapped table.
+These are eq. 7.124 and 7.125, solved for the motion relative to the moving frame. This module implements the
+equations a second time. The check would not be independent if it used `urdfkin.kinematics.equations`, which
+computes the table's results. The bound is the rounding of both sides, plus the deviation that a snapped table
+declares.
 
 The scale of rounding is the robot's size: the lengths from the root to both ends, prismatic displacements
-included. Columns of the Jacobian are scaled by the mimic multipliers. A table's own lengths count up to
-`PROMISED` times the robot's reach, which tables with Hayati rows never exceed.
+included. Columns of the Jacobian are scaled by the mimic multipliers. The scale includes the table's own
+lengths, up to `PROMISED` times the robot's reach. Lengths in tables with Hayati rows never exceed that limit.
 
-Four parameters for nearly parallel axes may need lengths of kilometres. Two such lengths cancel with an error
-of eps times their size. A difference within that error is no disagreement, but the table does lose digits.
-`TableCheck.loss` then states the loss.
+Four parameters for nearly parallel axes may need lengths of kilometres. When two such lengths cancel, the
+error is eps times their size. A difference within that error is not a disagreement, but the table loses
+digits. `TableCheck.loss` then states this loss.
 """
 
 from __future__ import annotations
@@ -68,8 +69,8 @@ class TableCheck:
         units: Differences of "placement", "jacobian" and "acceleration", in eps * scale.
         shares: The same differences divided by their bounds; at most 1 if the table agrees.
         snapped: True if the bound includes the declared deviation of snapping.
-        loss: Explanation of the digits that very large lengths lose, if the difference exceeds the bound for
-            that reason; None otherwise.
+        loss: Explanation of the lost digits, if the difference exceeds the bound because of very large
+            lengths; None otherwise.
     """
 
     samples: int
@@ -198,7 +199,7 @@ def _measured(apart: _Apart, size: Sizes, slack: _Slack) -> tuple[dict[str, floa
 
 
 def _worst(found: FloatArray, unit: FloatArray | float) -> float:
-    """Return the largest ratio; 0 / 0 counts as 0."""
+    """Return the largest ratio of a difference to its unit; 0 / 0 counts as 0."""
     return float((found / np.maximum(unit, NOT_ZERO)).max(initial=0.0))
 
 
@@ -276,7 +277,7 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
             joint = tree.joints[i]
             joints += 1
             tilt += joint.tilt
-            reach += math.hypot(*joint.T_parent_joint[:3, 3])  # hypot avoids the underflow of squares
+            reach += math.hypot(*joint.T_parent_joint[:3, 3])  # hypot, because squares may underflow
             factor, offset, leader = 1.0, 0.0, joint.name
             if (rule := joint.mimic) is not None:
                 factor, offset, leader = abs(rule.multiplier), abs(rule.offset), rule.leader
@@ -292,8 +293,8 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
                 weights[joint.kind.turns][names.index(leader)] += factor
     own = own_length(table)
     reach = np.maximum(reach, np.minimum(own, PROMISED * reach))
-    # Joints round in Pinocchio and in the chain that the rows are made of, and rows round too. The
-    # acceleration relative to the base has four factors that a tilt rotates.
+    # Rounding occurs at the joints in Pinocchio, at the joints of the chain that the rows are made of, and at
+    # the rows. The acceleration relative to the base has four factors that a tilt rotates.
     counted = of_rows(len(table.rows)) + of_joints(joints, 4.0 * tilt) + angles
     rounding = EPS * counted + left_out(chain(tree, table.tip_frame, table.base_frame))
     return Sizes(reach, weights[True], weights[False], rates, accelerations, rounding)
@@ -303,8 +304,8 @@ class _Slack:
     """Allowed difference of a snapped table beyond rounding.
 
     Snapping rotates an axis by at most `turn` and displaces a joint origin or the tip by at most `metres`. So
-    z x d changes by at most turn times reach plus twice metres, and a product of two such factors by twice
-    that. Angular terms z x z change by at most twice the turn.
+    z x d changes by at most `turn` times the reach plus twice `metres`. A product of two such factors changes
+    by at most twice as much. Angular terms z x z change by at most twice `turn`.
     """
 
     def __init__(self, table: DHTable, own_q: FloatArray, size: Sizes) -> None:

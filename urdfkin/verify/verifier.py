@@ -1,6 +1,7 @@
 """The verifier of a robot: it compares results with the oracle and records the checks.
 
-The oracle receives the user's original arguments, and the comparison uses the result in its final shape.
+The oracle receives the user's original arguments. The comparison uses the result in the shape that the method
+returns.
 """
 
 from __future__ import annotations
@@ -58,8 +59,8 @@ class Verifier:
         policy: Default of `verify` in calls.
         mimic: True: mimic joints are coupled. False: each moves freely.
         unverifiable: Known reason why Pinocchio cannot check the robot; None if there is none.
-        oracle: Oracle for quantities, "pinocchio" or "mujoco". Tables, the accuracy study and enclosures
-            always use Pinocchio.
+        oracle: Oracle for quantities, "pinocchio" or "mujoco". Checks of tables, the accuracy study and
+            enclosures always use Pinocchio.
 
     Attributes:
         ledger: Record of checked and unchecked results.
@@ -90,7 +91,9 @@ class Verifier:
         return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
 
     def oracle(self, base: BaseMotion | None = None, by: Witness = PINOCCHIO) -> Oracle:
-        """Return the oracle's model of the robot; with a free-flyer if the base moves. It is built once.
+        """Return the oracle's model of the robot, which is built once.
+
+        If the base moves, the model's root is on a free-flyer.
 
         Raises:
             OracleError: the oracle does not accept the text, or reads other joints from it.
@@ -131,7 +134,7 @@ class Verifier:
         return checked_choice(self.policy if verify is None else verify)
 
     def ready(self, verify: Verify | None) -> None:
-        """Import Pinocchio before the computation if its results need a check.
+        """Import Pinocchio before the computation if the results of the computation need a check.
 
         Raises:
             InstallationError: Pinocchio is missing, or a different project has its name.
@@ -187,7 +190,10 @@ class Verifier:
     def _compare(
         self, quantity: Quantity, call: Call, ours: FloatArray, part: slice | IntArray
     ) -> tuple[Comparison, VerificationError | None]:
-        """Compare some of the results with the oracle's; also return the error of the worst, if any."""
+        """Compare some of the results with the oracle's.
+
+        Also return the error to raise for the worst result, if that result exceeds its bound.
+        """
         x = call.part(part)
         theirs, bound = held_against(quantity, self.oracle(call.base, self.witness), x, ours, self.witness)
         comparison = compare(ours, theirs, bound, 2)
@@ -234,7 +240,7 @@ class Verifier:
     def table(self, table: DHTable, samples: int = TABLE_SAMPLES) -> TableCheck | None:
         """Check a Denavit-Hartenberg table with Pinocchio.
 
-        A strict table with very large lengths loses digits; that also causes a warning.
+        A strict table with very large lengths loses digits. In this case a warning is issued.
 
         Returns:
             The result; None, with a warning, if Pinocchio cannot check the robot.

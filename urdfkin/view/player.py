@@ -145,7 +145,7 @@ class Player:
         except (
             RuntimeError,
             TimeoutError,
-        ):  # the page was closed, or lies in the background and draws nothing
+        ):  # the page was closed, or is in a background tab, where browsers draw nothing
             return
         finally:
             note.remove()
@@ -160,7 +160,7 @@ def as_gif(frames: list[np.ndarray], seconds: float) -> bytes:
     stream = io.BytesIO()
     shown = max(
         20, 10 * round(100 * seconds)
-    )  # ms; a GIF counts hundredths, and browsers slow a picture of one
+    )  # milliseconds; a GIF counts in hundredths of a second, and browsers slow down pictures of 1/100 s
     images[0].save(stream, "gif", save_all=True, append_images=images[1:], duration=shown, loop=0)
     return stream.getvalue()
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 #: A function that draws a motion over time, in seconds, into axes.
 Panel = Callable[["Axes", FrameMotion, FloatArray], None]
 
-#: Line styles, because a colour alone is no key.
+#: Line styles. They distinguish lines for readers who see no colours.
 STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), "-")
 
 
@@ -99,7 +99,7 @@ def parts(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
 
 
 def singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit: str) -> None:
-    """Draw the singular values of the Jacobian's linear or angular rows; all rows would mix units."""
+    """Draw the singular values of the Jacobian's linear or angular rows, not of all: units differ."""
     values = x.singular_values_of(rows)
     largest = values.max(initial=1.0)
     shown = np.where(values > EPS * largest, values, np.nan)
@@ -157,7 +157,7 @@ PANELS: dict[str, Panel] = {
     "disagreement": disagreement,
 }
 
-#: The suffix of a unit in the panels of q, v and a.
+#: Suffix of the unit of a coordinate in the panels of q, v and a.
 _PER = {"q": "", "v": "/s", "a": "/s²"}
 #: Names of the panels of coordinates; each of them has one plot for each unit.
 COORDINATES = tuple(_PER)
@@ -185,8 +185,8 @@ def _coordinates(
 ) -> None:
     """Draw the coordinates that change, or all if none does.
 
-    Thin lines are the limits. A cross marks a sample outside its limits. Of more lines than a legend can
-    tell apart, only those that leave their limits are coloured and named.
+    Thin lines are the limits. A cross marks a sample outside its limits. If there are too many
+    lines for a legend, only those that leave their limits are coloured and named.
     """
     del x
     values: FloatArray = getattr(trajectory, what)

@@ -82,7 +82,7 @@ def corners(shape: Shape) -> FloatArray:
     return np.asarray(signs * half @ shape.T_link_shape[:3, :3].T + shape.T_link_shape[:3, 3])
 
 
-#: Default colour: that of metal.
+#: Default colour of a shape: a metallic grey.
 GREY = (0.72, 0.74, 0.78, 1.0)
 
 

@@ -6,7 +6,7 @@ Four independent measures keep them out:
 | measure | protects against |
 |---|---|
 | a **key** of 128 random bits in the address | other users of the machine, other pages |
-| a check of the **Host** header | another host name that an attacker points at this machine (DNS rebinding) |
+| a check of the **Host** header | a foreign host name that resolves to this machine (DNS rebinding) |
 | a check of the **Origin** header | another page that opens a WebSocket, which browsers allow |
 | security **headers** of the page | embedding in a frame, foreign scripts, connections to other servers |
 
@@ -15,7 +15,7 @@ Four independent measures keep them out:
 Viser checks neither Host nor Origin and has no option for it. It starts its web server by a call of
 `websockets.asyncio.server.serve`. This module replaces that call and answers the requests itself. Before a
 robot is shown, the module tests the running server with requests that it must refuse. It stops the server if
-one of them is accepted.
+the server accepts one of these requests.
 A new version of viser can therefore make the viewer fail, but it cannot make it insecure.
 
 The address is not passed to the browser on its command line, which every user of the machine can read. The
@@ -285,7 +285,7 @@ def _page() -> Callable[[str], bytes]:
         raise UnguardedError("its page has unexpected scripts")
     if text.count(_HEAD) != 1:
         raise UnguardedError("its page has no head to add to")
-    # Ours comes first: it names the controls, follows the browser's theme, and runs before viser's script.
+    # Our script comes first: it names the controls, follows the browser's theme, and runs before viser's.
     ours = (Path(__file__).parent / "page.html").read_text(encoding="utf-8")
 
     def page(nonce: str) -> bytes:

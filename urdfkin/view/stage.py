@@ -132,7 +132,7 @@ def scalar_first(R: FloatArray) -> FloatArray:
     return np.asarray(np.roll(quaternion_of(R), 1, axis=-1), dtype=np.float64)
 
 
-#: Seconds in which a page takes its layout.
+#: Maximum seconds until a page that opens has its final layout.
 _OPENING = 15.0
 #: Direction from the robot to the camera, share of the view that the robot fills, and viser's field of view.
 _FROM, _FILLED, _FOV = np.array([1.1, -1.3, 0.6]), 0.85, np.deg2rad(75.0)
@@ -206,7 +206,7 @@ class Stage:
         server.on_client_connect(self._welcome)
 
     def fill(self, Ts: FloatArray) -> None:
-        """Let the robot fill the view in the placements (n, links, 4, 4); `look` and new clients use it."""
+        """Choose the view from n placements (n, links, 4, 4) of the links; the robot fills this view."""
         points = [Ts[:, :, :3, 3].reshape(-1, 3)]
         for link, box in self._corners:
             R, p = Ts[:, link, :3, :3], Ts[:, link, np.newaxis, :3, 3]
@@ -301,7 +301,7 @@ class Stage:
             self._look(client)
 
     def _welcome(self, client: Any) -> None:
-        """Set the camera of a new client, and again when its panel has taken its part of the window."""
+        """Set the camera of a new client, and again when the panel has reduced the width of the view."""
         begin, aspects = time.monotonic(), [0.0]
 
         def fit(_: Any) -> None:
@@ -347,7 +347,7 @@ class Stage:
     # -- overlays ------------------------------------------------------------------------------------
 
     def arrows(self, name: str, arrows: Arrows | None) -> None:
-        """Replace the arrows of a name; None removes them."""
+        """Replace the group of arrows with a given name; None removes the group."""
         size = 0.008 * self.reach
         none = arrows is None or not len(arrows.points)
         self._scene.add_arrows(
@@ -418,7 +418,7 @@ def _segments(table: DHTable, q: FloatArray, frames: FloatArray) -> tuple[FloatA
 
 
 def _towards(axis: FloatArray) -> FloatArray:
-    """Return a (3, 3) rotation with z axis `axis`."""
+    """Return a (3, 3) rotation that turns the z axis into the direction `axis`."""
     side = np.eye(3)[int(np.abs(axis).argmin())]
     x = np.cross(side, axis)
     x = x / np.linalg.norm(x)

@@ -1,7 +1,7 @@
 """The viewer: a panel with sliders and checked numbers beside the robot's picture.
 
-A slider reports only changes by the user, and only of its own number. The sliders show values that the
-program sets, but do not report them.
+A slider reports a change only if the user moves it, and then only its own number. When the program sets a
+value, the slider shows it and reports nothing.
 """
 
 from __future__ import annotations
@@ -213,7 +213,7 @@ def within_limits(robot: Robot, q: FloatArray) -> FloatArray:
 
 
 def written(values: FloatArray) -> str:
-    """Return numbers in the exact form that `--q` and `set_q` read."""
+    """Return numbers as text without loss of digits, in a form that `--q` and `set_q` read."""
     return ",".join(repr(float(value)) for value in values)
 
 
@@ -509,7 +509,7 @@ class Viewer:
                 try:
                     self._table = self.robot.dh(self.frame.value, convention=self.dh.value)
                     table = self._table
-                    # Not as code: in code, too, viser searches for images and reads their files.
+                    # Escape names: code formatting is unsafe, because viser reads images even inside code.
                     self.dh_words.content = markdown_text(f"{table.base_frame} to {table.tip_frame}")
                 except UrdfkinError as error:
                     self.dh_words.content = markdown_text(str(error))

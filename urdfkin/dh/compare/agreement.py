@@ -1,8 +1,9 @@
 """Compare a URDF with a published table: cell by cell, and in millimetres at the tip.
 
-`max_tip_error_bound` proves a bound for every configuration, by the method of `urdfkin same`. The path and
-the table become two mechanisms with the same joints. `urdfkin.model.mechanisms` matches them joint by joint,
-as they are written. Support functions carry the differences from the tip to the base.
+`max_tip_error_bound` proves a bound of the tip error for every configuration, by the method of `urdfkin
+same`. The path and the table become two mechanisms with the same joints. `urdfkin.model.mechanisms` matches
+the two mechanisms joint by joint, without a fit. It then bounds the effect of all differences with support
+functions, from the tip to the base.
 """
 
 from __future__ import annotations
@@ -40,16 +41,18 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limi
 
 #: Default tolerance at the tip (metres): 1.5 times the effect of rounding one or two cells to 0.1 mm.
 TOLERANCE = 2e-4
-#: Number of configurations of a fit, and of its check; different seeds give different configurations.
+#: Number of configurations of a fit, and of its check. The two use different seeds, so their configurations
+#: differ.
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
-#: Fraction of the tip error: if changed cells leave more, they do not explain it.
+#: If changed cells leave more than this fraction of the tip error, they do not explain the error.
 _EXPLAINS = 0.5
 #: Fraction of the tip error that the correction of a single mistake may leave.
 _LEFT = 0.05
-#: Smallest change of a cell, relative to the reach: a tenth of `EXPLAINED`.
+#: Smallest reported change of a cell, relative to the reach: a tenth of `EXPLAINED`.
 _MOVED = 1e-10
-#: Fraction of the path length: with a smaller motion the tip is fixed, and its motion gives no reach.
+#: If the tip moves by less than this fraction of the path length, it counts as fixed, and its motion does not
+#: determine the reach.
 _FIXED_TIP = 1e-6
 #: Range of samples of a prismatic joint without limits (metres).
 _SLIDE = (-0.5, 0.5)
@@ -68,7 +71,8 @@ def compare(
     """Compare a reference table with a path of a URDF.
 
     Args:
-        chain: The path, base to tip; the table's ends may be other frames fixed to the same links.
+        chain: The path, from base to tip. The base and tip frames of the table may be other frames that are
+            fixed to the same links.
         reference: The table in either convention, with a row for each moving joint in the path's order.
         tolerance: Tolerance at the tip (metres).
         fit: Whether to fit base, tool, and the joints' zeros and senses; False uses the table as it is
@@ -79,7 +83,7 @@ def compare(
         The comparison, with the cells that differ, or the likely mistakes.
 
     Raises:
-        InputError: the table has another number or other kinds of joints than the path.
+        InputError: the joints of the table differ in number or kind from those of the path.
     """
     check_joints(chain, reference)
     standard = to_convention(reference, Convention.STANDARD)
@@ -125,7 +129,8 @@ def compare(
 def best_fit(chain: FrameChain, reference: DHTable, enough: float) -> tuple[float, float]:
     """Return the largest tip error on samples (metres, radians) after a fast fit of base, tool and offsets.
 
-    The fit tries only a few sign patterns, and no opposite rotations of nearly coinciding axes.
+    To be fast, the fit tries only a few sign patterns, and no opposite rotations about nearly coinciding
+    axes.
 
     Args:
         chain: The path.
@@ -133,7 +138,7 @@ def best_fit(chain: FrameChain, reference: DHTable, enough: float) -> tuple[floa
         enough: Tip error at which the fit stops (metres).
 
     Raises:
-        InputError: the table has another number or other kinds of joints than the path.
+        InputError: the joints of the table differ in number or kind from those of the path.
     """
     check_joints(chain, reference)
     standard = to_convention(reference, Convention.STANDARD)
@@ -150,8 +155,8 @@ def _off(fitted: Model, written: Model, judged: TargetPoses) -> dict[str, float]
 def _reach(chain: FrameChain, wanted: FloatArray) -> float:
     """Return the robot's reach, which converts radians to metres.
 
-    A URDF made from a strict table may have offsets of kilometres that cancel. The path length along its
-    links is then too large, so the reach is the spread of the tip's positions.
+    A URDF made from a strict table may have offsets of kilometres that cancel. The path length along the
+    links is then far larger than the reach. The reach is therefore the spread of the tip's positions.
     """
     tips = wanted[:, :3, 3]
     across = 2.0 * float(np.linalg.norm(tips - tips.mean(axis=0), axis=-1).max())
@@ -186,7 +191,7 @@ def _target_poses(chain: FrameChain) -> tuple[TargetPoses, TargetPoses]:
 
 
 def _samples(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray, FloatArray]:
-    """Return values of all joints (count, n) without mimic rules, and the tip's poses at them."""
+    """Return values of all joints (count, n) without mimic rules, and the tip's poses at these values."""
     slides = _slides(chain)
     ranges = [slides.get(joint.name, (-math.pi, math.pi)) for joint in chain.joints]
     values = values_within(ranges, count, seed)
@@ -219,9 +224,9 @@ def _absorbed_offset(written: FloatArray, fitted: FloatArray) -> AbsorbedOffset:
 
 
 def _cell_at(reference: DHTable, i: int, cell: str) -> int:
-    """Return the row of the reference that contains a cell of standard row i; the row count if none does.
+    """Return the index of the reference's row with a cell of standard row i; the row count if there is none.
 
-    In a modified table a, alpha and beta are in the next row.
+    In a modified table a, alpha and beta of standard row i are in the next row.
     """
     return i + (reference.convention is Convention.MODIFIED and cell not in ("theta", "d"))
 
@@ -233,7 +238,7 @@ def _cells_of(reference: DHTable) -> FloatArray:
 
 
 def _hidden(reference: DHTable, fitted: Model, judged: TargetPoses) -> tuple[tuple[int, str], ...]:
-    """Return the cells that base, tool and offsets can replace, except for a beta of zero."""
+    """Return the cells that base, tool and offsets can replace, except a beta of zero."""
     found = [
         (_cell_at(reference, i, CELLS[k]), CELLS[k])
         for i, k in hidden_cells(fitted, judged)
@@ -251,7 +256,7 @@ def _differences(
     digits: Digits,
     free: bool,
 ) -> tuple[CellDifference, ...]:
-    """Return the cells that changed by more than rounding, the largest effect at the tip first."""
+    """Return the cells that changed by more than rounding, in descending order of their effect at the tip."""
     twists, scale = columns(fitted, judged)[2], judged.scale
     linear = np.linalg.norm(twists.reshape(len(judged.values), 6, -1)[:, :3], axis=1).max(axis=0)
     found = []
@@ -278,7 +283,7 @@ def _instead(
     wanted: tuple[TargetPoses, TargetPoses],
     digits: Digits,
 ) -> tuple[CellDifference, ...]:
-    """Return the cells that would have to change without a fit, if they explain the difference."""
+    """Return the cells that would have to change without a fit, if these changes explain the difference."""
     tried, judged = wanted
     complete = fit_cells(written, tried, _cells_of(reference), free=False)
     metres, radians = judged.apart(complete)
@@ -316,7 +321,7 @@ def max_tip_error_bound(
 
     Args:
         path: The path; its mimic rules are ignored.
-        table: The table. Its variables are the path's coordinates; it contains senses and zeros.
+        table: The table. Its variables are the path's coordinates, and its rows contain the senses and zeros.
         slides: Ranges of the prismatic joints (metres).
     """
     mechanisms = Mechanism(_free(path, table, slides)), Mechanism(free_tree(table))
@@ -328,7 +333,7 @@ def max_tip_error_bound(
 
 
 def _free(path: FrameChain, table: DHTable, slides: Mapping[str, tuple[float, float]]) -> KinematicTree:
-    """Return a path as a tree with the names of the table's links, without mimic rules."""
+    """Return a path as a tree without mimic rules, with the link names of the table."""
     names, z = link_names(table), np.array([0.0, 0.0, 1.0])
     joints = list[tuple[Joint, str, str]]()
     for i, joint in enumerate(path.joints):

@@ -1,21 +1,22 @@
 """Fit a reference table to the URDF: first its free parameters, then as few cells as possible.
 
 The tip's error at each sampled configuration is a twist. A change of any number of the table also moves the
-tip by a twist: a rotation about a line or a translation along one. Gauss-Newton solves for these numbers.
-Base, tool and joint offsets are the free parameters; they are eliminated first and absorb as much error as
-possible. The cells absorb the rest. If several cells can do so (for example offsets along parallel axes), a
-reweighted least-norm solution changes as few cells as possible.
+tip by a twist: a rotation about a line or a translation along one. The Gauss-Newton method finds the changes
+that remove the error. Base, tool and joint offsets are the free parameters. They are eliminated first and
+absorb as much error as possible. Changes of cells absorb the remaining error. If several cells can absorb it
+(for example offsets along parallel axes), a reweighted least-norm solution changes as few cells as possible.
 
 **Free parameters.** `fit_freedoms` fits base, tool and joint offsets, with the cells unchanged. The method is
 damped least squares (`urdfkin.kinematics.least_squares`) on the tip's twists. Two joints with nearly
-coinciding axes have nearly the same effect. Opposite changes of their offsets follow a curved valley of the
-error, along which the error falls by at most the distance of the axes. The damping therefore decreases while
+coinciding axes have nearly the same effect. Opposite changes of the two offsets therefore change the error
+only slowly, by at most the distance of the axes. To make long steps in this case, the damping decreases while
 steps succeed. At the end of a descent, opposite rotations of such pairs are tried as new starts.
 
-**Signs.** `align` finds the senses and the directions of x with which a reference table fits the URDF. Three
-choices of a table do not change the robot: the sense of a joint, the direction of x along a common normal,
-and the zero of theta. The first two are signs, and the offsets of theta follow from them. A beam search
-extends sign patterns joint by joint and keeps those with the cells closest to the reference.
+**Signs.** `align` finds the senses and the directions of x with which a reference table fits the URDF. The
+author of a table has three choices that do not change the robot: the sense of a joint, the direction of x
+along a common normal, and the zero of theta. The first two choices are signs, and they determine the offsets
+of theta. A beam search extends sign patterns joint by joint. It keeps the patterns with the cells closest to
+the reference.
 """
 
 from __future__ import annotations
@@ -37,22 +38,24 @@ from urdfkin.model.path import Motion, Path
 from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray
 
-#: Cells in the order of their transforms, and these transforms.
+#: Names of the cells in the order of their transforms, and the transforms.
 CELLS = ("theta", "d", "a", "alpha", "beta")
 _ROW = (Motion(2, True), Motion(2, False), Motion(0, False), Motion(0, True), Motion(1, True))
 #: Largest step: radians, and metres per metre of reach.
 LONGEST_STEP = 0.5
-#: Largest number of steps; smallest relative improvement; mean error that counts as zero.
+#: Largest number of steps, smallest relative improvement of a step, and mean error that counts as zero.
 _ROUNDS, _BETTER, _SOLVED = 40, 1e-9, 1e-14
-#: Relative sizes below which a singular value counts as zero: for free parameters, for cells.
+#: Relative sizes below which a singular value counts as zero, for free parameters and for cells.
 _FREE, _CELLS = 1e-8, 1e-9
-#: Iterations of the sparse solution, and its smallest weight relative to the reach.
+#: Number of iterations of the sparse solution, and the smallest weight relative to the reach.
 _SPARSER, _STAYS = 25, 1e-9
-#: Tie-breaker: weight of the last cell relative to the first, so that one of two equal cells wins.
+#: Weight of the last cell relative to the first, so that the weights decide between two cells of equal
+#: effect.
 _LAST_WINS = 1.2
-#: Weight of beta at first, and its factor in each iteration: beta changes only if alpha does not suffice.
+#: First weight of beta, and factor on this weight in each iteration. Thus beta changes only if alpha does not
+#: suffice.
 _BETA, _BETA_AGAIN = 0.3, 0.5
-#: Fraction of a cell's effect that free parameters may leave if they can replace it.
+#: If free parameters leave at most this fraction of a cell's effect, they can replace the cell.
 _HIDDEN = 1e-6
 
 
@@ -97,7 +100,10 @@ class Model:
         return _ROW * len(self.cells)
 
     def path_at(self, values: FloatArray) -> tuple[Path, FloatArray]:
-        """Return the path from base to tip, and its amounts (s, 5 n) at joint values (s, n): all cells."""
+        """Return the path from base to tip, and the amounts (s, 5 n) of its motions at joint values (s, n).
+
+        Each cell of the table is one motion.
+        """
         amounts = np.tile(self.cells.ravel(), (len(values), 1))
         for i in range(len(self.cells)):
             amounts[:, len(CELLS) * i + self.own(i)] += self.senses[i] * values[:, i]
@@ -124,27 +130,27 @@ class TargetPoses:
     scale: float
 
     def apart(self, model: Model) -> tuple[float, float]:
-        """Return the largest tip error of a model on the samples (metres, radians)."""
+        """Return the largest tip errors of a model on the samples (metres, radians)."""
         poses = model.poses(self.values)
         metres = np.linalg.norm(poses[:, :3, 3] - self.poses[:, :3, 3], axis=-1).max()
         return float(metres), float(rotation_angle(poses[:, :3, :3], self.poses[:, :3, :3]).max())
 
     def errors(self, poses: FloatArray) -> FloatArray:
-        """Return the (6 s,) twists from a model's poses to the targets, angles times `scale`."""
+        """Return the (6 s,) twists from a model's poses to the target poses; angles are times `scale`."""
         turn = log_rotation(self.poses[:, :3, :3] @ np.swapaxes(poses[:, :3, :3], -1, -2))
         return np.concatenate([self.poses[:, :3, 3] - poses[:, :3, 3], self.scale * turn], axis=-1).ravel()
 
 
 def columns(model: Model, wanted: TargetPoses) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the tip's poses, and the twists (6 s, parameters) of free parameters and of cells.
+    """Return the tip's poses, and the twists (6 s, parameters) by free parameters and by cells.
 
-    The free parameters are six of the base, six of the tool, and each row's own variable. Cells are in the
-    order of (n, 5). Angles are multiplied by the scale.
+    The free parameters are six numbers of the base, six of the tool, and the variable of each row. The cells
+    are in the order of the array (n, 5). Angles are multiplied by the scale.
     """
     scale = wanted.scale
     path, amounts = model.path_at(wanted.values)
     poses, twists = path.columns(amounts)
-    # Angular cells are in metres at the distance `scale`, like the angular part of a twist.
+    # Angular cells are multiplied by `scale` and are then in metres, like the angular part of a twist.
     n, turning = len(model.cells), np.tile([motion.turns for motion in _ROW], len(model.cells))
     twists = twists * np.where(turning, 1.0 / scale, 1.0)
     twists[:, 3:] *= scale
@@ -188,7 +194,8 @@ def fit_cells(model: Model, wanted: TargetPoses, cells_of: FloatArray, *, free: 
         cells = cells * cells_of.ravel()
         freedoms = freedoms if free else np.zeros_like(freedoms)
         change = _sparse(model, start, freedoms, cells, error, scale)
-        # For nearly coinciding axes, opposite offsets have almost no effect: rcond removes them.
+        # For nearly coinciding axes, opposite offsets have almost no effect. The argument rcond removes these
+        # offsets.
         offsets = np.linalg.lstsq(freedoms, error - cells @ change, rcond=_FREE)[0]
         shorten = min(1.0, LONGEST_STEP * scale / max(float(np.abs(offsets).max()), NOT_ZERO))
         model = moved(model, np.asarray(offsets * shorten, np.float64), scale, change * shorten)
@@ -198,7 +205,7 @@ def fit_cells(model: Model, wanted: TargetPoses, cells_of: FloatArray, *, free: 
 def _sparse(
     model: Model, start: Model, freedoms: FloatArray, cells: FloatArray, error: FloatArray, scale: float
 ) -> FloatArray:
-    """Return the changes of cells for the error that the free parameters leave.
+    """Return the changes of cells that remove the error left by the free parameters.
 
     The total change since `start` has as few non-zero entries as possible.
     """
@@ -221,7 +228,7 @@ def _sparse(
 
 
 def _span(freedoms: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of the free parameters' twists; no column if there are none."""
+    """Return an orthonormal basis of the free parameters' twists, with no column if there are none."""
     return np.linalg.qr(freedoms)[0] if freedoms.any() else np.zeros((len(freedoms), 0))
 
 
@@ -241,15 +248,15 @@ def moved(model: Model, free: FloatArray, scale: float, change: FloatArray | Non
     for i, own in enumerate(free[12:]):
         k = model.own(i)
         cells[i, k] += own * per_cell[k]
-    # Base and tool move in the axes of the revolute joints next to them. A rotation that they share with
-    # such a joint is then exact, not only to first order.
+    # The base is changed in the frame of the first revolute joint, and the tool in the frame of the last one.
+    # A rotation that can be moved from the base or tool to this joint is then exact, not only to first order.
     base = _apply_twist(model.base @ model.first, free[:6], scale) @ np.linalg.inv(model.first)
     tool = np.linalg.inv(model.last) @ _apply_twist(np.eye(4), free[6:12], scale) @ model.last
     return replace(model, cells=cells, base=np.asarray(base), tool=np.asarray(model.tool @ tool))
 
 
 def _apply_twist(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:
-    """Return T after a small translation and rotation in its own axes."""
+    """Return T after a small translation and rotation, expressed in the axes of T."""
     return T @ pose(exp_rotation(twist[3:] / scale), twist[:3])
 
 
@@ -257,13 +264,13 @@ def _apply_twist(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:
 _PATIENCE = 4
 #: Mean error at which a fit ends, relative to the reach.
 _ROUNDING = 1e-13
-#: A fast fit fits this many sign patterns, and keeps this many at each joint.
+#: Numbers of sign patterns that a fast fit fits, and that its search keeps at each joint.
 HASTY = (3, 16)
 #: Tip error that counts as rounding, relative to the reach; the search ends there.
 _AT_ROUNDING = 1e-12
-#: Fraction of the tip error below which another sign pattern replaces the written one.
+#: Another sign pattern replaces the written pattern if it leaves less than this fraction of the tip error.
 _TWICE_AS_GOOD = 0.5
-#: Opposite rotations of two consecutive offsets that are tried (rad).
+#: Rotations (rad) that are tried: each is added to one offset, and undone in the next offset.
 _TURNS = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
 
 
@@ -287,7 +294,7 @@ def fitted_model(
     *,
     hasty: bool = False,
 ) -> Model:
-    """Return the best fit of the table as it is written and of the likely sign patterns.
+    """Return the best fit, from the table as it is written and from the likely sign patterns.
 
     The written signs have priority: another pattern must halve the error.
     """
@@ -300,7 +307,8 @@ def fitted_model(
         return written
     best, best_size = written, size(written)
     for start in starts(chain, standard, written, *(HASTY if hasty else ())):
-        # Least squares minimize the sum, but the worst sample decides. The start may be better there.
+        # Least squares minimize the sum of squares, but the worst sample decides. At that sample the start
+        # may be better than the fit.
         model = min(fit_freedoms(start, wanted, turns=not hasty), start, key=size)
         needed = 1.0 if start is written else _TWICE_AS_GOOD
         if (its_size := size(model)) < needed * best_size:
@@ -400,15 +408,16 @@ def _opposite_rotations(model: Model) -> list[Model]:
     return found
 
 
-#: Numbers of sign patterns: returned, and kept at each joint.
+#: Numbers of sign patterns that `align` returns, and that it keeps at each joint.
 PATTERNS, BEAM = 12, 128
-#: Cost of each reversed joint (metres), so that the URDF's senses win between equal fits.
+#: Cost of each reversed joint (metres), so that the pattern with the URDF's senses wins among equal fits.
 REVERSAL = 1e-9
-#: Weight of a difference beside a prismatic axis: its line is free, so it decides only between equals.
+#: Weight of a difference in a cell next to a prismatic axis. The line of this axis is free, so such a
+#: difference decides only between otherwise equal patterns.
 _SLIDING = 1e-3
 #: Axes with a smaller distance (metres) count as coinciding, and leave x free.
 _NO_OFFSET = 1e-5
-#: Decimals of metres and radians in the comparison of patterns.
+#: Number of decimals (metres and radians) to which patterns are compared.
 _ALIKE = 6
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -444,8 +453,9 @@ class _Partial:
         phi_in: Rotation from this joint's DH frame to its URDF frame (rad).
         carry: Offset from this joint's DH frame to its URDF frame (metres).
         base: (4, 4) contribution of the first row's offset to the base.
-        absorber: If the axes before the joint coincide, only the sum of their angles is defined. This is then
-            the row with a free offset (that of row 0 is in the base), and the sign of its effect on x.
+        absorber: The row with a free offset (the offset of row 0 is in the base), and the sign of its effect
+            on x. There is such a row if the axes before the joint coincide, because then only the sum of
+            their angles is defined.
     """
 
     cost: float
@@ -460,8 +470,8 @@ class _Partial:
 def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: int = BEAM) -> list[Alignment]:
     """Return the sign patterns closest to a standard reference table with the same kinds of joints.
 
-    Prismatic joints leave patterns with equal cells. Only a fit can distinguish them, so up to `count`
-    patterns are returned.
+    With prismatic joints, several patterns may have equal cells. Only a fit can distinguish these patterns,
+    so up to `count` patterns are returned.
     """
     reach = max(chain.reach, reference.span, LEAST_SIZE)
     n = len(reference.rows)
@@ -474,7 +484,8 @@ def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: in
             for extended in _extend(partial, chain, reference, i, sense, reach)
         ]
         partials = _without_equivalents(sorted(longer, key=lambda partial: partial.cost))[:beam]
-    # If axes nearly coincide, many directions of x are nearly the same. The fit reaches one from another.
+    # If axes nearly coincide, many directions of x are nearly equivalent. A fit can reach one direction from
+    # another.
     by_senses: dict[tuple[int, ...], _Partial] = {}
     for partial in partials:
         by_senses.setdefault(partial.senses, partial)
@@ -487,7 +498,7 @@ def _first(sense: int) -> _Partial:
 
 
 def _without_equivalents(partials: list[_Partial]) -> list[_Partial]:
-    """Keep the first of several equivalent candidates; coinciding axes have many of them."""
+    """Keep the first of several equivalent candidates; coinciding axes lead to many equivalent candidates."""
     found: dict[tuple[object, ...], _Partial] = {}
     for one in partials:
         # With a free offset before the joint, both directions of x are equivalent.
@@ -541,7 +552,7 @@ def _extend(
 
 
 def _absorber(partial: _Partial, step: Step, i: int, turns: bool) -> tuple[int, float] | None:
-    """Return the row before joint i + 1 with a free offset, and the sign of its effect on x, after a step."""
+    """Return the row before joint i + 1 with a free offset, and the sign of its effect on x."""
     if not step.free:
         return None
     sign = math.copysign(1.0, math.cos(step.alpha))
@@ -570,9 +581,9 @@ def _steps(
     """Yield the possible steps of a pair of axes, each with both directions of x.
 
     If the axes are nearly parallel in the URDF and in the reference, a Hayati step at the reference's d is
-    tried too. There x is free if the distance is nearly zero, or if an axis is prismatic and has no fixed
-    line (not `placed`). A step along the common normal is tried for prismatic axes too, because it needs no
-    line.
+    also tried. In this step x is free if the distance of the axes is nearly zero, or if an axis is prismatic
+    and has no fixed line (not `placed`). For prismatic axes, a step along the common normal is also tried,
+    because the direction of the normal does not depend on the line.
     """
     steps = []
     sine = math.hypot(A[0, 2], A[1, 2])
@@ -584,7 +595,8 @@ def _steps(
         lifted[2, 3] -= delta
         if math.hypot(lifted[0, 3], lifted[1, 3]) < _NO_OFFSET or not placed:
             lifted[:2, 3] = 0.0
-        # With reach 0 every foot is far, so each pair that is not exactly parallel gets a Hayati step.
+        # With reach 0 every foot counts as far away, so each pair that is not exactly parallel gets a Hayati
+        # step.
         cut = step_between(lifted, reach if sine < NEARLY_PARALLEL else 0.0, NearParallel.HAYATI, phi_free)
         steps.append(replace(cut, delta=cut.delta + delta))
     for step in steps:

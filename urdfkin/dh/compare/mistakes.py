@@ -1,8 +1,9 @@
 """Find a single mistake in a table: a wrong sign, an extra right angle, or rows in the wrong order.
 
-Base, tool, zeros and senses absorb most wrong signs: such a table agrees after a fit. The corrected table
-needs fewer fitted parameters, usually none. Each single change is therefore tried. The likely mistakes are
-the changes that leave the fewest fitted parameters.
+A fit of base, tool, zeros and senses absorbs most wrong signs, so a table with a wrong sign agrees after the
+fit. The corrected table agrees with fewer fitted parameters, usually with none. `Search` therefore tries each
+single change of the table. The likely mistakes are the changes after which the fewest parameters must be
+fitted.
 """
 
 from __future__ import annotations
@@ -28,13 +29,14 @@ from urdfkin.model.tree import FloatArray
 
 #: Angles with a smaller difference (rad) are equal.
 _SAME_ANGLE = 1e-9
-#: Largest number of changes (tables of nine rows) after which zeros and senses are fitted too.
+#: Zeros and senses are fitted after a change only if there are at most this many changes (as in a table of
+#: nine rows).
 _MOST_FITS = 100
 
 
 @dataclass(frozen=True, slots=True)
 class _Change:
-    """A table after one correction; `cell` is None if rows are exchanged."""
+    """A table after one correction; `cell` is None if the correction exchanges rows."""
 
     kind: MistakeKind
     rows: tuple[int, ...]
@@ -59,10 +61,11 @@ class Search:
     tolerance: float
 
     def mistakes(self, reference: DHTable, *, fit: bool, agrees: bool) -> tuple[Mistake, ...]:
-        """Return the changes that leave the fewest fitted parameters; none if no change is better.
+        """Return the changes after which the fewest parameters must be fitted; none if no change is better.
 
-        A table that agrees after a fit of base, tool and zeros has other frames, or a mistake. The fit cannot
-        distinguish the two. In this case a change is a mistake only if it leaves at most one end to fit.
+        A table that agrees after a fit of base, tool and zeros has different frames, or a mistake. The fit
+        cannot distinguish these two cases. A change of such a table is a likely mistake only if at most one
+        end (base or tool) must be fitted after it.
 
         Args:
             reference: The table.
@@ -108,7 +111,7 @@ class Search:
         return model if self._agrees(model) else None
 
     def _with_one_end(self, table: DHTable) -> Model | None:
-        """Fit the tool, or else the base; None if the table does not agree."""
+        """Fit only the tool, or else only the base; return None if the table agrees with neither."""
         model = _model(table)
         poses, wanted = model.poses(self.tried.values), self.tried.poses
         tool = replace(model, tool=_mean(model.tool @ np.linalg.inv(poses) @ wanted))
@@ -116,7 +119,7 @@ class Search:
         return next((one for one in (tool, base) if self._agrees(one)), None)
 
     def _with_both_ends(self, table: DHTable) -> Model | None:
-        """Fit base and tool; the start of the base is a solution of A X = X B."""
+        """Fit base and tool; the start value of the base is a solution of A X = X B."""
         model = _model(table)
         poses, wanted = model.poses(self.tried.values), self.tried.poses
         A, B = wanted @ np.linalg.inv(wanted[0]), poses @ np.linalg.inv(poses[0])
@@ -181,7 +184,7 @@ def _changes(reference: DHTable) -> Iterator[_Change]:
             value = math.remainder(row.alpha + turn, 2.0 * math.pi)
             if (
                 abs(math.remainder(value + row.alpha, 2.0 * math.pi)) > _SAME_ANGLE
-            ):  # else the change is a sign
+            ):  # otherwise the change is a change of sign, which is tried already
                 table = _with_cell(reference, i, "alpha", value)
                 yield _Change(MistakeKind.RIGHT_ANGLE, (i,), "alpha", table)
     orders = list[tuple[MistakeKind, tuple[int, ...], list[DHRow]]]()
@@ -189,7 +192,7 @@ def _changes(reference: DHTable) -> Iterator[_Change]:
         rows = list(reference.rows)
         rows[i], rows[j] = rows[j], rows[i]
         orders.append((MistakeKind.EXCHANGED, (i, j), rows))
-    if len(reference.rows) > 3:  # for three rows this is an exchange of two
+    if len(reference.rows) > 3:  # for three rows, the reversal is an exchange of two rows
         backwards = list(reversed(reference.rows))
         orders.append((MistakeKind.REVERSED, tuple(range(len(backwards))), backwards))
     for kind, places, rows in orders:
@@ -209,7 +212,7 @@ def _with_cell(table: DHTable, i: int, cell: str, value: float) -> DHTable:
 
 
 def _mean(poses: FloatArray) -> FloatArray:
-    """Return the (4, 4) mean of nearly equal poses; the first pose if they are not nearly equal."""
+    """Return the (4, 4) mean of nearly equal poses; for poses that are not nearly equal, return the first."""
     middle = poses.mean(axis=0)
     R = polar_factor(middle[:3, :3])
     return pose(R, middle[:3, 3]) if np.linalg.det(R) > 0.0 else np.array(poses[0])

@@ -1,6 +1,6 @@
-"""Store the result of a comparison, and write it as text.
+"""Store the result of comparing a table with a URDF, and write the result as text.
 
-The result has the tip error, the fitted parameters and the cells that differ.
+The result contains the tip error, the fitted parameters and the cells that differ.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from urdfkin.kinematics.roundings import EPS, of_a_fit
 
 Parts = list[str | Table | Matrix]
 
-#: Largest remaining error (metres per metre of reach, rad) if changed cells explain the whole difference: far
-#: above the rounding of a fit, far below the last digit of any data sheet.
+#: If changed cells leave at most this error (metres per metre of reach, rad), they explain the whole
+#: difference. The limit is far above the rounding of a fit and far below the last digit of any data sheet.
 EXPLAINED = 1e-9
-#: Finest resolution of printed fitted numbers (rad, or relative to the reach).
+#: Finest resolution to which fitted numbers are printed (rad, or relative to the reach).
 _FINEST = 1e-12
-#: Slack of half a digit for the rounding of decimals to doubles.
+#: Factor on half a digit that allows for the rounding of decimals to doubles.
 _HALF = 1.0 + 1e-6
 
 
@@ -40,7 +40,7 @@ class CellDifference:
         cell: "a", "alpha", "d", "theta" or "beta".
         reference: The table's value (metres or radians).
         urdf: The URDF's value (metres or radians).
-        tip: Displacement of the tip by this difference alone, at the worst sample (metres).
+        tip: Displacement of the tip that this difference alone causes, at the worst sample (metres).
         last_digit: Half a unit of the last digit in the table's file (metres or radians); 0 if the value is
             exact, or if its text is unknown.
     """
@@ -83,7 +83,7 @@ class MistakeKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Fitted:
-    """Free parameters that a fit must change for a table to agree.
+    """Count of the free parameters that a fit must change for a table to agree.
 
     Attributes:
         base: Whether the base changes.
@@ -111,12 +111,12 @@ class Fitted:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mistake:
-    """A likely mistake: a change of the table that leaves fewer fitted parameters.
+    """A likely mistake: a change of the table after which fewer parameters must be fitted.
 
     Attributes:
         kind: Kind of the mistake.
         rows: Indices of the changed rows, from 0.
-        cell: The changed cell; None if rows change places.
+        cell: The changed cell; None if rows are exchanged.
         table: The table after the change.
         fitted: The parameters that still need a fit.
         metres: Position error of the tip after the change, at the worst sample.
@@ -152,13 +152,15 @@ class Comparison:
         most_radians: Proven bound of its orientation error.
         written_metres: Position error at the worst sample of the table as it is written.
         written_radians: Orientation error at the worst sample of the table as it is written.
-        differences: The cells that differ, the largest effect at the tip first; with a single mistake, its
-            cell.
-        instead: The cells that would have to change without a fit. Empty if they do not explain the URDF, or
-            if there are too many of them.
-        hidden: (row, cell) of cells that base, tool and offsets can replace; samples cannot determine them.
-        mistakes: Single changes of the table that leave the fewest fitted parameters.
-        residual: Error that remains with the URDF's cells (metres): rounding, if the cells explain the URDF.
+        differences: The cells that differ, in descending order of their effect at the tip. If there is a
+            single mistake, this is the cell of the mistake.
+        instead: The cells that would have to change without a fit. Empty if such changes do not explain the
+            difference, or if there are too many such cells.
+        hidden: (row, cell) of each cell that base, tool and offsets can replace; samples cannot determine
+            such a cell.
+        mistakes: Single changes of the table after which the fewest parameters must be fitted.
+        residual: Tip error that remains if the differing cells take the URDF's values (metres). It is
+            rounding if these cells explain the difference.
         tolerance: Tolerance at the tip (metres).
         samples: Number of configurations in the check.
     """
@@ -186,7 +188,10 @@ class Comparison:
 
     @property
     def agrees(self) -> bool:
-        """Whether position error and rotation error times reach are within the tolerance on all samples."""
+        """Whether the position error and the orientation error times the reach are within `tolerance`.
+
+        This is tested on all samples.
+        """
         return self.metres <= self.tolerance and self.radians * self.reach <= self.tolerance
 
     @property
@@ -196,7 +201,7 @@ class Comparison:
 
     @property
     def rounding(self) -> float:
-        """Error that counts as rounding: radians, and metres per metre of reach."""
+        """Error that counts as rounding, in radians and in metres per metre of reach."""
         return EPS * of_a_fit(len(self.reference.rows))
 
     @property
@@ -211,7 +216,7 @@ class Comparison:
 
 
 def resolution(share: float, radians: float) -> float:
-    """Return the resolution of fitted numbers: a power of ten, at least twice the tip error.
+    """Return the resolution to print fitted numbers: a power of ten that is at least twice the tip error.
 
     Args:
         share: Position error of the tip, metres per metre of reach.
@@ -236,7 +241,7 @@ def document(found: Comparison, units: Units) -> TextDocument:
 
 
 def _fitted(found: Comparison, units: Units) -> Parts:
-    """Return the fitted variables, base and tool that are not the identity."""
+    """Return the parts of the text about fitted variables, base and tool, if the fit changed them."""
     parts: Parts = []
     table, fine = found.reference, resolution(found.metres / found.reach, found.radians)
     moved = [
@@ -345,7 +350,7 @@ def _change(mistake: Mistake, table: DHTable, units: Units) -> str:
 
 
 def _cells(found: Comparison, units: Units) -> Parts:
-    """Return the cells that differ, those not compared, and the changes without a fit."""
+    """Return the text about cells that differ, cells that are not compared, and the changes without a fit."""
     unit = f"({units.length_name}, {units.angle_name})"
     parts: Parts = []
     if found.differences:
@@ -379,7 +384,7 @@ def _table(cells: Sequence[CellDifference], units: Units) -> Table:
 
 
 def shown_offset(offset: float, row: DHRow, fine: float, units: Units) -> str:
-    """Format an offset at the resolution; as a fraction of pi if it is one at this resolution."""
+    """Format an offset at the resolution `fine`, as a fraction of pi if both are equal at this resolution."""
     if abs(offset) <= fine:
         return "0"
     if not row.kind.turns:

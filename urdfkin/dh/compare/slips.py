@@ -1,16 +1,18 @@
-"""Find the convention, units or columns with which a table that disagrees would agree with a URDF.
+"""Find the convention, units or column names with which a disagreeing table would agree with a URDF.
 
-Every reading of the table has a shape: distances and angles of consecutive axes,
-and the offsets between the feet of their common normals. The shape does not depend on signs, zeros, base and
-tool, and is fast to compute. The few readings with a shape closest to the URDF's are fitted.
+A reading is one way to interpret the numbers of a table. Every reading has a shape: the distances and angles
+of consecutive axes, and the offsets between the feet of their common normals. The shape does not depend on
+signs, zeros, base and tool, and is fast to compute. Only the few readings with a shape closest to the URDF's
+are fitted.
 
-`other_readings` changes the convention, units or column names of the same data (`urdfkin.dh.rows` defines
-their form) and parses them again. A reading with an impossible value, such as an angle of eighty turns, is
-rejected by the parser.
+`other_readings` changes the convention, units or column names of the plain data (in the form of
+`urdfkin.dh.rows`), and parses the data again. A reading with an impossible value, such as an angle of eighty
+turns, is rejected by the parser.
 
 `doubts` finds a suspicious table without a URDF. It checks the units, and whether two columns are exchanged.
-Designers choose right angles and thirds of them for angles, and hardly ever such numbers for lengths. An arm
-is between some centimetres and some metres long. With a URDF, `diagnose` decides exactly.
+The check uses two facts. Most angles of an arm are multiples of 30 degrees, and lengths hardly ever look like
+such numbers. An arm is between some centimetres and some metres long. With a URDF, `diagnose` decides by a
+fit.
 """
 
 from __future__ import annotations
@@ -34,7 +36,7 @@ from urdfkin.errors import InputError, Question, RangeError
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
 
-#: Number of readings to fit; tilt of parallel axes (rad); relative cost of one more difference.
+#: Number of readings to fit, largest tilt of parallel axes (rad), and relative cost of one more difference.
 _TRIED, _PARALLEL, _WORTH = 3, 2e-2, 0.1
 #: Largest fraction of the original tip error that a reading may leave.
 _EXPLAINS = 0.05
@@ -42,11 +44,11 @@ _EXPLAINS = 0.05
 
 @dataclass(frozen=True, slots=True)
 class CommonMistake:
-    """A reading in which a table agrees.
+    """A reading of a table with which the table agrees with the URDF.
 
     Attributes:
         reading: The reading.
-        said: The reading that the table names.
+        said: The reading that the table's file states.
         metres: Position error of the tip at the worst sample, after a fit of base, tool and offsets.
         radians: Orientation error of the tip at the worst sample.
     """
@@ -77,13 +79,14 @@ class CommonMistake:
 def diagnose(
     chain: FrameChain, data: Mapping[str, Any], tolerance: float, off: float = math.inf
 ) -> CommonMistake | None:
-    """Return the reading in which a table agrees, or None.
+    """Return the reading with which a table agrees with a URDF; None if there is none.
 
     Args:
         chain: The path of the URDF.
         data: The table's plain data from `urdfkin.dh.parse_table.mapping_from_text`.
         tolerance: Tolerance at the tip (metres).
-        off: Tip error of the table as it is read (metres); the result must leave at most 5 % of it.
+        off: Tip error of the table as its file states it (metres). The result must leave at most 5 % of this
+            error.
     """
     kinds = [joint.kind.turns for joint in chain.joints]
     own = shape(derive(chain, Choices(last=Last.FLANGE)), chain.reach)
@@ -118,7 +121,7 @@ def diagnose(
 def convention_that_fits(
     chain: FrameChain, data: Mapping[str, Any], tolerance: float, where: str = "table"
 ) -> Convention:
-    """Return the convention with which a table without a named convention agrees with a path.
+    """Return the convention with which a table agrees with a path, if its file names no convention.
 
     Args:
         chain: The path of the URDF.
@@ -127,7 +130,7 @@ def convention_that_fits(
         where: The table's file.
 
     Raises:
-        InputError: both conventions agree equally well, or neither does with any units.
+        InputError: both conventions agree equally well, or neither convention agrees with any units.
     """
     found = list[tuple[Convention, Comparison]]()
     errors = list[InputError]()
@@ -160,11 +163,11 @@ def convention_that_fits(
 def shape(table: DHTable, scale: float) -> FloatArray:
     """Return numbers of a table that do not depend on signs, zeros, base and tool.
 
-    They are in metres, and in radians times `scale`. For each pair of axes they are the distance and the
-    angle of their lines. For each joint between two pairs of axes that are not parallel, they include the
-    offset along it; offsets along parallel axes are summed. The line of a prismatic axis is free, so
-    distances from it and offsets beside it are zero. Offsets along the first axis are also left out, because
-    the base absorbs them.
+    The numbers are in metres, and in radians times `scale`. For each pair of consecutive axes they contain
+    the distance and the angle of the two lines. For each axis between two pairs that are not parallel, they
+    contain the offset along the axis. Offsets along a run of parallel axes are summed. The line of a
+    prismatic axis is free, so distances from this line and offsets next to it are set to zero. Offsets along
+    the first axis are also left out, because the base absorbs them.
     """
     rows = to_convention(table, Convention.STANDARD).rows
     numbers, offset, known = list[float](), 0.0, False
@@ -183,7 +186,8 @@ def shape(table: DHTable, scale: float) -> FloatArray:
     return np.array(numbers)
 
 
-#: Keys of a row that a reading uses, and keys of a table that it ignores because base and tool are fitted.
+#: Keys of a row that a reading uses, and keys of a table that a reading ignores because base and tool are
+#: fitted.
 _CELLS = ("joint", "kind", "sense", "beta", *ORDER)
 _ENDS = ("base", "tool", "coordinates")
 
@@ -193,10 +197,11 @@ class ConventionHypothesis:
     """One way to read a table.
 
     Attributes:
-        convention: Standard or modified; None if the table names none.
+        convention: Standard or modified; None if the table names no convention.
         lengths: Metres or millimetres.
         angles: Radians or degrees.
-        columns: True contents of the columns named a, alpha, d, theta (or in this order).
+        columns: True contents of the columns with the names a, alpha, d, theta, or of unnamed columns in this
+            order.
     """
 
     convention: Convention | None
@@ -205,7 +210,7 @@ class ConventionHypothesis:
     columns: tuple[str, ...] = ORDER
 
     def of(self, data: Mapping[str, Any]) -> DHTable:
-        """Return the table under this reading, without base and tool; raise InputError if it is invalid."""
+        """Return the table in this reading, without base and tool; raise InputError for an invalid table."""
         said = {"convention": self.convention, "lengths": self.lengths, "angles": self.angles}
         rows = [self._row(row) for row in data["rows"]]
         return table_from_mapping({**_bare(data), **said, "rows": rows})
@@ -215,7 +220,7 @@ class ConventionHypothesis:
         return {meant.get(key, key): value for key, value in row.items()}
 
     def slips(self, other: ConventionHypothesis) -> int:
-        """Count the differences from another reading; two exchanged columns count as one."""
+        """Count the differences from another reading; two exchanged columns count as one difference."""
         moved = sum(mine != theirs for mine, theirs in zip(self.columns, other.columns, strict=True))
         return len(self._differences(other)) + (moved + 1) // 2
 
@@ -232,14 +237,14 @@ class ConventionHypothesis:
 
 
 def as_said(data: Mapping[str, Any]) -> ConventionHypothesis:
-    """Return the reading that the data name; raise InputError for an unknown convention or unit."""
+    """Return the reading that the data state; raise InputError for an unknown convention or unit."""
     units = units_of(data.get("angles", "radians"), data.get("lengths", "metres"))
     convention = convention_of(data["convention"]) if "convention" in data else None
     return ConventionHypothesis(convention, units.lengths, units.angles)
 
 
 def other_readings(data: Mapping[str, Any]) -> Iterator[tuple[ConventionHypothesis, DHTable]]:
-    """Yield every other reading that gives a valid table, the fewest differences first."""
+    """Yield every other reading that gives a valid table; readings with the fewest differences are first."""
     if not _has_rows(data):
         return
     data, said = {**data, "rows": [_row(row) for row in data["rows"]]}, as_said(data)
@@ -273,7 +278,7 @@ _LONGEST, _SHORTEST = 20.0, 1e-3
 
 
 def doubts(table: DHTable) -> list[str]:
-    """Return warnings about units or columns that look misread, each with its remedy.
+    """Return warnings about units or columns that look wrong, each with a remedy.
 
     Example:
         >>> from urdfkin.dh.rows import table_from_rows

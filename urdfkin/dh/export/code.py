@@ -1,10 +1,11 @@
-"""Export a table as code: for numbers and for symbols.
+"""Export a table as code that computes with numbers or with symbols.
 
-For numbers, the languages are Python with NumPy, C99, and MATLAB (also Octave). The code contains the rows as
-constants and one function. It needs no other library. Numbers are exact to the last bit. The other code
-formats use the functions for identifiers, headers and numbers.
+To compute with numbers, the languages are Python with NumPy, C99, and MATLAB (also Octave). The code contains
+the rows as constants and one function. It needs no other library. The constants are exact to the last bit.
+The other modules that write code use this module's functions for identifiers, headers and numbers.
 
-For symbols, they are Python with SymPy or CasADi, and MATLAB's Symbolic Math Toolbox.
+To compute with symbols, the languages are Python with SymPy or CasADi, and MATLAB with the Symbolic Math
+Toolbox.
 
 - SymPy: pi/2 stays pi/2, and 0.425 becomes 17/40, so that the algebra is exact.
 - CasADi: the pose is an expression of SX, MX or DM, for functions and their derivatives.
@@ -39,13 +40,13 @@ def identifier(name: str) -> str:
 
 
 def docstring(table: DHTable) -> list[str]:
-    """Return `header` as a Python module's docstring, with a blank line."""
+    """Return the lines of `header` as a Python module's docstring, followed by a blank line."""
     first, *others = (f"{line}." for line in header(table))
     return ['"""' + first, "", *others, '"""', ""]
 
 
 def header(table: DHTable) -> list[str]:
-    """Return the header's lines without comment marks; names in it cannot end a comment."""
+    """Return the lines of the header without comment marks; no name in the header can end a comment."""
     lines = [
         f"{table.robot}: {table.base_frame} to {table.tip_frame}",
         f"{table.convention} Denavit-Hartenberg parameters, metres and radians",
@@ -58,12 +59,12 @@ def header(table: DHTable) -> list[str]:
 
 
 def plain(text: str) -> str:
-    """Replace all characters but printable ASCII, and those that could end a comment or a string."""
+    """Replace all characters that are not printable ASCII or that could end a comment or a string."""
     return re.sub(r"[^ -~]|[\"'\\*%]", "_", text)
 
 
 def numbers(values: FloatArray | list[float]) -> str:
-    """Format numbers so that they parse to the same bits."""
+    """Format numbers so that a parser reads back the same bits."""
     return ", ".join(repr(float(value)) for value in values)
 
 
@@ -197,7 +198,7 @@ def write_c(table: DHTable, units: Units) -> str:
         "#include <math.h>",
         "",
     ]
-    # C has no empty arrays: a table without rows has one unused row.
+    # C has no empty arrays, so the code of a table without rows has one unused row.
     lines += ["/* a, alpha, d, theta, beta, 1 for revolute and 0 for prismatic, sense */"]
     lines += [f"static const double {name}_rows[{max(len(rows), 1)}][7] = {{"]
     lines += [f"    {{{numbers(row)}}}," for row in rows or [[0.0] * 7]]
@@ -252,19 +253,20 @@ def write_matlab(table: DHTable, units: Units) -> str:
 
 
 def frames(table: DHTable) -> str:
-    """Return the end of a loop over rows, which computes T from a, alpha, d, theta and beta."""
+    """Return the end of the loop over rows; this code computes T from a, alpha, d, theta and beta."""
     product = "S * (X * Y)" if table.convention is Convention.STANDARD else "(X * Y) * S"
     return _FRAMES.format(product=product)
 
 
 def matrix(name: str, rows: list[list[float]] | FloatArray, columns: int) -> list[str]:
-    """Return the lines that assign a matrix, also one without rows."""
+    """Return the lines that assign a matrix; the matrix may have no rows."""
     if not len(rows):
         return [f"{name} = zeros(0, {columns});"]
     return [f"{name} = [", *(f"    {numbers(row)}" for row in rows), "];"]
 
 
-#: Largest denominator and largest integer of a handwritten number; other numbers are decimals.
+#: Largest denominator and largest integer of a number that is written as a fraction; other numbers are
+#: decimals.
 _LONGEST = 10**9
 _BODY = '''
 def step(a, alpha, d, theta, beta=0):
@@ -297,7 +299,10 @@ class Doubles(Units):
 
 
 class Fractions(Doubles):
-    """Exact multiples of pi and fractions (0.425 is 17/40); other angles and long numbers are decimals."""
+    """Exact multiples of pi, and exact fractions (0.425 is 17/40).
+
+    Other angles and numbers with many digits are decimals.
+    """
 
     def length(self, metres: float) -> str:
         """Format a length or another number."""
@@ -313,7 +318,7 @@ class Fractions(Doubles):
         return ("-" if radians < 0.0 else "") + self.decimal(abs(radians))
 
     def ratio(self, x: Fraction) -> str:
-        """Format a fraction with a handwritten decimal value."""
+        """Format a number of few digits as a fraction."""
         return f"Rational({x.numerator}, {x.denominator})"
 
     def decimal(self, x: float) -> str:

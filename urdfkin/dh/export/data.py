@@ -1,7 +1,7 @@
-"""Write a table as plain data, JSON, TOML and CSV.
+"""Write a table as plain data, or as JSON, TOML or CSV.
 
-`urdfkin.dh.rows.table_from_mapping` reads the plain data; `urdfkin.dh.read_table` reads the files. All
-numbers are the same after reading, to the last bit. The reference tables in urdfkin are TOML files.
+`urdfkin.dh.rows.table_from_mapping` reads the plain data; `urdfkin.dh.read_table` reads the files. Both read
+back all numbers unchanged to the last bit. The reference tables in urdfkin are TOML files.
 """
 
 from __future__ import annotations

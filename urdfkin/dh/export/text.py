@@ -1,9 +1,9 @@
 """Export a table as text: for a terminal, in Markdown, in HTML and in LaTeX.
 
-All formats contain the convention, the formula, base and tool. One `document` gives text, Markdown and HTML.
-LaTeX uses booktabs, has the convention in the caption, and fits the table to the width of the text. The
-functions for headings, cells, formulas and poses do not depend on a format. Each format passes its own
-notation for pi, products and names.
+All formats contain the convention, the formula, base and tool. `document` makes one document, which is
+written as plain text, Markdown or HTML. The LaTeX table uses booktabs, names the convention in its caption,
+and is at most as wide as the text. The functions for headings, cells, formulas and poses do not depend on the
+format. Each format passes its own notation for pi, products and names to them.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ HAYATI_FORMULA = {
     Convention.MODIFIED: "T(i-1, i) = Tx(a(i-1)) Rx(alpha(i-1)) Ry(beta(i-1)) Rz(theta) Tz(d)",
 }
 
-#: Factor before rounding up: an excess of 1e-12 beyond a digit is rounding error.
+#: Factor before a number is rounded up, because a relative excess of 1e-12 beyond a digit is rounding error.
 _ON_THE_DIGIT = 1.0 - 1e-12
 
 
 def formula(table: DHTable) -> str:
-    """Return the product that a row means."""
+    """Return the product of transforms that a row stands for."""
     return (HAYATI_FORMULA if table.has_hayati_rows else FORMULA)[table.convention]
 
 
@@ -54,14 +54,14 @@ def variable(
 
 
 def coordinate_names(table: DHTable) -> str:
-    """Return the joint of each coordinate as text; "" if the coordinates are the rows' joints in order."""
+    """Return text with the joint of each coordinate; "" if the coordinates are the rows' joints in order."""
     if [row.joint for row in table.rows] == list(table.joint_names):
         return ""
     return "with " + ", ".join(f"q{i} = {name}" for i, name in enumerate(table.joint_names, 1))
 
 
 def constant_of(row: DHRow) -> float:
-    """Return the constant beside the variable: the cell plus the offset of a mimic rule."""
+    """Return the constant that is added to the variable: the cell plus the offset of a mimic rule."""
     cell = row.theta if row.kind.turns else row.d
     return cell + row.sense * row.mimic.offset if row.mimic else cell
 
@@ -74,7 +74,7 @@ def added(variable: str, constant: str) -> str:
 
 
 def cells(table: DHTable, row: DHRow, units: Units, pi: str = "pi", **style: Any) -> list[str]:
-    """Return a, alpha, d, theta as text with the variable; also beta if any row needs it."""
+    """Return a, alpha, d and theta as text, with the joint's variable; also beta if any row needs it."""
     moves = variable(table, row, **style)
     theta, d = units.angle(row.theta, pi), units.length(row.d)
     if row.kind.turns:
@@ -124,7 +124,7 @@ def at_most(value: float) -> str:
 
 
 def snap_lines(table: DHTable) -> list[str]:
-    """Return the effect of snapping as text, then a line for each change."""
+    """Return lines of text: first the effect of snapping, then a line for each change."""
     snap = table.snap
     if snap is None:
         return []
@@ -252,7 +252,7 @@ def _caption(table: DHTable) -> str:
 
 
 def fitted(lines: list[str]) -> list[str]:
-    """Reduce LaTeX lines to the width of the text if they are wider."""
+    """Return LaTeX code that scales a table down to the width of the text if the table is wider."""
     size = r"\ifdim\width>\linewidth\linewidth\else\width\fi"
     return [rf"  \resizebox{{{size}}}{{!}}{{%", *(f"    {line}" for line in lines), "  }"]
 

@@ -1,12 +1,13 @@
 """Export a table for two toolboxes: roboticstoolbox (Python) and MATLAB's Robotics System Toolbox.
 
 For roboticstoolbox the code makes a `DHRobot` of Revolute and Prismatic links (DH or MDH) with their limits.
-A DHRobot has no fifth parameter, and has at least one joint. A table with Hayati rows, or without rows,
-therefore becomes a `Robot` of elementary transforms.
+A DHRobot cannot have a fifth parameter, and must have at least one joint. A table with Hayati rows, or
+without rows, therefore becomes a `Robot` of elementary transforms.
 
 For the Robotics System Toolbox the code makes a `rigidBodyTree`. The toolbox's "dh" and "mdh" transforms
 ignore theta of a revolute joint and d of a prismatic one, so they would lose offsets. They also have no
-Hayati rows. The code therefore sets each joint's frame by a matrix of the table, and the joint's axis is z.
+Hayati rows. The code therefore sets each joint's frame by a matrix from the table, and the joint's axis is
+the z axis.
 
 The MATLAB code is tested in Octave with substitutes for the toolbox's classes (`scripts/forms/octave`). It
 has not been tested in MATLAB.
@@ -91,7 +92,7 @@ def write_matlab_rst(table: DHTable, units: Units) -> str:
 
 
 def write_ets(table: DHTable, units: Units) -> str:
-    """Return a module with `ets`, and `robot`, a Robot of these transforms.
+    """Return a module with two variables: `ets`, the transforms, and `robot`, a Robot of these transforms.
 
     Raises:
         InputError: a mimic joint.
@@ -147,7 +148,7 @@ def write_screws(screws: ProductOfExponentials, form: str, digits: int = 10) -> 
 
 
 def screws_document(screws: ProductOfExponentials, digits: int = 10) -> TextDocument:
-    """Return a title, the formula, the screws in space and body axes, and M."""
+    """Return a document with a title, the formula, the screws in space and body axes, and M."""
     parts: list[str | Table | Matrix] = [Code(FORMULA)]
     heads = ("i", "joint", "w_x", "w_y", "w_z", "v_x", "v_y", "v_z")
     for what, rows in (("space screws S", screws.space), ("body screws B", screws.body)):
@@ -215,7 +216,7 @@ def _matlab(screws: ProductOfExponentials) -> str:
     return "\n".join([*lines, "end"]) + "\n"
 
 
-#: Data and code, which are exact.
+#: Functions for the formats of data and code, which are exact.
 _CODE: dict[str, Callable[[ProductOfExponentials], str]] = {
     "toml": _toml,
     "json": _json,

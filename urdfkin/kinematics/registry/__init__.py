@@ -1,4 +1,4 @@
-"""The textbook's equations as data: statement, meaning, function and test of each.
+"""The textbook's equations as data: the statement, meaning, functions and tests of each equation.
 
 The TOML files in `data` are the only source. This module generates `docs/equations.md` and the output of
 `urdfkin explain 7.130` from them. Tests check that every function and test exists.
@@ -45,12 +45,12 @@ class Equation:
     Attributes:
         number: The printed number, "7.130".
         statement: The equation in urdfkin's notation, in plain characters.
-        latex: The same in LaTeX.
+        latex: The statement in LaTeX.
         meaning: One or two sentences.
         written: Names of the functions of `urdfkin.kinematics.equations` that state the equation.
-        functions: Functions that compute it, "module:name".
-        tests: Tests that fail without it, "file::name".
-        against: The independent source that the tests compare with.
+        functions: Functions that compute the equation, "module:name".
+        tests: Tests that fail if the equation is computed wrongly, "file::name".
+        against: The independent source with which the tests compare the result.
     """
 
     number: str
@@ -86,7 +86,7 @@ class Misprint:
         where: Its location in the chapter.
         printed: The printed statement.
         correct: The correct statement.
-        proof: The reason, in one sentence.
+        proof: The reason why the printed statement is wrong, in one sentence.
         test: The test that proves it, "file::name".
     """
 
@@ -208,7 +208,7 @@ _NUMBER = re.compile(r"^\(?(?:eq\.?|equation)?\s*(7\.\d{1,3})\)?$", re.IGNORECAS
 
 
 def explain(number: str) -> str | None:
-    """Return a page with an equation, its meaning, its functions and its tests; None for another text.
+    """Return a page about an equation: its meaning, functions and tests; None if there is no such equation.
 
     Args:
         number: "7.130", "(7.130)" or "eq. 7.130".

@@ -130,7 +130,7 @@ def exp_rotation(rotation_vector: ArrayLike) -> FloatArray:
 
 
 def log_rotation(R: ArrayLike) -> FloatArray:
-    """Return the rotation vector phi k of a rotation, with phi in [0, pi]; accurate at both ends.
+    """Return the rotation vector phi k of a rotation, with phi in [0, pi]; accurate near 0 and near pi too.
 
     At phi = pi both k and -k are correct; the function returns either of them.
 

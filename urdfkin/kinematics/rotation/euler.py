@@ -18,7 +18,7 @@ from urdfkin.errors.validators import as_str
 from urdfkin.kinematics.inputs import FloatArray, rotations, vectors
 
 _AXES = "xyz"
-#: Triples of axes in which no axis follows itself.
+#: Triples of axes in which two neighbouring axes always differ.
 _TRIPLES = [a + b + c for a in _AXES for b in _AXES for c in _AXES if a != b != c]
 #: Names of all sequences: twelve with turning axes and twelve with fixed axes.
 SEQUENCES = (*(triple.upper() for triple in _TRIPLES), *_TRIPLES)
@@ -52,7 +52,7 @@ class Sequence:
         return self.first == self.third
 
     def turning(self, values: FloatArray) -> FloatArray:
-        """Return angles or rates in the order of the turning axes; a second call restores the order."""
+        """Return angles or rates in the order of the turning axes; a second call restores the first order."""
         return values[..., ::-1] if self.fixed else values
 
 
@@ -81,7 +81,7 @@ def _sequence(name: str) -> Sequence:
 
 
 def coordinate_rotation(axis: int, angle: FloatArray) -> FloatArray:
-    """Return Rx, Ry or Rz (axis 0, 1, 2) of `angle` (...) in radians, (..., 3, 3) with exact 0 and 1."""
+    """Return Rx, Ry or Rz (axis 0, 1, 2) of `angle` (...), rad; constant entries are exactly 0 and 1."""
     angle = np.asarray(angle)
     R = np.zeros((*angle.shape, 3, 3))
     j, k = (axis + 1) % 3, (axis + 2) % 3
@@ -143,10 +143,12 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     else:
         first = np.arctan2(-sign * R[..., j, m], R[..., m, m])
         second = np.arctan2(sign * R[..., i, m], np.hypot(R[..., j, m], R[..., m, m]))
-    # R_first^T R = R_second R_third; its row of the second axis depends on the third angle only.
+    # R_first^T R = R_second R_third. The row of this product for the second axis depends on the third angle
+    # only.
     cosine, sine = np.cos(first), np.sin(first)
     row = cosine[..., np.newaxis] * R[..., j, :] + (sign * sine)[..., np.newaxis] * R[..., m, :]
-    # R_third turns the plane of the second axis and a further one: the other axis, or the first.
+    # R_third turns the plane of the second axis and of one more axis: the axis `other` in a proper sequence,
+    # else the first axis.
     rest, sense = (m, sign) if axes.proper else (i, -sign)
     third = np.arctan2(-sense * row[..., rest], row[..., j])
     return axes.turning(np.stack((first, second, third), axis=-1)).copy()
@@ -182,7 +184,7 @@ def rpy_of(R: ArrayLike) -> FloatArray:
     return euler_of("xyz", R)
 
 
-#: Least distance from the singularity, radians. Nearer to it the rates have lost too many digits.
+#: Least allowed distance from the singularity, radians. At a smaller distance the rates lose too many digits.
 NEAREST = 1e-9
 
 
@@ -278,8 +280,8 @@ def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -
     axes = sequence(name)
     turns = axes.turning(angles)
     cosine, sine = np.cos(turns[..., 1]), np.sin(turns[..., 1])
-    # Components of the third axis in that frame: `along` the first axis, and `across` along the remaining
-    # one.
+    # Components of the third axis in the frame after the first turn: `along` is the component along the first
+    # axis, `across` the component along the axis `other`.
     if axes.proper:
         along, across = cosine, -axes.sign * sine
     else:
@@ -319,8 +321,9 @@ def singularity_distance(name: str, angles: ArrayLike) -> FloatArray:
 def euler_condition(name: str, angles: ArrayLike) -> FloatArray:
     """Return the condition number of Omega: the largest factor by which a relative error of w grows.
 
-    The middle axis is perpendicular to the two others. If d is the angle between these, the singular values
-    are 1 and sqrt(1 +- cos d), and the condition number is cot(d / 2).
+    The middle axis is perpendicular to the first and to the third axis. Let d be the angle between the first
+    and the third axis. The singular values are then 1 and sqrt(1 +- cos d), and the condition number is cot(d
+    / 2).
 
     Args:
         name: SciPy's name of the sequence.
@@ -330,7 +333,7 @@ def euler_condition(name: str, angles: ArrayLike) -> FloatArray:
         (...); 1 if the axes are perpendicular.
 
     Raises:
-        RepresentationSingularityError: a sample is at the singularity, where the number does not exist.
+        RepresentationSingularityError: a sample is at the singularity, where no condition number exists.
         UnknownNameError: the sequence does not exist.
         InputError: a wrong shape, or a value that is not finite.
     """

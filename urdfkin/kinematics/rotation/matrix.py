@@ -9,10 +9,11 @@
 
 `w_0_1` is the angular velocity of frame 1 relative to frame 0.
 
-A user's matrix often has only a few printed digits, so its columns are orthogonal to these digits only.
-Methods that make a rotation of it (by a quaternion, by angles, column by column) differ by as much.
-`nearest_rotation` and `polar_factor` return the rotation that is nearest in the Frobenius norm. It depends on
-the matrix alone: it is the orthogonal factor U of the polar decomposition M = U H.
+A user's matrix is often printed with a few digits only, so its columns are orthogonal only to these digits.
+There are several ways to convert such a matrix to a rotation (by a quaternion, by angles, column by column).
+Their results differ in the last printed digit. `nearest_rotation` and `polar_factor` return the rotation that
+is nearest to the matrix in the Frobenius norm. This rotation is unique: it is the orthogonal factor U of the
+polar decomposition M = U H.
 
 The textbook's joint i turns about the axis z_{i-1} of a frame. A URDF joint turns about any axis of its
 frame. `axis_aligning` returns the rotation between the two frames.
@@ -55,7 +56,8 @@ def skew(w: ArrayLike) -> FloatArray:
 def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
     """Return the vector w of a skew-symmetric matrix S = S(w), the inverse of `skew`.
 
-    A computed S has a small symmetric part from rounding. The mean of each pair of entries removes it.
+    A computed S has a small symmetric part, caused by rounding. The function removes this part: each
+    component of w is the mean of two entries, S_ij and -S_ji.
 
     Args:
         S: (..., 3, 3).
@@ -99,7 +101,8 @@ def rotate_skew(R_0_1: ArrayLike, S_1: ArrayLike) -> FloatArray:
     return R_0_1 @ matrices(S_1, "S_1") @ R_0_1.swapaxes(-1, -2)
 
 
-#: A matrix with entries within this distance of a rotation is a rotation up to rounding and is not changed.
+#: A matrix whose entries differ from those of the nearest rotation by at most this is a rotation up to
+#: rounding, and is not changed.
 ROUNDED = 1e-15
 
 
@@ -107,17 +110,17 @@ def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
     """Return the nearest rotation, up to rounding.
 
     The method is one Newton step (Bjorck and Bowie): M - M (M^T M - I)/2. With M = U (I + E) the result is
-    U (I - 3/2 E^2). Here |E| is 3e-9 at most, so the error is 1.4e-17, an eighth of a rounding.
+    U (I - 3/2 E^2). Here |E| is 3e-9 at most, so the error is 1.4e-17 at most, an eighth of a rounding error.
 
     Args:
-        M: (..., 3, 3), a rotation to nine decimals.
+        M: (..., 3, 3), a rotation whose entries are rounded to nine decimals.
         name: Name of the argument, for messages.
 
     Returns:
         (..., 3, 3).
 
     Raises:
-        InputError: a wrong shape, or not a rotation.
+        InputError: a wrong shape, or `M` is not a rotation.
     """
     M = rotations(M, name)
     defect = np.swapaxes(M, -1, -2) @ M - np.eye(3)
@@ -126,7 +129,7 @@ def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
 
 
 def polar_factor(M: FloatArray) -> FloatArray:
-    """Return the nearest rotation of a matrix that is far from one, for example printed with few digits.
+    """Return the rotation nearest to a matrix with larger errors, for example one printed with few digits.
 
     Args:
         M: (3, 3), of positive determinant.
@@ -142,9 +145,10 @@ def polar_factor(M: FloatArray) -> FloatArray:
 def axis_aligning(axis: ArrayLike) -> FloatArray:
     """Return a rotation with `axis` as its third column.
 
-    If the axis does not point down, it is the shortest turn from z to the axis. If it does, half a turn about
-    x precedes that turn. No axis is therefore near a singular case (Duff and others, "Building an Orthonormal
-    Basis, Revisited", 2017). For a coordinate axis the entries are exactly 0 and +-1.
+    If the axis does not point down (its z component is not negative), the result is the shortest rotation
+    from z to the axis. If the axis points down, the result is half a turn about x, followed by the shortest
+    rotation from -z to the axis. No axis is therefore near a singular case (Duff and others, "Building an
+    Orthonormal Basis, Revisited", 2017). For a coordinate axis the entries are exactly 0 and +-1.
 
     Args:
         axis: (..., 3) unit axis.
@@ -153,7 +157,7 @@ def axis_aligning(axis: ArrayLike) -> FloatArray:
         (..., 3, 3) rotation; the identity for the axis z.
 
     Raises:
-        InputError: a shape, or an axis that is not of unit length.
+        InputError: a wrong shape, or an axis that is not of unit length.
 
     Example:
         >>> axis_aligning([1.0, 0.0, 0.0])
@@ -189,7 +193,7 @@ def rotation_rate(R_0_1: ArrayLike, w_0_1: ArrayLike) -> FloatArray:
 
 
 def angular_velocity_of(R_0_1: ArrayLike, R_rate: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
-    """Return w with S(w) = R-dot R^T, from 7.38; by 7.35 to 7.37 such a w exists.
+    """Return w with S(w) = R-dot R^T (7.38); 7.35 to 7.37 show that such a w exists.
 
     Args:
         R_0_1: (..., 3, 3) orientation of frame 1 in frame 0.

@@ -6,8 +6,8 @@ configuration; qw is the textbook's q0. A quaternion and its negative are the sa
 The angular velocity is expressed in the fixed frame 0, as in the textbook (`frame="fixed"`), or in the
 frame of the turning body (`frame="body"`). Quaternion rates have no singularity.
 
-`integrate_orientation` integrates quaternion rates and normalises after each step. The integral of the
-angular velocity itself is not an orientation (example 7.3).
+`integrate_orientation` integrates the rates of a quaternion and normalises the quaternion after each step. It
+does not integrate the angular velocity itself: that integral is not an orientation (example 7.3).
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def quaternion_of(R: ArrayLike) -> FloatArray:
         InputError: a wrong shape, or `R` is not a rotation.
     """
     R = rotations(R, "R")
-    # K = 4 q q^T is linear in R. Its row with the largest diagonal entry gives q without cancellation.
+    # K = 4 q q^T is linear in R. The row of K with the largest diagonal entry gives q without cancellation.
     K = np.empty((*R.shape[:-2], 4, 4))
     trace = R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2]
     K[..., 3, 3] = 1.0 + trace
@@ -191,8 +191,8 @@ def angular_velocity_from_quaternion_rates(
 ) -> FloatArray:
     """Return the angular velocity w = 4 E^T (q-dot, q0-dot), the inverse of 7.57.
 
-    A part of the rates along the quaternion would change its length only. It is not a rotation and is
-    ignored.
+    The component of the rates along the quaternion would only change the quaternion's length. It belongs to
+    no rotation, so the function ignores this component.
 
     Args:
         quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
@@ -215,15 +215,15 @@ def integrate_orientation(
 ) -> FloatArray:
     """Integrate an angular velocity w(t) to quaternions, by the fourth-order Runge-Kutta method on 7.57.
 
-    The exact solution has constant length. Rounding and truncation change the length, so each step is
-    normalised. Halving the step divides the error by 16.
+    The exact quaternion has constant length. Rounding and truncation errors change the length, so the
+    quaternion is normalised after each step. Halving the step divides the error by 16.
 
     Args:
         w: Function of the time in s that returns the angular velocity, (..., 3) rad/s. It must be smooth
             within a step, so add a time to `times` at each jump. At the two ends of a step, w is evaluated
             just inside the step.
         quat: (..., 4) orientation at `times[0]`, unit quaternion, scalar last.
-        times: (n,) increasing times in s; there is one step between each two of them.
+        times: (n,) increasing times in s; the method makes one step from each time to the next.
         frame: Frame of w: "fixed" is frame 0, "body" the body's own.
 
     Returns:

@@ -15,16 +15,17 @@ INERTIAL_INCOMPLETE = Rule("URDF701", "inertial-incomplete", WARNING)
 INERTIAL_IMPOSSIBLE = Rule("URDF702", "inertial-impossible", WARNING)
 INERTIAL_SCALE = Rule("URDF703", "inertial-scale", WARNING)
 
-#: Larger masses (kg) and distances of the centre of mass (m) are reported as mistakes.
+#: Largest plausible mass (kg) and distance of the centre of mass from the link's origin (m). Larger values
+#: are reported.
 HEAVIEST, FARTHEST = 1e9, 1e6
 
-#: Bodies below this mass (kg) are placeholders; their moments are not checked.
+#: A body with a smaller mass (kg) is a placeholder. Its moments of inertia are not checked.
 NEGLIGIBLE = 1e-3
 
-#: Moments of inertia per kg (m^2) that are rounding errors: those of a body of 0.03 mm.
+#: Moments of inertia per kg (m^2) below this count as rounding errors. A body of 0.03 mm has such moments.
 ROUNDING = 1e-9
 
-#: Relative rounding error of moments, from the number of digits that exporters write.
+#: Relative rounding error of moments of inertia, because exporters write few digits.
 _WRITTEN = 1e-6
 
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -151,7 +152,7 @@ def principal_moments(moments: Sequence[float]) -> tuple[float, float, float]:
 UNREADABLE = Rule("URDF704", "unreadable-extra", WARNING)
 GEOMETRY = Rule("URDF705", "geometry-incomplete", WARNING)
 
-#: Shape -> its numbers: (attribute, count, required).
+#: Shape -> the attributes with its numbers. Each is (name, count of numbers, whether it is required).
 _SHAPES: dict[str, tuple[tuple[str, int, bool], ...]] = {
     "box": (("size", 3, True),),
     "sphere": (("radius", 1, True),),
@@ -282,12 +283,12 @@ MESH_REMOTE = Rule("URDF707", "mesh-remote", WARNING)
 
 
 def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
-    """Report each package that is not found once, and each missing file.
+    """Report each missing file, and each package that is not found. A package is reported once.
 
     Args:
         report: The reporter, which receives the findings.
         root: The root element of the document.
-        beside: The file of the URDF; None if the URDF is text. Then only packages are searched, on the
+        beside: The file of the URDF; None if the URDF is text. For text, only packages are searched, in the
             search paths of the environment.
     """
     packages: dict[str, Path | None] = {}

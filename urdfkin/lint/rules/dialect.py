@@ -145,7 +145,7 @@ def _moves(element: Element) -> bool:
 
 
 def _partition(items: Iterable[_T], predicate: Callable[[_T], bool]) -> tuple[list[_T], list[_T]]:
-    """Return the items for which the predicate is true, and the others, both in their order."""
+    """Return two lists: the items for which the predicate is true, and the others. The order is kept."""
     parts: tuple[list[_T], list[_T]] = ([], [])
     for one in items:
         parts[not predicate(one)].append(one)
@@ -190,8 +190,8 @@ _ADDED = (
 )
 EXTENSIONS = frozenset(_ADDED.split())
 
-#: Element: attributes > child elements. Without a colon, the attributes are not checked. An element without
-#: a line is not checked.
+#: Each line is `element: attributes > child elements`. If the colon is missing, the attributes of the element
+#: are not checked. An element that has no line here is not checked.
 _TABLE = """
 robot: name version > link joint material
 link: name type > inertial visual collision
@@ -221,19 +221,19 @@ ATTRIBUTES = {
 #: Elements and attributes of other formats for poses, which URDF readers skip.
 _FOREIGN = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
 
-#: Attributes with a meaning elsewhere: `--fix` does not remove them.
+#: Attributes that have a meaning on other elements or in other formats. `--fix` does not remove them.
 _MEANT = frozenset().union(*ATTRIBUTES.values()) | _FOREIGN | EXTENSIONS
 
-#: Children that may occur only once.
+#: Element -> child elements that may occur only once.
 _ONCE = {
     **{tag: CHILDREN[tag] for tag in ("joint", "inertial", "visual", "collision", "geometry")},
     "link": frozenset({"inertial"}),
 }
 
-#: Elements whose value belongs into attributes; text between their tags is lost.
+#: Elements that have their values in attributes. Readers ignore text between their tags.
 _VALUES = {"origin", "axis", "limit", "mimic", "parent", "child"}
 
-#: Elements whose text can only be a misplaced value.
+#: Elements in which text between the tags can only be a value in the wrong position.
 _VECTORS = ("origin", "axis")
 
 
@@ -315,7 +315,8 @@ def _is_part(element: Element) -> bool:
 
 _PARTS = frozenset({"link", "joint"})
 
-#: Longer tags are similar to neither: difflib's ratio with five common letters of eight is no match.
+#: Tags of this length or longer are similar neither to `link` nor to `joint`, because difflib's ratio is too
+#: small.
 _LONGEST_PART = 8
 
 
@@ -387,7 +388,7 @@ UNDECLARED_PREFIX = Rule("URDF214", "undeclared-prefix", WARNING)
 #: Prefixes that XML declares itself.
 _PREDECLARED = ("xml", "xmlns")
 
-#: Prefixes with findings of their own (URDF202, URDF112).
+#: Prefixes that other rules report (URDF202, URDF112).
 _REPORTED = ("xacro:", "xi:include")
 
 
@@ -450,7 +451,7 @@ ODD_NAME = Rule("URDF405", "odd-name", WARNING)
 NAME_BLANKS = Rule("URDF406", "line-break-in-name", WARNING, DIFFERS)
 LOOKALIKE = Rule("URDF407", "lookalike-names", WARNING)
 
-#: Longer names break tables and file paths.
+#: Longest name, in characters, that is not reported. Longer names break tables and file paths.
 LONGEST = 200
 
 
@@ -535,7 +536,7 @@ def _check_lookalikes(report: Reporter, named: list[tuple[str, Element]]) -> Non
     seen: dict[str, str] = {}
     for name, element in named:
         if name.isascii() or len(name) > LONGEST:
-            continue  # a longer name is reported anyway; normalising its marks takes quadratic time
+            continue  # a long name is already reported, and slow to normalise
         key = unicodedata.normalize("NFKC", name)
         first = seen.setdefault(key, name)
         if first != name:
@@ -597,7 +598,7 @@ def _read(report: Reporter, comment: Comment, codes: Mapping[str, str]) -> Silen
 
 
 def check_unused(report: Reporter) -> None:
-    """Report the codes of comments that silence no finding, after all rules."""
+    """Report the codes of comments that silence no finding. Call this after all other rules."""
     for silence in report.silences.all:
         for code in silence.codes:
             if code not in silence.used:

@@ -76,8 +76,8 @@ def _ends_exist(report: Reporter, robot: RobotRecord, joint: JointRecord) -> boo
 def _no_loops_or_diamonds(report: Reporter, robot: RobotRecord, edges: list[JointRecord]) -> bool:
     """Search depth first for links with several parents.
 
-    A joint to a link on the current path closes a loop. A joint to another visited link gives this link a
-    second parent.
+    A joint whose child is on the current path closes a loop. A joint whose child was visited on another path
+    gives this child a second parent.
     """
     below: dict[str, list[JointRecord]] = {}
     children = set()
@@ -141,7 +141,7 @@ def _one_root(report: Reporter, robot: RobotRecord) -> bool:
     if not children <= robot.links.keys():
         return False  # already reported: a joint with a missing or wrong child
     parents = {joint.parent for joint in robot.joints}
-    # The first root with children is the robot; the others are disconnected.
+    # The first root with children is the root of the robot. The other roots are disconnected from it.
     main = next((root for root in roots if root in parents), roots[0])
     for root in roots:
         if root != main:
@@ -160,19 +160,21 @@ AXIS_LENGTH = Rule("URDF503", "axis-not-unit", WARNING)
 PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
 NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
-#: A smaller difference of the length from one is rounding of the last digits: a note.
+#: If the length of an axis differs from 1 by less than this, the cause is rounding of the last digits, and
+#: the finding is a note.
 LENGTH_ROUNDING = 2e-4
 
 #: Tolerance of a unit vector's length, the same as in `kinematics.inputs`.
 _ONE = 1e-12
 
-#: Relative tolerance within which the axis of a planar joint is z.
+#: Relative tolerance within which the axis of a planar joint counts as the z axis.
 _LEAN = 1e-9
 
-#: Tolerance within which Pinocchio replaces an axis by a coordinate axis; Eigen's isApprox compares squares.
+#: Relative tolerance within which Pinocchio replaces an axis by a coordinate axis. It is that of Eigen's
+#: isApprox, which compares squares of lengths.
 _SNAPPED = 1e-12
 
-#: A smaller tilt (rad) is within the rounding that `verify.bounds` allows for an axis of Pinocchio.
+#: A tilt (rad) below this is not reported. It is within the rounding that `verify.bounds` allows for an axis.
 _TILT = 2.0**-52
 
 
@@ -231,7 +233,7 @@ def unit_vector(vector: Sequence[float]) -> tuple[float, ...]:
     with localcontext(prec=60):
         numbers = [Decimal(x) for x in vector]
         length = sum((x * x for x in numbers), Decimal(0)).sqrt()
-        return tuple(float(x / length) + 0.0 for x in numbers)  # + 0.0: no minus before zero
+        return tuple(float(x / length) + 0.0 for x in numbers)  # + 0.0 turns -0.0 into 0.0
 
 
 def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], element: Element) -> None:
@@ -256,7 +258,10 @@ def tilts(robot: RobotRecord) -> dict[str, float]:
 
 
 def _snap(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
-    """Return the coordinate axis that Pinocchio uses instead of an axis, and their angle (rad), or None."""
+    """Return the coordinate axis that Pinocchio uses for an axis, and the angle between them (rad).
+
+    Return None if Pinocchio uses the axis itself.
+    """
     if axis is None:
         return None
     for i in range(3):
@@ -367,9 +372,10 @@ MIMIC_CHAIN = Rule("URDF525", "mimic-chain", NOTE)
 MIMIC_SCALE = Rule("URDF526", "mimic-scale", WARNING)
 MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
-#: Larger multipliers and offsets (rad or m) are reported as mistakes.
+#: Largest plausible multiplier and offset (rad or m) of a mimic joint. Larger ones are reported.
 LARGEST = 1e6
-#: Share of a joint's range that limits of its mimic joint may leave out: limits are written with few digits.
+#: Share of the mimicked joint's range that the limits of the mimic joint may exclude without a finding.
+#: Limits are often written with few digits.
 LEAST_LOST = 1e-3
 
 
@@ -514,7 +520,10 @@ class _MimicChecker:
         )
 
     def resolved(self, mimic: MimicRecord) -> tuple[Mimic, JointRecord | None]:
-        """Return the combined rule of a chain of mimic joints, and the last joint; None if there is none."""
+        """Return the combined rule of a chain of mimic joints, and the joint at the end of the chain.
+
+        The joint is None if the chain is a circle, or names a joint that does not exist.
+        """
         from urdfkin.model.tree import Mimic  # noqa: PLC0415
 
         rule = Mimic(mimic.leader, mimic.multiplier, mimic.offset)
@@ -566,20 +575,21 @@ NEUTRAL = Rule("URDF608", "neutral-outside", NOTE)
 #: A joint origin longer than this (m) is probably in millimetres.
 FAR = 100.0
 
-#: A robot whose lengths have a smaller sum (m) was probably scaled twice.
+#: If the sum of all lengths of a robot is smaller than this (m), the robot was probably scaled twice.
 TINY = 1e-4
 
-#: A whole number of radians from `MANY` on is probably an angle in degrees. From `ENDLESS` on it means
-#: "no limit" in some exporters.
+#: An angle in radians that is a whole number and at least `MANY` was probably meant in degrees. If it is at
+#: least `ENDLESS`, it is some exporters' notation for "no limit".
 MANY, ENDLESS = 30.0, 1000.0
 
-#: A rounded pi is a warning if it moves a tip by more than this (m).
+#: A rounded multiple of pi is a warning if the rounding moves a tip by more than this (m).
 NOTICEABLE = 1e-3
 
-#: A smaller difference (rad) from a multiple of pi is not reported.
+#: If an angle differs from a multiple of pi by less than this (rad), it is not reported.
 ANGLE_ROUNDING = 1e-10
 
-#: Multiples of pi, each with the smallest number of decimals from which it is recognized.
+#: Multiples of pi, each with the smallest number of decimals that a number needs to be recognized as this
+#: multiple.
 _MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
@@ -664,9 +674,9 @@ def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], rea
 
 
 def _replace_words(raw: str | None, words: list[str]) -> str:
-    """Replace the words of a raw value, without changes of the white space between them."""
+    """Return the raw value with other words; the white space between the words stays the same."""
     blanks = re.split(r"[^ \t\r\n]+", raw or "")
-    if len(blanks) != len(words) + 1:  # white space is written as character references
+    if len(blanks) != len(words) + 1:  # the white space is written as character references
         return " ".join(words)
     return "".join(blank + word for blank, word in zip(blanks, [*words, ""], strict=True))
 
@@ -698,7 +708,7 @@ def _as_pi(multiple: Fraction) -> str:
 def _metres(length: float) -> str:
     units = ((1.0, "m"), (1e3, "mm"), (1e6, "um"))
     factor, unit = next((pair for pair in units if length * pair[0] >= 1.0), (1e9, "nm"))
-    # Two digits, without an exponent.
+    # Write two significant digits, without an exponent.
     return f"{float(f'{length * factor:.1e}'):g} {unit}"
 
 

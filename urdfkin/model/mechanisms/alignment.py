@@ -1,19 +1,21 @@
-"""The alignment of two mechanisms: base, senses and zeros are matched, and differences are kept by joint.
+"""The alignment of two mechanisms A and B: matched joints and frames, and the differences of each.
 
-The matcher starts from a common body. Let G be the motion from A's zero configuration to B's. A joint of A
-moves by exp(S t), the joint of B by exp(S' t'). B's coordinate may have the opposite sense and another zero;
-t' and its screw are written in A's. G changes where B's axis, or the body behind it, is elsewhere. So B is A
-with a rigid motion L inserted before some joints, and some axes replaced:
+The matcher starts from a body that both mechanisms have. Let G be the motion that moves A's zero
+configuration to B's. A joint of A moves by exp(S t), and the matched joint of B by exp(S' t'). B's coordinate
+may have the opposite sense and another zero; t' and S' are therefore expressed with A's sense and zero. G
+changes at a joint if B's axis, or the body after the joint, is in another place than in A. B is therefore the
+same as A, except that a rigid motion L is inserted before some joints and some axes are replaced:
 
     T_A = exp(S_1 t_1) ... exp(S_n t_n) H,      T_B = L_1 exp(S'_1 t'_1) ... L_n exp(S'_n t'_n) L H,
 
-with S'_i = S_i, t'_i = t_i and L_i = 1 where nothing differs. Two models move alike if and only if nothing
-differs, except for rotations that screws on one line share.
+with S'_i = S_i, t'_i = t_i and L_i = 1 where nothing differs. The two models have the same motion if and only
+if nothing differs. There is one exception: joints on a common line can exchange parts of their rotation.
 
-**Variables.** The joint values of both models are linear functions of shared variables. A's coordinates are
-variables. B's coordinates follow from them by the senses and zeros of the joints. So each joint value of
-either model is a constant plus a multiple of one variable. A motion that only B has is a variable of its own:
-a mimic joint that is independent in B, or a joint that is fixed in A.
+**Variables.** The joint values of both models are linear functions of shared variables. Each coordinate of A
+is a variable. The coordinates of B are computed from these variables, with the senses and zeros of the
+joints. Each joint value of A or B is therefore a constant plus a multiple of one variable. A motion that only
+B has is a separate variable. Examples are a joint of B that is a mimic joint in A, and a joint of B that is
+fixed in A.
 """
 
 from __future__ import annotations
@@ -53,7 +55,7 @@ class Step:
         offset: B's value is sense * A's value + offset, rad or m.
         before: (4, 4) L, inserted before the joint, in A's zero configuration.
         axis: A's screw in the zero configuration, directed away from the base.
-        other: B's screw, likewise; `axis` itself if they agree.
+        other: B's screw in the zero configuration, directed away from the base; `axis` itself if both agree.
         tilt: Angle (rad) between the axes, or between the normals of planar joints.
         shift: Distance (m) between the axes; for a planar or floating joint, between the frames.
         conversion: From A's coordinates of a planar or floating joint to B's; None if they are equal.
@@ -91,8 +93,8 @@ class FramePair:
         previous: Index of the step that carries it, -1 for none.
         home: (4, 4) pose of A's link in the zero configuration.
         end: (4, 4) L, inserted behind the last joint, in A's zero configuration.
-        tilt: Angle (rad) between the two on their body.
-        shift: Distance (m) between the two on their body.
+        tilt: Angle (rad) between A's and B's link frames on the matched body.
+        shift: Distance (m) between A's and B's link frames on the matched body.
         tool: (4, 4) pose of B's link in A's, if it counts as a different tool on the same body.
     """
 
@@ -106,13 +108,13 @@ class FramePair:
     tool: FloatArray = field(default_factory=lambda: IDENTITY)
 
     def put_right(self) -> FramePair:
-        """Return the same pair, with B's frame as a different tool."""
+        """Return the same pair, but count B's frame as a different tool on the same body."""
         tool = inverse(self.home) @ self.end @ self.home
         return replace(self, end=IDENTITY, tilt=0.0, shift=0.0, tool=tool)
 
     @property
     def differs(self) -> bool:
-        """Whether the link is elsewhere on its body."""
+        """Whether the link frame has another pose on its body in B than in A."""
         return self.tilt > 0.0 or self.shift > 0.0
 
 
@@ -182,7 +184,7 @@ class Alignment:
 
     @property
     def gauge(self) -> Gauge:
-        """The free choices as the alignment found them; the joint order is already that of `b`."""
+        """The free choices of this alignment, without joint orders; `b` already has the chosen order."""
         joints = self.a.tree.joints
         return Gauge(
             (self.a.tree.links[self.base[0]], self.b.tree.links[self.base[1]]),
@@ -192,7 +194,7 @@ class Alignment:
         )
 
     def exchangeable(self, given: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
-        """Yield two joint pairs of one body that lead to a difference and are not paired by name."""
+        """Yield sets of two joint pairs at one body that are not paired by name and lead to a difference."""
         known_names = {joint.name for joint in self.b.tree.joints} | set(given)
         ends = [i for i, step in enumerate(self.steps) if step.differs]
         ends += [frame.previous for frame in self.frames if frame.differs]
@@ -211,7 +213,7 @@ class Alignment:
         for a, b in pairs:
             if (known := on.get((self.a.body_of[a], self.b.body_of[b]))) is None:
                 continue
-            # The motion from B's zero configuration to A's body, from any two links on it.
+            # Any known frame pair on the body gives the motion from B's zero configuration to A's body.
             T_a_b = known.end @ known.home @ known.tool @ inverse(self.b.homes[known.b])
             home, at = self.a.homes[a], T_a_b @ self.b.homes[b]
             tilt, shift = apart(home, at)
@@ -236,7 +238,7 @@ class Alignment:
 
     @property
     def deepest(self) -> int:
-        """The most steps on a path, and one for the base."""
+        """The largest number of steps on a path, plus one for the base."""
         return 1 + max((len(self.indices(i)) for i in range(len(self.steps))), default=0)
 
 
@@ -259,24 +261,24 @@ class Gauge:
     orders: tuple[tuple[str, ...], ...] = ()
 
 
-#: No free choice: equal roots, and equal coordinates.
+#: A gauge without any change: both roots have the same pose, and all coordinates are equal.
 AS_WRITTEN = Gauge()
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """constant + slope * variable; the variable has no meaning if the slope is 0."""
+    """The linear function constant + slope * variable; `variable` has no meaning if the slope is 0."""
 
     variable: str
     slope: float
     constant: float
 
     def moved(self, slope: float, constant: float) -> Line:
-        """Return the line slope * self + constant."""
+        """Return the linear function slope * self + constant."""
         return Line(self.variable, slope * self.slope, slope * self.constant + constant)
 
     def at(self, values: Mapping[str, float | FloatArray]) -> float | FloatArray:
-        """Return the value of the line."""
+        """Return the value of the linear function for given values of the variables."""
         return self.constant + (self.slope * values[self.variable] if self.slope else 0.0)
 
 
@@ -293,7 +295,7 @@ class Pair:
 
     @property
     def variable(self) -> str | None:
-        """The one variable that moves both; None if there are two."""
+        """The one variable that moves the joint in both models; None if two variables do."""
         if self.a.slope and self.b.slope and self.a.variable != self.b.variable:
             return None
         return self.a.variable if self.a.slope else self.b.variable
@@ -320,7 +322,7 @@ class Variables:
     leaders: dict[str, Line]
 
     def range(self, line: Line) -> tuple[float, float]:
-        """Return the smallest and the largest value of a line."""
+        """Return the smallest and the largest value of a linear function over the ranges of the variables."""
         if not line.slope:
             return line.constant, line.constant
         ends = sorted(line.slope * end + line.constant for end in self.ranges[line.variable])
@@ -352,7 +354,7 @@ class _Maker:
         self.deepest = found.deepest
 
     def _leaders(self) -> dict[str, Line]:
-        """Return each coordinate of B as a line in A's, or as its own variable.
+        """Return each coordinate of B as a linear function of one of A's, or as a variable of its own.
 
         A's independent joints come first.
         """
@@ -419,11 +421,11 @@ class _Maker:
         return Variables(tuple(pairs), ranges, tuple(freer_a), tuple(freer_b), tuple(rules), self.leaders)
 
     def _alike(self, a: Line, b: Line) -> bool:
-        """Return whether two lines differ by rounding only; a slope counts for a turn or a metre.
+        """Return whether two linear functions differ by rounding only.
 
-        A rule's constant compares the zeros of two joints. Each zero is found from poses at the end of a
-        path, which are as inexact as all steps of the path together. A slope depends on no zero: the
-        rounding of one step is its bound.
+        The constant of a mimic rule depends on the zeros of two joints. Each zero is computed from poses at
+        the end of a path, so its rounding error is at most the sum for all steps of the path. A slope does
+        not depend on a zero, so its bound is the rounding error of one step.
         """
         same = a.variable == b.variable or not (a.slope or b.slope)
         one = self._one_step(a)
@@ -435,8 +437,9 @@ class _Maker:
     def _ranges(self, pairs: list[Pair | None]) -> dict[str, tuple[float, float]]:
         """Return the limits of each coordinate.
 
-        They are the intersection of both models' limits if it moves joints of both; A's if that is empty. A
-        mimic joint obeys its rule, not its limits: its limits count only for a coordinate without limits.
+        If a coordinate moves joints of both models, its range is the intersection of their limits, or A's
+        limits if the intersection is empty. The limits of a mimic joint are used only for a coordinate that
+        has no limits of its own, because a mimic joint follows its rule even beyond its limits.
         """
         first: dict[str, tuple[float, float]] = {}
         own: dict[str, tuple[float, float]] = {}

@@ -1,13 +1,14 @@
 """Candidates for matching two mechanisms: pairs of joints, and poses and zeros that align their axes.
 
-Joints of two bodies are paired by given names, then by equal names, then by geometry. The functions for poses
-and zeros yield candidates that a search tries; they are not results.
+The joints at two matched bodies are paired by the names that the user gives, then by equal names, then by
+geometry. The functions for poses and zeros yield candidates; the matcher tries each of them.
 
-Two subtrees match exactly if every axis of one coincides with an axis of the other, for some zeros. The axes
-on one body are fixed relative to each other. A joint leaves free only a rotation about its axis, or a
-translation along it. So whether the subtrees behind two joints match depends on the joints and on the
-directions and positions of their axes, not on the angle; each case is computed once. The search visits each
-pair of joints a few times, even for long chains and for many joints with two possible zeros.
+Two subtrees match exactly if, for some zeros of the joints, every axis of one subtree coincides with an axis
+of the other. The axes on one body are fixed relative to each other. A joint allows only a rotation about its
+axis, or a translation along its axis. The subtrees after two joints therefore match or not for every angle of
+the joints. The result depends only on the two joints and on the directions and positions of their axes, so it
+is computed once for each such case. The search visits each pair of joints only a few times, even for long
+chains and for many joints with two possible zeros.
 """
 
 from __future__ import annotations
@@ -85,9 +86,9 @@ class Pairing:
 
         Args:
             bodies: Of A and of B.
-            via: The joints by which they were reached.
-            G: (4, 4) motion of A's zero configuration to B's pose.
-            XC: (4, 4) motion of B's zero configuration to that pose.
+            via: The joints from which the matcher reached these bodies.
+            G: (4, 4) motion that moves A's zero configuration to the current pose of B.
+            XC: (4, 4) motion that moves B's zero configuration to the current pose of B.
         """
         named, left_a, left_b = self.by_names(bodies, via)
         pairs = list(named)
@@ -130,7 +131,7 @@ class Pairing:
         return self._signature(self.a, bodies[0], e) == self._signature(self.b, bodies[1], f)
 
     def all_lie_alike(self, bodies: tuple[int, int], X: FloatArray) -> bool:
-        """Return whether each axis at a body of A coincides with one of B, with B's zero moved by X."""
+        """Return whether each axis at a body of A coincides with one of B, after B is moved by X."""
         at = np.eye(4)
         return all(
             any(
@@ -248,13 +249,13 @@ class _JointGeometry:
 
 def _lines_apart(kind: str, s: Screw, t: Screw) -> tuple[float, float]:
     """Return the angle and distance (rad, m) between the axes of two joints of the same kind."""
-    if kind == "floating":  # reaches every pose from any origin
+    if kind == "floating":  # a floating joint reaches every pose from any origin
         return 0.0, 0.0
     return between_lines(s, t, placed=kind == "turns")
 
 
 _Some = TypeVar("_Some")
-#: A pair: one of A and one of B.
+#: A pair of objects of the same type: the first belongs to A, the second to B.
 Both = tuple[_Some, _Some]
 
 
@@ -263,9 +264,10 @@ class Axis:
     """A joint's screw in the zero configuration.
 
     Attributes:
-        screw: Its line; the line of a prismatic joint has no position.
+        screw: The axis as a directed line; for a prismatic joint, only the direction of the line has a
+            meaning.
         turns: Whether the joint is revolute.
-        seen: The reference line, along which heights are measured.
+        seen: The reference line; the height is measured at its point nearest to the joint's axis.
     """
 
     screw: Screw
@@ -311,7 +313,8 @@ def behind(
 ) -> Iterator[Both[Axis]]:
     """Yield pairs of axes at two bodies.
 
-    An axis parallel to the line `seen` does not move that line, so the axes behind it are included.
+    If an axis is parallel to the line `seen`, the joint does not move that line. The axes after this joint
+    are then yielded too.
     """
     for e, f in _next_joints(mechanisms, via, bodies):
         axes = _axis(mechanisms[0], e, seen[0]), _axis(mechanisms[1], f, seen[1])
@@ -325,8 +328,8 @@ def behind(
 def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
     """Yield poses of B's root that align its axes with A's: the first axis, then those behind it.
 
-    The first axis leaves a rotation about it and a translation along it free. If no axis is behind it, as for
-    a rotor, the other axes of the body decide.
+    After the first axis is aligned, a rotation about it and a translation along it are still free. The axes
+    after it determine both. If there are none, as for a rotor, the other axes of the body determine both.
     """
     firsts = _firsts((a, b), (None, None), bodies, ())
     for (ours, theirs), near, far in firsts:
@@ -374,7 +377,7 @@ def root_poses_by_siblings(
             more = [
                 pair_of(ours[i], one) for i in others for h, one in theirs[i] if h is not f and h is not g
             ]
-            if not ours[second].turns:  # a translation across the first axis keeps heights along it
+            if not ours[second].turns:  # a translation perpendicular to the first axis keeps heights along it
                 carried = edges[second].beyond(bodies[0]), g.beyond(bodies[1])
                 led = _next_joints((a, b), (edges[second], g), carried)
                 more += [pair_of(_axis(a, e), _axis(b, h)) for e, h in led]
@@ -625,7 +628,7 @@ class Congruence:
 
 
 def _distinct(poses: Iterable[FloatArray]) -> Iterator[FloatArray]:
-    """Yield each pose once; poses are equal if all bits are equal."""
+    """Yield each pose once; two poses count as equal only if all their bits are equal."""
     seen = set[bytes]()
     for X in poses:
         if (key := X.tobytes()) not in seen:

@@ -1,13 +1,14 @@
-"""Align mechanism B with mechanism A: match their joints, and choose base, senses, zeros and order.
+"""Align mechanism B with mechanism A: match their joints, and choose B's base, senses, zeros and joint order.
 
 The matcher goes through both mechanisms from a common body outwards. At each joint it chooses the sense and
 the zero with which most links and axes behind the joint agree. `align` calls it for several starting bodies
 and joint orders, and returns the best result.
 
-Only mimic rules determine some joint zeros, because no axis and no link frame does. Let v = m w + c be a rule
-of A and v' = m' w' + c' one of B. They are equivalent if v' = s v + o and w' = s' w + o' turn one into the
-other. If nothing is attached to a joint's link, its offset o is free, and the rule determines it. For a
-revolute joint o is free by full turns in any case.
+Most joint zeros are determined by axes or link frames. The zero of a joint without an axis or a common link
+frame after it is determined only by a mimic rule. Let v = m w + c be a rule of A and v' = m' w' + c' a rule
+of B. The rules are equivalent if the substitution v' = s v + o, w' = s' w + o' converts one rule to the
+other. If nothing is attached to the joint's link, its offset o is free, and the rules determine it. For a
+revolute joint, a multiple of a full turn may always be added to o.
 """
 
 from __future__ import annotations
@@ -49,11 +50,12 @@ from urdfkin.model.mechanisms.mechanism import (
 from urdfkin.model.pose import inverse
 from urdfkin.model.tree import FloatArray, Joint
 
-#: Number of joints that a choice looks ahead when the next axis does not decide it.
+#: Number of joints that the matcher looks ahead if the next axis does not decide between two choices.
 AHEAD = 6
-#: Number of poses of B's root that are tried with all axes of one body on axes of A's body.
+#: Largest number of poses of B's root that are tried with all axes of a body of B on axes of a body of A.
 MOST_ROOT_POSES = 48
-#: A choice with as many agreements is better only if its largest disagreement is below this share.
+#: Of two choices with equally many agreements, one is better only if its largest disagreement is less than
+#: this fraction of the other's.
 TWICE_AS_WELL = 0.5
 
 #: The free part of a joint: an offset, or a pose.
@@ -75,10 +77,10 @@ class Place:
 
     Attributes:
         bodies: The current body of A and of B.
-        via: The joints by which they were reached; None at the base.
+        via: The joints from which the matcher reached these bodies; None at the base.
         previous: Index of the last step, -1 for none.
-        G: (4, 4) motion of A's zero configuration to B's pose.
-        XC: (4, 4) motion of B's zero configuration to that pose.
+        G: (4, 4) motion that moves A's zero configuration to the current pose of B.
+        XC: (4, 4) motion that moves B's zero configuration to the current pose of B.
     """
 
     bodies: tuple[int, int]
@@ -413,7 +415,7 @@ class MechanismMatcher:
                 zero = 0.0 if self.tolerance.holds(*apart(place.XC, exact)) else zero
             offset, there, score = self._best_zero(there, place.G, t, turns, zero, depth)
             return Step(a, b, kind, place.previous, sense, offset, IDENTITY, s, s, 0.0, 0.0), there, score
-        # Either the joint and all behind it have moved, or only its axis differs.
+        # Either the joint and all bodies after it are displaced in B, or only the joint's axis differs.
         with_it = self._best_zero(there, K @ place.G, t, turns, zero, depth)
         if depth == AHEAD:
             alone = self._best_zero(there, place.G, t, turns, zero, depth)
@@ -458,7 +460,7 @@ class MechanismMatcher:
                 continue
             score = self._score(place)
             scored.append((what, place, score))
-            if not score[1] and self.pairing.links(*place.bodies):  # no other choice agrees better
+            if not score[1] and self.pairing.links(*place.bodies):  # no other choice can agree better
                 return scored[-1]
         best = _best_of(scored)
         equal = [one for one in scored if not better(best[2], one[2])]
@@ -519,7 +521,7 @@ def _best_of(scored: Sequence[tuple[_Free, Place, Score]]) -> tuple[_Free, Place
 
 
 def better(score: Score, than: Score) -> bool:
-    """Return whether more agrees, or as much agrees and the rest disagrees by less than half."""
+    """Return whether `score` has more agreements, or as many and less than half the largest disagreement."""
     return score[0] > than[0] or (score[0] == than[0] and score[1] < TWICE_AS_WELL * than[1])
 
 
@@ -649,10 +651,10 @@ def _exchanged(best: Alignment, given: Mapping[str, str]) -> Alignment:
 def _nearly(best: Alignment, given: Mapping[str, str]) -> Alignment:
     """Return a much better alignment found with a larger tolerance; the same one if there is none.
 
-    If every axis is slightly off, no exact agreement decides between two candidates. So the search runs again
-    with increasing tolerances, until everything agrees. Then the mechanisms are aligned again with the exact
-    tolerance and the free choices of that search, so that small differences are reported. A large difference
-    counts as a wrong choice only if a joint before it has a smaller one.
+    If every axis differs slightly, no exact agreement decides between two candidates. The search is therefore
+    repeated with increasing tolerances until everything agrees. Then the mechanisms are aligned once more,
+    with the exact tolerance and the free choices of the last search, so that the small differences are
+    reported. A large difference counts as a wrong choice only if an earlier joint has a smaller difference.
     """
     a, b, (least, most), ahead = best.a, best.b, best.inner_off, Ahead(MOST_AHEAD)
     for angle in NEARLY:
@@ -695,7 +697,8 @@ def _best_alignment(
 
 #: Full turns by which the zero of a mimicked joint may be changed.
 TURNS = (0, 1, -1)
-#: Tolerance of a zero that axes determine, in units of the angle tolerance; the axes may be close together.
+#: Tolerance of a zero that axes determine, as a multiple of the angle tolerance. It is large because axes
+#: that are close together determine a zero only inexactly.
 LEVER = 1e4
 
 
@@ -711,7 +714,7 @@ class _Rule:
         d: Offset of B's rule.
         offset: o, as the alignment found it.
         turns: Whether the joint is revolute.
-        free: Whether no axis and no common link determines o.
+        free: Whether o is free, because no axis and no common link determines it.
         meets: Whether links of A and of B coincide on the body behind the joint.
     """
 
@@ -746,7 +749,7 @@ def zeros_by_rules(found: Alignment, tolerance: Tolerance) -> Mapping[str, tuple
     zeros = dict[str, tuple[int, float]]()
     for rules in _groups(found):
         alphas = [rule.slope / rule.n for rule in rules if rule.n]
-        # A joint with a different slope keeps its difference; the others are set nevertheless.
+        # The zero of a joint with a different slope stays as it is; the zeros of the other joints are set.
         alpha = max(
             alphas, key=lambda one: sum(_near(one, other, tolerance) for other in alphas), default=0.0
         )

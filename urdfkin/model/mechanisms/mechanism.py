@@ -1,9 +1,9 @@
 """A robot as a mechanism: rigid bodies and joint screws in the zero configuration.
 
 By the product of exponentials a link's pose is exp(S_1 t_1) ... exp(S_n t_n) H. The unit screws S_i and the
-pose H are those of the zero configuration, in one common frame. Links between the joints do not appear, so
-fixed links may be merged or split. No body is special as the root: seen from another body, a path passes
-some joints backwards, with reversed screws.
+pose H are those of the zero configuration, in one common frame. The links between the joints do not occur in
+this product, so links that are fixed to each other may be merged or split. Any body may serve as the root: a
+path from another body passes some joints backwards, with reversed screws.
 
 The coordinates of a planar or floating joint are a pose P. If B's joint is in another frame, or the body
 behind it has another frame, the motions are equal for
@@ -11,7 +11,8 @@ behind it has another frame, the motions are equal for
     P_b = M P_a N,      or      M P_a^-1 N if one model's joint is reversed.
 
 For a floating joint any rigid M and N are valid. For a planar joint, M P N must be in the plane for every P
-in the plane: M raises the plane by as much as N lowers it, and both or neither turn it over.
+in the plane. This requires that M raises the plane by as much as N lowers it, and that both or neither turn
+it over.
 """
 
 from __future__ import annotations
@@ -48,9 +49,9 @@ def along(screw: Screw, value: float, *, turns: bool) -> FloatArray:
 def between(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArray, float, float]:
     """Return the smallest motion from one joint axis to another, its tilt (rad) and its shift (m).
 
-    The axis is tilted about the first joint's origin and shifted perpendicular to itself. A rotation
-    about the axis and a shift along it remain; they belong to the joint's zero, or have no effect. The axis
-    of a prismatic joint has no position, so its shift is 0.
+    The motion tilts the axis about the first joint's origin and then shifts it perpendicular to itself. It
+    contains no rotation about the axis and no shift along it, because these belong to the joint's zero or
+    have no effect. The axis of a prismatic joint has no position, so its shift is 0.
     """
     R, tilt = shortest_turn(start.direction, end.direction)
     across = np.zeros(3)
@@ -170,8 +171,9 @@ def onto_plane(P: FloatArray) -> FloatArray:
 def undoing(M: FloatArray) -> FloatArray:
     """Return N (4, 4) for which M P N is in the plane for every P in the plane.
 
-    M must keep the direction of the plane's normal, or reverse it. Then M is a lift by h, a motion in the
-    plane, and possibly half a turn about x: N undoes the lift and the half turn.
+    M must keep the direction of the plane's normal or reverse it. M is then composed of a translation by h
+    along the normal, a motion in the plane, and possibly half a turn about x. N reverses the translation and
+    the half turn.
     """
     over = np.diag([1.0, -1.0, -1.0, 1.0]) if M[2, 2] < 0.0 else np.eye(4)
     return over @ pose(p=(0.0, 0.0, -M[2, 3]))
@@ -208,7 +210,7 @@ class Edge:
     outer: int
 
     def beyond(self, body: int) -> int:
-        """Return the body at the other end."""
+        """Return the other body of the joint."""
         return self.outer if body == self.inner else self.inner
 
 
@@ -217,7 +219,8 @@ class Mechanism:
 
     Args:
         tree: The robot.
-        parting: Fixed joints (indices) that count as joints, because they move in the other model.
+        parting: Indices of fixed joints that separate two bodies, because these joints move in the other
+            model.
     """
 
     def __init__(self, tree: KinematicTree, parting: Collection[int] = ()) -> None:
@@ -342,7 +345,7 @@ class Mechanism:
 
     @cached_property
     def rounding(self) -> float:
-        """Rounding error (rad, and as a share of `size`) of poses read from a file, summed over all links.
+        """Rounding error of poses read from a file, summed over all links (rad, and as a fraction of `size`).
 
         It includes the small tilts of Pinocchio's axes (URDF514).
         """

@@ -1,15 +1,16 @@
 """Upper bounds on the distance between a frame in two models, proven for all configurations at once.
 
 Support functions. The support function of a set W of points is h(u) = max over p in W of u . p. A bound on
-distances needs only h. A joint transforms h directly: if W rotates about an axis by any angle of a range,
-h'(u) is the largest h over the directions u rotated back; if W translates, the translation's term is added.
-So the reach of a chain is one function of the direction, for any number of joints. A search over all joint
-values is not needed.
+distances needs only h. The effect of a joint on h is simple. If W rotates about an axis by any angle of a
+range, the new h'(u) is the largest h over the directions that result when u is rotated back by these angles.
+If W translates, h'(u) is h(u) plus the largest product of u and the translation. One function of the
+direction therefore describes the reach of a chain with any number of joints, and no search over joint values
+is needed.
 
 h is stored at the points of a grid on the surface of a cube. It is convex with h(s u) = s h(u), so
 interpolation between grid points gives an upper bound. A rotation is bounded in the same way: an arc of
-directions lies in a circumscribed polygon, and h on the polygon is largest at a corner. Each step enlarges
-the bound by a share that decreases with the square of the grid's step.
+directions lies in a circumscribed polygon, and h on the polygon is largest at a corner. Each joint enlarges
+the bound by a fraction that decreases with the square of the distance between grid points.
 
 Recursion. Let y be the position of B's frame behind joint i, in A's zero configuration, and d its difference
 from A's frame. In front of the joint
@@ -17,10 +18,10 @@ from A's frame. In front of the joint
     d' = (L - 1) e(S' t') y  +  (e(S' t') - e(S t')) y  +  (e(S t') - e(S t)) y  +  e(S t) d.
 
 All terms but the last vanish if nothing differs. For each direction u, the largest u . d' is at most the sum
-of the largest values of the terms, which the support functions of y and d give. If one thing differs, there
-is one term, and only the grid enlarges the bound. If several differ, each may have its own worst
-configuration, and the bound is larger than the true maximum. If only fixed offsets differ, a sum of path
-lengths gives a second bound, without grid error.
+of the largest values of the terms. The support functions of y and d give these values. If there is one
+difference between the models, there is one term, and only the grid makes the bound larger than the true
+maximum. Several differences may be largest in different configurations, so their bound is larger than the
+true maximum. If only fixed offsets differ, a sum of path lengths gives a second bound without grid error.
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ from urdfkin.model.mechanisms.mechanism import Screw, apart
 from urdfkin.model.tree import FloatArray
 
 _WHOLE = 2.0 * math.pi
-#: Number of corners of the polygon around a circle; the corners are 0.1 % farther out.
+#: Number of corners of the polygon around a circle; the corners are 0.1 % farther from the centre than the
+#: circle.
 _AROUND = 64
 
 
@@ -228,7 +230,7 @@ def _differs(step: Step, pair: Pair | None) -> bool:
 def _radians(
     steps: Sequence[Step], pairs: Sequence[Pair | None], variables: Variables, frame: FramePair
 ) -> float:
-    """Return a bound (rad) on the frame's angle: that of a product is at most the sum of the angles."""
+    """Return a bound (rad) on the frame's angle: the sum of the angles of all differing rotations."""
     total = apart(IDENTITY, frame.end)[0]
     for step, pair in zip(steps, pairs, strict=True):
         total += apart(IDENTITY, step.before)[0]

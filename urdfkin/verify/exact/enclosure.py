@@ -1,8 +1,8 @@
 """Enclosures: intervals that provably contain the true values of one sample.
 
 `urdfkin.kinematics.equations` is evaluated with interval arithmetic (`urdfkin.verify.exact.intervals`). The
-inputs are the decimals in the URDF text and the exact values of q, v and a. An enclosure proves the rounding,
-not the equations: the agreement with Pinocchio supports those.
+inputs are the decimals in the URDF text and the exact values of q, v and a. An enclosure proves a bound on
+the rounding error. It does not prove the equations; the agreement with Pinocchio supports the equations.
 """
 
 from __future__ import annotations
@@ -38,9 +38,10 @@ from urdfkin.verify.quantities import (
 )
 from urdfkin.verify.verifier import Verifier, theirs_of, urdfkins
 
-#: Accepted numbers of digits. A double has 15; more than 10,000 take too long.
+#: Smallest and largest accepted number of digits. A double has 15 digits; more than 10,000 take too long.
 LEAST_DIGITS, MOST_DIGITS = 15, 10_000
-#: Default: twice the digits of a double. One is added for each joint; oblique axes lose a third of one each.
+#: Default number of digits, twice that of a double. One digit is added for each joint. A joint with an
+#: oblique axis loses a third of a digit.
 ENOUGH_DIGITS = 30
 
 
@@ -64,7 +65,10 @@ class Enclosure:
 
     @property
     def width(self) -> FloatArray:
-        """Upper - lower: 0 where the true value is a double, else at least the distance of two doubles."""
+        """The difference upper - lower. It is 0 where the true value is a double.
+
+        Elsewhere it is at least the distance of two neighbouring doubles.
+        """
         return self.upper - self.lower
 
     def contains(self, x: ArrayLike) -> NDArray[np.bool_]:
@@ -115,7 +119,8 @@ class Enclosures:
     Attributes:
         frame: Name of the frame.
         reference: Reference frame of velocity, acceleration and Jacobians.
-        digits: Decimal digits of the interval arithmetic; the ends are then rounded outward to doubles.
+        digits: Decimal digits of the interval arithmetic. The ends of the resulting intervals are rounded
+            outward to doubles.
         placement: (4, 4) m.
         velocity: (6,) [linear; angular], m/s, rad/s.
         acceleration: (6,) [linear; angular], classical, m/s^2, rad/s^2.

@@ -1,8 +1,8 @@
 """Interval arithmetic with rigorous bounds.
 
 mpmath computes sums, differences, products, quotients and integer powers of intervals in integer arithmetic
-and rounds them outward once, which is rigorous. Its square root, sine, cosine and parser of large exponents
-are accurate but not proven. This module replaces them by rigorous versions.
+and rounds them outward once, which is rigorous. mpmath's square root, sine, cosine and parser of large
+exponents are accurate, but their bounds are not proven. This module has rigorous versions of these functions.
 """
 
 from __future__ import annotations
@@ -16,14 +16,15 @@ from mpmath.libmp import dps_to_prec, from_float, from_int, mpf_gt, mpf_lt, to_f
 
 from urdfkin.verify.exact.numbers import Matrix, Number, defect, nearest_rotation
 
-#: Additional bits for iterations.
+#: Additional bits of precision during iterations.
 _SPARE = 30
-#: Taylor's series is used for angles below 2^-10; larger ones follow from the double-angle formulas.
+#: Taylor's series is used for angles below 2^-10. Sine and cosine of larger angles follow from the
+#: double-angle formulas.
 _SMALL = 10
 
 
 class Intervals:
-    """A number context for `urdfkin.verify.exact.recursion`: intervals with ends of a given precision.
+    """Functions of intervals with ends of a given precision, for `urdfkin.verify.exact.recursion`.
 
     Args:
         bits: Precision of the ends, bits; a double has 53.
@@ -50,16 +51,17 @@ class Intervals:
         return self._field.make_mpf((end, end))
 
     def sqrt(self, x: Number) -> Number:
-        """Return the square root: it lies between m and x / m for any m > 0 (Heron)."""
+        """Return the square root. For any m > 0 it lies between m and x / m (Heron)."""
         m = self._field.sqrt(x.mid).mid
         other = x / m
         return self._field.mpf((min(m, other.a), max(m, other.b)))
 
     def cos_sin(self, angle: Number) -> tuple[Number, Number]:
-        """Return cosine and sine: those of the midpoint, widened by the half width of the angle.
+        """Return cosine and sine of an angle: those of its midpoint, widened by half its width.
 
-        The midpoint is halved until Taylor's series converges fast. The remainder is below the next term.
-        Then 1 - 2 s^2 and 2 s c double the angle. Each doubling enlarges the error at most four times.
+        The midpoint is halved until Taylor's series converges fast. The remainder of the series is below its
+        next term. Then the formulas 1 - 2 s^2 and 2 s c double the angle. Each doubling enlarges the error at
+        most four times.
         """
         if angle == 0:
             return self.mpf(1), self.mpf(0)
@@ -85,14 +87,14 @@ class Intervals:
         return self._field.mpf((-size, size))
 
     def _own(self, x: Number) -> Number:
-        """Return an interval of another context as one of this context, unchanged."""
+        """Return an interval of another precision as an interval of this context, with the same ends."""
         return self._field.make_mpf(x._mpi_)
 
     def nearest_rotation(self, M: Matrix) -> Matrix:
         """Return the rotation nearest to a matrix that is a rotation to some digits, with rigorous bounds.
 
-        Newton's iteration returns X = U (1 + E) with the same orthogonal factor U. The eigenvalues of E are
-        above -1, so X^T X - 1 = 2 E + E^2 is larger than E, and |X - U| <= |X^T X - 1|.
+        Newton's iteration returns X = U (1 + E) with the same orthogonal factor U. X^T X - 1 = 2 E + E^2. The
+        eigenvalues of E are above -1, so |E| <= |2 E + E^2| and |X - U| <= |X^T X - 1|.
         """
         wide = intervals(self.bits + _SPARE)
         X = nearest_rotation(_each(wide._own, M))
@@ -101,7 +103,7 @@ class Intervals:
 
 
 def _each(function: Callable[[Number], Number], M: Matrix) -> Matrix:
-    """Return the matrix of the function's results."""
+    """Return the matrix with the function applied to each number."""
     x, y, z = ((function(a), function(b), function(c)) for a, b, c in M)
     return x, y, z
 
@@ -123,7 +125,8 @@ def ends(x: Number) -> tuple[float, float]:
         return float(x), float(x)
     a, b = x._mpi_
     low, high = to_float(a), to_float(b)
-    # The error of `to_float` is less than one double, also for subnormal and infinite numbers.
+    # The error of `to_float` is less than the distance to the next double, also for subnormal and infinite
+    # numbers.
     if mpf_lt(a, from_float(low)):
         low = math.nextafter(low, -math.inf)
     if mpf_gt(b, from_float(high)):

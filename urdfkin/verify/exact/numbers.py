@@ -4,7 +4,7 @@ A context determines the kind of number: `mp` of mpmath for fifty digits, `urdfk
 intervals. Vectors are triples of numbers.
 
 `read_exact` reads the decimals of a URDF text without rounding them to doubles. Names and order of the joints
-come from the tree; `urdfkin.lint` checked the text before.
+come from the tree. `urdfkin.lint` has already checked the text.
 """
 
 from __future__ import annotations
@@ -21,10 +21,11 @@ from urdfkin.kinematics import equations as eq
 from urdfkin.model.tree import Joint, JointKind, KinematicTree
 from urdfkin.urdf.plain_xml import plain_xml
 
-#: Digits of the accuracy study. Doubles have 16, so fifty determine their last digit reliably.
+#: Number of digits in the accuracy study. A double has 16 digits, so fifty digits are enough to measure an
+#: error in its last digit.
 DIGITS = 50
 
-#: A separate context, so that mpmath's global one does not change.
+#: A separate mpmath context, so that urdfkin does not change the precision of mpmath's global context.
 mp = mpmath.mp.clone()
 mp.dps = DIGITS
 
@@ -33,7 +34,7 @@ Number = Any
 Vector = tuple[Number, Number, Number]
 Matrix = tuple[Vector, Vector, Vector]
 
-# Integers work with every kind of number.
+# A vector of integers can be combined with every kind of number.
 ZERO: Vector = (0, 0, 0)
 IDENTITY: Matrix = (1, 0, 0), (0, 1, 0), (0, 0, 1)
 
@@ -77,10 +78,10 @@ def from_quaternion(quaternion: tuple[Number, ...], context: Context) -> Matrix:
 
 
 def nearest_rotation(M: Matrix) -> Matrix:
-    """Return the rotation nearest to M, its orthogonal factor U in M = U H.
+    """Return the rotation nearest to M. It is the orthogonal factor U of the polar decomposition M = U H.
 
-    M must be a rotation to some digits. Newton's iteration X - X (X^T X - I)/2 doubles the digits with each
-    step.
+    M must be close to a rotation. Each step of Newton's iteration X - X (X^T X - I)/2 doubles the number of
+    correct digits.
     """
     for _ in range(6):
         x, y, z = (
@@ -107,7 +108,7 @@ class ExactJoint:
 
     Attributes:
         R: Orientation of the joint frame relative to its parent.
-        p: Its position relative to its parent, m.
+        p: Position of the joint frame relative to its parent, m.
         axis: Unit axis in the joint frame.
         multiplier: Multiplier of a mimic joint, else 1.
         offset: Offset of a mimic joint, else 0.

@@ -1,8 +1,8 @@
 """The forward recursion of section 7.7 with exact numbers: fifty digits or intervals.
 
 The equations are those of `urdfkin.kinematics.equations`, in world axes as in the textbook. The inputs are
-the URDF's decimals and the exact values of q, v and a. The results are reference values for the rounding; the
-comparison with Pinocchio checks the equations themselves.
+the URDF's decimals and the exact values of q, v and a. The results are reference values that measure rounding
+errors. They do not check the equations; the comparison with Pinocchio does.
 """
 
 from __future__ import annotations
@@ -40,7 +40,8 @@ def on_base(
     Args:
         base: (4, 4) placement, (6,) velocity and acceleration.
         context: The number context.
-        nearest: Function for the rotation nearest to the placement's matrix, a rotation to nine digits.
+        nearest: Function that returns the rotation nearest to the matrix of the placement. The matrix is a
+            rotation to nine digits.
     """
 
     def vector(x: FloatArray) -> Vector:
@@ -80,7 +81,7 @@ def move(
 
     Args:
         tree: The robot.
-        joints: Exact numbers of the joints, by index; each joint after those on its path to the root.
+        joints: Exact numbers of the joints, by index. A joint comes after all joints on its path to the root.
         q: (nq,) coordinates, in numbers of the context.
         v: (nv,) joint velocities.
         a: (nv,) joint accelerations.
@@ -166,7 +167,7 @@ def hessian_values(motion: Motion, link: int, reference: Reference) -> NDArray[n
     """Return the Hessian (6, nv, nv)."""
     out = np.zeros((motion.nv, motion.nv, 6), dtype=object)
     for of, by, factor, six in _RECURSION.hessian(motion.states[link], motion.columns[link], reference):
-        out[of, by] += _array([factor * x for x in six])  # intervals do not multiply arrays
+        out[of, by] += _array([factor * x for x in six])  # an interval times an array is not defined
     return out.transpose(2, 0, 1)
 
 
