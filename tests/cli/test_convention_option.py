@@ -54,6 +54,12 @@ def test_the_table_names_the_angular_part_first_where_the_tool_does() -> None:
     assert named == ["angular", "linear"]
 
 
+def test_the_check_is_that_of_the_numbers_before_the_conversion() -> None:
+    done = run("velocity", "ur5", "--convention", "drake", "--v", "random")
+    assert "before the conversion to drake" in done.err + done.text
+    assert "before the conversion" not in run("velocity", "ur5", "--v", "random").err
+
+
 def test_a_users_file_and_names_are_read(tmp_path: Path) -> None:
     file = tmp_path / "motors.toml"
     file.write_text('joints = ["elbow", "joint_1"]\nangle = "deg"\n[joint.joint_2]\nname = "elbow"\n')

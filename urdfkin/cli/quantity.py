@@ -90,10 +90,13 @@ def _read() -> Inputs:
 def _checked(x: Inputs, title: str, parts: Callable[[], Iterable[str | Table]], **data: Any) -> Answer:
     """Return an answer whose check is the robot's certificate."""
     certificate = x.robot.certificate()
+    check = check_line(certificate)
+    if x.conversion is not None:
+        check += f", before the conversion to {x.conversion.convention.name}"
     return Answer(
         lambda: TextDocument(f"{x.robot.name}: {title}", list(parts())),
         data,
-        check_line(certificate),
+        check,
         exit_code(certificate),
     )
 
