@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import resource
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-import urdfkin
 from urdfkin.compiled.batch import default_threads
+from urdfkin.export import compiled_frame
 from urdfkin.urdf import confinement
 from urdfkin.validation import memory
 
@@ -22,13 +23,17 @@ def test_the_number_of_processors_is_known_without_affinity(monkeypatch: pytest.
     assert default_threads(10**6) == os.cpu_count()
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
-def test_a_compiled_frame_loads_without_files_in_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_machine_code_loads_from_a_temporary_file_without_files_in_memory(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    source, library = tmp_path / "twice.c", tmp_path / "twice.so"
+    source.write_text("double twice(double x) { return 2.0 * x; }\n")
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", library, source], check=True)
     monkeypatch.delattr(os, "memfd_create")
-    robot = urdfkin.load("ur5")
-    q = np.full(6, 0.3)
-    np.testing.assert_allclose(robot.compiled("tool0").jacobian(q), robot.jacobian(q, "tool0"), atol=1e-15)
+    twice = compiled_frame._load(library.read_bytes()).twice
+    twice.argtypes, twice.restype = [ctypes.c_double], ctypes.c_double
+    assert twice(21.0) == 42.0
 
 
 def test_no_limit_of_memory_is_derived_where_the_system_states_none(
