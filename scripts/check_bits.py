@@ -1,6 +1,6 @@
 """Check that results are equal to the last bit: single and in a batch, before and after a change.
 
-    python scripts/check_bits.py [ROBOT ...]           # compare single, prepared, batched and joint calls
+    python scripts/check_bits.py [ROBOT ...]           # compare single, prepared, batched, joint, interpreted
     python scripts/check_bits.py --write before.npz    # also store the results
     python scripts/check_bits.py --against before.npz  # also compare with stored results
 
@@ -27,6 +27,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 
 import urdfkin
+from urdfkin.compiled.preload import Way, only
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -42,6 +43,9 @@ LENGTHS = (1, 2, 7, 8, 9, 100)
 THREADS = (None, 1, 2, 3)
 #: Number of stored configurations, and of stored frames.
 KEPT, FRAMES = 9, 6
+#: Index of the configuration that Python's numbers compute; and the two ways.
+INTERPRETED = 3
+WAYS: tuple[Way, ...] = ("interpreted", "compiled")
 
 Arrays = Mapping[str, Any]
 
@@ -141,6 +145,18 @@ def differing_in_one_pass(subject: Subject, now: Arrays) -> Iterator[str]:
             yield f"{what}: several frames in one pass"
 
 
+def differing_interpreted(subject: Subject) -> Iterator[str]:
+    """Yield the results that differ between Python's numbers and the kernels."""
+    for what, quantity, reference, inputs in subject.results():
+        row = [x[INTERPRETED] for x in inputs]
+        found = []
+        for way in WAYS:
+            with only(way):
+                found.append(computed(subject, quantity, reference, subject.frames, row))
+        if not same(*found):
+            yield f"{what}: interpreted"
+
+
 # -- before and after ------------------------------------------------------------------------------------
 
 
@@ -212,8 +228,10 @@ def main(words: Sequence[str] | None = None) -> int:
     wrong = 0
     for name in given.robots or known:
         subject = Subject.of(name, before)
-        now = to_keep(subject)
-        found = [*differing(subject), *differing_in_one_pass(subject, now)]
+        with only("compiled"):
+            now = to_keep(subject)
+            found = [*differing(subject), *differing_in_one_pass(subject, now)]
+        found += differing_interpreted(subject)
         everything |= now
         said, most = ("", 0.0) if before is None else compared(name, now, before)
         print(f"{name:28} {digest(now)} {said}", *found[:3], sep="\n    " if found else " ", flush=True)

@@ -19,7 +19,7 @@ _NEW = count()
 class Counted:
     """A double; what each rounding so far did to it at most, in u = eps/2, to first order; whether sums fuse.
 
-    A product that is fused waits for the sum that it meets, as in `urdfkin.compiled.numbers`.
+    A product that is fused waits for the sum that it meets, as in `urdfkin.compiled.machine.numbers`.
     """
 
     value: float

@@ -1349,19 +1349,8 @@ class Robot(Displayable):
         [0.0, 0.9, 0.0, 0.0, 0.0, 1.0]
         """
         frame = self._default_frame() if frame is None else frame
-        # Hashing an enumeration member takes longer than the rest of this function. So for the default
-        # reference, the key is the plain name alone. The types in the other keys distinguish a member from an
-        # equal number, and `LinkFrame("link:a")` from a link with the literal name "link:a".
-        plain = reference is _ALIGNED and type(frame) is str
-        key = frame if plain else (type(frame), frame, type(reference), reference)
-        try:
-            prepared = self._prepared.get(key)
-        except TypeError:  # not hashable, therefore not a valid name
-            self.tree.frame_link(frame)
-            return self.prepare(frame, Reference.of(reference))
-        if prepared is None:
-            plan = self.plan([self.tree.frame_link(frame)])
-            prepared = self._prepared[key] = PreparedFrame(self, frame, Reference.of(reference), plan)
+        prepared = self._prepare(frame, reference)
+        prepared.wanted = True
         return prepared
 
     def compiled(self, frame: str | None = None, reference: Reference | str = _ALIGNED) -> CompiledFrame:
@@ -1664,4 +1653,21 @@ class Robot(Displayable):
             return None
         if reference is _ALIGNED and type(frame) is str and (fast := self._prepared.get(frame)) is not None:
             return fast
-        return self.prepare(frame, reference)
+        return self._prepare(frame, reference)
+
+    def _prepare(self, frame: str, reference: Reference | str) -> PreparedFrame:
+        """Return the fast evaluator of a frame; it is made once."""
+        # Hashing an enumeration member takes longer than the rest of this function, so a plain name is a key
+        # by itself. The types in the key distinguish a member from an equal number, and `LinkFrame("link:a")`
+        # from a link with the literal name "link:a".
+        plain = reference is _ALIGNED and type(frame) is str
+        key = frame if plain else (type(frame), frame, type(reference), reference)
+        try:
+            prepared = self._prepared.get(key)
+        except TypeError:  # not hashable, therefore not a valid name
+            self.tree.frame_link(frame)
+            return self._prepare(frame, Reference.of(reference))
+        if prepared is None:
+            plan = self.plan([self.tree.frame_link(frame)])
+            prepared = self._prepared[key] = PreparedFrame(self, frame, Reference.of(reference), plan)
+        return prepared

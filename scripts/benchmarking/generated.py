@@ -21,7 +21,7 @@ import numpy as np
 
 from scripts.benchmarking.subject import Subject
 from scripts.benchmarking.timing import Work
-from urdfkin.compiled import sine
+from urdfkin.compiled.machine import sine
 from urdfkin.compiled.plan import CompiledTree, Motion, Step
 from urdfkin.kinematics import equations
 from urdfkin.model.tree import FloatArray

@@ -16,10 +16,10 @@ import numpy as np
 from scripts.benchmarking.calls import Calls
 from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, Subject
 from scripts.benchmarking.timing import Work, times
-from urdfkin.compiled import kernels
 from urdfkin.compiled.evaluate import is_staged, task_of
+from urdfkin.compiled.machine import kernels
+from urdfkin.compiled.machine.single import single
 from urdfkin.compiled.program import WIDTH, Head, Op, Program, program_of
-from urdfkin.compiled.single import single
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray

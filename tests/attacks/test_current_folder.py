@@ -97,7 +97,9 @@ def test_compiling_runs_nothing_there(
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder.parent / "cache"))
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     script = Path(command[-1])
-    script.write_text("from urdfkin.compiled.single import one_configuration\none_configuration.compiled\n")
+    script.write_text(
+        "from urdfkin.compiled.machine.single import one_configuration\none_configuration.compiled\n"
+    )
     run(folder, command)
     assert list((folder.parent / "cache").rglob("*.kernel"))
 
@@ -133,7 +135,7 @@ def test_numba_takes_no_settings_from_there(tmp_path: Path) -> None:
         f"cache_dir: {tmp_path}\ndisable_jit: 1\ncache_locator_classes: evil.Locator\n"
     )
     code = (
-        "import os; from urdfkin.compiled.compiling import _config as c; c.reload_config(); print("
+        "import os; from urdfkin.compiled.machine.compiling import _config as c; c.reload_config(); print("
         "repr(c.CACHE_DIR), c.DISABLE_JIT, repr(getattr(c, 'CACHE_LOCATOR_CLASSES', '')), os.getcwd())"
     )
     environ = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}

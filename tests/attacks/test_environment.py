@@ -158,7 +158,7 @@ def test_numba_told_not_to_compile_is_no_matter_where_kernels_are_kept() -> None
 @pytest.mark.slow
 def test_numba_told_not_to_compile_is_no_matter_where_none_is(tmp_path: Path) -> None:
     """The kernel that takes the least time to compile, and is made of parts as all are."""
-    compiling = "from urdfkin.compiled.single import one_configuration as made; print(made.compiled)"
+    compiling = "from urdfkin.compiled.machine.single import one_configuration as made; print(made.compiled)"
     done = subprocess.run(
         [sys.executable, "-c", compiling],
         env=os.environ | {"NUMBA_DISABLE_JIT": "1", "XDG_CACHE_HOME": str(tmp_path), "NUMBA_CACHE_DIR": ""},

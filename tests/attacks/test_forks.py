@@ -78,7 +78,7 @@ CASES = {
         fork(lambda: (robot.placement(q[:3], "tool0"), robot.certificate()))
         """,
     "a kernel, while another thread compiles one": """
-        from urdfkin.compiled import compiling
+        from urdfkin.compiled.machine import compiling
         held(compiling._compiling)
         fork(lambda: robot.placement(q[:3], "tool0"))
         """,

@@ -19,8 +19,8 @@ import numpy as np
 import pytest
 
 from tests.cli.running import Done, process
-from urdfkin.compiled import compiling
-from urdfkin.compiled.compiling import NUMBERS, Kernel
+from urdfkin.compiled.machine import compiling
+from urdfkin.compiled.machine.compiling import NUMBERS, Kernel
 from urdfkin.system import cache
 from urdfkin.system.cache import CacheWarning, get, kept_folder, put
 

@@ -10,7 +10,7 @@ import pytest
 
 from urdfkin import compiled as recursion
 from urdfkin import kinematics
-from urdfkin.compiled import compiling
+from urdfkin.compiled.machine import compiling
 from urdfkin.system import cache
 from urdfkin.system.cache import kept_folder
 

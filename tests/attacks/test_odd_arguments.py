@@ -17,7 +17,7 @@ import pytest
 
 import urdfkin
 from urdfkin.compiled import batch
-from urdfkin.compiled.memory import LANES
+from urdfkin.compiled.program import LANES
 from urdfkin.motion.trajectory import line
 from urdfkin.robot import Robot
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import urdfkin
-from urdfkin.compiled.memory import LANES
+from urdfkin.compiled.program import LANES
 from urdfkin.compiled.plan import LARGE
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.model.base_motion import BaseMotion

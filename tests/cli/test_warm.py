@@ -10,9 +10,10 @@ import pytest
 
 import urdfkin as library
 from tests.cli.running import process, urdfkin
-from urdfkin.compiled import compiling, preload
-from urdfkin.compiled import kernels as every_kernel
-from urdfkin.compiled.compiling import Kernel
+from urdfkin.compiled import preload
+from urdfkin.compiled.machine import compiling
+from urdfkin.compiled.machine import kernels as every_kernel
+from urdfkin.compiled.machine.compiling import Kernel
 from urdfkin.validation import campaign
 
 

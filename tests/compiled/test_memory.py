@@ -10,7 +10,7 @@ import pytest
 import urdfkin
 from tests.laws.subjects import robot_of, state
 from urdfkin.compiled import evaluate
-from urdfkin.compiled.memory import LANES
+from urdfkin.compiled.program import LANES
 from urdfkin.compiled.plan import CompiledTree, compile_tree
 from urdfkin.compiled.program import program_of
 from urdfkin.model.reference import Reference

@@ -16,29 +16,24 @@ add the rounding errors of another rotation.
 
 from __future__ import annotations
 
-from urdfkin.compiled import compiled_equations as eq
-from urdfkin.compiled.compiling import compiled
+from urdfkin.kinematics import equations as eq
 
 
-@compiled
 def link_axes(own, world):
     """Return the vector expressed in the link's own axes, the first of the two arguments."""
     return own
 
 
-@compiled
 def world_axes(own, world):
     """Return the vector expressed in world axes, the second of the two arguments."""
     return world
 
 
-@compiled
 def seen(axes, R, x):
     """Express x, given in a link's own axes, in world axes or in the link's axes, as `axes` selects."""
     return axes(x, eq.rotate(R, x))
 
 
-@compiled
 def seen_after(axes, S, x):
     """Express a velocity or acceleration x after the link's axes are rotated by S; world axes stay fixed."""
     return axes(eq.rotate(eq.transposed(S), x), x)

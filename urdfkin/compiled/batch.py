@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cache
 from itertools import pairwise
 
-from urdfkin.compiled.memory import LANES
+from urdfkin.compiled.program import LANES
 from urdfkin.errors.validators import whole_number
 from urdfkin.model.tree import FloatArray
 

@@ -1,29 +1,30 @@
-"""The compiled recursions as plain functions of arrays.
+"""The recursions as plain functions of arrays.
 
-The inputs are batches of shape (n, nq) and (n, nv). `urdfkin.robot` checks and reshapes them, and verifies
-the results. If a batch is one row that was broadcast to n rows, the row is not copied. A kernel is compiled
-or read from disk when it is first needed.
+Inputs are checked flat batches, (n, nq) and (n, nv); `urdfkin.robot` checks, reshapes and verifies. A row
+that was broadcast to n is not copied. Python's numbers compute a few configurations, and a kernel computes
+more (`preload`); the bits are the same.
 """
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Sequence
 from typing import Any, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
+from urdfkin.compiled import preload, recursions
 from urdfkin.compiled.batch import in_blocks
-from urdfkin.compiled.compiling import Core
 from urdfkin.compiled.kernel_args import REFERENCES, KernelArgs, lines, scratch
-from urdfkin.compiled.memory import LANES
 from urdfkin.compiled.plan import LARGE, CompiledTree
-from urdfkin.compiled.program import Program, program_of
+from urdfkin.compiled.program import LANES, Program, program_of
 from urdfkin.errors import NotFiniteError, RangeError
+from urdfkin.errors.validators import whole_number
 from urdfkin.model.base_motion import STILL_STATE, against_gravity
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.system.locks import importing
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _PLACES = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
@@ -34,12 +35,6 @@ _STREAMED = 2 << 20
 _MOST_STAGED = 3072
 
 _STRIDES = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V, KernelArgs.STRIDE_A
-
-
-def _cores() -> Any:
-    with importing:
-        from urdfkin.compiled import kernels  # noqa: PLC0415
-    return kernels
 
 
 class How(TypedDict, total=False):
@@ -59,7 +54,7 @@ class How(TypedDict, total=False):
 def placements(plan: CompiledTree, q: FloatArray, **how: Unpack[How]) -> FloatArray:
     """Return T_world_frame (n, frames, 4, 4): the positions of 7.77, and the rotations."""
     program = program_of(plan, turned=True)
-    return _compute(_cores().placements, plan, program, [q], _ALIGNED, (4, 4), **how)
+    return _compute("placements", plan, program, [q], _ALIGNED, (4, 4), **how)
 
 
 def velocities(
@@ -67,8 +62,8 @@ def velocities(
 ) -> FloatArray:
     """Return velocities (n, frames, 6), [linear; angular]: 7.127, 7.128."""
     local = reference.own_axes
-    core = _cores().local_velocities if local else _cores().velocities
-    return _compute(core, plan, program_of(plan, turned=local), [q, v], reference, (6,), **how)
+    name = "local_velocities" if local else "velocities"
+    return _compute(name, plan, program_of(plan, turned=local), [q, v], reference, (6,), **how)
 
 
 def accelerations(
@@ -81,8 +76,8 @@ def accelerations(
 ) -> FloatArray:
     """Return classical accelerations (n, frames, 6), [linear; angular]: 7.129, 7.130."""
     local = reference.own_axes
-    core = _cores().local_accelerations if local else _cores().accelerations
-    return _compute(core, plan, program_of(plan, turned=local), [q, v, a], reference, (6,), **how)
+    name = "local_accelerations" if local else "accelerations"
+    return _compute(name, plan, program_of(plan, turned=local), [q, v, a], reference, (6,), **how)
 
 
 def jacobians(
@@ -90,7 +85,7 @@ def jacobians(
 ) -> FloatArray:
     """Return Jacobians (n, frames, 6, nv): 7.85."""
     program = program_of(plan, turned=reference.own_axes, columns=True)
-    return _compute(_cores().jacobians, plan, program, [q], reference, (6, plan.nv), **how)
+    return _compute("jacobians", plan, program, [q], reference, (6, plan.nv), **how)
 
 
 def jacobian_rates(
@@ -98,7 +93,7 @@ def jacobian_rates(
 ) -> FloatArray:
     """Return time derivatives of the Jacobians (n, frames, 6, nv): the J-dot of 7.126."""
     program = program_of(plan, turned=reference.own_axes, columns=True)
-    return _compute(_cores().jacobian_rates, plan, program, [q, v], reference, (6, plan.nv), **how)
+    return _compute("jacobian_rates", plan, program, [q, v], reference, (6, plan.nv), **how)
 
 
 def hessians(
@@ -106,7 +101,7 @@ def hessians(
 ) -> FloatArray:
     """Return Hessians (n, frames, 6, nv, nv); [..., i, j]: derivative of column i by joint velocity j."""
     program = program_of(plan, turned=reference.own_axes, columns=True, pairs=True)
-    return _compute(_cores().hessians, plan, program, [q], reference, (6, plan.nv, plan.nv), **how)
+    return _compute("hessians", plan, program, [q], reference, (6, plan.nv, plan.nv), **how)
 
 
 def imus(
@@ -125,11 +120,11 @@ def imus(
     """
     how["base"] = against_gravity(how.get("base", STILL_STATE), gravity)
     program = program_of(plan, turned=True)
-    return _compute(_cores().imus, plan, program, [q, v, a], Reference.LOCAL, (6,), **how)
+    return _compute("imus", plan, program, [q, v, a], Reference.LOCAL, (6,), **how)
 
 
 def _compute(
-    core: Core,
+    name: str,
     plan: CompiledTree,
     program: Program,
     inputs: Sequence[FloatArray],
@@ -140,7 +135,7 @@ def _compute(
     out: FloatArray | None = None,
     threads: int | None = None,
 ) -> FloatArray:
-    """Return (n, frames, *shape), computed by a kernel; `inputs` are q, or q and v, or q, v and a.
+    """Return (n, frames, *shape), computed from q, or q and v, or q, v and a.
 
     Raises:
         NotFiniteError: an input is not finite.
@@ -148,18 +143,76 @@ def _compute(
     """
     shape = len(inputs[0]), len(plan.frames), *shape
     out = np.empty(shape) if out is None else out.reshape(shape)
-    inputs = [x[:1] if _is_broadcast(x) else x for x in inputs]
-    staged = is_staged(out)
+    inputs = [base, *(x[:1] if _is_broadcast(x) else x for x in inputs)]
+    if (odd := _interpreted(name, program, reference, inputs, out, threads)) is None:
+        odd = _compiled(name, program, reference, inputs, out, threads)
+    if odd or plan.is_large or _is_large(base):
+        _check_finite(inputs, out)
+    return out
+
+
+def _interpreted(
+    name: str,
+    program: Program,
+    reference: Reference,
+    inputs: Sequence[FloatArray],
+    out: FloatArray,
+    threads: int | None,
+) -> int | None:
+    """Compute with Python's numbers; return whether an input is not ordinary, or None if a kernel pays.
+
+    Whether it pays depends on the time that the first configurations take.
+    """
+    if preload.kernel(name) is not None:
+        return None
+    if threads is not None:
+        whole_number(threads, "threads", 1)
+    recursion, least, odd = getattr(recursions, name), math.inf, 0
+    flat = out.reshape(len(out), math.prod(out.shape[1:]))
+    for i, row in enumerate(flat):
+        begin, result = time.perf_counter(), [0.0] * len(row)
+        odd |= recursion(_lists(program, reference, inputs, i, result))
+        row[:] = result
+        least = min(least, took := time.perf_counter() - begin)
+        preload.spend(name, took)
+        if (left := len(flat) - 1 - i) and preload.kernel(name, left * least) is not None:
+            return None
+    return odd
+
+
+def _lists(
+    program: Program, reference: Reference, inputs: Sequence[FloatArray], i: int, result: list[float]
+) -> list[Any]:
+    """Return the arguments of a recursion on Python's numbers for configuration `i`."""
+    task: list[Any] = [0] * len(KernelArgs)
+    task[KernelArgs.PROGRAM], task[KernelArgs.CONSTANTS] = program.lists
+    task[KernelArgs.SCRATCH], task[KernelArgs.OUT] = [None] * program.rows, result
+    task[KernelArgs.REFERENCE], task[KernelArgs.N], task[KernelArgs.WIDTH] = REFERENCES[reference], 1, len(result)
+    for place, x in zip(_PLACES, inputs, strict=False):
+        task[place] = x[0 if len(x) == 1 else i].tolist()
+    if inputs[0] is STILL_STATE:
+        task[KernelArgs.BASE] = 0
+    return task
+
+
+def _compiled(
+    name: str,
+    program: Program,
+    reference: Reference,
+    inputs: Sequence[FloatArray],
+    out: FloatArray,
+    threads: int | None,
+) -> int:
+    """Compute with a kernel; return whether an input is not ordinary."""
+    core, staged = preload.kernel(name), is_staged(out)
 
     def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
         task, kept = task_of(program, reference, parts, part, staged=staged)
-        outcome = core(task.ctypes.data)
+        outcome: int = core(task.ctypes.data)
         del kept
         return outcome
 
-    if in_blocks(compute, [base, *inputs], out, threads) or plan.is_large or _is_large(base):
-        _check_finite([base, *inputs], out)
-    return out
+    return in_blocks(compute, inputs, out, threads)
 
 
 def is_staged(out: FloatArray) -> bool:

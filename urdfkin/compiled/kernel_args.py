@@ -6,8 +6,7 @@ from enum import IntEnum, auto
 
 import numpy as np
 
-from urdfkin.compiled.memory import LANES
-from urdfkin.compiled.program import Program
+from urdfkin.compiled.program import LANES, Program
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 

@@ -10,13 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from urdfkin.compiled import compiled_equations as eq
-from urdfkin.compiled.compiling import compiled
 from urdfkin.compiled.kernel_args import REFERENCES
-from urdfkin.compiled.memory import constant, numbers_of, put, same, write_rows
-from urdfkin.compiled.numbers import nothing, zero
 from urdfkin.compiled.program import ONE_ROW, OUT_ROW, PAIR_WIDTH, ZERO_ROW, Head
+from urdfkin.compiled.python_numbers import constant, nothing, numbers_of, put, same, write_rows, zero
 from urdfkin.compiled.recursion import put_vector, vector
+from urdfkin.kinematics import equations as eq
 
 _LOCAL, _WORLD, _ALIGNED = REFERENCES.values()
 _FRAMES, _NV = int(Head.FRAMES), int(Head.NV)
@@ -30,30 +28,25 @@ _SIX = np.arange(OUT_ROW, OUT_ROW + 6)
 # -- needed parts of the state ---------------------------------------------------------------------------
 
 
-@compiled
 def _unused_vector():
     return nothing(), nothing(), nothing()
 
 
-@compiled
 def follow_place(state):
     """Keep R and p."""
     return state[0], state[1], _unused_vector(), _unused_vector(), _unused_vector(), _unused_vector()
 
 
-@compiled
 def follow_velocity(state):
     """Keep R, p, w and vel."""
     return state[0], state[1], state[2], state[3], _unused_vector(), _unused_vector()
 
 
-@compiled
 def follow_acceleration(state):
     """Keep R, p, w, alpha and acc, because 7.130 does not contain vel."""
     return state[0], state[1], state[2], _unused_vector(), state[4], state[5]
 
 
-@compiled
 def _no_vector():
     return zero(), zero(), zero()
 
@@ -61,7 +54,6 @@ def _no_vector():
 # -- the result of one frame -----------------------------------------------------------------------------
 
 
-@compiled
 def emit_place(m, s, program, place, sources, b, reference, state, to):
     """Write the 4 by 4 pose of a frame."""
     R, p = state[0], state[1]
@@ -72,14 +64,12 @@ def emit_place(m, s, program, place, sources, b, reference, state, to):
     write_rows(m, s, numbers_of(_POSE), 0, 16, to, (b * frames + place) * 16, frames * 16)
 
 
-@compiled
 def _pose_row(s, row, x, last):
     """Write a row of a pose."""
     put_vector(s, row, x)
     put(s, row + 3, last)
 
 
-@compiled
 def emit_velocity(m, s, program, place, sources, b, reference, state, to):
     """Write [linear; angular] velocity, 7.127 and 7.128, in a reference frame."""
     p, w, vel = state[1], state[2], state[3]
@@ -88,7 +78,6 @@ def emit_velocity(m, s, program, place, sources, b, reference, state, to):
     _emit_six(m, s, program, place, b, vel, w, to)
 
 
-@compiled
 def emit_acceleration(m, s, program, place, sources, b, reference, state, to):
     """Write [linear; angular] acceleration, 7.129 and 7.130, in a reference frame."""
     p, w, alpha, acc = state[1], state[2], state[4], state[5]
@@ -97,13 +86,11 @@ def emit_acceleration(m, s, program, place, sources, b, reference, state, to):
     _emit_six(m, s, program, place, b, acc, alpha, to)
 
 
-@compiled
 def emit_imu(m, s, program, place, sources, b, reference, state, to):
     """Write accelerometer and gyroscope readings; the base is accelerated by -gravity."""
     _emit_six(m, s, program, place, b, state[5], state[2], to)
 
 
-@compiled
 def _emit_six(m, s, program, place, b, linear, angular, to):
     put_vector(s, OUT_ROW, linear)
     put_vector(s, OUT_ROW + 3, angular)
@@ -111,7 +98,6 @@ def _emit_six(m, s, program, place, b, linear, angular, to):
     write_rows(m, s, numbers_of(_SIX), 0, 6, to, (b * frames + place) * 6, frames * 6)
 
 
-@compiled
 def emit_matrix(m, s, program, place, sources, b, reference, state, to):
     """Write the computed columns, and zeros for the joint velocities that do not move the frame."""
     frames, size = program[_FRAMES], 6 * program[_NV]
@@ -121,17 +107,14 @@ def emit_matrix(m, s, program, place, sources, b, reference, state, to):
 # -- columns ---------------------------------------------------------------------------------------------
 
 
-@compiled
 def keep_none(s, row, axis, state):
     """Do nothing: the output has no columns."""
 
 
-@compiled
 def column_none(s, row, to, how, g, c, reference, state):
     """Do nothing: the output has no columns."""
 
 
-@compiled
 def keep_axis(s, row, axis, state):
     """Store the axis z_{i-1} and the origin O_{i-1} of a joint, in the world's axes, as 7.85 needs them."""
     R, p = state[0], state[1]
@@ -144,7 +127,6 @@ def keep_axis(s, row, axis, state):
     put_vector(s, row + 3, p)
 
 
-@compiled
 def keep_moving_axis(s, row, axis, state):
     """Store the axis and the origin, and w and vel of the link that carries the axis."""
     keep_axis(s, row, axis, state)
@@ -152,7 +134,6 @@ def keep_moving_axis(s, row, axis, state):
     put_vector(s, row + 9, state[3])
 
 
-@compiled
 def column_jacobian(s, row, to, how, g, c, reference, state):
     """Compute [z x d_{i-1,n}; z] (revolute) or [z; 0] (prismatic), eq. 7.85, in a reference frame."""
     z, R = vector(s, row), state[0]
@@ -164,7 +145,6 @@ def column_jacobian(s, row, to, how, g, c, reference, state):
         _put_column(s, to, how, g, c, reference, R, z, _no_vector())
 
 
-@compiled
 def column_rate(s, row, to, how, g, c, reference, state):
     """Compute the time derivative of a Jacobian column (7.126); for LOCAL, of its components in the frame."""
     R, p, w, vel = state[0], state[1], state[2], state[3]
@@ -185,7 +165,6 @@ def column_rate(s, row, to, how, g, c, reference, state):
         _put_column(s, to, how, g, c, reference, R, z_rate, _no_vector())
 
 
-@compiled
 def _end(reference, x):
     """Return the reference point of a column: the frame's origin x, or for WORLD the world's origin."""
     if reference == _WORLD:
@@ -194,7 +173,6 @@ def _end(reference, x):
     return x
 
 
-@compiled
 def _put_column(s, to, how, g, c, reference, R, linear, angular):
     """Write a column in the axes of the reference frame.
 
@@ -210,7 +188,6 @@ def _put_column(s, to, how, g, c, reference, R, linear, angular):
         _add_column(s, to, how, linear, angular)
 
 
-@compiled
 def _add_column(s, to, how, linear, angular):
     if how & 2:
         _add_six(s, to, linear, angular)
@@ -219,7 +196,6 @@ def _add_column(s, to, how, linear, angular):
         put_vector(s, to + 3, angular)
 
 
-@compiled
 def _add_six(s, to, linear, angular):
     put_vector(s, to, eq.plus(vector(s, to), linear))
     put_vector(s, to + 3, eq.plus(vector(s, to + 3), angular))
@@ -228,7 +204,6 @@ def _add_six(s, to, linear, angular):
 # -- pairs of columns ------------------------------------------------------------------------------------
 
 
-@compiled
 def emit_pairs(m, s, program, place, pairs, b, reference, state, to):
     """Compute and write the derivative of each column by each joint velocity, (6, nv, nv)."""
     count, nv = program[pairs], program[_NV]
@@ -247,7 +222,6 @@ def emit_pairs(m, s, program, place, pairs, b, reference, state, to):
             write_rows(m, s, program, end + row * nv, nv, to, at, frames * 6 * size)
 
 
-@compiled
 def _add_changes(s, program, i, first, end, reference):
     """Add the derivatives of column i by each joint velocity.
 

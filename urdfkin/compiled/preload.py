@@ -1,16 +1,223 @@
-"""Compile all kernels in advance, with two processes."""
+"""Decide when a kernel is compiled, without importing Numba.
+
+A single configuration needs no kernel: Python computes it in a millisecond, with the same bits. Importing
+Numba and reading a kernel from disk takes longer, and compiling takes seconds. So each kernel has an account
+of the time that was spent without it. From `LOADING` on, the kernel is read from disk. If it is not there,
+a process beside this one compiles it, and Python computes until that is done, or until `COMPILING`.
+
+Events. Compiling takes seconds, reading from disk almost no time. Listeners are informed of each compilation
+that this process waits for.
+"""
 
 from __future__ import annotations
 
+import atexit
+import logging
+import os
 import subprocess
-from collections.abc import Sequence
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Literal
 
-from urdfkin.compiled.compiling import cache_folder
+from urdfkin.kinematics import equations
+from urdfkin.system.cache import kept_folder
+from urdfkin.system.lazy_import import installed_version
+from urdfkin.system.locks import importing
 from urdfkin.system.processes import own_python
 
-#: The kernels in two groups of equal compile time.
+#: Seconds that a kernel must save before Numba is imported for it; and before this process compiles it.
+LOADING, COMPILING = 0.3, 3.0
+#: The same if Numba is imported already.
+_LOADING_MORE = 0.03
+
+#: The modules of the kernels, and the kernels of `warm` in two groups of equal compile time.
+RECURSIONS, SINGLE = "urdfkin.compiled.machine.kernels", "urdfkin.compiled.machine.single"
 _ONE_HALF = "accelerations", "local_accelerations", "velocities"
 _OTHER_HALF = "jacobians", "jacobian_rates", "local_velocities", "placements"
+
+#: Called with a kernel's name and None when its compilation begins, and with the seconds when it is ready.
+Listener = Callable[[str, float | None], None]
+
+
+def _log(name: str, seconds: float | None) -> None:
+    """Log one warning in each process, which goes to standard error by default."""
+    if seconds is None and not _logged:
+        _logged.append(name)
+        logging.getLogger("urdfkin").warning(
+            "urdfkin: compiling %s once, then cached on disk; 'urdfkin warm' compiles all kernels at once",
+            name,
+        )
+
+
+_logged: list[str] = []
+_listeners: list[Listener] = [_log]
+
+
+@contextmanager
+def listen_to_compile_events(listener: Listener) -> Iterator[None]:
+    """Send compile events to `listener` only, while the context is open."""
+    _listeners.append(listener)
+    try:
+        yield
+    finally:
+        _listeners.remove(listener)
+
+
+@contextmanager
+def compile_event(name: str) -> Iterator[Callable[[], None]]:
+    """Report a compilation. The context yields a function that must be called if a compilation begins."""
+    begun: list[float] = []
+
+    def missed() -> None:
+        begun.append(time.perf_counter())
+        _listeners[-1](name, None)
+
+    yield missed
+    if begun:
+        _listeners[-1](name, time.perf_counter() - begun[0])
+
+
+@cache
+def cache_folder() -> Path | None:
+    """Return the cache folder of compiled kernels; None if no folder is writable."""
+    numba = sys.modules.get("numba")
+    chosen = numba.config.CACHE_DIR if numba else os.environ.get("NUMBA_CACHE_DIR")
+    python = sys.implementation.cache_tag + sys.abiflags
+    versions = installed_version("numba") or "", installed_version("llvmlite") or "", python
+    sources = [*Path(__file__).parent.rglob("*.py"), *Path(equations.__file__).parent.glob("*.py")]
+    return kept_folder("kernels", sorted(sources), *versions, root=Path(chosen) if chosen else None)
+
+
+# -- when a kernel pays ----------------------------------------------------------------------------------
+
+#: How to compute: with Python's numbers, or with a kernel.
+Way = Literal["interpreted", "compiled"]
+
+_spent: dict[str, float] = {}
+_loaded: dict[str, Any] = {}
+_only: list[Way] = []
+
+
+@contextmanager
+def only(way: Way) -> Iterator[None]:
+    """Compute everything in one way while the context is open, to compare the two."""
+    _only.append(way)
+    try:
+        yield
+    finally:
+        _only.pop()
+
+
+def spend(name: str, seconds: float) -> None:
+    """Record time that was spent without a kernel."""
+    _spent[name] = _spent.get(name, 0.0) + seconds
+
+
+def kernel(name: str, more: float = 0.0, home: str = RECURSIONS) -> Any:
+    """Return a kernel if it is loaded, or if it pays to load or compile it; else None.
+
+    Args:
+        name: Name of the kernel.
+        more: Seconds that the next computations will take without it.
+        home: Its module.
+    """
+    if _only:
+        return load(name, home) if _only[-1] == "compiled" else None
+    if (found := _loaded.get(name)) is not None:
+        return found
+    seconds = _spent.get(name, 0.0) + more
+    if seconds < (_LOADING_MORE if _loaded else LOADING):
+        return None
+    if seconds < COMPILING and not _on_disk(name) and _compile_beside(name, home):
+        return None
+    return load(name, home)
+
+
+def single_pays(name: str) -> bool:
+    """Return whether to load the function for single calls (`SINGLE`) of the kernel `name`."""
+    if _only:
+        return _only[-1] == "compiled"
+    more = COMPILING if cache_folder() is None else LOADING
+    used = name in _loaded or f"local_{name}" in _loaded
+    return used and kernel("one_configuration", more, SINGLE) is not None
+
+
+def load(name: str, home: str = RECURSIONS) -> Any:
+    """Return a kernel; compile it or read it from disk."""
+    with importing:
+        found = getattr(import_module(home), name)
+    _ = found.compiled
+    _loaded[name] = found
+    return found
+
+
+def _on_disk(name: str) -> bool:
+    folder = cache_folder()
+    return folder is not None and any(folder.glob(f"*.{name}.*.kernel"))
+
+
+# -- the process beside ----------------------------------------------------------------------------------
+
+#: Ends the process when its standard input closes: at the end of this process, however it ends.
+_UNTIL_CLOSED = (
+    "import os, sys, threading;"
+    " threading.Thread(target=lambda: (sys.stdin.read(), os._exit(1)), daemon=True).start();"
+)
+_beside: dict[str, subprocess.Popen[bytes]] = {}
+
+
+def _compile_beside(name: str, home: str) -> bool:
+    """Return whether another process compiles a kernel; start it, unless it has failed before.
+
+    One process compiles at a time; a kernel whose turn has not come counts as being compiled.
+    """
+    if cache_folder() is None:
+        return False
+    running = any(process.poll() is None for process in _beside.values())
+    if name not in _beside and not running:
+        _beside[name] = _compile_elsewhere((name,), home)
+        running = True
+    return running
+
+
+def _compile_elsewhere(names: Sequence[str], home: str = RECURSIONS) -> subprocess.Popen[bytes]:
+    """Start another interpreter that compiles; this process compiles all kernels that it fails to compile."""
+    code = (
+        f"{_UNTIL_CLOSED} from urdfkin.compiled import preload; preload._compile({tuple(names)!r}, {home!r})"
+    )
+    return subprocess.Popen(
+        own_python(code),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+
+
+def _end_beside() -> None:
+    for process in _beside.values():
+        process.kill()
+        process.wait()
+
+
+def _forget_beside() -> None:
+    """Forget the process in a forked child, which must not keep its standard input open."""
+    for process in _beside.values():
+        process.returncode = 0
+        if process.stdin is not None:
+            process.stdin.close()
+    _beside.clear()
+
+
+atexit.register(_end_beside)
+os.register_at_fork(after_in_child=_forget_beside)
+
+
+# -- all kernels in advance ------------------------------------------------------------------------------
 
 
 def load_kernels() -> None:
@@ -20,7 +227,8 @@ def load_kernels() -> None:
     process compiles on one processor only. A second process therefore compiles half of the kernels, and this
     process then reads that half from disk.
     """
-    helper = None if all(map(_on_disk, _OTHER_HALF)) else _compile_elsewhere(_OTHER_HALF)
+    missing = cache_folder() is not None and not all(map(_on_disk, _OTHER_HALF))
+    helper = _compile_elsewhere(_OTHER_HALF) if missing else None
     try:
         _compile(_ONE_HALF)
     finally:
@@ -29,24 +237,6 @@ def load_kernels() -> None:
     _compile(_OTHER_HALF)
 
 
-def _compile(names: Sequence[str]) -> None:
-    from urdfkin.compiled import kernels  # noqa: PLC0415
-
+def _compile(names: Sequence[str], home: str = RECURSIONS) -> None:
     for name in names:
-        _ = getattr(kernels, name).compiled
-
-
-def _on_disk(name: str) -> bool:
-    folder = cache_folder()
-    return folder is None or any(folder.glob(f"kernels.{name}.*.kernel"))
-
-
-def _compile_elsewhere(names: Sequence[str]) -> subprocess.Popen[bytes]:
-    """Start another interpreter that compiles; this process compiles the kernels that it fails to compile."""
-    code = f"from urdfkin.compiled import preload; preload._compile({tuple(names)!r})"
-    return subprocess.Popen(
-        own_python(code),
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
+        load(name, home)

@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from urdfkin.compiled import preload
 from urdfkin.compiled.kernel_args import KernelArgs
 from urdfkin.compiled.plan import CompiledTree
 from urdfkin.model.configuration_like import Given
@@ -68,12 +69,14 @@ class PreparedFrame:
 
     __slots__ = (
         "_acceleration", "_hessian", "_jacobian", "_placement", "_plan", "_robot", "_velocity", "frame",
-        "reference",
+        "reference", "wanted",
     )  # fmt: skip
 
     def __init__(self, robot: _Robot, frame: str, reference: Reference, plan: CompiledTree) -> None:
         self.frame, self.reference = frame, reference
         self._robot, self._plan = robot, plan
+        #: Whether the user asked for this object, and so for machine code at the first call.
+        self.wanted = False
         # Compiled, or read from disk, at the first call.
         self._placement: Fast = partial(self._first, "placement")
         self._velocity: Fast = partial(self._first, "velocity")
@@ -148,14 +151,17 @@ class PreparedFrame:
         return self._robot.acceleration(q, v, a, self.frame, self.reference, out=out, verify=False, threads=1)
 
     def _first(self, quantity: str, q: Given, *others: object) -> FloatArray | None:
-        """Create the fast function of a quantity at its first call, and call it."""
-        with importing:
-            from urdfkin.compiled.single import arrays_are_known, single  # noqa: PLC0415  loads Numba
-
-        # `Robot` computes for trees with quaternions, which it normalises first, and for trees whose results
-        # may overflow.
+        """Create the function of a quantity, and call it; None as long as that does not pay."""
+        # The robot handles quaternions, which are normalised first, and trees whose results may overflow.
         robots = self._robot.tree.floating_joints or self._plan.is_large
-        if robots or not (isinstance(q, np.ndarray) and q.ndim == 1 and arrays_are_known()):
+        if robots or not (isinstance(q, np.ndarray) and q.ndim == 1):
+            return None
+        if not self.wanted and not preload.single_pays(f"{quantity}s"):
+            return None
+        with importing:
+            from urdfkin.compiled.machine.single import arrays_are_known, single  # noqa: PLC0415  loads Numba
+
+        if not arrays_are_known():
             return None
         compute, task = single(quantity, self._plan, self.reference)
         self._robot.verifier.ledger.account(quantity).counters.append((task, KernelArgs.COUNT))

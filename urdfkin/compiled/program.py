@@ -16,6 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from urdfkin.compiled.plan import Column, CompiledTree, Geometry, IntArray, Motion, Step
+from urdfkin.compiled.python_numbers import Number
 from urdfkin.model.tree import FloatArray
 
 
@@ -60,6 +61,8 @@ class Head(IntEnum):
     BASE = 12
 
 
+#: Number of configurations in a row of scratch memory: one AVX-512 register, or two of AVX2.
+LANES = 8
 #: Length of an instruction: the operation, three operands, and the index of its constants.
 WIDTH = 5
 #: Length of an entry in the list of angles: the angle's row, the row of its sine, the index of a mimic rule,
@@ -99,6 +102,12 @@ class Program:
     def addresses(self) -> tuple[int, int]:
         """Addresses of words and constants; valid while the program exists."""
         return self.words.ctypes.data, self.constants.ctypes.data
+
+    @cached_property
+    def lists(self) -> tuple[list[int], list[Number]]:
+        """Words and constants for Python."""
+        words: list[int] = self.words.tolist()
+        return words, list(map(Number, self.constants.tolist()))
 
 
 def program_of(plan: CompiledTree, *, turned: bool, columns: bool = False, pairs: bool = False) -> Program:

@@ -12,33 +12,46 @@ The axes of the recursion are those of the requested result, the world's or the 
 end would add the rounding of a second rotation. The equations are those of `urdfkin.kinematics.equations`;
 they are the same in both axes.
 
-A part of the state that an output does not need is `numbers.nothing`; it costs no time.
+A part of the state that an output does not need is `nothing`; it costs no time.
+
+This module, `axes`, `outputs` and `recursions` are plain functions of Python's numbers. The kernels are
+copies of them that use Numba's numbers (`urdfkin.compiled.machine.kernels`).
 """
 
 from __future__ import annotations
 
-from urdfkin.compiled import compiled_equations as eq
 from urdfkin.compiled.axes import seen, seen_after
-from urdfkin.compiled.compiling import compiled
 from urdfkin.compiled.kernel_args import KernelArgs
-from urdfkin.compiled.memory import (
+from urdfkin.compiled.program import (
+    ANGLE_ROW,
+    ANGLE_WIDTH,
     LANES,
+    ONE_ROW,
+    STATE_ROWS,
+    WIDTH,
+    ZERO_ROW,
+    Head,
+    Op,
+)
+from urdfkin.compiled.python_numbers import (
     all_written,
     constant,
     fetch,
     number,
     number_if,
     numbers_at,
+    one,
     ordinary,
     put,
     read_rows,
+    rounded,
     same,
+    sine_cosine,
     stream,
     whole_numbers_at,
+    zero,
 )
-from urdfkin.compiled.numbers import one, rounded, zero
-from urdfkin.compiled.program import ANGLE_ROW, ANGLE_WIDTH, ONE_ROW, STATE_ROWS, WIDTH, ZERO_ROW, Head, Op
-from urdfkin.compiled.sine import sine_cosine
+from urdfkin.kinematics import equations as eq
 
 # Compiled code takes plain integers, not Python's enumerations.
 _PROGRAM, _CONSTANTS, _SCRATCH, _OUT = map(
@@ -62,7 +75,6 @@ _SAVE, _RESUME, _KEEP, _COLUMN = map(int, (Op.SAVE, Op.RESUME, Op.KEEP, Op.COLUM
 # -- from one link to the next ------------------------------------------------------------------------
 
 
-@compiled
 def carried(axes, state, d):
     """Move the state along the rigid link by d; d is given in the link's axes (7.58, 7.128, 7.130)."""
     R, p, w, vel, alpha, acc = state
@@ -77,7 +89,6 @@ def carried(axes, state, d):
     )
 
 
-@compiled
 def turned(axes, state, S):
     """Return the state of the same body with its frame rotated by S."""
     R, p, w, vel, alpha, acc = state
@@ -91,13 +102,11 @@ def turned(axes, state, S):
     )
 
 
-@compiled
 def _turned_about_z(axes, state, s, row):
     """Rotate the frame by a joint's angle (7.5); its sine and cosine are in `row` and the row after it."""
     return turned(axes, state, eq.about_z(number(s, row), number(s, row + 1), zero(), one()))
 
 
-@compiled
 def revolute(axes, state, s, row, v, a):
     """Compute the state after a revolute joint: 7.129, then 7.127, then the rotation itself."""
     R, p, w, vel, alpha, acc = state
@@ -106,7 +115,6 @@ def revolute(axes, state, s, row, v, a):
     return _turned_about_z(axes, (R, p, eq.angular_velocity(w, z, v), vel, alpha, acc), s, row)
 
 
-@compiled
 def prismatic(axes, state, slide, v, a):
     """Compute the state after a prismatic joint: 7.64 for its displacement, then 7.130 and 7.128."""
     R, p, w, vel, alpha, acc = carried(axes, state, (zero(), zero(), slide))
@@ -114,7 +122,6 @@ def prismatic(axes, state, slide, v, a):
     return R, p, w, eq.sliding_velocity(vel, z, v), alpha, eq.sliding_acceleration(acc, w, z, v, a)
 
 
-@compiled
 def free(axes, state, o, u, o_rate, u_rate):
     """Add the velocity of a planar or floating joint, in the child link's axes, after its displacement."""
     R, p, w, vel, alpha, acc = state
@@ -129,7 +136,6 @@ def free(axes, state, o, u, o_rate, u_rate):
     )
 
 
-@compiled
 def _coordinate(s, row, g, c, follows):
     """Return a joint's coordinate; for a mimic joint, product and sum are each rounded, as in Pinocchio."""
     x = number(s, row)
@@ -138,7 +144,6 @@ def _coordinate(s, row, g, c, follows):
     return x
 
 
-@compiled
 def _rate(wanted, s, row, g, c, follows):
     x = number_if(wanted, s, row)
     if follows:
@@ -146,13 +151,11 @@ def _rate(wanted, s, row, g, c, follows):
     return x
 
 
-@compiled
 def _vector_if(wanted, s, row):
     """Return the numbers of three consecutive rows; return `nothing()` if `wanted` is `nothing()`."""
     return number_if(wanted[0], s, row), number_if(wanted[1], s, row + 1), number_if(wanted[2], s, row + 2)
 
 
-@compiled
 def _planar(axes, state, s, q, row, v, a):
     """Compute the state after a planar joint: translation along x and y, rotation about z."""
     state = carried(axes, state, (number(s, q), number(s, q + 1), zero()))
@@ -163,7 +166,6 @@ def _planar(axes, state, s, q, row, v, a):
     return free(axes, state, o, u, o_rate, (number_if(alpha, s, a), number_if(alpha, s, a + 1), zero()))
 
 
-@compiled
 def _floating(axes, state, s, q, v, a):
     """Compute the state after a floating joint: translation along, and rotation about, all three axes."""
     state = carried(axes, state, (number(s, q), number(s, q + 1), number(s, q + 2)))
@@ -177,12 +179,10 @@ def _floating(axes, state, s, q, v, a):
 # -- constants -----------------------------------------------------------------------------------------
 
 
-@compiled
 def _vector(g, i):
     return constant(g, i), constant(g, i + 1), constant(g, i + 2)
 
 
-@compiled
 def _rotation(g, i):
     return _vector(g, i), _vector(g, i + 3), _vector(g, i + 6)
 
@@ -190,7 +190,6 @@ def _rotation(g, i):
 # -- states in scratch memory --------------------------------------------------------------------------
 
 
-@compiled
 def put_vector(s, row, x):
     """Write a vector to three rows."""
     put(s, row, x[0])
@@ -198,13 +197,11 @@ def put_vector(s, row, x):
     put(s, row + 2, x[2])
 
 
-@compiled
 def vector(s, row):
     """Return the vector in three rows."""
     return number(s, row), number(s, row + 1), number(s, row + 2)
 
 
-@compiled
 def _save(s, row, state):
     R, p, w, vel, alpha, acc = state
     put_vector(s, row, R[0])
@@ -217,7 +214,6 @@ def _save(s, row, state):
     put_vector(s, row + 21, acc)
 
 
-@compiled
 def _resume(s, row, state):
     """Return the saved state, without the parts that this recursion does not need."""
     R, p, w, vel, alpha, acc = state
@@ -234,7 +230,6 @@ def _resume(s, row, state):
 # -- inputs --------------------------------------------------------------------------------------------
 
 
-@compiled
 def _read(m, x, b, width, stride, blocks, begin, end, s, row):
     """Read the needed blocks of eight numbers from rows `b` to `b + m - 1` of x, or from its only row."""
     for i in range(begin, end):
@@ -244,7 +239,6 @@ def _read(m, x, b, width, stride, blocks, begin, end, s, row):
     fetch(x, (b + m) * stride, m * stride)
 
 
-@compiled
 def _start(axes, m, s, task, row, b):
     """Return the initial conditions: the state of the base (motion of the textbook's frame 0 in -1)."""
     nil, unit = same(0.0), same(1.0)
@@ -259,7 +253,6 @@ def _start(axes, m, s, task, row, b):
     return R, p, w, vel, alpha, acc
 
 
-@compiled
 def _sines_and_cosines(s, program, g):
     """Compute sine and cosine of all joint angles in advance, because the recursion needs all registers."""
     for i in range(program[_ANGLES], program[_ANGLES_END], ANGLE_WIDTH):
@@ -272,7 +265,6 @@ def _sines_and_cosines(s, program, g):
 # -- the recursion -------------------------------------------------------------------------------------
 
 
-@compiled
 def _along_link(axes, op, state, g, c):
     """Execute an instruction with a constant translation or rotation."""
     if op == _CARRY_X:
@@ -294,7 +286,6 @@ def _along_link(axes, op, state, g, c):
     return state
 
 
-@compiled
 def _over_joint(axes, op, state, s, x, v, a, z, g, c):
     """Execute a joint's instruction; x, z, c are operands, v and a are the rows of velocity, acceleration."""
     if op == _REVOLUTE:
@@ -310,7 +301,6 @@ def _over_joint(axes, op, state, s, x, v, a, z, g, c):
     return state
 
 
-@compiled
 def _read_inputs(m, task, program, s, b, orders):
     """Read the coordinates and, if needed, the joint velocities and accelerations."""
     q, nq, nv = numbers_at(task[_Q]), program[_NQ], program[_NV]
@@ -324,7 +314,6 @@ def _read_inputs(m, task, program, s, b, orders):
         _read(m, a, b, nv, task[_STRIDE_A], program, edge, end, s, program[_ROW_A])
 
 
-@compiled
 def _ordinary(m, task, program, b, orders):
     """Return whether all inputs of a block are ordinary, also those that the recursion does not need."""
     good = _rows_are_ordinary(m, numbers_at(task[_Q]), b, program[_NQ], task[_STRIDE_Q])
@@ -335,12 +324,10 @@ def _ordinary(m, task, program, b, orders):
     return good
 
 
-@compiled
 def _rows_are_ordinary(m, x, b, width, stride):
     return ordinary(x, b * stride, (m if stride else 1) * width)
 
 
-@compiled
 def _block(axes, m, task, program, g, s, b, reference, orders, follow, keep, column, emit):
     """Run the recursion for `m` configurations, starting at `b`."""
     _read_inputs(m, task, program, s, b, orders)
@@ -370,7 +357,6 @@ def _block(axes, m, task, program, g, s, b, reference, orders, follow, keep, col
         stream(to, m * width, numbers_at(task[_OUT]), b * width, task[_OUT])
 
 
-@compiled
 def forward_recursion(address, axes, orders, follow, keep, column, emit):
     """Execute a program for every block of configurations; return 0, or 1 if an input is not ordinary.
 

@@ -26,9 +26,9 @@ import numpy as np
 from urdfkin.compiled.batch import in_blocks
 from urdfkin.compiled.evaluate import is_staged
 from urdfkin.compiled.kernel_args import KernelArgs, lines
-from urdfkin.compiled.memory import LANES
 from urdfkin.compiled.plan import CompiledTree
 from urdfkin.compiled.prepared import Fast
+from urdfkin.compiled.program import LANES
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.export.c import Layout, advance, framed, spare, unit
 from urdfkin.export.code import Code, bare
@@ -311,7 +311,7 @@ class CompiledFrame:
     def _first(self, name: str, q: Given, *others: object) -> FloatArray | None:
         """Compile the function for one configuration, and call it."""
         with importing:
-            from urdfkin.compiled.single import arrays_are_known, called  # noqa: PLC0415  loads Numba
+            from urdfkin.compiled.machine.single import arrays_are_known, called  # noqa: PLC0415  loads Numba
 
         own = (
             self._tree.floating_joints or self._plan.is_large

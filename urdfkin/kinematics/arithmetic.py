@@ -6,8 +6,8 @@ functions and replaces their basic operations, such as `plus` and `cross`. This 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from types import FunctionType, SimpleNamespace
+from collections.abc import Callable, Mapping
+from types import FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
 from urdfkin.kinematics import equations
@@ -29,16 +29,26 @@ def bound(
     >>> lengths.point_velocity(1.0, 2.0, 3.0)
     7.0
     """
-    names: dict[str, Any] = {}
-    for name, function in _functions():
-        copy = FunctionType(function.__code__, names, name, function.__defaults__)
-        copy.__doc__, copy.__module__ = function.__doc__, function.__module__
-        names[name] = vectors.get(name) or made(copy)
-    return SimpleNamespace(**names)
+    return SimpleNamespace(**rebound(equations, made=made, others=vectors))
 
 
-def _functions() -> list[tuple[str, FunctionType]]:
-    return [(name, value) for name, value in vars(equations).items() if isinstance(value, FunctionType)]
+def rebound(
+    *modules: ModuleType, made: Callable[[Callable[..., Any]], Any], others: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return a copy of each function of some modules, by name; the copies use other functions and each other.
 
-
-#: The equations on NumPy arrays: a number is (...), a vector (..., 3) and a rotation (..., 3, 3).
+    Args:
+        modules: The modules; each may use functions of those before it.
+        made: A decorator for each copied function, for example a compiler's.
+        others: Functions and modules to use instead of those that a module imports or defines.
+    """
+    copies: dict[str, Any] = {}
+    for module in modules:
+        names = dict(vars(module))
+        names |= {name: x for name, x in (others | copies).items() if name in names}
+        for name, function in vars(module).items():
+            if isinstance(function, FunctionType) and function.__module__ == module.__name__:
+                copy = FunctionType(function.__code__, names, name, function.__defaults__)
+                copy.__doc__, copy.__module__ = function.__doc__, function.__module__
+                names[name] = copies[name] = others.get(name) or made(copy)
+    return copies

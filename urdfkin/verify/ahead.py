@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from urdfkin.compiled.preload import load_kernels as load_cores
-from urdfkin.verify import comparison, mimic_columns
+from urdfkin.compiled import preload
+from urdfkin.verify.comparison import KERNELS
 
 
 def load_kernels() -> None:
-    """Compile each kernel or read it from disk. Call this before worker processes start.
-
-    Otherwise each worker process would compile the kernels again.
-    """
-    load_cores()
-    comparison.load_kernel()
-    mimic_columns.load_kernel()
+    """Compile each kernel or read it from disk, before worker processes start that would each compile it."""
+    preload.load_kernels()
+    for name in ("worst", "coupling"):
+        preload.load(name, KERNELS)

@@ -1,18 +1,22 @@
-"""Kernel for the largest difference of each result, in one pass over the numbers.
+"""The largest difference of each result; `bounds.disagreement` defines the difference.
 
-`bounds.disagreement` defines the difference. An implementation with NumPy expressions took as long as
-Pinocchio's computation of the results.
+For large batches a kernel computes it in one pass: NumPy takes as long as Pinocchio itself. The numbers are
+equal.
 """
 
 from __future__ import annotations
 
 import math
+import time
 
 import numpy as np
 
-from urdfkin.compiled.compiling import ROWS, SCRATCH, helper, kernel
+from urdfkin.compiled import preload
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
 from urdfkin.model.tree import FloatArray
+
+#: The module of the kernels of checks.
+KERNELS = "urdfkin.verify.kernels"
 
 
 def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes: int) -> FloatArray:
@@ -32,40 +36,25 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
         np.ascontiguousarray(np.broadcast_to(x, ours.shape)).reshape(math.prod(leading), math.prod(own))
         for x in (ours, theirs, scale)
     ]
-    worst = np.zeros(len(flat[0]))
-    _worst(*flat, worst)
+    if (kernel := preload.kernel("worst", home=KERNELS)) is None:
+        begin = time.perf_counter()
+        worst = _worst(*flat)
+        preload.spend("worst", time.perf_counter() - begin)
+    else:
+        worst = np.zeros(len(flat[0]))
+        kernel(*flat, worst)
     return worst.reshape(leading)
 
 
-@helper(fastmath={"reassoc"})
-def _finite(x, i):
-    """Return whether a row is finite. If x is not finite, 0 * x is NaN, and so is every sum with it."""
-    total = 0.0
-    for j in range(x.shape[1]):
-        total += 0.0 * x[i, j]
-    return total == 0.0
-
-
-@helper(fastmath={"nnan", "nsz"})
-def _largest(ours, theirs, scale, i):
-    """Return the largest difference in a row. The numbers are finite, so any order gives the same result."""
-    largest = 0.0
-    for j in range(ours.shape[1]):
-        size, difference = scale[i, j], abs(ours[i, j] - theirs[i, j])
-        must_be_equal = math.inf if difference > 0.0 else 0.0
-        units = difference / max(EPS * size, LEAST_UNIT) if size > 0.0 else must_be_equal
-        largest = max(largest, units)
-    return largest
-
-
-@kernel(ROWS, ROWS, ROWS, SCRATCH)
-def _worst(ours, theirs, scale, worst):
-    for i in range(len(worst)):
-        good = _finite(ours, i) and _finite(theirs, i) and _finite(scale, i)
-        worst[i] = _largest(ours, theirs, scale, i) if good else math.inf
-    return 0
-
-
-def load_kernel() -> None:
-    """Compile the kernel or read it from disk, before its first use."""
-    _ = _worst.compiled
+@np.errstate(all="ignore")
+def _worst(ours: FloatArray, theirs: FloatArray, scale: FloatArray) -> FloatArray:
+    """Return the largest difference in each row; inf for a row that is not finite."""
+    difference = np.abs(ours - theirs)
+    units = np.where(
+        scale > 0.0,
+        difference / np.maximum(EPS * scale, LEAST_UNIT),
+        np.where(difference > 0.0, np.inf, 0.0),
+    )
+    finite = np.logical_and.reduce([np.isfinite(x).all(axis=1) for x in (ours, theirs, scale)])
+    worst: FloatArray = np.where(finite, units.max(axis=1, initial=0.0), np.inf)
+    return worst

@@ -17,30 +17,13 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from urdfkin.compiled.compiling import compiled
-from urdfkin.compiled.memory import LANES, put
-from urdfkin.compiled.numbers import fused
+from urdfkin.compiled.machine.compiling import compiled
+from urdfkin.compiled.machine.memory import put
+from urdfkin.compiled.machine.numbers import fused
+from urdfkin.compiled.program import LANES
+from urdfkin.compiled.python_numbers import COSINE, LARGEST_ANGLE, NO_FRACTION, PI_2, PI_2_REST, SINE
 
-_LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
-_2_PI, _PI_2, _PI_2_REST = 2.0 / math.pi, math.pi / 2.0, 6.123233995736766e-17
-#: If this constant is added to a number below 2^51, the last bits of the sum are the nearest integer.
-_NO_FRACTION = 1.5 * 2.0**52
-_SINE = (
-    -1.66666666666666324348e-01,
-    8.33333333332248946124e-03,
-    -1.98412698298579493134e-04,
-    2.75573137070700676789e-06,
-    -2.50507602534068634195e-08,
-    1.58969099521155010221e-10,
-)
-_COSINE = (
-    4.16666666666666019037e-02,
-    -1.38888888888741095749e-03,
-    2.48015872894767294178e-05,
-    -2.75573143513906633035e-07,
-    2.08757232129817482790e-09,
-    -1.13596475577881948265e-11,
-)
+_2_PI = 2.0 / math.pi
 
 
 @compiled
@@ -50,7 +33,7 @@ def sine_cosine(s, row, x):
     if _any_large(x):
         put(s, row, x)
         for k in range(row * LANES, (row + 1) * LANES):
-            if not abs(s[k]) < _LARGEST_ANGLE:
+            if not abs(s[k]) < LARGEST_ANGLE:
                 sine, cosine = (
                     _with_lane(sine, k - row * LANES, math.sin(s[k])),
                     _with_lane(cosine, k - row * LANES, math.cos(s[k])),
@@ -79,24 +62,24 @@ def _of_small(context: Any, x: Any) -> Any:
                 value = fused(builder, z, value, all_lanes(coefficient))
             return value
 
-        shifted = fused(builder, x, all_lanes(_2_PI), all_lanes(_NO_FRACTION))
+        shifted = fused(builder, x, all_lanes(_2_PI), all_lanes(NO_FRACTION))
         quarters = builder.bitcast(shifted, whole)
-        n = builder.fsub(shifted, all_lanes(_NO_FRACTION))
-        # `near` is exact, because both terms are multiples of 2^-53 and their difference is below 1. The
-        # rounding error of r is `lost`, and that of z is `z_lost`.
-        near = fused(builder, n, all_lanes(-_PI_2), x)
-        r = fused(builder, n, all_lanes(-_PI_2_REST), near)
-        lost = fused(builder, n, all_lanes(-_PI_2_REST), builder.fsub(near, r))
+        n = builder.fsub(shifted, all_lanes(NO_FRACTION))
+        # Exact: both terms are multiples of 2^-53, and their difference is below 1. The rounding error of r
+        # is `lost`, that of z is `z_lost`.
+        near = fused(builder, n, all_lanes(-PI_2), x)
+        r = fused(builder, n, all_lanes(-PI_2_REST), near)
+        lost = fused(builder, n, all_lanes(-PI_2_REST), builder.fsub(near, r))
         z = builder.fmul(r, r)
         z_lost = fused(builder, r, r, builder.fneg(z))
         # `most` is 1 - z/2, and `most_lost` is its rounding error.
         most = fused(builder, z, all_lanes(-0.5), all_lanes(1.0))
         most_lost = fused(builder, z, all_lanes(-0.5), builder.fsub(all_lanes(1.0), most))
         # sin(r + lost) = sin r + lost cos r, cos(r + lost) = cos r - lost sin r. The largest term is added
-        # last; the other terms are small, so their rounding errors are small too.
-        sine = fused(builder, builder.fmul(r, z), polynomial(z, _SINE), builder.fmul(lost, most))
+        # last; the other terms are small, and so are their rounding errors.
+        sine = fused(builder, builder.fmul(r, z), polynomial(z, SINE), builder.fmul(lost, most))
         sine = builder.fadd(r, sine)
-        rest = fused(builder, builder.fmul(z, z), polynomial(z, _COSINE), most_lost)
+        rest = fused(builder, builder.fmul(z, z), polynomial(z, COSINE), most_lost)
         rest = fused(builder, z_lost, all_lanes(-0.5), rest)
         rest = fused(builder, builder.fneg(r), lost, rest)
         cosine = builder.fadd(most, rest)
@@ -127,7 +110,7 @@ def _any_large(context: Any, x: Any) -> Any:
         size = builder.bitcast(x, ir.VectorType(ir.IntType(64), width))
         positive = ir.Constant(size.type, [2**63 - 1] * width)
         size = builder.bitcast(builder.and_(size, positive), x.type)
-        large = builder.fcmp_unordered(">=", size, ir.Constant(x.type, [_LARGEST_ANGLE] * width))
+        large = builder.fcmp_unordered(">=", size, ir.Constant(x.type, [LARGEST_ANGLE] * width))
         as_bits = builder.bitcast(large, ir.IntType(width))
         return builder.icmp_unsigned("!=", as_bits, ir.Constant(as_bits.type, 0))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from urdfkin.compiled.compiling import compiled
+from urdfkin.compiled.machine.compiling import compiled
 from urdfkin.kinematics.arithmetic import bound
 
 globals().update(vars(bound(made=compiled)))

@@ -18,12 +18,11 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from urdfkin.compiled.compiling import compiled, helper
-from urdfkin.compiled.numbers import NOTHING, Known, Lanes, as_number, in_all_lanes
+from urdfkin.compiled.machine.compiling import compiled, helper
+from urdfkin.compiled.machine.numbers import NOTHING, Known, Lanes, as_number, in_all_lanes
 from urdfkin.compiled.plan import LARGE
+from urdfkin.compiled.program import LANES
 
-#: Number of configurations in a row: their doubles fill one AVX-512 register, or two AVX2 registers.
-LANES = 8
 NUMBER = Lanes(LANES)
 _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 NUMBERS, WHOLE_NUMBERS = types.CPointer(types.float64), types.CPointer(types.int64)

@@ -6,31 +6,23 @@ files have no digest: a truncated file makes every later run fail, and a changed
 cache file has a digest. If a cache file is damaged, its kernel is compiled again. If no folder is writable,
 nothing is cached.
 
-Parts. A part is a function that only other compiled functions call. It is inlined and never called by itself,
-so it needs no machine code of its own and no optimization before it is inlined. It also needs none of Numba's
-passes for closures, `with`, literal loops, inlining by Numba, or rewriting of array expressions. Skipping
-these passes halves the compile time.
-
-Events. Compiling a kernel takes seconds; reading it from disk takes almost no time. Listeners are functions
-that are called at the beginning and at the end of each compilation.
+Parts. A function that is only a part of kernels is inlined and never called by itself. It needs no machine
+code, no optimization before it is inlined, and no passes for closures, `with`, literal loops, inlining by
+Numba, or rewriting of array expressions. Skipping them halves the compile time.
 """
 
 from __future__ import annotations
 
 import hashlib
-import logging
 import pickle
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import llvmlite
 import numba
 from numba import types
 from numba._dynfunc import make_function
@@ -42,52 +34,10 @@ from numba.core.compiler import CompilerBase, CompileResult
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.serialize import dumps
 
-from urdfkin.kinematics import equations
-from urdfkin.system.cache import get, kept_folder, put, report_damaged
+from urdfkin.compiled.preload import cache_folder, compile_event
+from urdfkin.system.cache import get, put, report_damaged
 from urdfkin.system.files import read_bytes
 from urdfkin.system.locks import lock_over_forks
-
-#: Called with a kernel's name and None when its compilation begins, and with the seconds when it is ready.
-Listener = Callable[[str, float | None], None]
-
-
-def _log(name: str, seconds: float | None) -> None:
-    """Log a warning, once in each process; by default it is printed to standard error."""
-    if seconds is None and not _logged:
-        _logged.append(name)
-        logging.getLogger("urdfkin").warning(
-            "urdfkin: compiling %s once, then cached on disk; 'urdfkin warm' compiles all kernels at once",
-            name,
-        )
-
-
-_logged: list[str] = []
-_listeners: list[Listener] = [_log]
-
-
-@contextmanager
-def listen_to_compile_events(listener: Listener) -> Iterator[None]:
-    """Send all compile events to `listener`, and to no other listener, while the context is open."""
-    _listeners.append(listener)
-    try:
-        yield
-    finally:
-        _listeners.remove(listener)
-
-
-@contextmanager
-def compile_event(name: str) -> Iterator[Callable[[], None]]:
-    """Report a compilation to the listener. The context yields a function; call it when compiling begins."""
-    begun: list[float] = []
-
-    def missed() -> None:
-        begun.append(time.perf_counter())
-        _listeners[-1](name, None)
-
-    yield missed
-    if begun:
-        _listeners[-1](name, time.perf_counter() - begun[0])
-
 
 _Null: Any = NullCache  # numba has no types
 _Result: Any = CompileResult
@@ -353,12 +303,3 @@ def kernel(*arguments: Any, nogil: bool = True) -> Callable[[Callable[..., int]]
             microsecond.
     """
     return lambda function: Kernel(function, arguments, nogil)
-
-
-@cache
-def cache_folder() -> Path | None:
-    """Return the cache folder of compiled kernels; None if no folder is writable."""
-    root = Path(_config.CACHE_DIR) if _config.CACHE_DIR else None
-    versions = numba.__version__, llvmlite.__version__, sys.implementation.cache_tag + sys.abiflags
-    sources = [*Path(__file__).parent.glob("*.py"), *Path(equations.__file__).parent.glob("*.py")]
-    return kept_folder("kernels", sorted(sources), *versions, root=root)

@@ -1,0 +1,28 @@
+"""The compiled recursions, one for each function of `recursions`. Each takes the address of its arguments.
+
+The same kernel computes a batch, eight configurations at a time, and a single configuration in all eight
+lanes. So the result of a configuration has the same bits at every position of a batch.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from urdfkin.compiled import axes, outputs, recursion, recursions
+from urdfkin.compiled.machine import compiled_equations, memory, numbers, sine
+from urdfkin.compiled.machine.compiling import Core, compiled, core
+from urdfkin.kinematics.arithmetic import rebound
+
+#: Numba's numbers and memory instead of Python's.
+_OTHERS = {
+    name: x for part in (numbers, memory, sine) for name, x in vars(part).items() if not name.startswith("_")
+} | {"eq": compiled_equations}
+_PARTS: dict[str, Any] = rebound(axes, recursion, outputs, made=compiled, others=_OTHERS)
+_MADE: dict[str, Core] = rebound(recursions, made=core, others=_PARTS)
+
+placements, velocities, accelerations = (
+    _MADE[name] for name in ("placements", "velocities", "accelerations")
+)
+local_velocities, local_accelerations = _MADE["local_velocities"], _MADE["local_accelerations"]
+jacobians, jacobian_rates = _MADE["jacobians"], _MADE["jacobian_rates"]
+hessians, imus = _MADE["hessians"], _MADE["imus"]

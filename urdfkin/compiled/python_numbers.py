@@ -1,0 +1,313 @@
+"""Numbers for the recursion without a compiler: one configuration, computed by Python's floats.
+
+Results have the same bits as those of compiled kernels (`urdfkin.compiled.machine.numbers`). A product is
+stored as its two factors until it is added: x y + z is then one fused multiply-add, rounded once. `zero()`
+and `one()` are known numbers, and everything computed from `nothing()` is nothing.
+
+Scratch memory is a list with a number in each row. A kernel's arguments are lists instead of addresses.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from urdfkin.compiled.plan import LARGE
+
+LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
+_2_PI, PI_2, PI_2_REST = 2.0 / math.pi, math.pi / 2.0, 6.123233995736766e-17
+#: Adding it rounds a number below 2^51 to an integer: the last bits of the sum are the nearest integer.
+NO_FRACTION = 1.5 * 2.0**52
+SINE = (
+    -1.66666666666666324348e-01,
+    8.33333333332248946124e-03,
+    -1.98412698298579493134e-04,
+    2.75573137070700676789e-06,
+    -2.50507602534068634195e-08,
+    1.58969099521155010221e-10,
+)
+COSINE = (
+    4.16666666666666019037e-02,
+    -1.38888888888741095749e-03,
+    2.48015872894767294178e-05,
+    -2.75573143513906633035e-07,
+    2.08757232129817482790e-09,
+    -1.13596475577881948265e-11,
+)
+
+
+def _c_fma() -> Callable[[float, float, float], float]:
+    """Return the C library's fused multiply-add, which Python has loaded already."""
+    function = ctypes.PyDLL(None).fma
+    function.restype, function.argtypes = ctypes.c_double, (ctypes.c_double,) * 3
+    result: Callable[[float, float, float], float] = function
+    return result
+
+
+def _python_fma(own: Callable[..., float], c: Callable[..., float]) -> Callable[[float, float, float], float]:
+    """Return Python's fused multiply-add; it raises errors where C returns inf or nan."""
+
+    def fma(x: float, y: float, z: float) -> float:
+        try:
+            return own(x, y, z)
+        except (OverflowError, ValueError):
+            return c(x, y, z)
+
+    return fma
+
+
+#: x y + z, rounded once.
+fma = _python_fma(math.fma, _c_fma()) if hasattr(math, "fma") else _c_fma()
+
+
+class Number:
+    """A double."""
+
+    __slots__ = ("x",)
+
+    def __init__(self, x: float) -> None:
+        self.x = x
+
+    def __mul__(self, other: Any) -> Any:
+        kind = type(other)
+        if kind is Number:
+            return Product(self.x, other.x)
+        if kind is Known:
+            return other if other.value != 1 else self
+        return Product(self.x, _double(other))
+
+    def __rmul__(self, other: int) -> Product:
+        return Product(float(other), self.x)
+
+    def __add__(self, other: Any) -> Any:
+        kind = type(other)
+        if kind is Product:
+            return Number(fma(other.x, other.y, self.x))
+        if kind is Number:
+            return Number(self.x + other.x)
+        if kind is Known and not other.value:
+            return self if other.value == 0 else other
+        return Number(self.x + _double(other))
+
+    def __sub__(self, other: Any) -> Any:
+        kind = type(other)
+        if kind is Product:
+            return Number(fma(-other.x, other.y, self.x))
+        if kind is Number:
+            return Number(self.x - other.x)
+        if kind is Known and not other.value:
+            return self if other.value == 0 else other
+        return Number(self.x - _double(other))
+
+    def __rsub__(self, other: int) -> Number:
+        return Number(other - self.x)
+
+    def __neg__(self) -> Number:
+        return Number(-self.x)
+
+
+class Product:
+    """Two doubles that are not yet multiplied."""
+
+    __slots__ = ("x", "y")
+
+    def __init__(self, x: float, y: float) -> None:
+        self.x, self.y = x, y
+
+    def __mul__(self, other: Any) -> Any:
+        if type(other) is Known:
+            return other if other.value != 1 else self
+        return Product(self.x * self.y, _double(other))
+
+    def __rmul__(self, other: int) -> Product:
+        return Product(float(other), self.x * self.y)
+
+    def __add__(self, other: Any) -> Any:
+        kind = type(other)
+        if kind is Product:
+            return Number(fma(other.x, other.y, self.x * self.y))
+        if kind is Known and not other.value:
+            return self if other.value == 0 else other
+        return Number(fma(self.x, self.y, _double(other)))
+
+    def __sub__(self, other: Any) -> Any:
+        kind = type(other)
+        if kind is Product:
+            return Number(fma(-other.x, other.y, self.x * self.y))
+        if kind is Known and not other.value:
+            return self if other.value == 0 else other
+        return Number(fma(self.x, self.y, -_double(other)))
+
+    def __rsub__(self, other: int) -> Number:
+        return Number(fma(-self.x, self.y, float(other)))
+
+    def __neg__(self) -> Product:
+        return Product(-self.x, self.y)
+
+
+class Known:
+    """0 or 1; None for an unused number."""
+
+    __slots__ = ("value",)
+
+    def __init__(self, value: int | None) -> None:
+        self.value = value
+
+    def __mul__(self, other: Any) -> Any:
+        if self.value == 1 or (type(other) is Known and other.value is None):
+            return other
+        return self
+
+    def __rmul__(self, other: int) -> Any:
+        return self if self.value != 1 else other
+
+    def __add__(self, other: Any) -> Any:
+        if self.value is None or (type(other) is Known and not other.value):
+            return self if self.value is None or other.value == 0 else other
+        return other if self.value == 0 else Number(1.0) + other
+
+    def __sub__(self, other: Any) -> Any:
+        if self.value is None or (type(other) is Known and not other.value):
+            return self if self.value is None or other.value == 0 else other
+        return -other if self.value == 0 else Number(1.0) - other
+
+    def __rsub__(self, other: int) -> Any:
+        return other if self.value == 0 else Number(float(other)) - self
+
+    def __neg__(self) -> Known:
+        return self
+
+
+def _double(x: Any) -> float:
+    """Return any number except nothing as a float; a product is multiplied and rounded."""
+    if type(x) is Product:
+        product: float = x.x * x.y
+        return product
+    return float(x.x if type(x) is Number else x.value if type(x) is Known else x)
+
+
+_ZERO, _ONE, _NOTHING = Known(0), Known(1), Known(None)
+
+
+def zero() -> Known:
+    """Return the known 0."""
+    return _ZERO
+
+
+def one() -> Known:
+    """Return the known 1."""
+    return _ONE
+
+
+def nothing() -> Known:
+    """Return an unused number."""
+    return _NOTHING
+
+
+def rounded(x: Any) -> Any:
+    """Multiply and round a product; return other numbers unchanged."""
+    return Number(x.x * x.y) if type(x) is Product else x
+
+
+# -- memory ----------------------------------------------------------------------------------------------
+
+
+def number(s: Sequence[Number], row: int) -> Number:
+    """Return the number in a row of scratch memory."""
+    return s[row]
+
+
+def number_if(wanted: Any, s: Sequence[Number], row: int) -> Any:
+    """Return the number in a row; nothing if `wanted` is nothing."""
+    return wanted if wanted is _NOTHING else s[row]
+
+
+def put(s: list[Number], row: int, x: Any) -> None:
+    """Write a number to a row of scratch memory; for nothing, do nothing."""
+    if x is not _NOTHING:
+        s[row] = x if type(x) is Number else Number(_double(x))
+
+
+def constant(g: Sequence[Number], i: int) -> Number:
+    """Return `g[i]`."""
+    return g[i]
+
+
+#: Return a double as a number.
+same = Number
+
+
+def numbers_of(array: Any) -> Any:
+    """Return an array's numbers."""
+    return array.tolist()
+
+
+def numbers_at(address: Any) -> Any:
+    """Return the list that is given instead of an address."""
+    return address
+
+
+whole_numbers_at = numbers_at
+
+
+def read_rows(
+    m: int, x: Sequence[float], at: int, stride: int, count: int, s: list[Number], row: int
+) -> None:
+    """Read `count` numbers, from `x[at]` on, into rows."""
+    s[row : row + count] = map(Number, x[at : at + count])
+
+
+def write_rows(
+    m: int, s: Sequence[Number], rows: Sequence[int], first: int, count: int, to: list[float], at: int, _: int
+) -> None:
+    """Write rows `rows[first]`, ... from `to[at]` on."""
+    to[at : at + count] = [s[row].x for row in rows[first : first + count]]
+
+
+def ordinary(x: Sequence[float], at: int, count: int) -> bool:
+    """Return whether `count` numbers are ordinary: none is nan or infinite, and sizes are at most `LARGE`."""
+    return sum(map(abs, x[at : at + count])) < LARGE
+
+
+def fetch(*_: object) -> None:
+    """Do nothing: there is no next block."""
+
+
+stream = all_written = fetch
+
+
+# -- sine and cosine -------------------------------------------------------------------------------------
+
+
+def sine_cosine(s: object, row: int, angle: Number) -> tuple[Number, Number]:
+    """Return (sine, cosine) of an angle; `urdfkin.compiled.machine.sine` explains the steps."""
+    x = angle.x
+    if not abs(x) < LARGEST_ANGLE:
+        return (Number(math.sin(x)), Number(math.cos(x))) if math.isfinite(x) else (Number(math.nan),) * 2
+    n = fma(x, _2_PI, NO_FRACTION) - NO_FRACTION
+    near = fma(n, -PI_2, x)
+    r = fma(n, -PI_2_REST, near)
+    lost = fma(n, -PI_2_REST, near - r)
+    z = r * r
+    z_lost = fma(r, r, -z)
+    most = fma(z, -0.5, 1.0)
+    most_lost = fma(z, -0.5, 1.0 - most)
+    sine = r + fma(r * z, _polynomial(z, SINE), lost * most)
+    rest = fma(z * z, _polynomial(z, COSINE), most_lost)
+    rest = fma(z_lost, -0.5, rest)
+    cosine = most + fma(-r, lost, rest)
+    quarters = int(n)
+    pair = (cosine, sine) if quarters & 1 else (sine, cosine)
+    return (
+        Number(-pair[0] if quarters & 2 else pair[0]),
+        Number(-pair[1] if quarters + 1 & 2 else pair[1]),
+    )
+
+
+def _polynomial(z: float, coefficients: Sequence[float]) -> float:
+    value = coefficients[-1]
+    for coefficient in coefficients[-2::-1]:
+        value = fma(z, value, coefficient)
+    return value
