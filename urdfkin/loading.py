@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
-from typing import Any, TypedDict, Unpack, cast
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack, cast
 
-from urdfkin.dh.compare.slips import doubts
-from urdfkin.dh.convert import to_urdf
-from urdfkin.dh.parse_table import is_table_file, read_table_or_screws
-from urdfkin.dh.screws import ProductOfExponentials
-from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
 from urdfkin.lint.rules.joints import MIMIC_CONTINUOUS, tilts
 from urdfkin.lint.rules.left_out import left_out
@@ -22,20 +16,18 @@ from urdfkin.lint.runner import read_urdf
 from urdfkin.model.tree import with_poses, with_tilts
 from urdfkin.robot import Robot
 from urdfkin.system.files import at_home, read_bytes
-from urdfkin.urdf.catalogue import described
 from urdfkin.urdf.findings import Finding, PinocchioReading, Reporter, Severity, UrdfError, UrdfWarning
-from urdfkin.urdf.foreign import XmlElement, XmlTree, is_model, lost_quaternions, text_of, tree_of_model
-from urdfkin.urdf.mjcf import is_mjcf, is_text, name_of
 from urdfkin.urdf.parser import NEWER_VERSION
 from urdfkin.urdf.reader import read_tree
-from urdfkin.urdf.sources import Origin, Source, Text, as_word, is_urdf_path, read_source
+from urdfkin.urdf.sources import Origin, Source, Text, as_word, entry_of, is_urdf_path, read_source
 from urdfkin.urdf.writer import to_urdf as write_urdf
-from urdfkin.verify.chain_checks import check_screws
-from urdfkin.verify.mjcf_check import check_mjcf_source, read_mjcf
-from urdfkin.verify.model_check import check_model_source
 from urdfkin.verify.oracles import WitnessName, witness_of
 from urdfkin.verify.sampling import Verify, checked_choice
-from urdfkin.verify.table_check import check_table_source
+
+if TYPE_CHECKING:
+    from urdfkin.dh.screws import ProductOfExponentials
+    from urdfkin.dh.table import DHTable
+    from urdfkin.urdf.foreign import XmlElement, XmlTree
 
 #: Codes of findings that only help the author of a URDF file. They are not reported for a URDF that urdfkin
 #: generates.
@@ -105,8 +97,15 @@ def load(
     0.7
     """
     how: How = {"verify": verify, "mimic": mimic, "root_joint": root_joint, "oracle": oracle}
-    if is_urdf_path(source):
+    if is_urdf_path(source) or (isinstance(source, str) and entry_of(source)):
         return robot_of(read_source(source, xacro_args=xacro_args), **how)
+    from urdfkin.dh.parse_table import is_table_file  # noqa: PLC0415  a URDF needs none of these
+    from urdfkin.dh.screws import ProductOfExponentials  # noqa: PLC0415
+    from urdfkin.dh.table import DHTable  # noqa: PLC0415
+    from urdfkin.urdf.catalogue import described  # noqa: PLC0415
+    from urdfkin.urdf.foreign import is_model, lost_quaternions, text_of  # noqa: PLC0415
+    from urdfkin.urdf.mjcf import is_mjcf  # noqa: PLC0415
+
     if (found := described(source)) is not None:
         source = found.path
         xacro_args = {**found.xacro_args, **(xacro_args or {})}
@@ -135,6 +134,14 @@ def _load_table(
     xacro_args: Mapping[str, object] | None,
     **how: Unpack[How],
 ) -> Robot:
+    from urdfkin.dh.compare.slips import doubts  # noqa: PLC0415
+    from urdfkin.dh.convert import to_urdf  # noqa: PLC0415
+    from urdfkin.dh.parse_table import read_table_or_screws  # noqa: PLC0415
+    from urdfkin.dh.screws import ProductOfExponentials  # noqa: PLC0415
+    from urdfkin.dh.table import DHTable  # noqa: PLC0415
+    from urdfkin.verify.chain_checks import check_screws  # noqa: PLC0415
+    from urdfkin.verify.table_check import check_table_source  # noqa: PLC0415
+
     _refuse_arguments(xacro_args, "a table")
     table: DHTable | ProductOfExponentials
     if isinstance(source, DHTable | ProductOfExponentials):
@@ -166,6 +173,11 @@ def _load_mjcf(
     streamed: Text | None,
     **how: Unpack[How],
 ) -> Robot:
+    import hashlib  # noqa: PLC0415
+
+    from urdfkin.urdf.mjcf import name_of  # noqa: PLC0415
+    from urdfkin.verify.mjcf_check import check_mjcf_source, read_mjcf  # noqa: PLC0415
+
     _refuse_arguments(xacro_args, "MJCF")
     wanted = bool(checked_choice(how["verify"]))
     digest = hashlib.sha256(_bytes_of_mjcf(source)).hexdigest()
@@ -187,6 +199,8 @@ def _bytes_of_mjcf(source: str | bytes | os.PathLike[str]) -> bytes:
     Raises:
         SourceError: the file cannot be read or is too large.
     """
+    from urdfkin.urdf.mjcf import is_text  # noqa: PLC0415
+
     if isinstance(source, bytes):
         return source
     if is_text(source):
@@ -195,6 +209,9 @@ def _bytes_of_mjcf(source: str | bytes | os.PathLike[str]) -> bytes:
 
 
 def _load_model(source: Any, xacro_args: Mapping[str, object] | None, **how: Unpack[How]) -> Robot:
+    from urdfkin.urdf.foreign import tree_of_model  # noqa: PLC0415
+    from urdfkin.verify.model_check import check_model_source  # noqa: PLC0415
+
     _refuse_arguments(xacro_args, "a pinocchio.Model")
     read = tree_of_model(source)
     text = Text(write_urdf(read.tree).encode(), "<pinocchio.Model>", "<pinocchio.Model>")

@@ -16,14 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.compiled.batch import in_parts
-from urdfkin.compiled.breakdown import KINDS, AccelerationBreakdown, moving_joints
 from urdfkin.compiled.plan import CompiledTree, compile_tree
 from urdfkin.compiled.prepared import PreparedFrame
 from urdfkin.conventions import Convention, ConventionRobot, Conversion, find_convention
-from urdfkin.dh.make import dh_table
-from urdfkin.dh.screws import ProductOfExponentials, screws_of
-from urdfkin.dh.table import DHTable
-from urdfkin.dh.tree_parameters import TreeParameters, tree_parameters
 from urdfkin.errors import InputError, RangeError, RepresentationSingularityError
 from urdfkin.errors.display import Displayable, TextDocument
 from urdfkin.errors.escape import log_line
@@ -37,7 +32,6 @@ from urdfkin.errors.validators import (
     whole_number,
 )
 from urdfkin.export import QUANTITIES as EXPORTED
-from urdfkin.kinematics.bodies import QUATERNION, seen_from
 from urdfkin.kinematics.inputs import scalars, vectors
 from urdfkin.kinematics.rotation.euler import NEAREST
 from urdfkin.kinematics.roundings import EPS
@@ -52,12 +46,10 @@ from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.system.lazy_import import hook
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import Finding, Findings
-from urdfkin.urdf.plain_xml import order_words
 from urdfkin.urdf.sources import Origin
 from urdfkin.verify.bounds import magnitudes, movable, nearest_singularity
 from urdfkin.verify.call import Call
 from urdfkin.verify.certificate import Certificate
-from urdfkin.verify.chain_checks import check_screws
 from urdfkin.verify.oracles import WitnessName
 from urdfkin.verify.quantities import (
     ACCELERATION_BREAKDOWN,
@@ -75,6 +67,10 @@ from urdfkin.verify.singularity import columns_of
 from urdfkin.verify.verifier import Verifier
 
 if TYPE_CHECKING:
+    from urdfkin.compiled.breakdown import AccelerationBreakdown
+    from urdfkin.dh.screws import ProductOfExponentials
+    from urdfkin.dh.table import DHTable
+    from urdfkin.dh.tree_parameters import TreeParameters
     from urdfkin.export.compiled_frame import CompiledFrame
     from urdfkin.verify.exact.enclosure import Enclosures
 
@@ -160,6 +156,8 @@ class Robot(Displayable):
         return [name for name in super().__dir__() if name not in _INSIDE]
 
     def _sheet(self) -> TextDocument:
+        from urdfkin.urdf.plain_xml import order_words  # noqa: PLC0415
+
         order = order_words(self.urdf, self.joint_names)
         return described(self.tree, self.base_frame, self.tip_frame, order)
 
@@ -768,6 +766,8 @@ class Robot(Displayable):
         >>> arm.relative_placement([0.0, 0.0], "tip", "link_2")[:3, 3].tolist()
         [0.4, 0.0, 0.0]
         """
+        from urdfkin.kinematics.bodies import seen_from  # noqa: PLC0415  few calls need these imports
+
         name = as_str(relative_to, "relative_to")
         name = name if isinstance(name, FrameName) else str(name)  # a replay line prints plain strings
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (q,), also=(name,), relative_to=name)
@@ -1193,7 +1193,7 @@ class Robot(Displayable):
         self.verifier.ready(verify)
         if self.verifier.wanted(verify):
             nearest = max(nearest, nearest_singularity(call.plan))
-        rows = 7 if representation == QUATERNION else 6
+        rows = 7 if representation == "quaternion" else 6
         to = call.flat(out, (rows, self.nv))
         J = np.empty((call.n, len(call.links), rows, self.nv)) if to is None else to
         walk, state = (call.plan, (call.q,), _ALIGNED), {"base": call.state, "threads": threads}
@@ -1268,6 +1268,8 @@ class Robot(Displayable):
         joint_1  centripetal   -0.9      0      0      0      0      0
         sum                    -0.9      0      0      0      0      0
         """
+        from urdfkin.compiled.breakdown import KINDS, AccelerationBreakdown, moving_joints  # noqa: PLC0415
+
         frame = self._default_frame() if frame is None else frame
         call = Call(self.tree, self.plan, as_str(frame, "frame"), reference, base, (q, v, a))
         self.verifier.ready(verify)
@@ -1520,6 +1522,9 @@ class Robot(Displayable):
             >>> urdfkin.load("ur5").dh("tool0", "base", snap=1e-6).rows[3].d
             0.10915
         """
+        from urdfkin.dh.make import dh_table  # noqa: PLC0415
+        from urdfkin.dh.table import DHTable  # noqa: PLC0415
+
         if not isinstance(like, DHTable | None):
             raise InputError(
                 "like must be a table", found=safe_repr(like), remedy="read one with urdfkin.read_table(FILE)"
@@ -1563,6 +1568,9 @@ class Robot(Displayable):
             >>> urdfkin.load("planar_two_link").screws("tip", "base").space[1].tolist()  # [w; v]
             [0.0, 0.0, 1.0, 0.0, -0.5, 0.0]
         """
+        from urdfkin.dh.screws import screws_of  # noqa: PLC0415
+        from urdfkin.verify.chain_checks import check_screws  # noqa: PLC0415
+
         found = screws_of(self.chain(tip, base))
         if self.verifier.wanted(verify):
             check_screws(self.verifier, found)
@@ -1582,6 +1590,8 @@ class Robot(Displayable):
         >>> [(row.joint, row.d) for row in urdfkin.load("planar_two_link").tree_parameters().rows]
         [('joint_1', 0.0), ('joint_2', 0.5), ('end', 0.4)]
         """
+        from urdfkin.dh.tree_parameters import tree_parameters  # noqa: PLC0415
+
         parameters = tree_parameters(self.tree)
         if self.verifier.wanted(verify):
             self.verifier.tree_parameters(parameters)

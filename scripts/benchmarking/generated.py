@@ -21,7 +21,7 @@ import numpy as np
 
 from scripts.benchmarking.subject import Subject
 from scripts.benchmarking.timing import Work
-from urdfkin.compiled.machine import sine
+from urdfkin.compiled import python_numbers
 from urdfkin.compiled.plan import CompiledTree, Motion, Step
 from urdfkin.kinematics import equations
 from urdfkin.model.tree import FloatArray
@@ -138,8 +138,8 @@ def compiled(subject: Subject, quantity: str) -> Callable[..., None]:
         f"static const int {name}[] = {{{_listed(column.astype(int).tolist())}}};"
         for name, column in tables.items()
     ]
-    lines += [f"#define SINE {_listed(sine._SINE)}", f"#define COSINE {_listed(sine._COSINE)}"]
-    lines += [f"#define PI_2_REST {sine._PI_2_REST}", _straight_line(plan, quantity)]
+    lines += [f"#define {name} {_listed(getattr(python_numbers, name))}" for name in ("SINE", "COSINE")]
+    lines += [f"#define PI_2_REST {python_numbers.PI_2_REST}", _straight_line(plan, quantity)]
     (folder / f"{quantity}.h").write_text("\n".join(lines), "utf-8")
     library = folder / f"{quantity}.so"
     here = [f"-I{folder}", f'-DROBOT="{quantity}.h"', str(_FRAME), "-o", str(library)]

@@ -18,7 +18,7 @@ from urdfkin.compiled.program import KEPT_ROWS, WIDTH, Head, Op, program_of
 from urdfkin.kinematics.arithmetic import bound
 
 #: Reduction 10, z and 1 - z/2 with their rounding errors 8, two polynomials 20, last steps 13
-#: (`compiled.sine`).
+#: (`compiled.python_numbers`).
 _SINE_COSINE = 51
 
 
@@ -101,8 +101,8 @@ class _Walk:
         }
         for module in (axes, recursion, outputs):
             for name, value in vars(module).items():
-                if hasattr(value, "py_func"):
-                    self.names.setdefault(name, FunctionType(value.py_func.__code__, self.names, name))
+                if isinstance(value, FunctionType):
+                    self.names.setdefault(name, FunctionType(value.__code__, self.names, name))
                 elif isinstance(value, int | np.ndarray):
                     self.names.setdefault(name, value)
         self.call = SimpleNamespace(**self.names)

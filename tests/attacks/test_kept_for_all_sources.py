@@ -10,7 +10,7 @@ import pytest
 
 from urdfkin import compiled as recursion
 from urdfkin import kinematics
-from urdfkin.compiled.machine import compiling
+from urdfkin.compiled import kept, machine
 from urdfkin.system import cache
 from urdfkin.system.cache import kept_folder
 
@@ -28,7 +28,7 @@ def test_a_change_in_any_source_leads_to_another_folder(changed: int, tmp_path: 
 @pytest.mark.parametrize(
     ("module", "ask", "needed"),
     [
-        (compiling, compiling.cache_folder, [recursion, kinematics]),
+        (cache, kept.cache_folder, [recursion, machine, kinematics]),
     ],
     ids=["kernels"],
 )

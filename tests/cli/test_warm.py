@@ -10,8 +10,7 @@ import pytest
 
 import urdfkin as library
 from tests.cli.running import process, urdfkin
-from urdfkin.compiled import preload
-from urdfkin.compiled.machine import compiling
+from urdfkin.compiled import kept, preload
 from urdfkin.compiled.machine import kernels as every_kernel
 from urdfkin.compiled.machine.compiling import Kernel
 from urdfkin.validation import campaign
@@ -77,11 +76,11 @@ def test_warm_compiles_every_kernel_of_the_package(tmp_path: Path) -> None:
 def test_programs_are_told_by_one_warning_of_a_logger(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(compiling, "_logged", [])
+    monkeypatch.setattr(kept, "_logged", [])
     for name in ("placements", "jacobians"):
-        with compiling.compile_event(name) as missed:
+        with kept.compile_event(name) as missed:
             missed()
-    with compiling.compile_event("velocities"):
+    with kept.compile_event("velocities"):
         pass  # read from disk
     (record,) = caplog.records
     assert (record.name, record.levelname) == ("urdfkin", "WARNING")

@@ -10,6 +10,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from urdfkin.compiled.single import single
 
 import urdfkin
 from urdfkin.cli.options import REFERENCES
@@ -17,7 +18,6 @@ from urdfkin.cli.quantity import REPRESENTATIONS
 from urdfkin.compiled.breakdown import acceleration_breakdown
 from urdfkin.compiled.kernel_args import REFERENCES as IN_KERNELS
 from urdfkin.compiled.plan import compile_tree
-from urdfkin.compiled.single import single
 from urdfkin.export.function import function_of
 from urdfkin.export.recursion import QUANTITIES as EXPORTED
 from urdfkin.kinematics.bodies import QUATERNION

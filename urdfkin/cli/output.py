@@ -159,7 +159,7 @@ def format_option(
 @contextmanager
 def compiling() -> Iterator[None]:
     """Print a line when a kernel is compiled, which happens once on a machine, and the time it took."""
-    from urdfkin.compiled.machine.compiling import listen_to_compile_events  # noqa: PLC0415  keeps --help fast
+    from urdfkin.compiled.kept import listen_to_compile_events  # noqa: PLC0415  keeps --help fast
 
     hints = [", once; 'urdfkin warm' compiles all kernels"]
 

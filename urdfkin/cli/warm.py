@@ -20,8 +20,8 @@ def command() -> None:
     stored below XDG_CACHE_HOME. Kernels from another processor are compiled again. Exit 2: the kernels cannot
     be stored.
     """
+    from urdfkin.compiled.kept import cache_folder, listen_to_compile_events  # noqa: PLC0415
     from urdfkin.compiled.machine import kernels  # noqa: PLC0415
-    from urdfkin.compiled.machine.compiling import cache_folder, listen_to_compile_events  # noqa: PLC0415
     from urdfkin.compiled.machine.single import one_configuration  # noqa: PLC0415
     from urdfkin.verify.ahead import load_kernels  # noqa: PLC0415
 

@@ -4,31 +4,22 @@ A single configuration needs no kernel: Python computes it in a millisecond, wit
 Numba and reading a kernel from disk takes longer, and compiling takes seconds. So each kernel has an account
 of the time that was spent without it. From `LOADING` on, the kernel is read from disk. If it is not there,
 a process beside this one compiles it, and Python computes until that is done, or until `COMPILING`.
-
-Events. Compiling takes seconds, reading from disk almost no time. Listeners are informed of each compilation
-that this process waits for.
 """
 
 from __future__ import annotations
 
 import atexit
-import logging
 import os
-import subprocess
-import sys
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import cache
 from importlib import import_module
-from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from urdfkin.kinematics import equations
-from urdfkin.system.cache import kept_folder
-from urdfkin.system.lazy_import import installed_version
+from urdfkin.compiled.kept import cache_folder
 from urdfkin.system.locks import importing
-from urdfkin.system.processes import own_python
+
+if TYPE_CHECKING:
+    import subprocess
 
 #: Seconds that a kernel must save before Numba is imported for it; and before this process compiles it.
 LOADING, COMPILING = 0.3, 3.0
@@ -39,59 +30,6 @@ _LOADING_MORE = 0.03
 RECURSIONS, SINGLE = "urdfkin.compiled.machine.kernels", "urdfkin.compiled.machine.single"
 _ONE_HALF = "accelerations", "local_accelerations", "velocities"
 _OTHER_HALF = "jacobians", "jacobian_rates", "local_velocities", "placements"
-
-#: Called with a kernel's name and None when its compilation begins, and with the seconds when it is ready.
-Listener = Callable[[str, float | None], None]
-
-
-def _log(name: str, seconds: float | None) -> None:
-    """Log one warning in each process, which goes to standard error by default."""
-    if seconds is None and not _logged:
-        _logged.append(name)
-        logging.getLogger("urdfkin").warning(
-            "urdfkin: compiling %s once, then cached on disk; 'urdfkin warm' compiles all kernels at once",
-            name,
-        )
-
-
-_logged: list[str] = []
-_listeners: list[Listener] = [_log]
-
-
-@contextmanager
-def listen_to_compile_events(listener: Listener) -> Iterator[None]:
-    """Send compile events to `listener` only, while the context is open."""
-    _listeners.append(listener)
-    try:
-        yield
-    finally:
-        _listeners.remove(listener)
-
-
-@contextmanager
-def compile_event(name: str) -> Iterator[Callable[[], None]]:
-    """Report a compilation. The context yields a function that must be called if a compilation begins."""
-    begun: list[float] = []
-
-    def missed() -> None:
-        begun.append(time.perf_counter())
-        _listeners[-1](name, None)
-
-    yield missed
-    if begun:
-        _listeners[-1](name, time.perf_counter() - begun[0])
-
-
-@cache
-def cache_folder() -> Path | None:
-    """Return the cache folder of compiled kernels; None if no folder is writable."""
-    numba = sys.modules.get("numba")
-    chosen = numba.config.CACHE_DIR if numba else os.environ.get("NUMBA_CACHE_DIR")
-    python = sys.implementation.cache_tag + sys.abiflags
-    versions = installed_version("numba") or "", installed_version("llvmlite") or "", python
-    sources = [*Path(__file__).parent.rglob("*.py"), *Path(equations.__file__).parent.glob("*.py")]
-    return kept_folder("kernels", sorted(sources), *versions, root=Path(chosen) if chosen else None)
-
 
 # -- when a kernel pays ----------------------------------------------------------------------------------
 
@@ -187,6 +125,10 @@ def _compile_beside(name: str, home: str) -> bool:
 
 def _compile_elsewhere(names: Sequence[str], home: str = RECURSIONS) -> subprocess.Popen[bytes]:
     """Start another interpreter that compiles; this process compiles all kernels that it fails to compile."""
+    import subprocess  # noqa: PLC0415
+
+    from urdfkin.system.processes import own_python  # noqa: PLC0415
+
     code = (
         f"{_UNTIL_CLOSED} from urdfkin.compiled import preload; preload._compile({tuple(names)!r}, {home!r})"
     )

@@ -185,7 +185,8 @@ def _double(x: Any) -> float:
     if type(x) is Product:
         product: float = x.x * x.y
         return product
-    return float(x.x if type(x) is Number else x.value if type(x) is Known else x)
+    double: float = x.x if type(x) is Number else float((x.value or 0) if type(x) is Known else x)
+    return double
 
 
 _ZERO, _ONE, _NOTHING = Known(0), Known(1), Known(None)

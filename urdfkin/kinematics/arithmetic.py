@@ -45,7 +45,7 @@ def rebound(
     copies: dict[str, Any] = {}
     for module in modules:
         names = dict(vars(module))
-        names |= {name: x for name, x in (others | copies).items() if name in names}
+        names |= {name: x for name, x in {**others, **copies}.items() if name in names}
         for name, function in vars(module).items():
             if isinstance(function, FunctionType) and function.__module__ == module.__name__:
                 copy = FunctionType(function.__code__, names, name, function.__defaults__)

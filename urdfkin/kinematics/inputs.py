@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from urdfkin.errors import InputError
 from urdfkin.errors.validators import is_real, safe_repr
+from urdfkin.system.lazy_import import is_a
 
 FloatArray = NDArray[np.float64]
 
@@ -42,8 +43,8 @@ def floats(value: ArrayLike, name: str) -> FloatArray:
 
 
 def _is_masked(value: object) -> bool:
-    """Return whether a number is masked (`numpy.ma`); NumPy would ignore the mask without an error."""
-    if isinstance(value, np.ma.MaskedArray):
+    """Return whether a number is masked; NumPy would ignore the mask without an error."""
+    if is_a(value, "numpy.ma:MaskedArray"):
         return bool(np.ma.is_masked(value))
     return isinstance(value, list | tuple) and any(map(_is_masked, value))
 

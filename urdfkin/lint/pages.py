@@ -10,18 +10,18 @@ index of the repetition. Line breaks in prose have no meaning.
 from __future__ import annotations
 
 import textwrap
-import tomllib
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
-from importlib.resources.abc import Traversable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from urdfkin.errors import Question, UnknownNameError
 from urdfkin.errors.escape import printable
 from urdfkin.lint.rules import bodies, dialect, joints, left_out
 from urdfkin.urdf import parser
 from urdfkin.urdf.findings import Rule
+
+if TYPE_CHECKING:
+    from importlib.resources.abc import Traversable
 
 _MODULES = (parser, dialect, joints, bodies)
 
@@ -74,6 +74,8 @@ def page(code: str) -> Page:
 
 def page_files() -> dict[str, Traversable]:
     """Return the file with the pages of each topic."""
+    from importlib import resources  # noqa: PLC0415  few runs need a page
+
     packages = {module.__name__.rpartition(".")[2]: module.__package__ for module in (*_MODULES, left_out)}
     return {topic: resources.files(str(package)) / f"{topic}.toml" for topic, package in packages.items()}
 
@@ -81,6 +83,8 @@ def page_files() -> dict[str, Traversable]:
 @cache
 def topic_pages(topic: str) -> dict[str, Page]:
     """Return the pages of a topic."""
+    import tomllib  # noqa: PLC0415
+
     data = tomllib.loads(page_files()[topic].read_text(encoding="utf-8"))
     defaults = {key: value for key, value in data.items() if isinstance(value, str)}
     return {

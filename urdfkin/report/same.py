@@ -21,10 +21,8 @@ from urdfkin.kinematics.roundings import NOT_ZERO
 from urdfkin.model.mechanisms.mechanism import Mechanism
 from urdfkin.model.pose import inverse
 from urdfkin.model.tree import FloatArray
-from urdfkin.report.html import as_is, asset, environment, when
 from urdfkin.report.words import counted
 from urdfkin.robot import Robot
-from urdfkin.verify.oracles import versions
 
 #: Number of lines that are shown for each kind of difference without --all.
 SHOWN = 12
@@ -272,6 +270,9 @@ def as_html(
         options: Other options of the command, for the line that repeats it.
         started: Date and time on the page; None: now.
     """
+    from urdfkin.report.html import as_is, asset, environment, when  # noqa: PLC0415  loads Jinja
+    from urdfkin.verify.oracles import versions  # noqa: PLC0415
+
     moment = started or datetime.now(UTC)
     frames = far_frames(found)
     written = question.within is not None and found.as_written is not None

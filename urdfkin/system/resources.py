@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import importlib.util
 import sys
 from collections.abc import Iterator
@@ -53,10 +52,12 @@ def example_robots_dir() -> Path:
 
 def _example_candidates() -> Iterator[Path]:
     below = Path("share", "example-robot-data", "robots")
+    from importlib import metadata  # noqa: PLC0415  its imports take as long as a robot takes to load
+
     try:
-        distribution = importlib.metadata.distribution("example-robot-data")
+        distribution = metadata.distribution("example-robot-data")
         yield Path(str(distribution.locate_file("cmeel.prefix"))) / below
-    except importlib.metadata.PackageNotFoundError:
+    except metadata.PackageNotFoundError:
         pass
     spec = importlib.util.find_spec("pinocchio")
     if spec is not None and spec.origin is not None:

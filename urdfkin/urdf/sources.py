@@ -213,7 +213,7 @@ def _read_string(word: str, most: int) -> Text:
         return Text(read_start_of_standard_input(most + 1), "<stdin>", "-")
     if word.lstrip("\ufeff \t\r\n").startswith("<"):
         return _encode(word, "<text>", "<text>")
-    if (entry := _entry(word)) is not None:
+    if (entry := entry_of(word)) is not None:
         read = _read_file(entry.path, most)
         return Text(read.data, read.label, word, entry)
     path = at_home(word)
@@ -257,11 +257,11 @@ def _read_file(path: Path, most: int) -> Text:
 def as_word(path: Path) -> str:
     """Return a path as a word for `load`, with `./` before it where it could be taken for something else."""
     word = str(path)
-    return f"./{word}" if word.startswith(("-", "<")) or _entry(word) is not None else word
+    return f"./{word}" if word.startswith(("-", "<")) or entry_of(word) is not None else word
 
 
-def _entry(word: str) -> Entry | None:
-    """Return the catalogue entry of a name; None for a path, that is, a word with a dot or a separator."""
+def entry_of(word: str) -> Entry | None:
+    """Return the catalogue entry of a name; None for a path, which has a point or a separator."""
     return None if "." in word or os.sep in word else catalogue().get(word)
 
 

@@ -7,7 +7,6 @@ are installed, Python finds the module of the plugins first.
 
 from __future__ import annotations
 
-import importlib.metadata
 from pathlib import Path
 from typing import Any
 
@@ -71,7 +70,9 @@ def _impostor(found: Any) -> InstallationError:
 
 def _owner(file: Path) -> tuple[str, str] | None:
     """Return name and version of the installed project that contains a file."""
-    for project in importlib.metadata.distributions():
+    from importlib import metadata  # noqa: PLC0415  for an error only
+
+    for project in metadata.distributions():
         for one in project.files or ():
             if one.name == file.name and Path(str(project.locate_file(one))) == file:
                 return project.metadata["Name"], project.version

@@ -10,13 +10,11 @@ import hashlib
 import sys
 import warnings
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from urdfkin.compiled.plan import IntArray
-from urdfkin.dh.table import DHTable
-from urdfkin.dh.tree_parameters import TreeParameters
 from urdfkin.errors import RangeError
 from urdfkin.kinematics.roundings import EPS, NOT_ZERO, of_joints
 from urdfkin.model.base_motion import BaseMotion
@@ -34,7 +32,11 @@ from urdfkin.verify.pinocchio_module import pinocchio, version
 from urdfkin.verify.quantities import Quantity
 from urdfkin.verify.replay import replay_line
 from urdfkin.verify.sampling import SAMPLE, Verify, checked_choice, draw, parts
-from urdfkin.verify.tables import TableCheck, TableError, check_table
+
+if TYPE_CHECKING:
+    from urdfkin.dh.table import DHTable
+    from urdfkin.dh.tree_parameters import TreeParameters
+    from urdfkin.verify.tables import TableCheck
 
 #: Random configurations for the check of a table, besides the zero configuration and the limits.
 TABLE_SAMPLES = 40
@@ -248,6 +250,8 @@ class Verifier:
         Raises:
             TableError: the two differ by more than the bound.
         """
+        from urdfkin.verify.tables import TableError, check_table  # noqa: PLC0415
+
         if (reason := self.cannot()) is not None:
             _warn(reason)
             return None
@@ -273,6 +277,8 @@ class Verifier:
         Raises:
             TableError: the two differ by more than the bound.
         """
+        from urdfkin.verify.tables import TableError  # noqa: PLC0415
+
         if (reason := self.cannot()) is not None:
             _warn(reason)
             return None

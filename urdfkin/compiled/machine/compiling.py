@@ -34,7 +34,7 @@ from numba.core.compiler import CompilerBase, CompileResult
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.serialize import dumps
 
-from urdfkin.compiled.preload import cache_folder, compile_event
+from urdfkin.compiled.kept import cache_folder, compile_event
 from urdfkin.system.cache import get, put, report_damaged
 from urdfkin.system.files import read_bytes
 from urdfkin.system.locks import lock_over_forks
