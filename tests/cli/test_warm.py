@@ -39,7 +39,7 @@ def test_bad_input_is_told_before_anything_is_compiled(words: str, tmp_path: Pat
 
 @pytest.mark.long
 def test_only_what_is_needed_is_compiled_and_it_is_said_once(tmp_path: Path) -> None:
-    words = ("placement", "elbow", "--no-verify")
+    words = ("placement", "elbow", "--no-verify", "--q", "random:20000", "--format", "npy")
     first = process(*words, XDG_CACHE_HOME=str(tmp_path))
     assert kernels(tmp_path) == ["placements"]
     assert first.err.count("urdfkin: compiling placements for this machine, once; 'urdfkin warm'") == 1

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import urdfkin
-import urdfkin.robot
 from urdfkin import VerificationError
+from urdfkin.kinematics import bodies
 from urdfkin.model.tree import FloatArray
 
 #: Frames of one branch and of two, up the tree, down and across; a base that moves by itself, a follower.
@@ -67,7 +67,7 @@ def test_several_frames_batches_and_a_given_array_are_as_in_placement() -> None:
 def test_a_slip_in_it_is_a_disagreement_with_a_line_that_shows_it(
     slip: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    face: Any = urdfkin.robot
+    face: Any = bodies
     right = face.seen_from
 
     def wrong(T_a: FloatArray, T_b: FloatArray, out: FloatArray | None) -> FloatArray:

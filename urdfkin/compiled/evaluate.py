@@ -161,7 +161,7 @@ def _interpreted(
 ) -> int | None:
     """Compute with Python's numbers; return whether an input is not ordinary, or None if a kernel pays.
 
-    Whether it pays depends on the time that the first configurations take.
+    Whether it pays depends on the processor time of the first configurations.
     """
     if preload.kernel(name) is not None:
         return None
@@ -170,12 +170,13 @@ def _interpreted(
     recursion, least, odd = getattr(recursions, name), math.inf, 0
     flat = out.reshape(len(out), math.prod(out.shape[1:]))
     for i, row in enumerate(flat):
-        begin, result = time.perf_counter(), [0.0] * len(row)
+        begin, result = time.thread_time(), [0.0] * len(row)
         odd |= recursion(_lists(program, reference, inputs, i, result))
         row[:] = result
-        least = min(least, took := time.perf_counter() - begin)
+        least = min(least, took := time.thread_time() - begin)
         preload.spend(name, took)
-        if (left := len(flat) - 1 - i) and preload.kernel(name, left * least) is not None:
+        # The first one takes longer than the others.
+        if i and (left := len(flat) - 1 - i) and preload.kernel(name, left * least) is not None:
             return None
     return odd
 

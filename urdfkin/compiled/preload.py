@@ -21,7 +21,7 @@ from urdfkin.system.locks import importing
 if TYPE_CHECKING:
     import subprocess
 
-#: Seconds that a kernel must save before Numba is imported for it; and before this process compiles it.
+#: Seconds of the processor that a kernel must save before Numba is imported for it; and before this process compiles it.
 LOADING, COMPILING = 0.3, 3.0
 #: The same if Numba is imported already.
 _LOADING_MORE = 0.03

@@ -35,10 +35,10 @@ def coupled(full: FloatArray, columns: Places, index: Places, factor: FloatArray
     """
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])
     if (kernel := preload.kernel("coupling", home=KERNELS)) is None:
-        begin, sums = time.perf_counter(), np.zeros((len(rows), nv))
+        begin, sums = time.thread_time(), np.zeros((len(rows), nv))
         for column in columns:
             sums[:, index[column]] += rows[:, column] * factor[column]
-        preload.spend("coupling", time.perf_counter() - begin)
+        preload.spend("coupling", time.thread_time() - begin)
         return sums.reshape(*full.shape[:-1], nv)
     out = np.zeros(len(rows) * nv)
     kernel(rows, columns, index, factor, out)

@@ -1,0 +1,238 @@
+"""A few configurations are computed by Python's numbers, without Numba, and have the bits of the kernels."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import urdfkin
+from scripts.check_bits import WAYS, Subject, differing_interpreted, same
+from tests.cli.running import process
+from urdfkin.compiled import preload
+from urdfkin.compiled.preload import only
+from urdfkin.compiled.python_numbers import Number, fma, sine_cosine
+from urdfkin.errors import NotFiniteError, RangeError
+from urdfkin.model.base_motion import BaseMotion
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray
+from urdfkin.robot import Robot
+from urdfkin.system.processes import own_python
+from urdfkin.urdf.catalogue import catalogue
+
+#: Modules that one result does not need.
+HEAVY = {"numba", "llvmlite", "scipy", "trimesh", "networkx", "jsonschema", "mpmath", "yourdfpy", "jinja2"}
+
+_FEW = ("panda", "ur5", "simple_humanoid", "planar_two_link")
+NAMES = [pytest.param(name, marks=() if name in _FEW else pytest.mark.slow) for name in catalogue()]
+
+
+def in_both_ways(compute: Callable[[], FloatArray]) -> list[FloatArray]:
+    found = []
+    for way in WAYS:
+        with only(way):
+            found.append(compute())
+    return found
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_quantity_of_every_robot_has_the_bits_of_the_kernels(name: str) -> None:
+    assert list(differing_interpreted(Subject.of(name))) == []
+
+
+@pytest.mark.parametrize("root_joint", [None, "floating", "planar"])
+def test_a_moving_base_a_free_root_and_an_imu_have_the_bits_of_the_kernels(root_joint: str | None) -> None:
+    robot = urdfkin.load("ur5", root_joint=root_joint, verify=False)
+    generator = np.random.default_rng(0)
+    q, (v, a) = robot.sample(2, seed=1), generator.standard_normal((2, 2, robot.nv))
+    base = BaseMotion(velocity=generator.standard_normal(6), acceleration=generator.standard_normal(6))
+    for reference in ("local", "world", "local_world_aligned"):
+        results = in_both_ways(lambda r=reference: robot.acceleration(q, v, a, "tool0", r, base=base))  # type: ignore[misc]
+        assert same(*results)
+    assert same(*in_both_ways(lambda: robot.imu(q, v, a, "tool0", base=base)))
+
+
+def test_the_sine_has_the_bits_of_the_kernels_for_angles_of_every_size() -> None:
+    robot = urdfkin.load("planar_two_link", verify=False)
+    generator = np.random.default_rng(0)
+    angles = generator.standard_normal((200, 2)) * 10.0 ** generator.uniform(-9.0, 9.0, (200, 2))
+    angles[:20] = np.pi / 4 * np.arange(-20, 20).reshape(20, 2)
+    assert same(*in_both_ways(lambda: robot.placement(angles, "tip")))
+
+
+def test_the_sine_of_a_number_that_is_not_finite_is_not_finite() -> None:
+    for x in (math.inf, -math.inf, math.nan):
+        assert all(math.isnan(y.x) for y in sine_cosine(None, 0, Number(x)))
+
+
+def test_a_fused_product_is_rounded_once_and_overflows_without_an_error() -> None:
+    x = 1.0 + 2.0**-30
+    assert fma(x, x, -1.0 - 2.0**-29) == 2.0**-60
+    assert fma(1e300, 1e300, 0.0) == math.inf
+    assert math.isnan(fma(math.inf, 0.0, 1.0))
+
+
+def test_numbers_that_cannot_be_used_are_the_same_errors() -> None:
+    robot = urdfkin.load("planar_two_link", verify=False)
+    for way in WAYS:
+        with only(way):
+            with pytest.raises(urdfkin.InputError):
+                robot.placement([math.nan, 0.0])
+            with pytest.raises(RangeError):
+                robot.velocity([0.0, 0.0], [1e308, 1e308])
+    assert issubclass(NotFiniteError, urdfkin.InputError)
+
+
+def test_a_certificate_does_not_depend_on_what_computed() -> None:
+    certificates = []
+    for way in WAYS:
+        with only(way):
+            robot = urdfkin.load("tiago")  # it has mimic joints
+            robot.jacobian(robot.sample(3), robot.link_names[-3:])
+            certificates.append(robot.certificate())
+    assert certificates[0] == certificates[1]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "jacobian OWN --q random", "placement OWN", "velocity OWN --q random --v random",
+        "jacobian-rate OWN --q random --v random", "hessian OWN --q random",
+        "acceleration OWN --q random --v random --a random", "imu OWN --q random --v random --a random",
+        "analytical-jacobian OWN --q random", "manipulability OWN --q random", "info OWN", "chain OWN",
+        "screws OWN", "dh OWN", "same OWN OWN", "jacobian OWN --format json", "jacobian tiago",
+    ],
+)  # fmt: skip
+def test_a_command_for_one_configuration_imports_no_compiler_and_no_library_for_meshes(words: str) -> None:
+    own = str(Path(urdfkin.__file__).parents[1] / "robots" / "elbow.urdf")
+    code = (
+        f"sys.argv = ['urdfkin', *{words.replace('OWN', own).split()!r}]\nfrom urdfkin.cli import main\n"
+        f"try: main()\nexcept SystemExit as end: print(end.code, sorted({HEAVY!r} & set(sys.modules)))"
+    )
+    done = subprocess.run(own_python(f"exec({code!r})"), check=True, capture_output=True, text=True)
+    assert done.stdout.splitlines()[-1] == "0 []"
+
+
+def test_one_result_needs_no_cache(tmp_path: Path) -> None:
+    done = process("jacobian", "elbow", XDG_CACHE_HOME=str(tmp_path / "none"))
+    assert (done.code, "compil" in done.err) == (0, False)
+    assert not (tmp_path / "none").exists()
+
+
+# -- when a kernel pays ----------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def unspent(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
+    """A process in which nothing is loaded; the names of the kernels that it loads."""
+    loaded: list[str] = []
+    for name in ("_spent", "_loaded", "_beside"):
+        monkeypatch.setattr(preload, name, {})
+    monkeypatch.setattr(preload, "load", lambda name, home: loaded.append(name) or name)
+    yield loaded
+    preload._end_beside()
+
+
+def test_a_kernel_on_disk_is_loaded_when_more_time_is_spent_without_it(
+    unspent: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(preload, "_on_disk", lambda name: True)
+    assert preload.kernel("jacobians") is None
+    preload.spend("jacobians", 0.9 * preload.LOADING)
+    assert preload.kernel("jacobians") is None
+    assert preload.kernel("placements", more=0.9 * preload.LOADING) is None
+    assert preload.kernel("jacobians", more=0.2 * preload.LOADING) == "jacobians"
+    assert unspent == ["jacobians"]
+
+
+def test_a_kernel_that_is_not_on_disk_is_compiled_beside_and_a_large_batch_does_not_wait_for_that(
+    unspent: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun: list[str] = []
+    monkeypatch.setattr(preload, "_on_disk", lambda name: False)
+    monkeypatch.setattr(preload, "_compile_beside", lambda name, home: begun.append(name) or True)
+    assert preload.kernel("jacobians", more=0.9 * preload.COMPILING) is None
+    assert (begun, unspent) == (["jacobians"], [])
+    assert preload.kernel("jacobians", more=preload.COMPILING) == "jacobians"
+
+
+def test_without_a_folder_for_kernels_no_process_starts(
+    unspent: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(preload, "cache_folder", lambda: None)
+    assert not preload._compile_beside("jacobians", preload.RECURSIONS)
+    assert preload._beside == {}
+
+
+_LONG = """
+import time, urdfkin
+from urdfkin.compiled import preload
+preload.LOADING = 0.0
+robot = urdfkin.load("one_link", verify=False)
+robot.placement([0.0])
+process, = preload._beside.values()
+print(process.pid, process.poll(), flush=True)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("end", ["", "import os; os._exit(0)", "import os, signal; os.kill(os.getpid(), 9)"])
+def test_the_process_that_compiles_ends_with_this_one(end: str, tmp_path: Path) -> None:
+    environ = os.environ | {"XDG_CACHE_HOME": str(tmp_path), "NUMBA_CACHE_DIR": ""}
+    done = subprocess.run(
+        [sys.executable, "-c", _LONG + end], env=environ, capture_output=True, text=True, check=False
+    )
+    pid, state = done.stdout.split()
+    assert (state, done.stderr) == ("None", "")
+    assert _ends(int(pid))
+
+
+def _ends(pid: int) -> bool:
+    for _ in range(100):
+        try:
+            if Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z":
+                return True
+        except FileNotFoundError:
+            return True
+        time.sleep(0.05)
+    return False
+
+
+@pytest.mark.slow
+def test_the_kernel_from_beside_is_used_as_soon_as_it_is_there(tmp_path: Path) -> None:
+    code = """
+import time
+from urdfkin.compiled import preload
+import urdfkin
+preload.LOADING, preload.COMPILING = 0.05, 1e9
+robot = urdfkin.load("one_link", verify=False)
+begin, before = time.perf_counter(), robot.placement([0.5])
+while "placements" not in preload._loaded and time.perf_counter() < begin + 120.0:
+    assert (robot.placement([0.5]) == before).all()
+print("placements" in preload._loaded)
+"""
+    environ = os.environ | {"XDG_CACHE_HOME": str(tmp_path), "NUMBA_CACHE_DIR": ""}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environ, capture_output=True, text=True, check=True
+    )
+    assert (done.stdout, done.stderr) == ("True\n", "")
+
+
+@pytest.mark.slow
+def test_many_single_calls_end_in_the_function_for_single_calls() -> None:
+    robot: Robot = urdfkin.load("panda", verify=False)
+    q, begin = robot.neutral(), time.perf_counter()
+    fast: Any = robot._prepare("panda_hand", Reference.LOCAL_WORLD_ALIGNED)
+    before = robot.jacobian(q, "panda_hand")
+    fast.wanted = False
+    while hasattr(fast._jacobian, "func") and time.perf_counter() < begin + 120.0:
+        assert (robot.jacobian(q, "panda_hand") == before).all()
+    assert not hasattr(fast._jacobian, "func")
