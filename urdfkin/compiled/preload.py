@@ -3,7 +3,8 @@
 A single configuration needs no kernel: Python computes it in a millisecond, with the same bits. Importing
 Numba and reading a kernel from disk takes longer, and compiling takes seconds. So each kernel has an account
 of the time that was spent without it. From `LOADING` on, the kernel is read from disk. If it is not there,
-a process beside this one compiles it, and Python computes until that is done, or until `COMPILING`.
+a process beside this one compiles it from `BESIDE` on, and Python computes until that is done. This process
+compiles it itself if more than `COMPILING` would pass.
 """
 
 from __future__ import annotations
@@ -21,8 +22,10 @@ from urdfkin.system.locks import importing
 if TYPE_CHECKING:
     import subprocess
 
-#: Seconds of the processor that a kernel must save before Numba is imported for it; and before this process compiles it.
+#: Seconds that a kernel must save before Numba is imported, and before this process compiles it.
 LOADING, COMPILING = 0.3, 3.0
+#: Seconds spent without a kernel, from which a process beside this one compiles it.
+BESIDE = 1.0
 #: The same if Numba is imported already.
 _LOADING_MORE = 0.03
 
@@ -71,7 +74,7 @@ def kernel(name: str, more: float = 0.0, home: str = RECURSIONS) -> Any:
     seconds = _spent.get(name, 0.0) + more
     if seconds < (_LOADING_MORE if _loaded else LOADING):
         return None
-    if seconds < COMPILING and not _on_disk(name) and _compile_beside(name, home):
+    if seconds < COMPILING and not _on_disk(name) and (seconds < BESIDE or _compile_beside(name, home)):
         return None
     return load(name, home)
 
@@ -160,6 +163,11 @@ os.register_at_fork(after_in_child=_forget_beside)
 
 
 # -- all kernels in advance ------------------------------------------------------------------------------
+
+
+def are_on_disk() -> bool:
+    """Return whether all kernels of `load_kernels` are stored."""
+    return all(map(_on_disk, _ONE_HALF + _OTHER_HALF))
 
 
 def load_kernels() -> None:

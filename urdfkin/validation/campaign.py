@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from urdfkin.compiled.preload import are_on_disk
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.validators import as_bool, as_str, safe_repr, whole_number
 from urdfkin.validation import memory
@@ -133,7 +134,7 @@ def validate(
                 for index in collector.missing(i):  # one failed chunk fails the robot
                     campaign.enter(campaign.task(i, index), failure(found[i], error))
             missing = [robot for i, robot in enumerate(found) if any(True for _ in collector.missing(i))]
-            if missing and (isolate or any(map(_is_robot, missing))):
+            if _kernels_pay(len(missing) * samples) and (isolate or any(map(_is_robot, missing))):
                 load_kernels()  # once, so that no worker compiles and no robot's time includes it
                 begin = time.perf_counter()
             collector.begin()
@@ -219,6 +220,15 @@ def _judgements(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Jud
         return (), True
     found = [results.found(i) for i, report in enumerate(reports) if report.tallies]
     return tuple(None if isinstance(one, NotJudged) else one for one in found), None not in found
+
+
+#: Samples from which kernels pay: those on disk, and those that must be compiled first.
+_WORTH_LOADING, _WORTH_COMPILING = 30, 300
+
+
+def _kernels_pay(samples: int) -> bool:
+    """Return whether reading or compiling all kernels takes less time than these samples without them."""
+    return samples > _WORTH_COMPILING or (samples > _WORTH_LOADING and are_on_disk())
 
 
 @dataclass
