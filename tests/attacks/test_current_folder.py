@@ -112,7 +112,8 @@ def test_the_process_that_compiles_runs_nothing_there_and_does_its_work(
 
     monkeypatch.chdir(folder)
     monkeypatch.syspath_prepend("")  # as in `python -c`
-    assert preload._compile_elsewhere(("placements",)).wait() == 0
+    with preload._compile_elsewhere(("placements",)) as process:
+        assert process.wait() == 0
     assert planted_code_ran(folder) == []
 
 

@@ -145,16 +145,25 @@ def _compile_elsewhere(names: Sequence[str], home: str = RECURSIONS) -> subproce
 
 def _end_beside() -> None:
     for process in _beside.values():
-        process.kill()
-        process.wait()
+        _end(process)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    process.kill()
+    process.wait()
+    _close(process)
+
+
+def _close(process: subprocess.Popen[bytes]) -> None:
+    if process.stdin is not None:
+        process.stdin.close()
 
 
 def _forget_beside() -> None:
     """Forget the process in a forked child, which must not keep its standard input open."""
     for process in _beside.values():
         process.returncode = 0
-        if process.stdin is not None:
-            process.stdin.close()
+        _close(process)
     _beside.clear()
 
 
@@ -184,6 +193,7 @@ def load_kernels() -> None:
     finally:
         if helper is not None:
             helper.wait()
+            _close(helper)
     _compile(_OTHER_HALF)
 
 

@@ -35,11 +35,18 @@ def coupled(full: FloatArray, columns: Places, index: Places, factor: FloatArray
     """
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])
     if (kernel := preload.kernel("coupling", home=KERNELS)) is None:
-        begin, sums = time.thread_time(), np.zeros((len(rows), nv))
-        for column in columns:
-            sums[:, index[column]] += rows[:, column] * factor[column]
+        begin = time.thread_time()
+        sums = _coupled(rows, columns, index, factor, nv)
         preload.spend("coupling", time.thread_time() - begin)
         return sums.reshape(*full.shape[:-1], nv)
     out = np.zeros(len(rows) * nv)
     kernel(rows, columns, index, factor, out)
     return out.reshape(*full.shape[:-1], nv)
+
+
+@np.errstate(all="ignore")
+def _coupled(rows: FloatArray, columns: Places, index: Places, factor: FloatArray, nv: int) -> FloatArray:
+    sums = np.zeros((len(rows), nv))
+    for column in columns:
+        sums[:, index[column]] += rows[:, column] * factor[column]
+    return sums
