@@ -39,6 +39,7 @@ from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, Subject
 from scripts.benchmarking.tables import show
 from scripts.benchmarking.timing import DifferenceError, Row
 from scripts.benchmarking.where import parts_of_batches, parts_of_calls
+from urdfkin.compiled.preload import only
 from urdfkin.verify.oracles import versions
 
 SECTIONS = ("batch", "single", "verified", "where", "first", "joints", "frames", "sizes", "memory")
@@ -144,7 +145,8 @@ def main(words: Sequence[str] | None = None) -> int:
     if arguments.rounds:
         plan = replace(plan, rounds=arguments.rounds)
     try:
-        figures = document(plan, arguments.only, ALWAYS if arguments.no_peers else ALWAYS + PEERS)
+        with only("compiled"):
+            figures = document(plan, arguments.only, ALWAYS if arguments.no_peers else ALWAYS + PEERS)
     except DifferenceError as difference:
         print(f"results differ: {difference}", file=sys.stderr)
         return 1

@@ -87,7 +87,7 @@ The study led to three improvements of urdfkin:
   1.4 times that of a computation in the world's axes. Now each result is computed in the requested axes
   (`urdfkin/compiled/axes.py`), with fused multiply-adds.
 - Sine and cosine had errors of 0.34 and 0.37 units in the last place (root mean square); correct rounding has
-  0.29. Now they correct for the rounding error of their reduced argument (`compiled/sine.py`)."""
+  0.29. Now they correct for the rounding error of their reduced argument (`compiled/machine/sine.py`)."""
     ]
     for name, judgement in judgements.items():
         parts += [f"## {name}", _table(judgement.lines)]

@@ -44,9 +44,8 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.summary import Joints, described
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.system.lazy_import import hook
-from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import Finding, Findings
-from urdfkin.urdf.sources import Origin
+from urdfkin.urdf.sources import Origin, entry_of
 from urdfkin.verify.bounds import magnitudes, movable, nearest_singularity
 from urdfkin.verify.call import Call
 from urdfkin.verify.certificate import Certificate
@@ -243,7 +242,7 @@ class Robot(Displayable):
         >>> urdfkin.load("planar_two_link").path.endswith("planar_two_link.urdf")
         True
         """
-        entry = catalogue().get(self.source)
+        entry = entry_of(self.source)
         path = entry.path if entry is not None else Path(self.source)
         return str(path.resolve()) if not self.source.startswith(("<", "-")) and path.is_file() else None
 

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 import urdfkin
+from urdfkin.compiled.preload import only
 from urdfkin.robot import Robot
 
 ROOT = Path(__file__).parents[2]
@@ -96,10 +97,11 @@ def _first(robot: str, frame: str, *uses: str) -> dict[str, object]:
 
 def _use(model: Robot, frame: str, use: str) -> None:
     inputs = [np.zeros(model.nq), np.zeros(model.nv), np.zeros(model.nv)][: USES[use]]
-    if use.startswith("prepared."):
-        getattr(model.prepare(frame), use.removeprefix("prepared."))(*inputs)
-    else:
-        getattr(model, use)(*inputs, frame, verify=False)
+    with only("compiled"):
+        if use.startswith("prepared."):
+            getattr(model.prepare(frame), use.removeprefix("prepared."))(*inputs)
+        else:
+            getattr(model, use)(*inputs, frame, verify=False)
 
 
 def _memory(robot: str, frame: str, quantity: str, count: str, kind: str) -> dict[str, object]:
@@ -110,7 +112,8 @@ def _memory(robot: str, frame: str, quantity: str, count: str, kind: str) -> dic
         method, inputs = getattr(subject.robot, quantity), subject.inputs(quantity, n)
         out = np.ones((n, *subject.width(quantity))) if kind == "out" else None
         few = tuple(x[:64] for x in inputs)
-        method(*few, frame, verify=False, threads=2)  # loads compiled code and starts threads
+        with only("compiled"):
+            method(*few, frame, verify=False, threads=2)  # loads compiled code and starts threads
         Path("/proc/self/clear_refs").write_text("5")  # reset the largest size
         before = _bytes("VmRSS")
         result = method(*inputs, frame, out=out, verify=False)

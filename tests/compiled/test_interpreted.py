@@ -136,7 +136,12 @@ def unspent(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
     loaded: list[str] = []
     for name in ("_spent", "_loaded", "_beside"):
         monkeypatch.setattr(preload, name, {})
-    monkeypatch.setattr(preload, "load", lambda name, home: loaded.append(name) or name)
+
+    def load(name: str, home: str) -> str:
+        loaded.append(name)
+        return name
+
+    monkeypatch.setattr(preload, "load", load)
     yield loaded
     preload._end_beside()
 
@@ -158,7 +163,12 @@ def test_a_kernel_that_is_not_on_disk_is_compiled_beside_and_a_large_batch_does_
 ) -> None:
     begun: list[str] = []
     monkeypatch.setattr(preload, "_on_disk", lambda name: False)
-    monkeypatch.setattr(preload, "_compile_beside", lambda name, home: begun.append(name) or True)
+
+    def begin(name: str, home: str) -> bool:
+        begun.append(name)
+        return True
+
+    monkeypatch.setattr(preload, "_compile_beside", begin)
     assert preload.kernel("jacobians", more=0.9 * preload.COMPILING) is None
     assert (begun, unspent) == (["jacobians"], [])
     assert preload.kernel("jacobians", more=preload.COMPILING) == "jacobians"

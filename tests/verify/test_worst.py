@@ -1,10 +1,14 @@
 """The compiled comparison is its definition, `bounds.disagreement`, whatever the numbers are."""
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from scripts.check_bits import WAYS
+from urdfkin.compiled.preload import Way, only
 from urdfkin.kinematics.roundings import EPS, SMALLEST
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.bounds import Bound, disagreement
@@ -16,6 +20,13 @@ numbers = st.one_of(st.floats(-10.0, 10.0), st.sampled_from(ODD), st.floats(), s
 scales = st.one_of(
     st.floats(0.0, 100.0), st.sampled_from([0.0, 5e-324, SMALLEST / EPS, 1e300, np.inf, np.nan])
 )
+
+
+@pytest.fixture(autouse=True, params=WAYS)
+def _in_both_ways(request: pytest.FixtureRequest) -> Iterator[None]:
+    way: Way = request.param
+    with only(way):
+        yield
 
 
 def definition(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes: int) -> FloatArray:

@@ -16,7 +16,7 @@ EXAMPLE = "urdfkin warm"
 def command() -> None:
     """Compile every kernel for this machine and store it, for container images and CI.
 
-    Otherwise a command or program compiles a kernel at its first use, which takes some seconds. Kernels are
+    Otherwise a command or program compiles a kernel when it saves time, which takes some seconds. Kernels are
     stored below XDG_CACHE_HOME. Kernels from another processor are compiled again. Exit 2: the kernels cannot
     be stored.
     """

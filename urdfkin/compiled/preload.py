@@ -67,10 +67,12 @@ def kernel(name: str, more: float = 0.0, home: str = RECURSIONS) -> Any:
         more: Seconds that the next computations will take without it.
         home: Its module.
     """
-    if _only:
-        return load(name, home) if _only[-1] == "compiled" else None
+    if _only and _only[-1] == "interpreted":
+        return None
     if (found := _loaded.get(name)) is not None:
         return found
+    if _only:
+        return load(name, home)
     seconds = _spent.get(name, 0.0) + more
     if seconds < (_LOADING_MORE if _loaded else LOADING):
         return None

@@ -13,7 +13,6 @@ import os
 import select
 import stat
 import sys
-import tempfile
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -276,6 +275,8 @@ def write_file(path: Path, data: bytes) -> None:
         if path.exists() and not os.access(path, os.W_OK):  # renaming would ignore this permission
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         mode = path.stat().st_mode if path.exists() else 0o666 & ~_umask()
+        import tempfile  # noqa: PLC0415  reading a robot needs none
+
         with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as stream:
             name = stream.name
             stream.write(data)

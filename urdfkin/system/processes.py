@@ -15,11 +15,9 @@ smaller stack.
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TypeVar
@@ -67,6 +65,8 @@ def ask_python(command: list[str], request: bytes, patience: float, most: int) -
     Returns:
         The output and the exit status. The status is None after a timeout.
     """
+    import subprocess  # noqa: PLC0415  reading a robot needs none
+
     environ = _ENVIRONMENT | {name: os.environ[name] for name in _NEEDED if name in os.environ}
     pipe = subprocess.PIPE
     timed_out = threading.Event()
@@ -128,6 +128,8 @@ def with_stack(size: int, function: Callable[[], _T]) -> _T:
     >>> with_stack(64 * 2**20, lambda: 6 * 7)
     42
     """
+    from concurrent.futures import Future  # noqa: PLC0415
+
     future: Future[_T] = Future()
 
     def run() -> None:

@@ -19,7 +19,6 @@ import importlib
 import importlib.util
 import os
 import re
-import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
@@ -106,6 +105,8 @@ def _read(file: str, *, own: bool) -> dict[str, Entry]:
     path = robots_dir() / file
     if not path.is_file():
         return {}
+    import tomllib  # noqa: PLC0415  a file needs no catalogue
+
     with path.open("rb") as stream:
         table = tomllib.load(stream)
     return {

@@ -6,7 +6,6 @@ returns.
 
 from __future__ import annotations
 
-import hashlib
 import sys
 import warnings
 from dataclasses import replace
@@ -157,6 +156,8 @@ class Verifier:
     @property
     def sha256(self) -> str:
         """SHA-256 of the MJCF file, or of the URDF text as UTF-8."""
+        import hashlib  # noqa: PLC0415  loads OpenSSL
+
         return self.origin.sha256 or hashlib.sha256(self.text.encode()).hexdigest()
 
     # -- quantities ----------------------------------------------------------------------------------

@@ -1,0 +1,145 @@
+"""Measure the processor time of a first result, and write it into docs/performance.md.
+
+    python scripts/measure_start.py            # measure, write the table; exit 1 if a bar is missed
+    python scripts/measure_start.py --rounds 3
+
+Each row is a new process. Its time is compared with that of `import numpy, pinocchio` in the same round. The
+medians of both make the ratio, so other work on the machine matters little. Bytecode is warm, as after an
+installation. A fresh cache is an empty folder for kernels.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
+
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "performance.md"
+_PLACE = re.compile(r"(<!-- start -->\n).*?(<!-- end -->)", re.DOTALL)
+_COMMAND = "import sys; sys.argv[0] = 'urdfkin'; from urdfkin.cli import main; main()"
+_NOTEBOOK = "import sys, urdfkin; r = urdfkin.load(sys.argv[1]); r.jacobian(r.neutral(), r.tip_frame)"
+BASE = ("-c", "import numpy, pinocchio")
+
+
+@dataclass(frozen=True)
+class Row:
+    """A process to measure.
+
+    Attributes:
+        what: Its name on the page.
+        words: Arguments of the interpreter; ROBOT stands for a URDF that is not in the catalogue.
+        most: Largest time, in multiples of that of `import numpy, pinocchio`; None: no bar.
+        fresh: Whether its cache is empty.
+    """
+
+    what: str
+    words: tuple[str, ...]
+    most: float | None = None
+    fresh: bool = False
+    seconds: list[float] = field(default_factory=list, compare=False)
+
+    @property
+    def median(self) -> float:
+        """Median of the measured times, seconds."""
+        return statistics.median(self.seconds)
+
+
+def rows() -> list[Row]:
+    """Return the rows of the page; the first is the base of all ratios."""
+    jacobian = ("-c", _COMMAND, "jacobian", "ROBOT", "--q", "random")
+    return [
+        Row("`import numpy, pinocchio`", BASE),
+        Row("`urdfkin --help`", ("-c", _COMMAND, "--help")),
+        Row("`urdfkin info MY.urdf`", ("-c", _COMMAND, "info", "ROBOT"), 1.3),
+        Row("`urdfkin jacobian MY.urdf --q random`", jacobian, 2.0),
+        Row("the same with a fresh cache", jacobian, 2.5, fresh=True),
+        Row("`urdfkin same panda panda`", ("-c", _COMMAND, "same", "panda", "panda"), 2.5),
+        Row("`import urdfkin`, `load`, `jacobian` in Python", ("-c", _NOTEBOOK, "ROBOT"), 2.0),
+        Row("the same with a fresh cache", ("-c", _NOTEBOOK, "ROBOT"), 2.5, fresh=True),
+    ]
+
+
+def seconds(words: Sequence[str], cache: str | None) -> float:
+    """Return the processor time of a process and its children.
+
+    Args:
+        words: Arguments of the interpreter.
+        cache: Folder for kernels; None: the user's.
+    """
+    environ = {name: x for name, x in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    environ["PYTHONPATH"] = str(ROOT)
+    if cache is not None:
+        environ |= {"XDG_CACHE_HOME": cache, "NUMBA_CACHE_DIR": ""}
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(
+        [sys.executable, *words],
+        env=environ,
+        check=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def measured(rounds: int, folder: Path) -> list[Row]:
+    """Return the rows with their times; a round that is not counted writes the bytecode."""
+    found, robot = rows(), folder / "MY.urdf"
+    robot.write_bytes((ROOT / "robots" / "elbow.urdf").read_bytes())
+    for k in range(rounds + 1):
+        for i, row in enumerate(found):
+            words = [str(robot) if word == "ROBOT" else word for word in row.words]
+            taken = seconds(words, str(folder / f"{k}-{i}") if row.fresh else None)
+            if k:
+                row.seconds.append(taken)
+    return found
+
+
+def table(found: Sequence[Row]) -> str:
+    """Return the table of the page."""
+    lines = ["|  | processor time, s | times `import numpy, pinocchio` | at most |", "|---|---:|---:|---:|"]
+    for row in found:
+        most = "" if row.most is None else f"{row.most:.1f}"
+        lines.append(f"| {row.what} | {row.median:.2f} | {row.median / found[0].median:.2f} | {most} |")
+    return "\n".join(lines)
+
+
+def page(text: str, figures: str) -> str:
+    """Return the page with the table inserted."""
+    return _PLACE.sub(lambda place: f"{place[1]}{figures}\n{place[2]}", text)
+
+
+def missed(found: Sequence[Row]) -> list[str]:
+    """Return the names of the rows that exceed their bar."""
+    base = found[0].median
+    return [row.what for row in found if row.most is not None and row.median > row.most * base]
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Measure and write the page; return 1 if a bar is missed."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
+    parser.add_argument("--rounds", type=int, default=11, help="number of processes for each row")
+    given = parser.parse_args(words)
+    with tempfile.TemporaryDirectory() as folder:
+        found = measured(given.rounds, Path(folder))
+    figures = table(found)
+    print(figures)
+    PAGE.write_text(page(PAGE.read_text("utf-8"), figures), "utf-8")
+    for what in missed(found):
+        print(f"too slow: {what}", file=sys.stderr)
+    return int(bool(missed(found)))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
