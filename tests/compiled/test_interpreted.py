@@ -107,7 +107,7 @@ def test_a_certificate_does_not_depend_on_what_computed() -> None:
         "jacobian OWN --q random", "placement OWN", "velocity OWN --q random --v random",
         "jacobian-rate OWN --q random --v random", "hessian OWN --q random",
         "acceleration OWN --q random --v random --a random", "imu OWN --q random --v random --a random",
-        "analytical-jacobian OWN --q random", "manipulability OWN --q random", "info OWN", "chain OWN",
+        "analytical-jacobian OWN --q random", "singular-values OWN --q random", "info OWN", "chain OWN",
         "screws OWN", "dh OWN", "same OWN OWN", "jacobian OWN --format json", "jacobian tiago",
     ],
 )  # fmt: skip

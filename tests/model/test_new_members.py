@@ -10,13 +10,13 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from urdfkin.compiled.single import single
 
 import urdfkin
 from urdfkin.cli.options import REFERENCES
 from urdfkin.cli.quantity import REPRESENTATIONS
 from urdfkin.compiled.breakdown import acceleration_breakdown
 from urdfkin.compiled.kernel_args import REFERENCES as IN_KERNELS
+from urdfkin.compiled.machine.single import single
 from urdfkin.compiled.plan import compile_tree
 from urdfkin.export.function import function_of
 from urdfkin.export.recursion import QUANTITIES as EXPORTED
