@@ -12,8 +12,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from tests.random_chains import configurations, trees
-from urdfkin import loading
-from urdfkin.dh import DHTable, dh_table, read_table, table_from_rows, to_tree, to_urdf
+from urdfkin.dh import DHTable, convert, dh_table, read_table, table_from_rows, to_tree, to_urdf
 from urdfkin.dh.parse_table import references
 from urdfkin.errors import InputError
 from urdfkin.loading import load
@@ -136,7 +135,7 @@ def test_a_table_is_validated_as_it_is_and_as_a_file() -> None:
 def test_a_urdf_that_is_not_the_tables_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     table = read_table(references()["ur5"])
     other = replace(table, rows=(replace(table.rows[0], d=table.rows[0].d + 1e-9), *table.rows[1:]))
-    monkeypatch.setattr(loading, "to_urdf", lambda _: to_urdf(other))
+    monkeypatch.setattr(convert, "to_urdf", lambda _: to_urdf(other))
     with pytest.raises(TableError, match="the URDF made of a table differs from the table"):
         load(table)
     assert load(table, verify=False).nq == 6
