@@ -8,16 +8,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cache
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 from urdfkin.compiled.program import LANES
 from urdfkin.errors.validators import whole_number
 from urdfkin.model.tree import FloatArray
-
-if TYPE_CHECKING:
-    from concurrent.futures import ThreadPoolExecutor
 
 #: Smallest batch for several threads by default; starting a thread costs about ten microseconds.
 _WORTH_THREADS = 4096
@@ -88,8 +85,6 @@ def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> N
 
     if len(shares) == 1:
         return compute_all(parts)
-    from concurrent.futures import wait  # noqa: PLC0415
-
     work = [_pool().submit(compute_all, share) for share in shares]
     wait(work)  # an error is raised only after all threads have finished writing
     for future in work:
@@ -111,8 +106,6 @@ def _rows(inputs: Sequence[FloatArray], n: int, start: int, stop: int) -> list[F
 @cache
 def _pool() -> ThreadPoolExecutor:
     """Return the thread pool; a forked child process starts its own."""
-    from concurrent.futures import ThreadPoolExecutor  # noqa: PLC0415  single calls start no threads
-
     return ThreadPoolExecutor(_processors(), thread_name_prefix="urdfkin")
 
 

@@ -17,6 +17,7 @@ from pathlib import Path
 
 from urdfkin.kinematics import equations
 from urdfkin.system.lazy_import import installed_version
+from urdfkin.system.locks import importing
 
 #: Called with a kernel's name and None when its compilation begins, and with the seconds when it is ready.
 Listener = Callable[[str, float | None], None]
@@ -63,7 +64,8 @@ def compile_event(name: str) -> Iterator[Callable[[], None]]:
 @cache
 def cache_folder() -> Path | None:
     """Return the cache folder of compiled kernels; None if no folder is writable."""
-    from urdfkin.system.cache import kept_folder  # noqa: PLC0415  not needed to interpret
+    with importing:
+        from urdfkin.system.cache import kept_folder  # noqa: PLC0415  not needed to interpret
 
     numba = sys.modules.get("numba")
     chosen = numba.config.CACHE_DIR if numba else os.environ.get("NUMBA_CACHE_DIR")
