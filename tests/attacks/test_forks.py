@@ -78,8 +78,8 @@ CASES = {
         fork(lambda: (robot.placement(q[:3], "tool0"), robot.certificate()))
         """,
     "a kernel, while another thread compiles one": """
-        from urdfkin.compiled.machine import compiling
-        held(compiling._compiling)
+        from urdfkin.compiled import kept
+        held(kept.compiling)
         fork(lambda: robot.placement(q[:3], "tool0"))
         """,
     "a deep robot, while another thread builds one": """

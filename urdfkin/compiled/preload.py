@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
 
-from urdfkin.compiled.kept import cache_folder
+from urdfkin.compiled.kept import cache_folder, compiling
 from urdfkin.system.locks import importing
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def single_pays(name: str) -> bool:
 
 def load(name: str, home: str = RECURSIONS) -> Any:
     """Return a kernel; compile it or read it from disk."""
-    with importing:
+    with compiling, importing:
         found = getattr(import_module(home), name)
     _ = found.compiled
     _loaded[name] = found

@@ -34,10 +34,9 @@ from numba.core.compiler import CompilerBase, CompileResult
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.serialize import dumps
 
-from urdfkin.compiled.kept import cache_folder, compile_event
+from urdfkin.compiled.kept import cache_folder, compile_event, compiling
 from urdfkin.system.cache import get, put, report_damaged
 from urdfkin.system.files import read_bytes
-from urdfkin.system.locks import lock_over_forks
 
 _Null: Any = NullCache  # numba has no types
 _Result: Any = CompileResult
@@ -210,10 +209,6 @@ ROWS = types.Array(types.float64, 2, "C", readonly=True)
 PLACES = types.Array(types.int64, 1, "C", readonly=True)
 SCRATCH = types.Array(types.float64, 1, "C")
 
-#: Only one kernel is compiled at a time, as in Numba. A fork waits until the current compilation has
-#: finished, because the child process could not finish it.
-_compiling = lock_over_forks()
-
 
 class Kernel:
     """A function that is compiled, or read from disk, when it is first called.
@@ -233,7 +228,7 @@ class Kernel:
         # Python 3.12 it has a lock of its own, which could stay locked forever in a forked child process.
         if name != "compiled":
             raise AttributeError(name)
-        with _compiling:
+        with compiling:
             if "compiled" not in self.__dict__:
                 self.compiled = self._compile()
             return self.__dict__["compiled"]
