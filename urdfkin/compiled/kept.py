@@ -19,9 +19,9 @@ from urdfkin.kinematics import equations
 from urdfkin.system.lazy_import import installed_version
 from urdfkin.system.locks import importing, lock_over_forks
 
-#: Held while Numba is imported, and while a kernel is compiled: one after the other, as in Numba. A fork waits
-#: for both, because the child process could not finish them. A fork takes the newest lock first; this one is
-#: newer than the lock of `logging`, which the import of Numba takes, and exists before that import begins.
+#: Held while Numba is imported, and while a kernel is compiled. A fork waits for both, because the child
+#: process could not finish them. A fork takes the newest lock first; this one is newer than the lock of
+#: `logging` that the import of Numba takes, and exists before that import begins.
 compiling = lock_over_forks()
 
 #: Called with a kernel's name and None when its compilation begins, and with the seconds when it is ready.
