@@ -14,6 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from urdfkin.compiled import preload
+from urdfkin.compiled.kept import compiling
 from urdfkin.compiled.kernel_args import KernelArgs
 from urdfkin.compiled.plan import CompiledTree
 from urdfkin.model.configuration_like import Given
@@ -158,7 +159,7 @@ class PreparedFrame:
             return None
         if not self.wanted and not preload.single_pays(f"{quantity}s"):
             return None
-        with importing:
+        with compiling, importing:
             from urdfkin.compiled.machine.single import arrays_are_known, single  # noqa: PLC0415  loads Numba
 
         if not arrays_are_known():

@@ -25,6 +25,7 @@ import numpy as np
 
 from urdfkin.compiled.batch import in_blocks
 from urdfkin.compiled.evaluate import is_staged
+from urdfkin.compiled.kept import compiling
 from urdfkin.compiled.kernel_args import KernelArgs, lines
 from urdfkin.compiled.plan import CompiledTree
 from urdfkin.compiled.prepared import Fast
@@ -310,7 +311,7 @@ class CompiledFrame:
 
     def _first(self, name: str, q: Given, *others: object) -> FloatArray | None:
         """Compile the function for one configuration, and call it."""
-        with importing:
+        with compiling, importing:
             from urdfkin.compiled.machine.single import arrays_are_known, called  # noqa: PLC0415  loads Numba
 
         own = (
