@@ -44,6 +44,7 @@ docs:  ## the pages that are generated from the code, then the site
 	python scripts/make_enclosures.py
 	python scripts/check_exports.py --sizes
 	python scripts/measure_size.py
+	python scripts/measure_start.py
 	$(MAKE) site
 
 site:  ## the documentation as a site, in site/index.html: no network, now or later

@@ -185,7 +185,7 @@ def test_without_a_folder_for_kernels_no_process_starts(
 _LONG = """
 import time, urdfkin
 from urdfkin.compiled import preload
-preload.LOADING = 0.0
+preload.LOADING = preload.BESIDE = 0.0
 robot = urdfkin.load("one_link", verify=False)
 robot.placement([0.0])
 process, = preload._beside.values()
