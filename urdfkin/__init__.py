@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.urdf.catalogue import robots
     from urdfkin.validation.campaign import validate
+    from urdfkin.validation.functions import verify_function
     from urdfkin.verify.certificate import Certificate, VerificationError
     from urdfkin.verify.tables import TableError
     from urdfkin.verify.verifier import NotVerifiedWarning
@@ -60,6 +61,7 @@ _HOMES = {
     "same": "urdfkin.comparison.verdict",
     "table_from_rows": "urdfkin.dh",
     "validate": "urdfkin.validation.campaign",
+    "verify_function": "urdfkin.validation.functions",
 }
 
 # Methods of earlier packages call these functions of later packages. They cannot import them.
@@ -96,6 +98,7 @@ __all__ = [
     "same",
     "table_from_rows",
     "validate",
+    "verify_function",
 ]
 
 

@@ -84,6 +84,10 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
             "urdfkin.cli.validate",
             "Compute all frames and joints on many samples, and compare with Pinocchio.",
         ),
+        "verify": (
+            "urdfkin.cli.verify",
+            "Check a function or a program of yours against the same numbers and bounds.",
+        ),
         "report": ("urdfkin.cli.reports", "Show, convert, compare or merge the results of validations."),
     },
     "Check files": {
@@ -133,7 +137,7 @@ _SYNONYMS = {
     **dict.fromkeys(("campaign", "status", "progress"), "report status"),
     "merge": "report merge",
     **dict.fromkeys(("lint", "validate-urdf", "check-urdf"), "check"),
-    **dict.fromkeys(("test", "verify"), "validate"),
+    "test": "validate",
     **dict.fromkeys(("codegen", "generate"), "export"),
     **dict.fromkeys(("identify", "fit", "calibration"), "calibrate"),
     **dict.fromkeys(("equal", "equivalent"), "same"),

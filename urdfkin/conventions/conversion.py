@@ -9,7 +9,7 @@ of a floating or planar joint.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import overload
@@ -335,6 +335,11 @@ class Conversion:
         return self._q_index.copy() if self._plain_q else None
 
     @property
+    def is_constant(self) -> bool:
+        """Whether `matrix` is the same at every q."""
+        return not self._blocks
+
+    @property
     def rate_permutation(self) -> NDArray[np.intp] | None:
         """Indices with `v_tool = v[..., rate_permutation]`; None if the conversion is no mere permutation."""
         return self._v_at.copy() if self._plain_v else None
@@ -650,6 +655,38 @@ class Conversion:
             lifted = change if columns.ndim == change.ndim - 1 else change[..., None, :, :, :]
             found += np.asarray(np.einsum("...rk,...kij->...rij", columns, lifted), dtype=np.float64)
         return found
+
+    def result(
+        self,
+        quantity: str,
+        ours: Sequence[FloatArray],
+        result: FloatArray,
+        jacobian: Callable[[], FloatArray],
+    ) -> FloatArray:
+        """Convert the result of a quantity to the tool's rows and columns.
+
+        Args:
+            quantity: Name of the quantity.
+            ours: This robot's q, or q and v, or q, v and a.
+            result: The result (..., 6), (..., 6, nv) or (..., 6, nv, nv); a placement is returned unchanged.
+            jacobian: Returns the Jacobian (..., 6, nv), which J-dot and the Hessian need.
+
+        Raises:
+            InputError: conventions do not define the quantity.
+        """
+        if quantity == "placement":
+            return result
+        if quantity in ("velocity", "acceleration"):
+            return self.six(result)
+        if quantity == "jacobian":
+            return self.jacobian(ours[0], result)
+        if quantity == "jacobian rate":
+            return self.jacobian_rate(ours[0], ours[1], jacobian(), result)
+        if quantity == "hessian":
+            return self.hessian(ours[0], jacobian(), result)
+        raise InputError(
+            "a convention has no form of this quantity", where=self.convention.name, found=quantity
+        )
 
     def _demand_own_columns(self) -> None:
         if self._v_copies:

@@ -1,0 +1,435 @@
+"""Explain a wrong result of a user's function by a usual mistake.
+
+Each mistake predicts the function's results from urdfkin's: other rows, another reference frame, another
+frame, other units, joints in another order. A mistake is named if it explains all but a thousandth of the
+difference at every configuration. Mistakes with the same prediction are all named.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import combinations
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from urdfkin.errors import UrdfkinError
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray
+
+if TYPE_CHECKING:
+    from urdfkin.conventions import Conversion
+    from urdfkin.robot import Robot
+    from urdfkin.verify.quantities import Quantity
+
+#: A mistake explains a result if at most this fraction of the difference remains.
+EXPLAINED = 1e-3
+#: Largest number of explanations that are named.
+_MOST = 3
+#: Number of configurations at which exchanges of two joints are tried.
+_FEW = 4
+#: Fraction of the largest scale that replaces a smaller one: numbers that must be 0 have the scale 0.
+_LEAST = 1e-9
+_HALVES = [3, 4, 5, 0, 1, 2]
+_G = 9.81
+
+#: Inputs of the function; they become those with which urdfkin computes what a mistaken function does.
+Inputs = tuple[FloatArray, ...]
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """A function's results, urdfkin's, and urdfkin's at other inputs.
+
+    Attributes:
+        inputs: q, or q and v, or q, v and a, in the function's convention.
+        found: The function's results (n, ...).
+        expected: urdfkin's results.
+        scale: The scale of their bound.
+        compute: Function (inputs, frame, reference) for urdfkin's results.
+    """
+
+    inputs: Inputs
+    found: FloatArray
+    expected: FloatArray
+    scale: FloatArray
+    compute: Callable[..., FloatArray]
+
+    def remainder(self, predicted: FloatArray, n: int | None = None) -> float:
+        """Return the part of the difference that a prediction for the first n results leaves: 0 is none."""
+        scale = np.maximum(self.scale[:n], _LEAST * self.scale[:n].max(initial=_LEAST))
+        with np.errstate(all="ignore"):
+            whole = float((np.abs(self.found[:n] - self.expected[:n]) / scale).max())
+            left = float((np.abs(self.found[:n] - predicted) / scale).max())
+            return left / whole if np.isfinite(left) and whole > 0.0 else np.inf
+
+    def is_expected(self, predicted: FloatArray) -> bool:
+        """Return whether a mistake changes nothing for these inputs."""
+        size = np.maximum(self.scale, _LEAST * self.scale.max(initial=_LEAST))
+        return bool((np.abs(predicted - self.expected) <= _LEAST * size).all())
+
+    def first(self, n: int) -> Inputs:
+        """Return the inputs of the first n configurations."""
+        return tuple(x[:n] for x in self.inputs)
+
+
+def diagnose(mistakes: Mistakes, case: Diagnosis) -> list[str]:
+    """Return sentences about the mistakes that explain the results, at most three; none if no mistake does.
+
+    A mistake together with exchanged halves of a six-vector is named only if no single mistake explains the
+    results.
+    """
+    single, double = list[tuple[float, str]](), list[tuple[float, str]]()
+    swaps = mistakes.exchanged_halves
+    if swaps:
+        single.append((case.remainder(case.expected[:, _HALVES]), f"{swaps}; {mistakes.expected_halves}"))
+    for words, predict in mistakes.all(case):
+        try:
+            predicted = predict()
+        except UrdfkinError:  # the mistake has no meaning for this robot
+            continue
+        if predicted.shape != case.found.shape or case.is_expected(predicted):
+            continue
+        single.append((case.remainder(predicted), words))
+        if swaps:
+            double.append((case.remainder(predicted[:, _HALVES]), f"{words}, and {swaps}"))
+    for found in (single, list(_columns(mistakes, case)), double):
+        best = min((rest for rest, _ in found), default=np.inf)
+        if best <= EXPLAINED:
+            return [words for rest, words in found if rest <= 100.0 * best + 1e-12][:_MOST]
+    return []
+
+
+#: A sentence, and a function that returns the predicted results.
+Mistake = tuple[str, Callable[[], FloatArray]]
+
+
+@dataclass(frozen=True)
+class Mistakes:
+    """The usual mistakes of a function that computes one quantity of one frame.
+
+    Attributes:
+        robot: The robot.
+        row: The quantity.
+        frame: The frame.
+        reference: The reference frame; None for a placement.
+        conversion: The function's convention; None for urdfkin's.
+    """
+
+    robot: Robot
+    row: Quantity
+    frame: str
+    reference: Reference | None
+    conversion: Conversion | None
+
+    @property
+    def exchanged_halves(self) -> str:
+        """Words for exchanged halves of a six-vector; empty for a quantity without halves."""
+        first = "linear" if self._angular_first else "angular"
+        return f"the {first} rows come first" if self.row.shape[0] == 6 else ""
+
+    @property
+    def expected_halves(self) -> str:
+        """The halves in their right order."""
+        tool = "urdfkin" if self.conversion is None else self.conversion.convention.name
+        return f"{tool} has the {'angular' if self._angular_first else 'linear'} rows first"
+
+    @property
+    def _angular_first(self) -> bool:
+        return self.conversion is not None and self.conversion.angular_first
+
+    def all(self, case: Diagnosis) -> Iterator[Mistake]:
+        """Yield all mistakes, the plainest first."""
+        yield from self._of_references(case)
+        if self.row.name == "acceleration":
+            yield from self._of_accelerations(case)
+        if self.row.name in ("placement", "relative placement"):
+            yield from self._of_placements(case)
+        yield from self._of_axes(case)
+        yield from self._of_units(case)
+        yield from self._of_mimic_joints(case)
+        yield from self._of_joints(case)
+        yield from self._of_orders(case)
+        yield from self._of_frames(case)
+
+    def _linear(self) -> slice:
+        return slice(3, 6) if self._angular_first else slice(0, 3)
+
+    def _angular(self) -> slice:
+        return slice(0, 3) if self._angular_first else slice(3, 6)
+
+    def _of_references(self, case: Diagnosis) -> Iterator[Mistake]:
+        for other in Reference if self.reference is not None else ():
+            if other is not self.reference:
+                assert self.reference is not None
+                words = f"the result is in {other.name}; {self.reference.name} was asked for"
+                yield words, partial(case.compute, case.inputs, reference=other)
+
+    def _of_accelerations(self, case: Diagnosis) -> Iterator[Mistake]:
+        q, v, a = case.inputs
+        linear, angular = self._linear(), self._angular()
+
+        def spatial() -> FloatArray:
+            velocity = self._velocity(q, v)
+            found = case.expected.copy()
+            found[:, linear] -= np.cross(velocity[:, angular], velocity[:, linear])
+            return found
+
+        def weighed(sign: float) -> FloatArray:
+            found = case.expected.copy()
+            down = np.array([0.0, 0.0, sign * _G])
+            if self.reference is Reference.LOCAL:
+                R = self.robot.placement(self._ours(case.inputs)[0], self.frame, verify=False)[:, :3, :3]
+                found[:, linear] += np.einsum("nji,j->ni", R, down)
+            else:
+                found[:, linear] += down
+            return found
+
+        yield "the spatial acceleration was computed; the classical one adds w x v", spatial
+        for sign, words in ((1.0, "upwards"), (-1.0, "downwards")):
+            yield f"gravity ({_G} m/s^2 {words}) is included", partial(weighed, sign)
+        zero = np.zeros_like(v)
+        yield "the term J' v is missing", partial(case.compute, (q, zero, a))
+        yield "the term J a is missing", partial(case.compute, (q, v, zero))
+
+    def _velocity(self, q: FloatArray, v: FloatArray) -> FloatArray:
+        """Return the velocity in the function's rows and reference frame."""
+        q, v = self._ours((q, v))
+        assert self.reference is not None
+        found = self.robot.velocity(q, v, self.frame, self.reference, verify=False)
+        return found if self.conversion is None else self.conversion.six(found)
+
+    def _ours(self, inputs: Inputs) -> Inputs:
+        if self.conversion is None:
+            return inputs
+        found = self.conversion.from_(*inputs)
+        return found if isinstance(found, tuple) else (found,)
+
+    def _of_placements(self, case: Diagnosis) -> Iterator[Mistake]:
+        yield "the placement is inverted", partial(np.asarray, np.linalg.inv(case.expected))
+
+        def turned() -> FloatArray:
+            found = case.expected.copy()
+            found[:, :3, :3] = found[:, :3, :3].swapaxes(1, 2)
+            return found
+
+        yield "the rotation is transposed", turned
+        q = self._ours(case.inputs)[0]
+        for link in self.robot.link_names[:64]:
+            base = self.robot.placement(q, f"link:{link}", verify=False)
+            if not np.allclose(base, np.eye(4)):
+                words = (
+                    f"the placement is relative to the link {link!r}; relative to the root link was asked for"
+                )
+                yield words, partial(np.linalg.solve, base, case.expected)
+
+    def _of_axes(self, case: Diagnosis) -> Iterator[Mistake]:
+        shape = case.expected.shape[1:]
+        if len(shape) == 2 and shape[0] == shape[1]:
+            yield "the result is transposed", partial(case.expected.swapaxes, 1, 2)
+        if len(shape) == 3:
+            yield (
+                "the last two axes are exchanged: entry (row, i, j) is the derivative of column i by joint j",
+                partial(case.expected.swapaxes, 2, 3),
+            )
+
+    def _of_units(self, case: Diagnosis) -> Iterator[Mistake]:
+        turns = self._turning()
+        lengths = case.expected.copy()
+        if self.row.name.endswith("placement"):
+            lengths[:, :3, 3] *= 1000.0
+        elif lengths.shape[1] == 6:
+            lengths[:, self._linear()] *= 1000.0
+        yield "lengths are in millimetres", partial(np.asarray, lengths)
+        if lengths.shape[1] == 6:
+            angles = case.expected.copy()
+            angles[:, self._angular()] *= np.degrees(1.0)
+            yield "angles of the result are in degrees", partial(np.asarray, angles)
+        for factor, words in (
+            (np.radians(1.0), "the function takes q in degrees"),
+            (np.degrees(1.0), "the function converts q to degrees, or takes it in degrees twice"),
+        ):
+            yield words, partial(case.compute, self._scaled(case.inputs, turns, factor, 1))
+            if len(case.inputs) > 1:
+                all_inputs = " q, v and a " if len(case.inputs) == 3 else " q and v "
+                everywhere = self._scaled(case.inputs, turns, factor, 3)
+                yield words.replace(" q ", all_inputs), partial(case.compute, everywhere)
+
+    def _turning(self) -> list[tuple[int, int]]:
+        """Return the indices in q and v of each joint with one angle, in the function's convention."""
+        return [(q, v) for _, q, v, turns in self._axes() if turns]
+
+    def _axes(self) -> list[tuple[str, int, int, bool]]:
+        """Return name, index in q, index in v, and whether it turns, of each joint with one coordinate."""
+        tree = self.robot.tree
+        found = []
+        indices = None if self.conversion is None else self.conversion.q_and_v_indices
+        for i, joint in enumerate(tree.joints):
+            if joint.mimic or joint.kind.nq != 1:
+                continue
+            if indices is None:
+                found.append((joint.name, tree.q_index[i], tree.v_index[i], joint.kind.turns))
+            elif joint.name in indices and len(indices[joint.name][0]) == 1:
+                (q,), (v,) = indices[joint.name]
+                found.append((joint.name, q, v, joint.kind.turns))
+        return found
+
+    @staticmethod
+    def _scaled(inputs: Inputs, at: Sequence[tuple[int, int]], factor: float, count: int) -> Inputs:
+        """Return the inputs with the numbers of some joints scaled, in q only or in all inputs."""
+        found = [x.copy() for x in inputs]
+        for k, x in enumerate(found[:count]):
+            x[:, [pair[min(k, 1)] for pair in at]] *= factor
+        return tuple(found)
+
+    def _of_mimic_joints(self, case: Diagnosis) -> Iterator[Mistake]:
+        tree = self.robot.tree
+        mimics = [joint for joint in tree.joints if joint.mimic]
+        if not mimics or self.conversion is not None:
+            return
+        from urdfkin.loading import load  # noqa: PLC0415  few robots need it
+
+        free = load(self.robot.urdf, mimic=False, root_joint=self.robot.root_joint, verify=False)
+        own = [free.rate_names.index(name) for name in self.robot.rate_names]
+        frame, method = self.frame, getattr(free, self.row.method)
+        named = {} if self.reference is None else {"reference": self.reference}
+
+        def spread(x: FloatArray, letter: str, *, moving: bool) -> FloatArray:
+            names = free.coordinate_names if letter == "q" else free.rate_names
+            ours = self.robot.coordinate_names if letter == "q" else self.robot.rate_names
+            found = np.zeros((len(x), len(names)))
+            found[:, [names.index(name) for name in ours]] = x
+            for joint in mimics if moving else ():
+                assert joint.mimic is not None
+                rule = joint.mimic
+                value = rule.multiplier * x[:, ours.index(rule.leader)]
+                found[:, names.index(joint.name)] = value + (rule.offset if letter == "q" else 0.0)
+            return found
+
+        def result(moving: str) -> FloatArray:
+            inputs = [
+                spread(x, letter, moving=letter in moving)
+                for letter, x in zip("qva", case.inputs, strict=False)
+            ]
+            found: FloatArray = method(*inputs, frame, verify=False, **named)
+            for axis in range(2, found.ndim) if self.row.columns else ():
+                found = found.take(own, axis)
+            return found
+
+        listed = ", ".join(repr(joint.name) for joint in mimics[:4])
+        if self.row.columns:
+            yield f"the columns of the mimic joints ({listed}) are not added", partial(result, "qva")
+        elif len(case.inputs) > 1:
+            yield f"the velocities of the mimic joints ({listed}) are missing", partial(result, "q")
+        yield f"the mimic joints ({listed}) do not move", partial(result, "")
+
+    def _of_joints(self, case: Diagnosis) -> Iterator[Mistake]:
+        """Yield signs and exchanges of joints; a coordinate change also changes the columns of a Jacobian."""
+        axes = self._axes()
+        for name, q, v, _ in axes:
+            words = f"the joint {name!r} has the opposite sign"
+            flipped = self._scaled(case.inputs, [(q, v)], -1.0, 3)
+            if self.row.columns:
+                sign = np.ones(case.expected.shape[-1])
+                sign[v] = -1.0
+                yield words, partial(self._columns_times, case, flipped, sign)
+                yield f"{words} in q only", partial(case.compute, flipped)
+            else:
+                yield words, partial(case.compute, flipped)
+                if len(case.inputs) > 1:
+                    only = self._scaled(case.inputs, [(q, v)], -1.0, 1)
+                    yield f"{words} in q only", partial(case.compute, only)
+        for (one, *at), (other, *to) in combinations(((name, q, v) for name, q, v, _ in axes), 2):
+            words = f"the joints {one!r} and {other!r} are exchanged"
+            few = self._exchanged(case.first(_FEW), tuple(at), tuple(to))
+            variants = (
+                ((words, True), (f"{words} in q only", False)) if self.row.columns else ((words, False),)
+            )
+            for sentence, columns in variants:
+                order = np.arange(case.expected.shape[-1])
+                if columns:
+                    order[[at[1], to[1]]] = order[[to[1], at[1]]]
+                predicted = self._columns_in(case, few, order)
+                if case.remainder(predicted, _FEW) <= EXPLAINED:
+                    every = self._exchanged(case.inputs, tuple(at), tuple(to))
+                    yield sentence, partial(self._columns_in, case, every, order)
+
+    def _columns_times(self, case: Diagnosis, inputs: Inputs, sign: FloatArray) -> FloatArray:
+        found: FloatArray = case.compute(inputs) * sign
+        return found * sign[:, None] if len(self.row.shape) == 3 else found
+
+    def _columns_in(self, case: Diagnosis, inputs: Inputs, order: Any) -> FloatArray:
+        result = case.compute(inputs)
+        if not self.row.columns:
+            return result
+        found: FloatArray = result[..., order]
+        return found[..., order, :] if len(self.row.shape) == 3 else found
+
+    @staticmethod
+    def _exchanged(inputs: Inputs, one: tuple[int, ...], other: tuple[int, ...]) -> Inputs:
+        found = [x.copy() for x in inputs]
+        for k, x in enumerate(found):
+            at = [one[min(k, 1)], other[min(k, 1)]]
+            x[:, at] = x[:, at[::-1]]
+        return tuple(found)
+
+    def _of_orders(self, case: Diagnosis) -> Iterator[Mistake]:
+        """Yield the joint orders of other tools that are permutations."""
+        if self.conversion is not None:
+            return
+        from urdfkin.conventions import BUILT_IN  # noqa: PLC0415  few functions need it
+
+        seen = {tuple(range(self.robot.nq))}
+        for name in BUILT_IN:
+            try:
+                other = self.robot.convention(name)
+            except UrdfkinError:
+                continue
+            q, v = other.permutation, other.rate_permutation
+            if q is None or v is None or len(q) != self.robot.nq or tuple(q.tolist()) in seen:
+                continue
+            seen.add(tuple(q.tolist()))
+            places = [np.argsort(q), np.argsort(v), np.argsort(v)]
+            inputs = tuple(x[:, at] for x, at in zip(case.inputs, places, strict=False))
+            yield (
+                f"the joints are in the order of {name}; try convention={name!r}",
+                partial(self._columns_in, case, inputs, v),
+            )
+
+    def _of_frames(self, case: Diagnosis) -> Iterator[Mistake]:
+        """Yield the results of all other links' frames."""
+        names = [f"link:{name}" for name in self.robot.link_names if name != self.frame]
+        if self.row.against is not None or not names:
+            return
+        every = case.compute(case.inputs, frame=names)
+        for k, name in enumerate(names):
+            title = name.removeprefix("link:")
+            yield (
+                f"the result is that of the frame {title!r}; {self.frame!r} was asked for",
+                partial(np.asarray, every[:, k]),
+            )
+
+
+def _columns(mistakes: Mistakes, case: Diagnosis) -> Iterator[tuple[float, str]]:
+    """Yield mistakes of single columns of a Jacobian; the columns without one may be wrong otherwise."""
+    if case.expected.shape[1:2] != (6,) or case.expected.ndim != 3:
+        return
+    names = (mistakes.conversion or mistakes.robot).rate_names
+    ours, theirs = case.expected, case.found
+    size = np.maximum(case.scale, np.finfo(float).tiny)
+
+    def equal(i: int, x: FloatArray) -> bool:
+        return bool((np.abs(theirs[..., i] - x) <= 1e-9 * size[..., i]).all())
+
+    wrong = [i for i in range(ours.shape[-1]) if not equal(i, ours[..., i])]
+    for i in wrong:
+        if equal(i, -ours[..., i]):
+            yield 0.0, f"the column of {names[i]!r} has the opposite sign"
+        elif equal(i, np.zeros_like(ours[..., i])):
+            yield 0.0, f"the column of {names[i]!r} is zero"
+        else:
+            other = next((k for k in range(ours.shape[-1]) if k != i and equal(i, ours[..., k])), None)
+            if other is not None:
+                yield 0.0, f"the column of {names[i]!r} is that of {names[other]!r}"

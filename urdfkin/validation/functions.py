@@ -1,0 +1,687 @@
+"""Check a function of a user against urdfkin, the oracle and the derived bound.
+
+The function computes a row of the table of quantities from q, from q and v, or from q, v and a. It is called
+at random configurations, at the zero configuration and at the joint limits. urdfkin's results at these
+configurations are compared with the oracle's first, so that a disagreement is the function's.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from copy import copy
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from urdfkin.conventions import Convention
+from urdfkin.errors import InputError
+from urdfkin.errors.display import Displayable, Table, TextDocument
+from urdfkin.errors.validators import as_bool, real_number, safe_repr, whole_number
+from urdfkin.kinematics.roundings import EPS
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray
+from urdfkin.system.documents import plain
+from urdfkin.validation.diagnosis import Diagnosis, Mistakes, diagnose
+from urdfkin.verify.bounds import Bound, disagreement, result_k
+from urdfkin.verify.oracles import versions
+from urdfkin.verify.quantities import ACCELERATION_BREAKDOWN, Quantity
+from urdfkin.verify.quantities import quantity as quantity_of
+from urdfkin.verify.sampling import draw
+from urdfkin.verify.verifier import Verifier, bound_of, held_against
+
+if TYPE_CHECKING:
+    from urdfkin.conventions import Conversion
+    from urdfkin.robot import Robot
+    from urdfkin.verify.call import Call
+
+#: Number of configurations that are computed at a time, and that a diagnosis uses.
+_AT_A_TIME = 256
+_DIAGNOSED = 48
+#: Number of exceptions and wrong results that are kept with their message.
+_KEPT = 5
+#: A relative precision, and its name in a diagnosis.
+_SINGLE = 1e-5
+
+
+@dataclass(frozen=True)
+class FunctionError:
+    """An exception of the function, or a result that is no array of the right shape.
+
+    Attributes:
+        sample: Index of the configuration.
+        message: The exception with its message, or the shape that was found.
+    """
+
+    sample: int
+    message: str
+
+
+@dataclass(frozen=True)
+class WorstResult:
+    """The result with the largest ratio of its difference to its bound.
+
+    Attributes:
+        sample: Index of the configuration.
+        inputs: q, or q and v, or q, v and a, as the function received them.
+        found: The function's result.
+        expected: urdfkin's result.
+        bound: Largest allowed difference of each number.
+        replay: A command or a line of Python that computes the expected result.
+    """
+
+    sample: int
+    inputs: tuple[FloatArray, ...]
+    found: FloatArray
+    expected: FloatArray
+    bound: FloatArray
+    replay: str
+
+    def largest(self, rows: Sequence[str], columns: Sequence[str]) -> str:
+        """Return a sentence about the number that exceeds its bound most."""
+        with np.errstate(all="ignore"):
+            over = np.abs(self.found - self.expected) / np.maximum(self.bound, np.finfo(float).tiny)
+        flat = int(np.nan_to_num(over, nan=np.inf).argmax())
+        at = tuple(int(i) for i in np.unravel_index(flat, over.shape))
+        names = [rows[at[0]], *(columns[k] if columns else f"column {k}" for k in at[1:])]
+        return (
+            f"The number {', '.join(names)} is {self.found[at]:.17g}; {self.expected[at]:.17g} was expected,"
+            f" within {self.bound[at]:.2g}."
+        )
+
+
+@dataclass(frozen=True)
+class FunctionCheck(Displayable):
+    """The comparison of a function with urdfkin, the oracle and the derived bound.
+
+    Attributes:
+        function: Name of the function.
+        robot: Name of the robot.
+        quantity: Name of the quantity.
+        frame: Name of the frame.
+        reference: Name of the reference frame; None for a quantity that has none.
+        convention: Name of the convention of inputs and results; None for urdfkin's.
+        oracle: Name and version of the oracle that confirmed urdfkin's results; "" if none could.
+        samples: Number of configurations.
+        compared: Number of results that have the right shape.
+        factor: The bound is multiplied by this factor.
+        eps_scale: Largest difference in multiples of eps * scale.
+        share: Largest ratio of a difference to the bound times `factor`; at most 1 if all results agree.
+        oracle_share: The same ratio for the difference from the oracle; None without an oracle.
+        rows: Largest ratio in each row of the result, by name.
+        columns: Largest ratio in each column of the result, by joint velocity; empty for other quantities.
+        worst: The worst result; None if no result was compared.
+        errors: Number of exceptions and wrong shapes.
+        first_errors: The first of them.
+        diagnoses: Explanations of a disagreement, each of which explains all results.
+
+    >>> import urdfkin
+    >>> arm = urdfkin.load("planar_two_link")
+    >>> check = urdfkin.verify_function(lambda q: arm.jacobian(q, "tip")[[3, 4, 5, 0, 1, 2]], arm)
+    >>> check.agrees, check.diagnoses
+    (False, ('the angular rows come first; urdfkin has the linear rows first',))
+    """
+
+    function: str
+    robot: str
+    quantity: str
+    frame: str
+    reference: str | None
+    convention: str | None
+    oracle: str
+    samples: int
+    compared: int
+    factor: float
+    eps_scale: float
+    share: float
+    oracle_share: float | None
+    rows: dict[str, float]
+    columns: dict[str, float]
+    worst: WorstResult | None
+    errors: int
+    first_errors: tuple[FunctionError, ...]
+    diagnoses: tuple[str, ...]
+
+    @property
+    def agrees(self) -> bool:
+        """True if the function returned every result, and each is within the bound times `factor`."""
+        good = self.compared == self.samples and not self.errors and self.share <= 1.0
+        return good and (self.oracle_share is None or self.oracle_share <= 1.0)
+
+    @property
+    def needed_factor(self) -> float:
+        """The smallest `factor` with which all compared results agree with urdfkin's."""
+        return self.share * self.factor
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain data for JSON; a value that is not finite becomes null.
+
+        >>> import urdfkin
+        >>> arm = urdfkin.load("planar_two_link")
+        >>> check = urdfkin.verify_function(lambda q: arm.jacobian(q, "tip"), arm, samples=5)
+        >>> check.as_dict()["agrees"]
+        True
+        """
+        names = (
+            *("function", "robot", "quantity", "frame", "reference", "convention", "oracle", "samples"),
+            *("compared", "factor", "eps_scale", "share", "oracle_share", "rows", "columns", "errors"),
+            *("first_errors", "diagnoses", "worst"),
+        )
+        data = {name: getattr(self, name) for name in names}
+        found: dict[str, Any] = plain({"agrees": self.agrees, **data, "versions": versions()})
+        return found
+
+    def _sheet(self) -> TextDocument:
+        return self.document()
+
+    def document(self) -> TextDocument:
+        """Return the result as a document, from which every format is made."""
+        of = f"{self.quantity} of {self.frame}" + (f" ({self.reference})" if self.reference else "")
+        verdict = "agrees" if self.agrees else "DISAGREES"
+        parts: list[str | Table] = [
+            f"{self.compared} of {self.samples} results compared"
+            + (f"; convention {self.convention}" if self.convention else "")
+        ]
+        if self.compared:
+            parts.append(
+                f"Largest difference from urdfkin: {self.eps_scale:.3g} eps*scale, {self.share:.3g} of the"
+                f" bound times {self.factor:g}."
+            )
+        if self.oracle_share is None:
+            parts.append("urdfkin's results were NOT checked: no oracle can check this robot.")
+        elif self.compared:
+            parts.append(f"Largest difference from {self.oracle}: {self.oracle_share:.3g} of the same bound.")
+        if self.errors:
+            parts.append(f"{self.errors} configurations without a result of the right shape:")
+            parts += [f"  sample {error.sample}: {error.message}" for error in self.first_errors]
+        if not self.agrees and self.compared:
+            parts += [f"Diagnosis: {words}." for words in self.diagnoses]
+            parts += self._parts_of_the_worst()
+        return TextDocument(f"{self.function}: {verdict} on the {of} of {self.robot}", parts)
+
+    def _parts_of_the_worst(self) -> Iterator[str | Table]:
+        for title, shares in (("row", self.rows), ("column", self.columns)):
+            wrong = [(name, f"{share:.3g}") for name, share in shares.items() if not share <= 1.0]
+            if wrong and len(wrong) < len(shares):
+                yield Table((title, "of the bound"), wrong)
+            elif wrong:
+                yield f"Every {title} differs."
+        assert self.worst is not None
+        yield self.worst.largest(tuple(self.rows), tuple(self.columns))
+        yield f"Worst result: sample {self.worst.sample}, with"
+        for letter, values in zip("qva", self.worst.inputs, strict=False):
+            yield f"  {letter} = [{', '.join(map(repr, values.tolist()))}]"
+        yield f"  the expected result: {self.worst.replay}"
+
+
+class _Recorder:
+    """The verifier of a robot that also keeps the call and the result that it checks."""
+
+    def __init__(self, verifier: Verifier) -> None:
+        self._verifier = verifier
+        self.calls: dict[str, tuple[Quantity, Call, FloatArray]] = {}
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._verifier, name)
+
+    def check(self, row: Quantity, call: Call, result: FloatArray, verify: object) -> None:
+        self.calls[row.name] = row, call, result
+        self._verifier.check(row, call, result, cast("Any", verify))
+
+
+def verify_function(
+    function: Callable[..., object],
+    robot: Robot,
+    quantity: str = "jacobian",
+    *,
+    frame: str | None = None,
+    reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
+    convention: str | Path | Convention | None = None,
+    samples: int = 1000,
+    seed: int = 0,
+    factor: float = 1.0,
+    batch: bool = False,
+    **options: Any,
+) -> FunctionCheck:
+    """Compare a function of yours with urdfkin's results, the oracle's, and the derived bound.
+
+    The function receives q (nq,), and v and a (nv,) if the quantity needs them, in rad, m and seconds. The
+    values are random within the limits; the zero configuration and the joint limits come first. In every
+    eighth sample, v and a are a hundred times larger, so that quadratic terms show. An exception of the
+    function and a wrong shape are results of the check, not exceptions of this function.
+
+    Args:
+        function: The function to check: q -> result, (q, v) -> result or (q, v, a) -> result.
+        robot: The robot that the function computes.
+        quantity: Name of a row of the table of quantities: "placement", "velocity", "jacobian",
+            "jacobian rate", "hessian", "acceleration", "relative placement", "analytical jacobian" or "imu".
+        frame: Name of a link or joint; None: the robot's only tip.
+        reference: Reference frame of the result.
+        convention: Convention of inputs and results, as for `Robot.convention`; None: urdfkin's.
+        samples: Number of random configurations.
+        seed: Seed of the random configurations.
+        factor: Multiplies the bound, for a function that rounds more than the textbook's recursion. The
+            result's `needed_factor` is the smallest that suffices.
+        batch: True: the function receives q (n, nq), and v and a (n, nv), and returns n results.
+        **options: Other arguments of the method of `Robot`, such as `representation`.
+
+    Returns:
+        The result; `print` shows it. In a test: `assert check.agrees, check`.
+
+    Raises:
+        UnknownNameError: no such quantity, frame or convention.
+        InputError: an invalid argument; or a convention that has no result for the quantity.
+        VerificationError: urdfkin and the oracle disagree.
+
+    >>> import urdfkin
+    >>> import numpy as np
+    >>> arm = urdfkin.load("planar_two_link")
+    >>> def tip_jacobian(q):  # links of 0.5 m and 0.4 m
+    ...     s, c = np.sin([q[0], q[0] + q[1]]), np.cos([q[0], q[0] + q[1]])
+    ...     J = np.zeros((6, 2))
+    ...     J[:2] = [[-0.5 * s[0] - 0.4 * s[1], -0.4 * s[1]], [0.5 * c[0] + 0.4 * c[1], 0.4 * c[1]]]
+    ...     J[5] = 1.0
+    ...     return J
+    >>> check = urdfkin.verify_function(tip_jacobian, arm, "jacobian", frame="tip", samples=100)
+    >>> check.agrees
+    True
+    """
+    if not callable(function):
+        raise InputError("the function to check must be callable", found=safe_repr(function))
+    row = quantity_of(quantity)
+    if row.of != "frames" or row is ACCELERATION_BREAKDOWN:
+        raise InputError("a function cannot be compared with this quantity", found=quantity)
+    how = _How(
+        row,
+        frame or robot.tip_frame,
+        None if not row.referred else Reference.of(reference),
+        whole_number(samples, "samples", 0),
+        whole_number(seed, "seed", 0),
+        real_number(factor, "factor"),
+        as_bool(batch, "batch"),
+        options,
+    )
+    if not how.factor > 0.0:
+        raise InputError("factor must be positive", found=safe_repr(factor))
+    conversion = None if convention is None else robot.convention(convention)
+    return _Run(function, robot, conversion, how).check()
+
+
+@dataclass(frozen=True)
+class _How:
+    """The arguments of `verify_function`, validated."""
+
+    row: Quantity
+    frame: str
+    reference: Reference | None
+    samples: int
+    seed: int
+    factor: float
+    batch: bool
+    options: dict[str, Any]
+
+
+@dataclass
+class _Compared:
+    """The results of some configurations, as the function and as urdfkin return them.
+
+    Attributes:
+        first: Index of the first configuration.
+        inputs: The function's inputs, one row for each configuration.
+        good: Indices of the configurations with a result of the right shape.
+        found: The function's results (n, ...) of these.
+        expected: urdfkin's results of these.
+        scale: The scale of the bound of these.
+        k: The k of the bound of these (n,).
+    """
+
+    first: int
+    inputs: tuple[FloatArray, ...]
+    good: list[int]
+    found: FloatArray
+    expected: FloatArray
+    scale: FloatArray
+    k: FloatArray
+    theirs: FloatArray | None
+
+    def shares(self, other: FloatArray) -> FloatArray:
+        """Return the ratio of each number's difference from another result to its bound."""
+        k = self.k.reshape(-1, *[1] * (self.found.ndim - 1))
+        return self.units(other) / k
+
+    def units(self, other: FloatArray) -> FloatArray:
+        """Return each number's difference from another result, in eps * scale; inf if it is not finite."""
+        with np.errstate(all="ignore"):
+            units = disagreement(self.found, other, Bound(self.scale, self.k))
+        return np.where(np.isfinite(units), units, np.inf)
+
+
+class _Run:
+    """One check of a function."""
+
+    def __init__(
+        self, function: Callable[..., object], robot: Robot, conversion: Conversion | None, how: _How
+    ) -> None:
+        self.function, self.robot, self.conversion, self.how = function, robot, conversion, how
+        self.recorder = _Recorder(robot.verifier)
+        self.recording = copy(robot)
+        self.recording.verifier = cast("Verifier", self.recorder)
+        self.nv = robot.nv if conversion is None else conversion.nv
+
+    def check(self) -> FunctionCheck:
+        row, how, robot = self.how.row, self.how, self.robot
+        drawn = draw(robot.tree, how.samples, np.random.default_rng(how.seed), with_special=True)
+        total = _Total(row, how.factor, self._row_names(), self._column_names())
+        checked = robot.verifier.cannot(None, robot.verifier.witness) is None
+        for first in range(0, len(drawn.q), _AT_A_TIME):
+            part = slice(first, first + _AT_A_TIME)
+            total.add(self._compared(first, (drawn.q[part], drawn.v[part], drawn.a[part]), total, checked))
+        return self._result(total, len(drawn.q), checked)
+
+    def _result(self, total: _Total, samples: int, checked: bool) -> FunctionCheck:
+        how, robot = self.how, self.robot
+        diagnoses: tuple[str, ...] = ()
+        if total.share > 1.0 or total.errors:
+            diagnoses = tuple(self._diagnoses(total))
+        worst = total.worst
+        if worst is not None:
+            values = self._ours(worst.inputs)
+            worst = replace(worst, replay=self._replay(values))
+        return FunctionCheck(
+            getattr(self.function, "__name__", type(self.function).__name__),
+            robot.name,
+            how.row.name,
+            how.frame,
+            None if how.reference is None else how.reference.name.lower(),
+            None if self.conversion is None else self.conversion.convention.name,
+            robot.certificate().oracle if checked else "",
+            samples,
+            total.compared,
+            how.factor,
+            total.eps_scale,
+            total.share,
+            total.oracle_share if checked else None,
+            dict(zip(total.row_names, total.by_row.tolist(), strict=True)),
+            dict(zip(total.column_names, total.by_column.tolist(), strict=True)),
+            worst,
+            total.errors,
+            tuple(total.first_errors),
+            diagnoses,
+        )
+
+    # -- the two results -----------------------------------------------------------------------------
+
+    def expected(
+        self,
+        inputs: Sequence[FloatArray],
+        frame: str | Sequence[str] | None = None,
+        reference: Reference | None = None,
+    ) -> FloatArray:
+        """Return urdfkin's results for inputs in the function's convention, without a check."""
+        ours = self._ours(inputs)
+        found = self._method(self.robot, ours, frame or self.how.frame, reference, verify=False)
+        return self._converted(ours, found, frame, reference)
+
+    def _compared(self, first: int, drawn: tuple[FloatArray, ...], total: _Total, checked: bool) -> _Compared:
+        row = self.how.row
+        ours = drawn[: len(row.inputs)]
+        result = self._method(self.recording, ours, self.how.frame, None, verify=checked)
+        _, call, _ = self.recorder.calls[row.name]
+        flat = result[:, None]
+        part = call.part(slice(0, call.n))
+        theirs, bound = None, None
+        if checked:
+            oracle = self.robot.verifier.oracle(call.base, self.robot.verifier.witness)
+            theirs, bound = held_against(row, oracle, part, flat, self.robot.verifier.witness)
+        else:
+            bound = bound_of(row, part)
+        scale = np.broadcast_to(bound.scale, flat.shape)[:, 0]
+        k = result_k(bound, flat.shape[:2])[:, 0] * self.how.factor
+        inputs: tuple[FloatArray, ...] = ours
+        if self.conversion is not None:
+            inputs = _tuple(self.conversion.to(*ours))
+            scale = self._converted_scale(ours, scale)
+            k = k + self._rounding_of_the_conversion(ours[0]) * self.how.factor
+        expected = self._converted(ours, result)
+        compared = _Compared(first, inputs, [], expected, expected, scale, k, None)
+        found = self._called(inputs, expected.shape[1:], first, total, compared.good)
+        good = compared.good
+        compared.found, compared.expected = found, expected[good]
+        compared.scale, compared.k = scale[good], k[good]
+        if theirs is not None:
+            compared.theirs = self._converted(ours, np.asarray(theirs)[:, 0])[good]
+        return compared
+
+    def _method(
+        self,
+        robot: Robot,
+        ours: Sequence[FloatArray],
+        frame: str | Sequence[str],
+        reference: Reference | None,
+        *,
+        verify: bool,
+    ) -> FloatArray:
+        how = self.how
+        named = (
+            {} if how.reference is None else {"reference": how.reference if reference is None else reference}
+        )
+        method = getattr(robot, how.row.method)
+        found: FloatArray = method(*ours, frame=frame, verify=verify, **named, **how.options)
+        return found
+
+    def _ours(self, inputs: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
+        return tuple(inputs) if self.conversion is None else _tuple(self.conversion.from_(*inputs))
+
+    def _converted(
+        self,
+        ours: Sequence[FloatArray],
+        result: FloatArray,
+        frame: str | Sequence[str] | None = None,
+        reference: Reference | None = None,
+    ) -> FloatArray:
+        if self.conversion is None:
+            return result
+        reference = self.how.reference if reference is None else reference
+        reference = Reference.LOCAL_WORLD_ALIGNED if reference is None else reference
+        jacobian = partial(self.robot.jacobian, ours[0], frame or self.how.frame, reference, verify=False)
+        return self.conversion.result(self.how.row.name, ours, result, jacobian)
+
+    def _converted_scale(self, ours: Sequence[FloatArray], scale: FloatArray) -> FloatArray:
+        """Return the scale of a converted result: each of its numbers is a sum of our numbers."""
+        conversion, name = self.conversion, self.how.row.name
+        assert conversion is not None
+        if name == "placement":
+            return scale
+        scale = conversion.six(scale, 1)
+        if name in ("velocity", "acceleration"):
+            return scale
+        if not conversion.is_constant and name != "jacobian":
+            raise InputError(
+                f"the bound of the {name} is not derived for a base velocity in other axes",
+                where=conversion.convention.name,
+                remedy="check the Jacobian in this convention, or use urdfkin's convention",
+            )
+        inverse = np.abs(conversion.inverse_matrix(ours[0]))
+        found: FloatArray = np.asarray(
+            scale @ inverse if name != "hessian" else np.einsum("nrkl,ki,lj->nrij", scale, inverse, inverse)
+        )
+        return found
+
+    def _rounding_of_the_conversion(self, q: FloatArray) -> float:
+        """Return the roundings of a conversion that is more than a permutation, in multiples of eps * scale.
+
+        The function receives a rounded angle. It differs by up to 2 eps |q| from urdfkin's,
+        which rotates each factor of a term by so much. The matrix of a base velocity has at most 16
+        roundings.
+        """
+        conversion, row = self.conversion, self.how.row
+        assert conversion is not None
+        if conversion.permutation is not None and conversion.rate_permutation is not None:
+            return 0.0
+        return 16.0 + 2.0 * row.factors * len(self.robot.tree.joints) * float(np.abs(q).max(initial=1.0))
+
+    def _called(
+        self,
+        inputs: tuple[FloatArray, ...],
+        shape: tuple[int, ...],
+        first: int,
+        total: _Total,
+        good: list[int],
+    ) -> FloatArray:
+        """Return the function's results of the right shape; add their indices to `good`."""
+        n, found = len(inputs[0]), list[FloatArray]()
+        if self.how.batch:
+            array = _call(self.function, [x.copy() for x in inputs], (n, *shape), first, total, n)
+            good += range(n) if array is not None else ()
+            return np.zeros((0, *shape)) if array is None else array
+        for k in range(n):
+            array = _call(self.function, [x[k].copy() for x in inputs], shape, first + k, total, 1)
+            if array is not None:
+                found.append(array)
+                good.append(k)
+        return np.array(found).reshape(-1, *shape)
+
+    # -- explanations --------------------------------------------------------------------------------
+
+    def _diagnoses(self, total: _Total) -> Iterator[str]:
+        if total.wrong_shapes and not total.compared:
+            words = _of_shape(next(iter(total.wrong_shapes)), total.shape)
+            if words:
+                yield words
+            return
+        if not total.kept:
+            return
+        if total.not_finite:
+            yield f"{total.not_finite} results are not finite"
+            return
+        if total.eps_scale * EPS <= _SINGLE and math.isfinite(total.share):
+            precision = "single" if total.eps_scale * EPS > 1e-9 else "double"
+            yield (
+                f"all differences are below {total.eps_scale * EPS:.1g} of the terms' size, as rounding in"
+                f" {precision} precision leaves;"
+                f" factor={math.ceil(total.share * self.how.factor)} accepts them"
+            )
+            return
+        inputs, found, expected, scale = total.for_diagnosis()
+        mistakes = Mistakes(self.robot, self.how.row, self.how.frame, self.how.reference, self.conversion)
+        diagnosis = Diagnosis(inputs, found, expected, scale, self.expected)
+        yield from diagnose(mistakes, diagnosis)
+
+    def _replay(self, values: tuple[FloatArray, ...]) -> str:
+        _, call, _ = self.recorder.calls[self.how.row.name]
+        one = copy(call)
+        one.q, one.rates, one.shape, one.n = values[0][None], [x[None] for x in values[1:]], (1,), 1
+        return self.robot.verifier._replay(self.how.row, one, 0, self.how.frame)
+
+    def _row_names(self) -> tuple[str, ...]:
+        row = self.how.row
+        angular_first = self.conversion is not None and self.conversion.angular_first
+        labels = row.labels[3:] + row.labels[:3] if angular_first and len(row.labels) == 6 else row.labels
+        return labels or tuple(f"row {k}" for k in range(row.own_shape(self.nv)[0]))
+
+    def _column_names(self) -> tuple[str, ...]:
+        if not self.how.row.columns:
+            return ()
+        return (self.conversion or self.robot).rate_names
+
+
+@dataclass
+class _Total:
+    """The comparison of all configurations so far."""
+
+    row: Quantity
+    factor: float
+    row_names: tuple[str, ...]
+    column_names: tuple[str, ...]
+    compared: int = 0
+    not_finite: int = 0
+    eps_scale: float = 0.0
+    share: float = 0.0
+    oracle_share: float = 0.0
+    errors: int = 0
+    first_errors: list[FunctionError] = field(default_factory=list)
+    wrong_shapes: set[tuple[int, ...]] = field(default_factory=set)
+    shape: tuple[int, ...] = ()
+    worst: WorstResult | None = None
+    kept: _Compared | None = None
+
+    def __post_init__(self) -> None:
+        self.by_row, self.by_column = np.zeros(len(self.row_names)), np.zeros(len(self.column_names))
+
+    def error(self, sample: int, message: str, configurations: int) -> None:
+        """Record an exception or a wrong shape."""
+        self.errors += configurations
+        if len(self.first_errors) < _KEPT:
+            self.first_errors.append(FunctionError(sample, message))
+
+    def add(self, part: _Compared) -> None:
+        """Add some configurations."""
+        self.shape = part.expected.shape[1:]
+        if not part.good:
+            return
+        self.compared += len(part.good)
+        shares, units = part.shares(part.expected), part.units(part.expected)
+        self.eps_scale = max(self.eps_scale, float(units.max()))
+        own = tuple(range(1, shares.ndim))
+        self.not_finite += int((~np.isfinite(part.found).all(axis=own)).sum())
+        of_each = shares.max(axis=own)
+        self.by_row = np.maximum(self.by_row, shares.max(axis=(0, *own[1:])))
+        if len(self.by_column):
+            self.by_column = np.maximum(self.by_column, shares.max(axis=(0, 1, *own[2:])))
+        if self.kept is None:
+            self.kept = part
+        if self.worst is None or of_each.max() > self.share:
+            k = int(of_each.argmax())
+            self.worst = WorstResult(
+                part.first + part.good[k],
+                tuple(x[part.good[k]] for x in part.inputs),
+                part.found[k],
+                part.expected[k],
+                EPS * part.k[k] * part.scale[k],
+                "",
+            )
+        self.share = max(self.share, float(of_each.max()))
+        if part.theirs is not None:
+            self.oracle_share = max(self.oracle_share, float(part.shares(part.theirs).max()))
+
+    def for_diagnosis(self) -> tuple[tuple[FloatArray, ...], FloatArray, FloatArray, FloatArray]:
+        """Return inputs, the function's results, urdfkin's and the scale of some configurations."""
+        assert self.kept is not None
+        good = np.array(self.kept.good[:_DIAGNOSED])
+        n = len(good)
+        inputs = tuple(x[good] for x in self.kept.inputs)
+        return inputs, self.kept.found[:n], self.kept.expected[:n], self.kept.scale[:n]
+
+
+def _call(
+    function: Callable[..., object],
+    inputs: list[FloatArray],
+    shape: tuple[int, ...],
+    sample: int,
+    total: _Total,
+    configurations: int,
+) -> FloatArray | None:
+    """Return a copy of the function's result; None, with a record, after an exception or a wrong shape."""
+    try:
+        found = np.array(function(*inputs), dtype=np.float64)
+    except Exception as error:  # a fault of the user's code is a result of the check
+        total.error(sample, f"{type(error).__name__}: {str(error)[:300]}", configurations)
+        return None
+    if found.shape != shape:
+        total.wrong_shapes.add(found.shape)
+        total.error(sample, f"shape {found.shape}, expected {shape}", configurations)
+        return None
+    return found
+
+
+def _of_shape(found: tuple[int, ...], expected: tuple[int, ...]) -> str:
+    if len(found) > 1 and found == expected[::-1]:
+        return f"the result is transposed: its shape is {found} in place of {expected}"
+    return ""
+
+
+def _tuple(x: FloatArray | tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:
+    return x if isinstance(x, tuple) else (x,)

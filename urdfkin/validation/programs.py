@@ -1,0 +1,201 @@
+"""A program in any language as a function to check: it answers lines of JSON on its standard output.
+
+Each request is one line on the program's standard input:
+
+    {"robot": "/tmp/.../robot.urdf", "quantity": "jacobian", "frame": "tool0",
+     "reference": "local_world_aligned", "q": [...], "v": [...], "a": [...]}
+
+`v` and `a` are present if the quantity needs them, `reference` if it has one. The answer is one line:
+
+    {"result": [[...], ...]}    or    {"error": "a text"}
+
+The program runs with the rights of the user who starts it. A program that hangs, ends or answers with
+anything else raises `ProgramError` for that configuration; it is started again for the next one.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import selectors
+import subprocess
+import tempfile
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import IO
+
+from urdfkin.errors import InputError, SourceError
+from urdfkin.errors.escape import json_text
+from urdfkin.model.tree import FloatArray
+
+#: Largest answer, and largest part of standard error in a message, in bytes.
+_MOST = 64 * 2**20
+_TAIL = 300
+#: Number of failures in a row after which the program is not started again.
+_PATIENCE = 3
+
+
+class ProgramError(Exception):
+    """The program did not answer a request with a result."""
+
+
+class Program:
+    """A program that computes one quantity of one frame; it is called like a function of q, v and a.
+
+    Args:
+        command: The program and its arguments. No shell is involved.
+        urdf: Text of the robot; the program receives the path of a file with it.
+        quantity: Name of the quantity.
+        frame: Name of the frame.
+        reference: Name of the reference frame; None for a placement.
+        timeout: Longest time for an answer, in seconds.
+
+    Raises:
+        InputError: an empty command, or a timeout that is not positive.
+        SourceError: the program cannot be started.
+    """
+
+    def __init__(
+        self,
+        command: Sequence[str],
+        urdf: str,
+        quantity: str,
+        frame: str,
+        reference: str | None,
+        timeout: float = 10.0,
+    ) -> None:
+        if not command:
+            raise InputError("a program needs a command")
+        if not timeout > 0.0:
+            raise InputError("the timeout must be positive", found=repr(timeout))
+        self.command, self.timeout = list(command), timeout
+        self.__name__ = Path(command[0]).name
+        self._fixed = {"quantity": quantity, "frame": frame}
+        if reference is not None:
+            self._fixed["reference"] = reference
+        self._urdf, self._failures = urdf, 0
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def __enter__(self) -> Program:
+        self._folder = tempfile.TemporaryDirectory(prefix="urdfkin-program-")
+        path = Path(self._folder.name, "robot.urdf")
+        path.write_text(self._urdf, encoding="utf-8")
+        self._fixed["robot"] = str(path)
+        try:
+            self._start()
+        except BaseException:
+            self._folder.cleanup()
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._stop()
+        self._folder.cleanup()
+
+    def __call__(self, *inputs: FloatArray) -> object:
+        """Return the program's result for one configuration.
+
+        Raises:
+            ProgramError: the program ended, took too long, or answered with no result.
+        """
+        if self._failures >= _PATIENCE:
+            raise ProgramError(f"not asked: the program failed {_PATIENCE} times in a row")
+        if self._process is None:
+            self._start()
+        values = {letter: x.tolist() for letter, x in zip("qva", inputs, strict=False)}
+        request = json_text({**self._fixed, **values}).replace("\n", " ") + "\n"
+        try:
+            answer = self._read(self._ask(request.encode()))
+        except ProgramError:
+            self._failures += 1
+            raise
+        self._failures = 0
+        return answer
+
+    def _start(self) -> None:
+        self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  open as long as the process
+        try:
+            self._process = subprocess.Popen(
+                self.command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors, bufsize=0
+            )
+        except OSError as error:
+            raise SourceError(
+                "the program cannot be started", where=self.command[0], found=error.strerror or str(error)
+            ) from None
+
+    def _stop(self) -> None:
+        process, self._process = self._process, None
+        if process is None:
+            return
+        process.kill()
+        process.wait()
+        for stream in (process.stdin, process.stdout, self._errors):
+            assert stream is not None
+            with suppress(OSError):
+                stream.close()
+
+    def _ask(self, request: bytes) -> bytes:
+        """Write a request, and return the line of the answer, both within the timeout."""
+        process = self._process
+        assert process is not None
+        assert process.stdin is not None
+        assert process.stdout is not None
+        end, sent, line = time.monotonic() + self.timeout, 0, bytearray()
+        os.set_blocking(process.stdin.fileno(), False)
+        with selectors.DefaultSelector() as ready:
+            ready.register(process.stdin, selectors.EVENT_WRITE)
+            ready.register(process.stdout, selectors.EVENT_READ)
+            while not line.endswith(b"\n"):
+                events = ready.select(max(0.0, end - time.monotonic()))
+                if not events:
+                    self._stop()
+                    raise ProgramError(f"no answer within {self.timeout:g} s; the program was stopped")
+                for key, _ in events:
+                    if key.fileobj is process.stdin:
+                        with suppress(BrokenPipeError):
+                            sent += os.write(process.stdin.fileno(), request[sent : sent + 65536])
+                            if sent < len(request):
+                                continue
+                        ready.unregister(process.stdin)
+                    elif part := os.read(process.stdout.fileno(), 65536):
+                        line += part
+                    else:
+                        raise ProgramError(self._ended())
+                if len(line) > _MOST:
+                    self._stop()
+                    raise ProgramError(f"the answer is longer than {_MOST} bytes")
+        return bytes(line)
+
+    def _ended(self) -> str:
+        """Return words about a program that closed its standard output: its status and last words."""
+        assert self._process is not None
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(1.0)
+        status = self._process.poll()
+        self._errors.seek(0, os.SEEK_END)
+        self._errors.seek(max(0, self._errors.tell() - _TAIL))
+        said = " ".join(self._errors.read(_TAIL).decode(errors="replace").split())
+        self._stop()
+        how = "closed its output" if status is None else f"ended with exit code {status}"
+        return f"the program {how}" + (f": {said}" if said else "")
+
+    @staticmethod
+    def _read(line: bytes) -> object:
+        try:
+            answer = json.loads(line)
+        except (ValueError, RecursionError):
+            shown = line[:80].decode(errors="replace").strip()
+            raise ProgramError(f"the answer is not JSON: {shown!r}") from None
+        if isinstance(answer, dict) and isinstance(answer.get("error"), str):
+            raise ProgramError(answer["error"][:_TAIL])
+        if not isinstance(answer, dict) or "result" not in answer:
+            raise ProgramError('the answer has no member "result"')
+        return answer["result"]
