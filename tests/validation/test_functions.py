@@ -1,0 +1,451 @@
+"""`verify_function` accepts correct functions, and names the usual mistake of a wrong one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import urdfkin
+from tests.cli.running import urdfkin as run
+from tests.robots.odd_urdfs import random_tree
+from urdfkin.robot import Robot
+from urdfkin.validation.diagnosis import _HALVES
+from urdfkin.validation.functions import FunctionCheck, verify_function
+from urdfkin.verify.quantities import walked
+
+#: Robots and frames: serial arms, a branched robot, a hand, and fingers that mimic.
+FRAMES = {
+    "ur5": "tool0",
+    "kinova": "j2s6s200_end_effector",
+    "a1": "FL_foot",
+    "xarm7": "link_eef",
+    "panda": "panda_rightfinger",
+}
+MIMICS = {
+    "panda": "panda_rightfinger",
+    "talos": "gripper_left_fingertip_1_link",
+    "pr2": "l_gripper_l_finger_tip_link",
+    "romeo": "LFinger22_link",
+    "tiago_pro": "gripper_left_fingertip_left_link",
+}
+
+
+@cache
+def robot_of(name: str) -> Robot:
+    return urdfkin.load(name)
+
+
+def computed(robot: Robot, quantity: str, frame: str, reference: str | None = None) -> Callable[..., Any]:
+    """Return urdfkin's method as the function of a user."""
+    method = getattr(robot, quantity.replace(" ", "_"))
+    named = {} if quantity == "placement" else {"reference": reference or "local_world_aligned"}
+    return lambda *inputs: method(*inputs, frame, verify=False, **named)
+
+
+def check(
+    name: str, quantity: str, function: Callable[..., Any], frames: dict[str, str] = FRAMES
+) -> FunctionCheck:
+    return verify_function(function, robot_of(name), quantity, frame=frames[name], samples=60)
+
+
+def turned(q: np.ndarray, robot: Robot, factor: float) -> np.ndarray:
+    """Return q with all angles multiplied by a factor."""
+    at = [robot.tree.q_index[i] for i, x in enumerate(robot.tree.joints) if x.kind.turns and not x.mimic]
+    q[..., at] *= factor
+    return q
+
+
+Wrong = Callable[[Callable[..., Any], Robot, str], Callable[..., Any]]
+
+#: Mistake -> the quantities that have it, part of the diagnosis, and the wrong function of the right one.
+SIX = ("velocity", "jacobian", "jacobian rate", "hessian", "acceleration")
+MISTAKES: dict[str, tuple[tuple[str, ...], str, Wrong]] = {
+    "angular rows first": (SIX, "the angular rows come first", lambda f, r, x: lambda *i: f(*i)[_HALVES]),
+    "transposed": (("placement", "jacobian"), "transposed", lambda f, r, x: lambda *i: f(*i).T),
+    "degrees": (
+        ("placement", "jacobian", "acceleration"),
+        "takes q in degrees",
+        lambda f, r, x: lambda q, *i: f(turned(q, r, np.pi / 180), *i),
+    ),
+    "millimetres": (
+        ("velocity", "jacobian"),
+        "millimetres",
+        lambda f, r, x: lambda *i: (f(*i).T * ([1000.0] * 3 + [1.0] * 3)).T,
+    ),
+    "spatial acceleration": (
+        ("acceleration",),
+        "the spatial acceleration was computed",
+        lambda f, r, x: lambda q, v, a: f(q, v, a) - bend(r, q, v, x),
+    ),
+    "gravity": (
+        ("acceleration",),
+        "gravity",
+        lambda f, r, x: lambda *i: f(*i) + np.array([0, 0, 9.81, 0, 0, 0]),
+    ),
+    "no J-dot term": (
+        ("acceleration",),
+        "the term J' v is missing",
+        lambda f, r, x: lambda q, v, a: f(q, 0 * v, a),
+    ),
+    "inverted": (("placement",), "inverted", lambda f, r, x: lambda q: np.linalg.inv(f(q))),
+}
+
+
+def bend(robot: Robot, q: np.ndarray, v: np.ndarray, frame: str) -> np.ndarray:
+    six = robot.velocity(q, v, frame, verify=False)
+    return np.concatenate((np.cross(six[3:], six[:3]), np.zeros(3)))
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+@pytest.mark.parametrize("name", FRAMES)
+def test_a_planted_mistake_is_named(name: str, mistake: str) -> None:
+    quantities, words, wrong = MISTAKES[mistake]
+    robot, frame = robot_of(name), FRAMES[name]
+    for quantity in quantities:
+        found = check(name, quantity, wrong(computed(robot, quantity, frame), robot, frame))
+        assert not found.agrees
+        assert words in " | ".join(found.diagnoses), (quantity, found)
+
+
+@pytest.mark.parametrize("quantity", ["velocity", "jacobian", "jacobian rate", "hessian", "acceleration"])
+@pytest.mark.parametrize("name", FRAMES)
+def test_another_reference_frame_is_named(name: str, quantity: str) -> None:
+    for reference in ("local", "world"):
+        found = check(name, quantity, computed(robot_of(name), quantity, FRAMES[name], reference))
+        assert any(f"is in {reference.upper()};" in words for words in found.diagnoses), found
+
+
+@pytest.mark.parametrize("quantity", [row.name for row in walked()])
+@pytest.mark.parametrize("name", FRAMES)
+def test_the_frame_of_a_wrong_point_is_named(name: str, quantity: str) -> None:
+    robot, frame = robot_of(name), FRAMES[name]
+    tree = robot.tree
+    joint = next(i for i in reversed(tree.path(tree.frame_link(frame))) if tree.joints[i].kind.nv)
+    other = tree.links[tree.joints[joint].parent]  # the link before the last moving joint
+    found = check(name, quantity, computed(robot, quantity, f"link:{other}"))
+    assert any(f"that of the frame {other!r}" in words for words in found.diagnoses), found
+
+
+@pytest.mark.parametrize("quantity", [row.name for row in walked()])
+@pytest.mark.parametrize("name", FRAMES)
+def test_the_sign_and_the_exchange_of_joints_are_named(name: str, quantity: str) -> None:
+    robot, frame = robot_of(name), FRAMES[name]
+    tree = robot.tree
+    path = [i for i in tree.path(tree.frame_link(frame)) if tree.joints[i].nv]
+    (q1, v1), (q2, v2) = ((tree.q_index[i], tree.v_index[i]) for i in path[1:3])
+    one, other = (tree.joints[i].name for i in path[1:3])
+    right = computed(robot, quantity, frame)
+
+    def columns(result: np.ndarray, change: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        for axis in range(1, result.ndim) if "nv" in str(quantity_shape(quantity)) else ():
+            result = np.moveaxis(change(np.moveaxis(result, axis, 0)), 0, axis)
+        return result
+
+    def flip(x: np.ndarray, at: int) -> np.ndarray:
+        x = x.copy()
+        x[at] *= -1.0
+        return x
+
+    def exchange(x: np.ndarray, at: list[int]) -> np.ndarray:
+        x = x.copy()
+        x[at] = x[at[::-1]]
+        return x
+
+    def flipped(q: np.ndarray, *rates: np.ndarray) -> np.ndarray:
+        return columns(right(flip(q, q1), *(flip(x, v1) for x in rates)), lambda x: flip(x, v1))
+
+    def exchanged(q: np.ndarray, *rates: np.ndarray) -> np.ndarray:
+        inputs = exchange(q, [q1, q2]), *(exchange(x, [v1, v2]) for x in rates)
+        return columns(right(*inputs), lambda x: exchange(x, [v1, v2]))
+
+    found = check(name, quantity, flipped)
+    assert any(f"{one!r} has the opposite sign" in words for words in found.diagnoses), found
+    found = check(name, quantity, exchanged)
+    assert any(f"{one!r} and {other!r} are exchanged" in words for words in found.diagnoses), found
+
+
+def quantity_shape(name: str) -> tuple[object, ...]:
+    return next(row.shape for row in walked() if row.name == name)
+
+
+@pytest.mark.parametrize("name", MIMICS)
+def test_a_missing_mimic_column_is_named(name: str) -> None:
+    robot = robot_of(name)
+    free = urdfkin.load(name, mimic=False, verify=False)
+    own = [free.rate_names.index(x) for x in robot.rate_names]
+    frame = MIMICS[name]
+
+    def function(q: np.ndarray) -> np.ndarray:
+        every = free.from_pinocchio(robot.to_pinocchio(q))
+        return free.jacobian(every, frame)[:, own]
+
+    found = check(name, "jacobian", function, MIMICS)
+    assert not found.agrees
+    assert any("mimic joint" in words and "not added" in words for words in found.diagnoses), found
+
+
+def test_two_mistakes_are_named_together() -> None:
+    robot = robot_of("ur5")
+    found = check("ur5", "jacobian", lambda q: robot.jacobian(q, "tool0", "local", verify=False)[_HALVES])
+    (words,) = found.diagnoses
+    assert "is in LOCAL" in words
+    assert words.endswith("and the angular rows come first")
+
+
+def test_the_order_of_another_tool_is_named() -> None:
+    robot = robot_of("a1")
+    mujoco = robot.with_convention("isaaclab")
+    found = check("a1", "jacobian", lambda q: mujoco.jacobian(q, "FL_foot", verify=False))
+    assert any("order of isaaclab" in words for words in found.diagnoses), found
+
+
+# -- correct functions ----------------------------------------------------------------------------------
+
+
+def pinocchio_function(robot: Robot, quantity: str, frame: str) -> Callable[..., Any]:
+    """Return the quantity by Pinocchio's own calls."""
+    model = robot.pinocchio_model()
+    data, at = model.createData(), model.getFrameId(frame)
+    aligned = pin.LOCAL_WORLD_ALIGNED
+
+    def function(q: np.ndarray, v: np.ndarray | None = None, a: np.ndarray | None = None) -> Any:
+        if quantity == "placement":
+            pin.framesForwardKinematics(model, data, q)
+            return data.oMf[at].homogeneous
+        if quantity == "jacobian":
+            return pin.computeFrameJacobian(model, data, q, at, aligned)
+        pin.forwardKinematics(model, data, q, v, np.zeros(model.nv) if a is None else a)
+        if quantity == "velocity":
+            return pin.getFrameVelocity(model, data, at, aligned).vector
+        return pin.getFrameClassicalAcceleration(model, data, at, aligned).vector
+
+    return lambda q, *rates: function(robot.to_pinocchio(q), *rates)
+
+
+@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")  # axes that are not of unit length
+@pytest.mark.parametrize("seed", range(200))
+def test_no_correct_function_is_called_wrong(seed: int) -> None:
+    robot = urdfkin.load(random_tree(1000 + seed), mimic=False)
+    leaves = list(robot.tree.leaves())
+    frame = robot.tree.links[leaves[seed % len(leaves)]]
+    quantity = ("placement", "velocity", "jacobian", "acceleration")[seed % 4]
+    function = pinocchio_function(robot, quantity, frame)
+    found = verify_function(function, robot, quantity, frame=f"link:{frame}", samples=20, seed=seed)
+    assert found.agrees, found
+    assert not found.diagnoses
+
+
+def test_a_function_by_another_algorithm_agrees() -> None:
+    robot = robot_of("ur5")
+    screws = robot.screws("tool0")
+    found = verify_function(screws.placement, robot, "placement", frame="tool0", samples=200)
+    assert found.agrees, found
+
+
+# -- what a check reports -------------------------------------------------------------------------------
+
+
+def test_one_wrong_number_is_found_in_its_row_and_column() -> None:
+    robot = robot_of("ur5")
+
+    def function(q: np.ndarray) -> np.ndarray:
+        J = robot.jacobian(q, "tool0", verify=False)
+        J[1, 3] += 1e-9
+        return J
+
+    found = check("ur5", "jacobian", function)
+    assert not found.agrees
+    assert [name for name, share in found.rows.items() if share > 1] == ["vy"]
+    assert [name for name, share in found.columns.items() if share > 1] == ["wrist_1_joint"]
+    assert "The number vy, wrist_1_joint is" in str(found)
+
+
+def test_the_factor_that_suffices_is_reported() -> None:
+    robot = robot_of("ur5")
+    single = lambda q: robot.jacobian(q, "tool0", verify=False).astype(np.float32)  # noqa: E731
+    found = check("ur5", "jacobian", single)
+    assert not found.agrees
+    assert "single precision" in found.diagnoses[0]
+    factor = found.needed_factor * 1.0001
+    assert verify_function(single, robot, "jacobian", frame="tool0", samples=60, factor=factor).agrees
+
+
+def test_exceptions_and_wrong_shapes_are_results() -> None:
+    robot = robot_of("ur5")
+
+    def function(q: np.ndarray) -> Any:
+        if q[0] > 0:
+            raise ValueError("no solution")
+        return robot.jacobian(q, "tool0", verify=False) if q[1] > 0 else [1.0, 2.0]
+
+    found = check("ur5", "jacobian", function)
+    assert not found.agrees
+    assert 0 < found.compared < found.samples == 63
+    assert found.errors == found.samples - found.compared
+    messages = {error.message for error in found.first_errors}
+    assert {"ValueError: no solution", "shape (2,), expected (6, 6)"} >= messages
+    assert found.share == 0.0
+
+
+def test_numbers_that_are_not_finite_disagree() -> None:
+    found = check("ur5", "jacobian", lambda q: np.full((6, 6), np.nan))
+    assert not found.agrees
+    assert found.diagnoses == ("63 results are not finite",)
+    assert found.as_dict()["share"] is None
+
+
+def test_a_function_that_changes_its_input_or_reuses_its_output_is_compared_rightly() -> None:
+    robot, out = robot_of("ur5"), np.zeros((6, 6))
+
+    def function(q: np.ndarray) -> np.ndarray:
+        out[:] = robot.jacobian(q, "tool0", verify=False)
+        q[:] = 0.0
+        return out
+
+    assert check("ur5", "jacobian", function).agrees
+
+
+def test_a_batch_is_one_call() -> None:
+    robot, sizes = robot_of("ur5"), list[int]()
+
+    def function(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        sizes.append(len(q))
+        return robot.velocity(q, v, "tool0", verify=False)
+
+    assert verify_function(function, robot, "velocity", frame="tool0", samples=300, batch=True).agrees
+    assert sum(sizes) == 303
+    assert len(sizes) == 2
+
+
+@pytest.mark.parametrize("convention", ["drake", "mujoco", "rtb", "isaaclab"])
+@pytest.mark.parametrize("quantity", [row.name for row in walked()])
+def test_a_function_in_a_convention_agrees_and_its_mistakes_are_named(convention: str, quantity: str) -> None:
+    robot = urdfkin.load("a1", root_joint="floating")
+    tool = robot.with_convention(convention)
+    right = computed(tool, quantity, "FL_foot")  # type: ignore[arg-type]
+    how = {"frame": "FL_foot", "samples": 20, "convention": convention}
+    moving = not tool.conversion.is_constant and quantity in ("jacobian rate", "hessian")
+    if moving:
+        with pytest.raises(urdfkin.InputError, match="base velocity in other axes"):
+            verify_function(right, robot, quantity, **how)
+        return
+    assert verify_function(right, robot, quantity, **how).agrees
+    if quantity != "placement":
+        found = verify_function(lambda *i: right(*i)[_HALVES], robot, quantity, **how)
+        assert any("rows come first" in words for words in found.diagnoses), found
+
+
+def test_a_robot_that_no_oracle_can_check_is_compared_with_a_note() -> None:
+    arm = urdfkin.load("planar_two_link")
+    arm.verifier.unverifiable = "a reason"
+    found = verify_function(lambda q: arm.jacobian(q, "tip", verify=False), arm, samples=5)
+    assert found.oracle_share is None
+    assert "NOT checked" in str(found)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"quantity": "torque"}, "torque"),
+        ({"quantity": "joint jacobian"}, "cannot be compared"),
+        ({"factor": 0.0}, "factor must be positive"),
+        ({"samples": -1}, "samples"),
+        ({"frame": "hand"}, "hand"),
+    ],
+)
+def test_a_wrong_argument_is_one_error(arguments: dict[str, Any], words: str) -> None:
+    with pytest.raises(urdfkin.UrdfkinError, match=words):
+        verify_function(lambda q: q, robot_of("ur5"), **arguments)
+
+
+# -- programs and the command ---------------------------------------------------------------------------
+
+ADAPTER = """
+import json, sys, time
+import urdfkin
+robot = None
+for k, line in enumerate(sys.stdin):
+    asked = json.loads(line)
+    if robot is None:
+        robot = urdfkin.load(asked["robot"], verify=False)
+    {fault}
+    J = robot.jacobian(asked["q"], asked["frame"], asked["reference"])
+    print(json.dumps({{"result": J.tolist()}}), flush=True)
+"""
+FAULTS = {
+    "hang": ("if k == 3: time.sleep(60)", "no answer within"),
+    "crash": ("if k == 3: sys.exit('out of luck')", "ended with exit code 1: out of luck"),
+    "nan": ("if k == 3: print(json.dumps({'result': [[float('nan')] * 6] * 6}), flush=True); continue", ""),
+    "shape": ("if k == 3: print(json.dumps(dict(result=[1, 2])), flush=True); continue", "shape (2,)"),
+    "garbage": ("if k == 3: print('hello', flush=True); continue", "not JSON: 'hello'"),
+    "error": ("if k == 3: print(json.dumps(dict(error='too far')), flush=True); continue", "too far"),
+    "no result": ("if k == 3: print('[]', flush=True); continue", 'no member "result"'),
+}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_broken_program_is_reported_and_the_check_goes_on(fault: str, tmp_path: Path) -> None:
+    code, words = FAULTS[fault]
+    adapter = tmp_path / "adapter.py"
+    adapter.write_text(ADAPTER.format(fault=code))
+    done = run(
+        *("verify", f"python {adapter}", "ur5", "--program", "--frame", "tool0", "--samples", "7"),
+        *("--timeout", "20" if fault != "hang" else "5", "--format", "json"),
+    )
+    assert done.code == 1, done.err
+    data = done.data
+    lost = [error["message"] for error in data["first_errors"]]
+    if fault == "nan":
+        assert data["diagnoses"] == ["1 results are not finite"]
+    else:
+        assert words in lost[0]
+    assert data["compared"] >= 10 - 3
+
+
+@pytest.mark.long
+def test_a_program_in_another_language_agrees(tmp_path: Path) -> None:
+    adapter = tmp_path / "adapter.py"
+    adapter.write_text(ADAPTER.format(fault="pass"))
+    done = run("verify", f"python {adapter}", "ur5", "--program", "--frame", "tool0", "--samples", "20")
+    assert done.code == 0, done.err
+    assert "23 of 23 results compared" in done.text
+
+
+def test_the_command_checks_a_function_of_a_file(tmp_path: Path) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(
+        "import urdfkin\nrobot = urdfkin.load('ur5', verify=False)\n"
+        "def jacobian(q):\n    return robot.jacobian(q, 'tool0')\n"
+        "def jacobian_in_local(q):\n    return robot.jacobian(q, 'tool0', 'local')\n"
+    )
+    good = run("verify", f"{file}:jacobian", "ur5", "--samples", "20")
+    assert good.code == 0
+    assert "agrees" in good.text
+    bad = run("verify", f"{file}:jacobian_in_local", "ur5", "--samples", "20")
+    assert bad.code == 1
+    assert "Diagnosis: the result is in LOCAL" in bad.text
+    assert "urdfkin jacobian ur5 --frame tool0" in bad.text
+
+
+def test_a_bad_target_is_one_line(tmp_path: Path) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text("def jacobian(q):\n    return q\n\n\ncompute = jacobian\n")
+    broken = tmp_path / "broken.py"
+    broken.write_text("1 / 0\n")
+    for target, words in (
+        ("mine", "FILE.py:FUNCTION"),
+        (f"{tmp_path / 'none.py'}:jacobian", "no such file"),
+        (f"{file}:jacobean", "jacobian"),
+        (f"{file}:compute", "pass --quantity"),
+        (f"{broken}:jacobian", "ZeroDivisionError"),
+    ):
+        done = run("verify", target, "ur5")
+        assert done.code == 2, (target, done.err)
+        assert words in done.err
