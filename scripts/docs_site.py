@@ -70,8 +70,9 @@ LIBRARY: dict[str, tuple[str, str, str]] = {
     ),
     "api/checks.md": (
         "Checks and reports",
-        "Certificates of results, validation of robots, and findings about URDF files.",
-        "certificate Certificate validate check Finding",
+        "Certificates of results, validation of robots, checks of your functions, findings about URDF files.",
+        "certificate Certificate validate check Finding verify_function"
+        " urdfkin.validation.functions.FunctionCheck urdfkin.validation.programs.Program",
     ),
     "api/errors.md": (
         "Errors",

@@ -79,6 +79,11 @@ OTHERS: dict[str, list[list[str]]] = {
         ["ROBOT", "elbow", "--no-effects", "--format", "json"],
         ["ROBOT", FILE],
     ],
+    "verify": [
+        [FILE, "ROBOT"],
+        [f"{FILE}.py:{FILE}", "ROBOT"],
+        ["echo '\x1b[31m::error::forged'", "ROBOT", "--program", "--samples", "0"],
+    ],
     "view": [[FILE]],
     "warm": [[], [FILE]],
     "completion": [["bash"], ["zsh"], ["fish"], [FILE]],

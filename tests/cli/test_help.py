@@ -77,6 +77,10 @@ def test_the_examples_of_the_help_run(command: str, tmp_path: Path, monkeypatch:
     for name in ("my", "robot", "arm", "robots/one"):
         (tmp_path / f"{name}.urdf").write_text(elbow())
     panda = load("panda", verify=False)
+    (tmp_path / "my_robot.py").write_text(
+        "import urdfkin\nrobot = urdfkin.load('panda', verify=False)\n"
+        "def jacobian(q):\n    return robot.jacobian(q, 'panda_hand')\n"
+    )
     q = panda.sample(5, seed=0)
     np.savetxt(tmp_path / "log.csv", q, delimiter=",", header=",".join(panda.coordinate_names), comments="")
     run_examples(command)

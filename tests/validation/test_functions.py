@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -329,7 +332,7 @@ def test_a_function_in_a_convention_agrees_and_its_mistakes_are_named(convention
     robot = urdfkin.load("a1", root_joint="floating")
     tool = robot.with_convention(convention)
     right = computed(tool, quantity, "FL_foot")  # type: ignore[arg-type]
-    how = {"frame": "FL_foot", "samples": 20, "convention": convention}
+    how: dict[str, Any] = {"frame": "FL_foot", "samples": 20, "convention": convention}
     moving = not tool.conversion.is_constant and quantity in ("jacobian rate", "hessian")
     if moving:
         with pytest.raises(urdfkin.InputError, match="base velocity in other axes"):
@@ -366,6 +369,7 @@ def test_a_wrong_argument_is_one_error(arguments: dict[str, Any], words: str) ->
 
 # -- programs and the command ---------------------------------------------------------------------------
 
+ADAPTERS = Path(__file__).parents[2] / "examples" / "adapters"
 ADAPTER = """
 import json, sys, time
 import urdfkin
@@ -396,7 +400,7 @@ def test_a_broken_program_is_reported_and_the_check_goes_on(fault: str, tmp_path
     adapter = tmp_path / "adapter.py"
     adapter.write_text(ADAPTER.format(fault=code))
     done = run(
-        *("verify", f"python {adapter}", "ur5", "--program", "--frame", "tool0", "--samples", "7"),
+        *("verify", f"{sys.executable} {adapter}", "ur5", "--program", "--frame", "tool0", "--samples", "7"),
         *("--timeout", "20" if fault != "hang" else "5", "--format", "json"),
     )
     assert done.code == 1, done.err
@@ -410,10 +414,20 @@ def test_a_broken_program_is_reported_and_the_check_goes_on(fault: str, tmp_path
 
 
 @pytest.mark.long
-def test_a_program_in_another_language_agrees(tmp_path: Path) -> None:
-    adapter = tmp_path / "adapter.py"
-    adapter.write_text(ADAPTER.format(fault="pass"))
-    done = run("verify", f"python {adapter}", "ur5", "--program", "--frame", "tool0", "--samples", "20")
+@pytest.mark.skipif(shutil.which("g++") is None, reason="no C++ compiler")
+def test_the_example_in_cpp_agrees(tmp_path: Path) -> None:
+    program = tmp_path / "planar"
+    subprocess.run(["g++", "-O2", ADAPTERS / "planar.cpp", "-o", program], check=True)
+    done = run("verify", str(program), "planar_two_link", "--program", "--samples", "20")
+    assert done.code == 0, done.err
+    assert "23 of 23 results compared" in done.text
+
+
+@pytest.mark.long
+@pytest.mark.skipif(shutil.which("octave") is None, reason="no Octave")
+def test_the_example_for_octave_agrees() -> None:
+    target = f"octave -q {ADAPTERS / 'planar.m'}"
+    done = run("verify", target, "planar_two_link", "--program", "--samples", "20", "--timeout", "60")
     assert done.code == 0, done.err
     assert "23 of 23 results compared" in done.text
 

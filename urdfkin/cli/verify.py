@@ -123,7 +123,7 @@ def verify_command(
                 batch=batch,
             )
     code = (3 if check.oracle_share is None else 0) if check.agrees else 1
-    return Answer(check.document, {"json": check.as_dict}, "", code)
+    return Answer(check._sheet, {"json": check.as_dict}, "", code)
 
 
 def _quantity_of(function: str) -> str:

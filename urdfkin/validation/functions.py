@@ -147,13 +147,27 @@ class FunctionCheck(Displayable):
 
     @property
     def agrees(self) -> bool:
-        """True if the function returned every result, and each is within the bound times `factor`."""
+        """True if the function returned every result, and each is within the bound times `factor`.
+
+        >>> import urdfkin
+        >>> arm = urdfkin.load("planar_two_link")
+        >>> urdfkin.verify_function(lambda q: arm.jacobian(q, "tip"), arm, samples=5).agrees
+        True
+        """
         good = self.compared == self.samples and not self.errors and self.share <= 1.0
         return good and (self.oracle_share is None or self.oracle_share <= 1.0)
 
     @property
     def needed_factor(self) -> float:
-        """The smallest `factor` with which all compared results agree with urdfkin's."""
+        """The smallest `factor` with which all compared results agree with urdfkin's.
+
+        >>> import urdfkin
+        >>> import numpy as np
+        >>> arm = urdfkin.load("planar_two_link")
+        >>> single = lambda q: arm.jacobian(q, "tip").astype(np.float32)
+        >>> urdfkin.verify_function(single, arm, samples=5).needed_factor > 1.0
+        True
+        """
         return self.share * self.factor
 
     def as_dict(self) -> dict[str, Any]:
@@ -175,10 +189,6 @@ class FunctionCheck(Displayable):
         return found
 
     def _sheet(self) -> TextDocument:
-        return self.document()
-
-    def document(self) -> TextDocument:
-        """Return the result as a document, from which every format is made."""
         of = f"{self.quantity} of {self.frame}" + (f" ({self.reference})" if self.reference else "")
         verdict = "agrees" if self.agrees else "DISAGREES"
         parts: list[str | Table] = [

@@ -56,6 +56,16 @@ class Program:
     Raises:
         InputError: an empty command, or a timeout that is not positive.
         SourceError: the program cannot be started.
+
+    >>> import sys
+    >>> import urdfkin
+    >>> arm = urdfkin.load("planar_two_link")
+    >>> code = "for line in __import__('sys').stdin: print(answer, flush=True)"
+    >>> code = "import json; answer = json.dumps(dict(result=[1]))\n" + code
+    >>> command = [sys.executable, "-c", code]
+    >>> with Program(command, arm.urdf, "jacobian", "tip", "local_world_aligned") as program:
+    ...     program(arm.neutral())
+    [1]
     """
 
     def __init__(
