@@ -84,7 +84,7 @@ def test_a_tables_file_becomes_a_table(tmp_path: Path) -> None:
         (["--order", "urdf"], "--order does nothing without --ur"),
         (["--ur", "x.yaml", "--tip", "tool0"], "--tip does nothing with --ur"),
         (["--ur", "x.yaml", "--fit", "base"], "--fit does nothing with --ur"),
-        (["--poses", "x.csv", "--ur", "x.yaml"], "give only one source of calibration"),
+        (["--poses", "x.csv", "--ur", "x.yaml"], "--poses and --ur cannot be used together"),
         (["--poses", "x.csv", "--positions"], "--positions does nothing with --poses"),
         (["--poses", "none.csv"], "none.csv"),
         (["--fit", "origin"], "did you mean origins"),

@@ -107,7 +107,7 @@ def test_the_line_stands_below_its_finding_with_carets_below_what_is_meant(here:
     assert lines[0].startswith("arm.urdf:5:18: URDF503 [*] warning: joint 'j': the axis has length 2")
     assert lines[1] == '  5 |     <!-- \u6c49 --><axis xyz="0 0 2"/>'
     assert lines[2] == "    | " + " " * (4 + len("<!-- ") + 2 + len(" --><axis ")) + "^" * len('xyz="0 0 2"')
-    assert lines[3:] == ["1 warning in 1 file", "[*] fixed by --fix; --diff shows the changes"]
+    assert lines[3:] == ["1 warning in 1 file", "[*] --fix fixes these findings; --diff prints the changes"]
     assert check("arm.urdf", "--format", "concise").text.splitlines() == [lines[0], *lines[3:]]
 
 
@@ -238,7 +238,7 @@ def test_what_a_baseline_knows_blocks_nobody_and_what_is_new_does(here: Path) ->
     assert found("--baseline", "known.json") == [("robots/arm.urdf", "URDF503")]
     arm.write_text(GOOD)
     assert (
-        "(1 known before, 1 in the baseline no longer occur: write it again)"
+        "(1 known before, 1 findings of the baseline no longer occur: write the baseline again)"
         in check("--baseline", "known.json").text
     )
 
@@ -551,7 +551,7 @@ def test_a_rounded_pi_says_how_far_it_turns(here: Path) -> None:
     arm = put("arm.urdf", GOOD.replace("<axis", '<origin rpy="1.5708 0 0"/><axis'))
     assert (
         check("--fix", "--unsafe-fixes").err
-        == "arm.urdf: fixed URDF601 rounded-pi, line 5; joints rotated by up to 3.7e-06 rad each\n"
+        == "arm.urdf: fixed URDF601 rounded-pi, line 5; each joint rotated by at most 3.7e-06 rad each\n"
     )
     assert 'rpy="1.5707963267948966 0 0"' in arm.read_text()
 

@@ -52,8 +52,8 @@ def test_what_was_not_verified_says_so_everywhere(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ((), "give a ROBOT to export, or --check FILE"),
-        (("planar_two_link", "--check", "x.c"), "give a ROBOT to export, or --check FILE"),
+        ((), "give either a ROBOT to export, or --check FILE"),
+        (("planar_two_link", "--check", "x.c"), "give either a ROBOT to export, or --check FILE"),
         (("--check", "x.c", "--to", "c"), "--to does nothing with --check"),
         (("--check", "nowhere.c"), "cannot be read"),
         (("planar_two_link", "--quantity", "speed"), "speed"),

@@ -33,7 +33,8 @@ MISTAKES = {
     "a binary csv file": (["jacobian", "panda", "--q", "@/bin/sh"], "/bin/sh: cannot be read: found text"),
     "an empty csv file": (["jacobian", "panda", "--q", "@/dev/null"], "no samples; write one line for each"),
     "random:many": (["jacobian", "panda", "--q", "random:many"], "random:N needs a whole number"),
-    "random:0": (["jacobian", "panda", "--q", "random:0"], "random:N needs a whole number from 1 on"),
+    "random:0": (["jacobian", "panda", "--q", "random:0"], "N in random:N must be a whole number, at"
+                                                           " least 1"),
     "a zero quaternion": (
         ["jacobian", "ur5", "--root-joint", "floating", "--q", ",".join("0" * 13)],
         "the quaternion of joint root_joint must be a unit quaternion: found norm 0",

@@ -29,19 +29,22 @@ if TYPE_CHECKING:
 _COMPUTE = "Compute"
 _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {
-        "robots": ("urdfkin.cli.robots", "List the robots that have a short name."),
+        "robots": ("urdfkin.cli.robots", "List the robots of the catalogue, which are loaded by name."),
         "info": (
             "urdfkin.cli.robots",
             "Show the whole robot: links, joints, limits, frames and coordinates.",
         ),
         "order": ("urdfkin.cli.order", "Show the order of the joints in MuJoCo, Drake, Isaac Lab and more."),
-        "view": ("urdfkin.cli.view", "Show a robot in a browser tab, with sliders and checked numbers."),
+        "view": (
+            "urdfkin.cli.view",
+            "Show a robot in a browser, with a slider for each joint and verified results.",
+        ),
         "plot": ("urdfkin.cli.plot", "Plot a frame's motion along a trajectory."),
     },
     _COMPUTE: {
         "analytical-jacobian": (
             "urdfkin.cli.quantity",
-            "Compute the derivatives of a frame's position and orientation angles.",
+            "Compute the analytical Jacobian: derivatives of a frame's position and angles.",
         ),
         "singular-values": (
             "urdfkin.cli.quantity",
@@ -54,35 +57,38 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     },
     "Tables and code": {
         "dh": ("urdfkin.cli.dh", "Derive Denavit-Hartenberg tables, or compare one with a published table."),
-        "screws": ("urdfkin.cli.paths", "Derive the product of exponentials: zero pose and joint screws."),
-        "chain": ("urdfkin.cli.paths", "Show one path of the robot: the joint axes between two frames."),
+        "screws": (
+            "urdfkin.cli.paths",
+            "Derive the product of exponentials of a path: zero pose and joint screws.",
+        ),
+        "chain": ("urdfkin.cli.paths", "Show the joint axes on the path between two frames."),
         "structure": (
             "urdfkin.cli.paths",
             "Classify the arm along a path: wrist, parallel axes, closed-form solvers.",
         ),
         "export": (
             "urdfkin.cli.export",
-            "Export kinematics as code in C, Python, MATLAB and more, with a check.",
+            "Export verified kinematics as code in C, Python, MATLAB and other languages.",
         ),
     },
     "Compare and calibrate": {
         "same": (
             "urdfkin.cli.models",
-            "Prove that two models move alike, whatever their files, or bound their distance.",
+            "Prove that two robot models move alike, or bound the distance of their frames.",
         ),
         "diff": (
             "urdfkin.cli.models",
-            "List the edits between two versions of one file, and their effect on motion.",
+            "List the changes between two versions of a robot file and their effect on motion.",
         ),
         "calibrate": (
             "urdfkin.cli.calibrate",
-            "Fit a robot's parameters to measured poses; write them to the URDF.",
+            "Fit a robot's parameters to measured poses and write them to the URDF.",
         ),
     },
     "Validate against Pinocchio": {
         "validate": (
             "urdfkin.cli.validate",
-            "Compute all frames and joints on many samples, and compare with Pinocchio.",
+            "Compare all frames and joints with Pinocchio at many random configurations.",
         ),
         "verify": (
             "urdfkin.cli.verify",
@@ -92,11 +98,14 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     },
     "Check files": {
         "check": ("urdfkin.cli.check", "Lint URDF files; every finding has a code, a line and a remedy."),
-        "explain": ("urdfkin.cli.explain", "Explain a finding's code, an equation, or a common question."),
+        "explain": (
+            "urdfkin.cli.explain",
+            "Explain the code of a finding, an equation, or a common question.",
+        ),
     },
     "Shell": {
         "completion": ("urdfkin.cli.completion", "Print a completion script for bash, zsh or fish."),
-        "warm": ("urdfkin.cli.warm", "Compile everything now, for container images and CI."),
+        "warm": ("urdfkin.cli.warm", "Compile all kernels in advance, for container images and CI."),
     },
 }
 #: The module that makes a command from a row of the table of quantities.

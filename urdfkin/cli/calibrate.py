@@ -37,27 +37,39 @@ _FORMS = (*TEXTS, "json")
 
 @click.command(epilog="Example: urdfkin calibrate ur5 --tip tool0 --fit base,tool,origins")
 @robot_argument
-@click.option("--poses", type=_FILE, help="Measured poses: CSV or .npz, see docs/calibration.md.")
+@click.option(
+    "--poses", type=_FILE, help="File of measured poses, CSV or .npz; docs/calibration.md describes it."
+)
 @click.option("--ur", type=_FILE, help="Factory calibration of a Universal Robots arm (YAML).")
 @click.option(
     "--order",
     type=click.Choice(["driver", "urdf"]),
     default="driver",
     show_default=True,
-    help="With --ur: order of the rotations in the file.",
+    help="With --ur: order of the roll, pitch and yaw rotations in the file.",
 )
-@click.option("--tip", metavar="NAME", help="Tip: a link or joint. Default: the robot's tip.")
-@click.option("--base", metavar="NAME", help="Base: a link or joint. Default: the robot's base.")
+@click.option("--tip", metavar="NAME", help="Link or joint at the tip of the path. Default: the robot's tip.")
+@click.option(
+    "--base", metavar="NAME", help="Link or joint at the base of the path. Default: the robot's base."
+)
 @click.option(
     "--fit",
     "fit",
     default="origins",
     show_default=True,
     metavar="SETS",
-    help="Parameters to fit: base, tool, offsets, origins, gains, separated by commas.",
+    help="Parameters to fit, separated by commas: `base`, `tool`, `offsets`, `origins`, `gains`.",
 )
-@click.option("--positions", is_flag=True, help="Without --poses: only positions will be measured.")
-@click.option("--noise", metavar="M,RAD", help="Standard deviations of the measurements. Default: estimated.")
+@click.option(
+    "--positions",
+    is_flag=True,
+    help="Without --poses: assume measurements of positions, without orientations.",
+)
+@click.option(
+    "--noise",
+    metavar="M,RAD",
+    help="Standard deviations of measured positions (m) and orientations (rad). Default: estimated.",
+)
 @click.option(
     "--unit",
     type=click.Choice(["m", "mm"]),
@@ -66,16 +78,18 @@ _FORMS = (*TEXTS, "json")
     help="Unit of measured positions.",
 )
 @click.option("--drop-odd", is_flag=True, help="Exclude outlier poses.")
-@click.option("--radians", is_flag=True, help="Joint angles are radians, even if they look like degrees.")
+@click.option("--radians", is_flag=True, help="Read joint angles as radians, even if they look like degrees.")
 @click.option(
     "--all",
     "every",
     is_flag=True,
-    help="Write all fitted parameters, not only those that moved by more than 2 sigma.",
+    help="Write all fitted parameters. Default: only those that changed by more than 2 sigma.",
 )
-@click.option("--force", is_flag=True, help="Write a calibration even if it is not plausible.")
+@click.option("--force", is_flag=True, help="Write the calibration even if urdfkin finds it implausible.")
 @format_option(*_FORMS, help_="Output format.")
-@click.option("--output", "-o", type=_FILE, help="Write the calibrated URDF, or the table as TOML.")
+@click.option(
+    "--output", "-o", type=_FILE, help="File for the calibrated URDF, or for the calibrated table (TOML)."
+)
 @click.pass_context
 def command(
     context: click.Context,
@@ -105,7 +119,7 @@ def command(
     given = [name for name in ("poses", "ur") if context.params[name] is not None]
     if len(given) > 1:
         raise InputError(
-            "give only one source of calibration", found=", ".join(f"--{name}" for name in given)
+            "--poses and --ur cannot be used together", found=", ".join(f"--{name}" for name in given)
         )
     _reject_unused(context, given)
     loaded = load_robot(robot)
@@ -147,7 +161,7 @@ def command(
 def _refusal(found: Calibration) -> ImplausibleError:
     from urdfkin.calibration.calibrate import ImplausibleError  # noqa: PLC0415
 
-    return ImplausibleError(found, "--force writes it anyway")
+    return ImplausibleError(found, "to write this calibration anyway, add --force")
 
 
 def _reject_unused(context: click.Context, given: list[str]) -> None:
@@ -221,7 +235,8 @@ def _factory_calibration(robot: Robot, path: Path, order: str) -> Rewritten:
 
     metres, radians = distance(*(read_calibration(path, one) for one in ORDERS))
     say(
-        f"using --order {order}; the tool differs by up to {length(metres)} and {angle(radians)} between "
+        f"using --order {order}; the pose of the tool differs by up to {length(metres)} and"
+        f" {angle(radians)} between "
         "--order driver and --order urdf (docs/calibration.md)",
         err=True,
     )

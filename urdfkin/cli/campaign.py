@@ -85,13 +85,13 @@ def duration(seconds: float) -> str:
 
 
 def _earlier(state: CampaignProgress) -> str:
-    return f" ({state.chunks_kept:,} from before)" if state.chunks_kept else ""
+    return f" ({state.chunks_kept:,} from an earlier run)" if state.chunks_kept else ""
 
 
 def _speed(state: CampaignProgress, pace: Pace) -> str:
     rate, left = pace.of(state)
     if rate is None or left is None:
-        return "nothing computed yet, "
+        return "no chunk computed yet, "
     return f"{rate:.3g} chunks/s, {duration(left)} left, "
 
 
@@ -159,7 +159,7 @@ _FOLDER = click.Path(path_type=Path, file_okay=False)
 
 
 @click.command(
-    "status", short_help="Show the progress of a resumable validation.", epilog=f"Example: {EXAMPLE}"
+    "status", short_help="Show the progress of a validation with --store.", epilog=f"Example: {EXAMPLE}"
 )
 @click.argument("folder", metavar="DIR", type=_FOLDER)
 @click.pass_context
@@ -189,11 +189,11 @@ def status(context: click.Context, folder: Path) -> None:
         say(f"  and {len(failed) - _NAMED:,} more")
     if missing and (seconds := _seconds(store, counts)) is not None:
         say(
-            f"remaining: {duration(missing * seconds)} on one processor, {seconds:.2g} s for each chunk;"
-            " divide by the number of processors"
+            f"remaining: {duration(missing * seconds)} on one processor, {seconds:.2g} s per chunk;"
+            " divide the time by the number of processors"
         )
     if (holder := store.at_work()) is not None:
-        say(f"in use by: {holder}")
+        say(f"the store is in use by: {holder}")
     elif missing:
         say("no process is running; to resume, repeat the same `urdfkin validate ... --store` command")
     if failed:
@@ -210,7 +210,7 @@ def _print_accuracy_progress(store: Store, counts: dict[int, tuple[int, bool]]) 
     from urdfkin.validation.accuracy_store import AccuracyResult  # noqa: PLC0415
 
     if (results := AccuracyResult.of(store)) is not None:
-        say(f"accuracy study: {sum(map(results.has, robots)):,} of {counted(len(robots), 'robot')}")
+        say(f"accuracy study: {sum(map(results.has, robots)):,} of {counted(len(robots), 'robot')} done")
 
 
 def _why(store: Store, robot: int) -> str:
@@ -238,7 +238,7 @@ def _seconds(store: Store, counts: dict[int, tuple[int, bool]]) -> float | None:
 
 @click.command(
     "merge",
-    short_help="Merge the stores of several machines.",
+    short_help="Merge the result stores of several machines.",
     epilog="Example: urdfkin report merge whole shard-1 shard-2 shard-3 shard-4",
 )
 @click.argument("folder", metavar="DIR", type=_FOLDER)

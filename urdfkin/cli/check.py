@@ -118,20 +118,22 @@ def _print_terminal(outcome: Outcome, *, excerpts: bool) -> None:
             say_styled((caret, colour))
     _print_summary(outcome)
     if any(finding.fix and finding.fix.is_safe for finding in outcome.findings):
-        say("[*] fixed by --fix; --diff shows the changes")
+        say("[*] --fix fixes these findings; --diff prints the changes")
     if unsafe := sum(bool(finding.fix and not finding.fix.is_safe) for finding in outcome.findings):
-        say(f"--unsafe-fixes fixes {unsafe} more; these fixes rotate joints by more than rounding")
+        say(f"--unsafe-fixes fixes {unsafe} more, but rotates joints by more than rounding")
     worst = next((f.code for f in outcome.findings if f.severity is Severity.ERROR), None)
     if worst is not None:
-        say(f"'urdfkin explain {worst}' explains: {page(worst).title}")
+        say(f"run 'urdfkin explain {worst}' for details: {page(worst).title}")
 
 
 def _print_summary(outcome: Outcome) -> None:
     asides = [
-        f"{len(outcome.silenced)} silenced by comments" if outcome.silenced else "",
+        f"{len(outcome.silenced)} findings silenced by comments" if outcome.silenced else "",
         f"{outcome.unchanged} files unchanged" if outcome.unchanged else "",
-        f"{outcome.known[0]} known before" if outcome.known[0] else "",
-        f"{outcome.known[1]} in the baseline no longer occur: write it again" if outcome.known[1] else "",
+        f"{outcome.known[0]} findings known from before" if outcome.known[0] else "",
+        f"{outcome.known[1]} findings of the baseline no longer occur: write the baseline again"
+        if outcome.known[1]
+        else "",
     ]
     aside = ", ".join(filter(None, asides))
     say(summary(outcome.findings, len(outcome.files)) + (f" ({aside})" if aside else ""))
@@ -151,7 +153,7 @@ def say_fixed(file: str, fixed: Sequence[Finding]) -> None:
         lines = sorted({finding.line for finding in these})
         more = f" and {len(lines) - 4} more" if len(lines) > 4 else ""
         where = f"line{'s' if len(lines) > 1 else ''} {', '.join(map(str, lines[:4]))}{more}"
-        moved = f"; joints rotated by up to {turns:.1e} rad each" if turns else "; the robot is the same"
+        moved = f"; each joint rotated by at most {turns:.1e} rad" if turns else "; the robot is unchanged"
         say(f"{file}: fixed {code} {RULES[code].slug}, {where}{moved}", err=True)
 
 
@@ -189,21 +191,28 @@ choice_options = together(
         multiple=True,
         metavar="CODE",
         shell_complete=complete_code,
-        help="Report only this code, name or family (URDF5); repeatable.",
+        help="Report only findings with this code (URDF502), name or family (URDF5); repeatable.",
     ),
     click.option(
         "--ignore",
         multiple=True,
         metavar="CODE",
         shell_complete=complete_code,
-        help="Leave out a code; repeatable, or a,b,c.",
+        help="Leave out findings with this code; repeatable, or several codes separated by commas.",
     ),
-    click.option("--strict/--no-strict", default=False, help="Turn warnings into errors."),
-    click.option("--notes/--no-notes", default=True, help="Show notes.  [default: notes]"),
-    click.option("--exclude", multiple=True, metavar="GLOB", help="Leave out matching files and folders."),
-    click.option("--baseline", type=_FILE, help="Leave out the findings listed in this file."),
+    click.option("--strict/--no-strict", default=False, help="Report warnings as errors."),
     click.option(
-        "--write-baseline", type=_FILE, help="Write all findings to this file, as a baseline; exit 0."
+        "--notes/--no-notes", default=True, help="Report findings of severity note.  [default: notes]"
+    ),
+    click.option(
+        "--exclude",
+        multiple=True,
+        metavar="GLOB",
+        help="Leave out files and folders that match this pattern.",
+    ),
+    click.option("--baseline", type=_FILE, help="Leave out the findings listed in this baseline file."),
+    click.option(
+        "--write-baseline", type=_FILE, help="Write all findings to this file as a baseline and exit with 0."
     ),
     click.option(
         "--changed-since",
@@ -218,18 +227,18 @@ settings_options = together(
     ),
     click.option(
         "--config", type=_FILE, is_eager=True, expose_value=False, callback=_take_settings,
-        help="File with the settings, in [tool.urdfkin].  [default: nearest pyproject.toml]",
+        help="File with a table [tool.urdfkin] of settings.  [default: nearest pyproject.toml]",
     ),
 )  # fmt: skip
 #: Field of `Limits` -> help of its option.
 _MOST = {
     "bytes": "Largest size of a file in bytes.",
     "depth": "Largest nesting depth of elements.",
-    "elements": "Largest number of elements.",
+    "elements": "Largest number of elements in a file.",
     "attributes": "Largest number of attributes of an element.",
-    "name": "Most characters of a name.",
-    "number": "Most characters of a number.",
-    "markup": "Most bytes of a tag, comment or instruction.",
+    "name": "Largest number of characters in a name.",
+    "number": "Largest number of characters in a number.",
+    "markup": "Largest size of a tag, comment or processing instruction in bytes.",
 }
 limit_options = together(
     *(
@@ -251,7 +260,7 @@ limit_options = together(
     "--format", "--output-format", "style", type=click.Choice(STYLES), default="terminal", show_default=True,
     help="Output format.",
 )  # fmt: skip
-@click.option("--output", "-o", type=_FILE, help="Write the findings, or the patch of --diff, to a file.")
+@click.option("--output", "-o", type=_FILE, help="Write the findings, or the patch of --diff, to this file.")
 @click.option("--fix", is_flag=True, help="Apply the automatic fixes to the files.")
 @click.option(
     "--unsafe-fixes", is_flag=True, help="Also apply fixes that rotate a joint by more than rounding."
@@ -260,10 +269,12 @@ limit_options = together(
 @click.option("--statistics", is_flag=True, help="Print the number of findings of each code.")
 @choice_options
 @click.option(
-    "--each", is_flag=True, help="Print every finding; by default, many of the same kind are one line."
+    "--each",
+    is_flag=True,
+    help="Print each finding on its own line. Default: one line for many findings of one kind.",
 )
-@mimic_option("Apply the mimic rules.  [default: mimic]")
-@root_joint_option("Also check the names that this root joint needs.")
+@mimic_option("Check the file for use with mimic joints coupled, or free.  [default: mimic]")
+@root_joint_option("Also check that no name of the robot collides with this root joint.")
 @xacro_option
 @settings_options
 @limit_options
@@ -440,7 +451,7 @@ class Run:
             return text
         mended = mend(text, self.look, lambda: self._safe(choose()))
         for code, objection in mended.kept.items():
-            say(f"{file}: {code} was not fixed: {objection}", err=True)
+            say(f"{file}: {code} is not fixed: {objection}", err=True)
         if self.diff:
             self.outcome.to_fix += len(mended.fixed)
             self.outcome.patches.append(difference(file, text.data, mended.text.data))

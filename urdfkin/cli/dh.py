@@ -44,40 +44,51 @@ def _choice(name: str, choices: tuple[str, ...], text: str) -> Any:
 def _columns(_context: click.Context, _option: click.Parameter, value: str) -> tuple[str, ...]:
     names = tuple(name.strip() for name in value.split(","))
     if sorted(names) != ["a", "alpha", "d", "theta"]:
-        raise click.BadParameter(f"{value!r} is not a, alpha, d and theta, each once, separated by commas")
+        raise click.BadParameter(
+            f"{value!r} is not the list of `a`, `alpha`, `d` and `theta` in any order, separated by commas"
+        )
     return names
 
 
 part_options = together(
     path_options,
-    click.option("--all", "all_", is_flag=True, help="Write a table for each leaf of the robot."),
     click.option(
-        "--tree", is_flag=True, help="Write Khalil and Kleinfinger's parameters of the whole robot."
+        "--all", "all_", is_flag=True, help="Write a table from the base to each leaf link of the robot."
     ),
+    click.option("--tree", is_flag=True, help="Write the Khalil-Kleinfinger parameters of the whole tree."),
 )
 choice_options = together(
     _choice(
         "--convention",
         ("standard", "modified"),
-        "Standard (distal) or modified (proximal, Craig's) parameters.",
+        "Denavit-Hartenberg convention: standard (distal) or modified (proximal, Craig's).",
     ),
     _choice(
-        "--near-parallel", ("hayati", "strict"), "Rows of nearly parallel axes: five parameters, or four."
+        "--near-parallel",
+        ("hayati", "strict"),
+        "Rows of nearly parallel axes: five parameters (Hayati), or four.",
     ),
     click.option(
         "--snap",
         type=Number(),
         default=0.0,
         metavar="RAD",
-        help="Round angles within this tolerance to multiples of 15 degrees.",
+        help="Round the table's angles to multiples of 15 degrees if they are within this tolerance.",
     ),
     _choice(
-        "--last", ("tip", "flange"), "Whether the last row reaches the tip, or the tool contains the rest."
+        "--last",
+        ("tip", "flange"),
+        "End of the last row: the tip, or the flange (the tool contains the remaining offset).",
     ),
     _choice(
-        "--parallel-offset", ("last", "first", "each"), "The row that takes the offset along parallel axes."
+        "--parallel-offset", ("last", "first", "each"), "Row whose d contains the offset along parallel axes."
     ),
-    click.option("--flip", multiple=True, metavar="JOINT", help="Reverse the sense of a joint; repeatable."),
+    click.option(
+        "--flip",
+        multiple=True,
+        metavar="JOINT",
+        help="Reverse the positive direction of this joint; repeatable.",
+    ),
     _choice(
         "--first",
         ("base", "joint"),
@@ -86,16 +97,18 @@ choice_options = together(
     _choice(
         "--sign",
         ("theta", "a", "alpha"),
-        "How to choose the direction of x: smallest theta, or a (alpha) not negative.",
+        "Choice of the direction of x: smallest theta, a not negative, or alpha not negative.",
     ),
     _choice(
-        "--slide", ("drawn", "minimal"), "Axis lines of prismatic joints: the URDF's, or those with a = 0."
+        "--slide",
+        ("drawn", "minimal"),
+        "Position of a prismatic joint's axis: that of the URDF, or the one with a = 0.",
     ),
     click.option(
         "--like",
         metavar="TABLE",
         shell_complete=complete_table,
-        help="Write the URDF's numbers in the frames, senses and zeros of a published table.",
+        help="Use the frames, joint directions and joint zeros of this published table.",
     ),
 )
 compare_options = together(
@@ -111,10 +124,12 @@ compare_options = together(
         default=0.2,
         show_default=True,
         metavar="MM",
-        help="Tolerance of --compare at the tip, in millimetres.",
+        help="With --compare: largest allowed error of the tip in millimetres.",
     ),
     click.option(
-        "--fit/--no-fit", default=True, help="Fit base, tool and joint offsets in --compare (default)."
+        "--fit/--no-fit",
+        default=True,
+        help="With --compare: fit base, tool and joint offsets first (default).",
     ),
 )
 form_options = together(
@@ -156,7 +171,7 @@ def _reject_unused(context: click.Context, is_table: bool, options: dict[str, An
         ((*_CHOICES, "base", "tip"), tree, "with --tree"),
         (("tip", "like"), options["all_"], "with --all"),
         (_SIGNS, options["like"] is not None, "with --like"),
-        (("columns",), tree or compares, "except for one table"),
+        (("columns",), tree or compares, "unless the output is one table"),
         (
             _UNITS,
             form not in written,

@@ -93,7 +93,9 @@ def run(work: Work) -> Answer:
         name for name, on in (("--all", work.all_), ("--tree", work.tree), ("--compare", work.compare)) if on
     ]
     if len(chosen) > 1:
-        raise InputError(f"{' and '.join(chosen)} cannot be used together", remedy="use one at a time")
+        raise InputError(
+            f"{' and '.join(chosen)} cannot be used together", remedy="use only one of these options"
+        )
     if work.compare is not None:
         return _compare(work, work.compare)
     if work.tree:
@@ -234,7 +236,9 @@ def _compare(work: Work, name: str) -> Answer:
     if "convention" not in data:
         convention = convention_that_fits(chain, data, tolerance, str(path))
         data = {**data, "convention": convention}
-        notes = [f"The table names no convention; {convention} fits best. Write the convention into it."]
+        notes = [
+            f"The table names no convention; {convention} fits best. Write the convention into the table."
+        ]
     try:
         reference = table_of(data, str(path))
     except InputError as error:

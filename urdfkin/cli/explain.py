@@ -64,7 +64,7 @@ def _indent(code: str) -> str:
 @click.command("explain")
 @click.argument("topic", metavar="CODE|EQUATION|QUESTION", required=False, shell_complete=complete_topic)
 def command(topic: str | None) -> None:
-    """Explain a finding's code, an equation, or a common question.
+    """Explain the code of a finding, an equation, or a common question.
 
     CODE is a finding's code or its short name. The page has the reason, a bad and a good example, and the
     behaviour of other programs. EQUATION is a number in the textbook chapter. The page has the equation, the

@@ -37,9 +37,11 @@ EXAMPLE = "urdfkin export panda --frame panda_hand --to c -o panda_hand.c"
 )
 @reference_option
 @click.option("--to", type=click.Choice(tuple(LANGUAGES)), default="c", show_default=True, help="Language.")
-@click.option("--name", metavar="WORD", help="Prefix of function names. Default: robot and frame.")
 @click.option(
-    "--check", "file", type=click.Path(path_type=Path), help="Run the test vectors of an exported file."
+    "--name", metavar="WORD", help="Prefix of the function names. Default: names of the robot and the frame."
+)
+@click.option(
+    "--check", "file", type=click.Path(path_type=Path), help="Run the test vectors of this exported file."
 )
 @verify_option
 @click.option(
@@ -71,7 +73,7 @@ def command(
     3: not verified, or changed after it was written.
     """
     if (robot is None) == (file is None):
-        raise InputError("give a ROBOT to export, or --check FILE")
+        raise InputError("give either a ROBOT to export, or --check FILE")
     if file is not None:
         reject_unused_options(
             context, [p.name or "" for p in context.command.params if p.name != "file"], "with --check"

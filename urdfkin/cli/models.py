@@ -29,31 +29,35 @@ _PATH = click.Path(path_type=Path, dir_okay=False)
     "pairs",
     multiple=True,
     metavar="JOINT_OF_A=JOINT_OF_B",
-    help="Match two joints; may be repeated.",
+    help="Match a joint of A with a joint of B; repeatable.",
 )
 @click.option(
     "--strict",
     is_flag=True,
-    help="Also exit 1 if the models are only equivalent, or if limits differ.",
+    help="Also exit 1 if the models are only equivalent, or if their joint limits differ.",
 )
 @click.option(
     "--within",
     type=NumberFrom(0.0),
-    help="Exit 0 only if all frames provably stay within this distance (m and rad) as written.",
+    help="Exit 0 only if it is proven that no frame of B is farther than this (m and rad) from A's.",
 )
 @click.option(
     "--boxes",
     type=Whole(0),
-    help="Number of boxes for bounds (default 131072). More: sharper but slower; 0: none.",
+    help="Number of parts of joint space for distance bounds (default 131072; 0: no bounds).",
 )
-@click.option("--all", "all_", is_flag=True, help="Show every line.")
-@click.option("--certificate", type=_PATH, help="Write the result as JSON that --recheck verifies.")
-@click.option("--recheck", type=_PATH, help="Verify a certificate for both models, without a search.")
-@click.option("--markdown", type=_PATH, help="Write Markdown for a pull request's comment.")
+@click.option("--all", "all_", is_flag=True, help="Show all differences and frames, not only the first ones.")
 @click.option(
-    "--html", type=_PATH, help="Write an HTML page with a picture of both at the worst configuration."
+    "--certificate", type=_PATH, help="Write the result as a JSON certificate, which --recheck verifies."
 )
-@click.option("--schema", is_flag=True, help="Print the JSON Schema of a certificate instead.")
+@click.option(
+    "--recheck", type=_PATH, help="Verify this certificate for A and B instead of comparing them again."
+)
+@click.option("--markdown", type=_PATH, help="Write the result as Markdown for a pull request comment.")
+@click.option(
+    "--html", type=_PATH, help="Write an HTML page with a picture of both robots at the worst configuration."
+)
+@click.option("--schema", is_flag=True, help="Print the JSON Schema of a certificate and exit.")
 @xacro_option
 @answering(*TEXTS, "json")
 def same_command(
@@ -85,7 +89,7 @@ def same_command(
         click.echo(SAME.schema_text(), nl=False)
         click.get_current_context().exit()
     if a is None or b is None:
-        raise click.UsageError("two models are needed: urdfkin same A B")
+        raise click.UsageError("name two robots to compare: urdfkin same A B")
     check_writable(*paths.values())
     robots = load_two(a, b)
     with compiling():
@@ -134,8 +138,12 @@ def _recheck(robots: tuple[Robot, Robot], path: Path) -> Answer:
 @click.command("diff", epilog="Example: urdfkin diff arm.urdf my.urdf --markdown comment.md")
 @click.argument("a", metavar="OLD", shell_complete=complete_robot)
 @click.argument("b", metavar="NEW", shell_complete=complete_robot)
-@click.option("--effects/--no-effects", default=True, help="Bound how far the changes move frames (default).")
-@click.option("--markdown", type=_PATH, help="Write Markdown for a pull request's comment.")
+@click.option(
+    "--effects/--no-effects",
+    default=True,
+    help="Compute bounds of the motion of frames by the changes (default).",
+)
+@click.option("--markdown", type=_PATH, help="Write the result as Markdown for a pull request comment.")
 @xacro_option
 @answering()
 def diff_command(a: str, b: str, effects: bool, markdown: Path | None) -> Answer:

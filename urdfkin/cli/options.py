@@ -171,7 +171,7 @@ xacro_option = click.option(
     metavar="NAME:=VALUE",
     expose_value=False,
     callback=_remember_xacro_args,
-    help="Argument of a .xacro file, which is expanded in a restricted process; repeatable.",
+    help="Argument of a .xacro file; repeatable. xacro runs in a restricted process.",
 )
 
 
@@ -189,7 +189,7 @@ def root_joint_option(help_: str) -> Callable[[_F], _F]:
 
 
 robot_options = together(
-    mimic_option("Move mimic joints with the mimicked joints, as the URDF demands (default)."),
+    mimic_option("Couple mimic joints to the mimicked joints, as in the URDF (default)."),
     root_joint_option("Add a moving joint between the world and the root link."),
     xacro_option,
 )
@@ -203,10 +203,10 @@ def frame_name(option: str, help_: str) -> Callable[[_F], _F]:
     return click.option(option, metavar="NAME", help=help_, shell_complete=complete_frame)
 
 
-frame_option = frame_name("--frame", "Link or joint. Default: the robot's tip.")
+frame_option = frame_name("--frame", "Link or joint to compute. Default: the robot's tip.")
 path_options = together(
-    frame_name("--base", "Link or joint. Default: the robot's base frame."),
-    frame_name("--tip", "Link or joint. Default: the robot's tip."),
+    frame_name("--base", "Link or joint where the path begins. Default: the robot's base frame."),
+    frame_name("--tip", "Link or joint where the path ends. Default: the robot's tip."),
 )
 
 
@@ -237,29 +237,35 @@ oracle_option = click.option(
     default="pinocchio",
     help="Library that checks the results: Pinocchio (default) or MuJoCo.",
 )
-seed_option = click.option("--seed", type=Whole(0), default=0, show_default=True, help="Seed of `random`.")
+seed_option = click.option(
+    "--seed", type=Whole(0), default=0, show_default=True, help="Seed of the value `random`."
+)
 _VALUES = (
     "Configuration: numbers '0,30deg,pi/2', names 'shoulder=30deg,elbow=0.5', a pose 'neutral' or 'ready',"
     " a pose with changes 'ready,elbow=0.5', a batch '@FILE.csv', 'random' or 'random:N'."
 )
 q_option = click.option("--q", metavar="VALUES", default="neutral", show_default=True, help=_VALUES)
 v_option = click.option(
-    "--v", metavar="VALUES", default="neutral", help="Joint velocities, in the same forms; neutral is zero."
+    "--v",
+    metavar="VALUES",
+    default="neutral",
+    help="Joint velocities, in the forms of --q; `neutral` is zero.",
 )
 a_option = click.option(
     "--a",
     metavar="VALUES",
     default="neutral",
-    help="Joint accelerations, in the same forms; neutral is zero.",
+    help="Joint accelerations, in the forms of --q; `neutral` is zero.",
 )
 
 convention_option = click.option(
     "--convention",
     metavar="NAME|FILE",
-    help="Convention of --q, --v, --a and of the result: a tool of `urdfkin order`, or a TOML file.",
+    help="Convention of --q, --v, --a and of the result: the name of a tool (`urdfkin order` lists"
+    " them), or a TOML file.",
 )
 
-TRAJECTORY_HELP = "File: CSV with t, coordinates, v:NAME, a:NAME; or .npz with t, q, v, a."
+TRAJECTORY_HELP = "Trajectory file: CSV with columns t, coordinates, v:NAME, a:NAME; or .npz with t, q, v, a."
 
 
 @dataclass(frozen=True, slots=True)
@@ -333,7 +339,7 @@ def load_two(a: str, b: str) -> tuple[Robot, Robot]:
     from urdfkin.urdf.sources import is_xacro  # noqa: PLC0415  keeps --help fast
 
     if a == b == "-":
-        raise click.UsageError("only one of the two models can come from standard input")
+        raise click.UsageError("only one of the two robots can come from standard input")
     none: dict[str, Any] = {"xacro_args": None} if is_xacro(a) or is_xacro(b) else {}
     one, other = (load_robot(source, **({} if is_xacro(source) else none)) for source in (a, b))
     return one, other
@@ -408,7 +414,7 @@ def _values(
 def _count(where: str, text: str) -> int:
     count = parse_int(text)
     if count is None or count < 1:
-        raise InputError("random:N needs a whole number from 1 on", where=where, found=repr(text))
+        raise InputError("N in random:N must be a whole number, at least 1", where=where, found=repr(text))
     return count
 
 
@@ -433,7 +439,7 @@ def read_batch(path: Path, option: str, layouts: Sequence[Sequence[str]]) -> tup
         raise InputError(
             "no samples",
             where=str(path),
-            remedy="write one line for each sample, numbers separated by commas",
+            remedy="write one line for each sample, with numbers separated by commas",
         )
     return np.ascontiguousarray(found), names
 
@@ -467,7 +473,8 @@ _OPTIONS = {
     "a": click.option(
         "--base-acceleration",
         metavar="VALUES",
-        help="Classical acceleration of the root link's origin, in the same form, m/s^2 and rad/s^2.",
+        help="Classical acceleration of the root link: ax,ay,az,alphax,alphay,alphaz in the world's"
+        " axes, m/s^2 and rad/s^2, or @FILE.csv.",
     ),
 }
 
@@ -501,7 +508,7 @@ def with_base(
     n = max(map(len, parts))
     if any(len(part) not in (1, n) for part in parts):
         raise InputError(
-            "the batches of q, v, a and of the base have different lengths",
+            "the batches of q, v, a and the base motion have different lengths",
             found=", ".join(str(len(part)) for part in parts),
         )
     q, v_, a_, *base = (np.ascontiguousarray(np.broadcast_to(part, (n, *part.shape[1:]))) for part in parts)

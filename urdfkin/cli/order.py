@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
 EXAMPLE = "urdfkin order a1 --from isaaclab --to mujoco"
-_NO_ORDER = "idyntree: its order follows no known rule; pass it as robot.convention('idyntree', joints=[...])"
+_NO_ORDER = (
+    "The joint order of idyntree follows no known rule; pass it as robot.convention('idyntree', joints=[...])"
+)
 
 
 @click.command("order", epilog=f"Example: {EXAMPLE}")
@@ -52,7 +54,7 @@ def _table(robot: Robot) -> Answer:
         heads = ("joint", *(first for first, *_ in groups.values()))
         rows = list(zip(robot.joint_names, *groups, strict=True))
         also = [f"{first}: also {', '.join(others)}" for first, *others in groups.values() if others]
-        title = f"{robot.name}: index of each joint in q, or in q/v where they differ"
+        title = f"{robot.name}: index of each joint in q; if its index in v differs, both as q/v"
         return TextDocument(title, [Table(heads, rows, names=(0,)), *also, _NO_ORDER])
 
     def lines() -> Iterator[list[object]]:
@@ -110,7 +112,7 @@ def _code(start: Conversion, end: Conversion) -> Answer:
             given = "q_from" if letter == "q" else "q_from, v_from"
             made = "q_to" if letter == "q" else "q_to, v_to"
             star = "" if letter == "q" else "*"
-            yield f"# {letter}: more than a permutation; use urdfkin:"
+            yield f"# {letter}: the conversion is more than a permutation; use urdfkin:"
             yield f"{made} = robot.convention({b!r}).to({star}robot.convention({a!r}).from_({given}))"
         if start.angular_first != end.angular_first:
             yield "six_to = six_from[..., [3, 4, 5, 0, 1, 2]]"

@@ -49,7 +49,7 @@ output_option = click.option(
     "-o",
     type=click.Path(path_type=Path),
     callback=lambda _context, _parameter, path: None if path == Path("-") else path,
-    help="Write to a file instead of standard output, in the format of its suffix.",
+    help="File for the output instead of standard output; its suffix selects the format.",
 )
 
 

@@ -74,10 +74,10 @@ def chain_command(robot: str, base: str | None, tip: str | None, q: str, seed: i
     joints = list(zip(path.joints, path.axes(own), origins, path.interorigin(own), strict=False))
 
     def document() -> TextDocument:
-        names = ", ".join(path.joint_names) or "none: nothing moves"
+        names = ", ".join(path.joint_names) or "none: no joint moves"
         rows = [(joint.name, _kind_of_joint(joint), *map(_vector, three)) for joint, *three in joints]
         rows.append((path.tip, "tip", "", _vector(origins[-1]), ""))
-        heads = ("joint", "kind", "axis z", "origin O [m]", "to the next d [m]")
+        heads = ("joint", "kind", "axis z", "origin O [m]", "d to the next origin [m]")
         title = f"{path.robot}: {path.base} to {path.tip}, coordinates {names}"
         return TextDocument(title, [Table(heads, rows, left=5, names=(0,))])
 
@@ -167,8 +167,8 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
         "--opw",
         type=Number(),
         metavar="MM",
-        help="Print parameters for OPW solvers as YAML; an error if the tip deviates by more than MM"
-        " (and mrad).",
+        help="Print parameters for OPW solvers as YAML; it is an error if the tip deviates by more than MM"
+        " (mm and mrad).",
     ),
     answers=answering(*TEXTS, "json"),
 )

@@ -45,27 +45,37 @@ EXAMPLE = "urdfkin plot ur5 --to 1,-1,1.2,0.3,0.5,0 --duration 2 --output ur5.sv
     "start",
     default="neutral",
     show_default=True,
-    help="Start configuration of a line, in the forms of --q.",
+    help="With --to: start of a line in joint space, in the forms of --q of other commands.",
 )
-@click.option("--to", "end", help="End configuration of a line, in the forms of --q.")
+@click.option("--to", "end", help="End of a line in joint space, in the forms of --q of other commands.")
 @click.option(
-    "--duration", type=Number(), default=1.0, show_default=True, help="Duration of a line in seconds."
+    "--duration",
+    type=Number(),
+    default=1.0,
+    show_default=True,
+    help="With --to: duration of the line in seconds.",
 )
-@click.option("--samples", type=Whole(3), default=201, show_default=True, help="Number of samples of a line.")
+@click.option(
+    "--samples",
+    type=Whole(3),
+    default=201,
+    show_default=True,
+    help="With --to: number of samples of the line.",
+)
 @seed_option
 @click.option(
     "--panel",
     "panels",
     multiple=True,
     type=click.Choice(PANELS),
-    help="Panel to draw; repeatable. Default: all panels.",
+    help="Panel of the plot to draw; repeatable. Default: all panels.",
 )
 @click.option(
     "--output",
     "-o",
     type=click.Path(path_type=Path),
     required=True,
-    help="File of the picture: .svg, .png or .pdf.",
+    help="File for the plot, with the suffix .svg, .png or .pdf.",
 )
 @click.pass_context
 def command(
@@ -91,7 +101,7 @@ def command(
     Exit 0: verified. 1: a disagreement. 3: Pinocchio could not check it.
     """
     if (trajectory is None) == (end is None):
-        raise click.UsageError("add either --trajectory FILE.csv, or --to VALUES for a line")
+        raise click.UsageError("give either --trajectory FILE.csv, or --to VALUES for a line in joint space")
     from urdfkin.motion.frame_motion import frame_motion  # noqa: PLC0415
     from urdfkin.motion.trajectory import read_trajectory  # noqa: PLC0415
     from urdfkin.view.figure import save  # noqa: PLC0415  keeps --help fast

@@ -116,7 +116,9 @@ _ROBOT = (
     " of a robot: .toml, .json or .csv."
 )
 _breakdown = click.option(
-    "--breakdown", is_flag=True, help="Split the acceleration by joint and term; the parts add up to it."
+    "--breakdown",
+    is_flag=True,
+    help="Split the acceleration into parts by joint and term, which add up to it.",
 )
 
 
@@ -416,7 +418,7 @@ REPRESENTATIONS = ("rpy", "quaternion", *(triple.upper() for triple in _TRIPLES)
         "--nearest",
         type=NumberFrom(min=0.0),
         metavar="RAD",
-        help="Smallest allowed distance to the representational singularity; nearer is an error.",
+        help="Smallest allowed distance (rad) from a representational singularity of the Euler angles.",
     ),
 )
 def analytical_jacobian_command(representation: str, nearest: float | None, **_: Any) -> Answer:
@@ -455,7 +457,7 @@ def labels(representation: str) -> tuple[str, ...]:
         metavar="X,Y,Z",
         default="0,0,-9.81",
         show_default=True,
-        help="Gravity in the world's axes, m/s^2.",
+        help="Acceleration of gravity in the world's axes, m/s^2.",
     ),
     click.option(
         "--trajectory",
@@ -510,7 +512,7 @@ def _along(robot: Robot, frame: str | None, path: Path) -> Inputs:
     type=click.Choice(["all", "linear", "angular"]),
     default="all",
     show_default=True,
-    help="Rows of the Jacobian; 'all' mixes metres and radians.",
+    help="Rows of the Jacobian; `all` mixes metres and radians.",
 )
 @q_option
 @seed_option

@@ -30,13 +30,13 @@ _PATH = click.Path(path_type=Path, dir_okay=False)
 #: Parameter names of the options for a report's files.
 FILES = ("json_", "html", "junit", "markdown")
 report_options = together(
-    click.option("--html", type=_PATH, help="Write the report as an offline HTML page."),
+    click.option("--html", type=_PATH, help="Write the report as an HTML page that works offline."),
     click.option(
         "--junit", type=_PATH, help="Write JUnit XML, with a test case for each robot and quantity."
     ),
-    click.option("--markdown", type=_PATH, help="Write Markdown for a pull request comment."),
+    click.option("--markdown", type=_PATH, help="Write the result as Markdown for a pull request comment."),
     click.option(
-        "--cases/--no-cases", default=False, help="Show the command that computes each worst case again."
+        "--cases/--no-cases", default=False, help="Show the command that reproduces each worst case."
     ),
 )
 
@@ -119,9 +119,9 @@ def report_command() -> None:
 
 @report_command.command("show", epilog=f"Example: {EXAMPLE}")
 @click.argument("results", metavar="RESULTS.json|DIR", type=click.Path(path_type=Path), required=False)
-@click.option("--json", "json_", type=click.Path(path_type=Path), help="Write the report of a store as JSON.")
+@click.option("--json", "json_", type=click.Path(path_type=Path), help="Write the report as JSON.")
 @report_options
-@click.option("--schema", is_flag=True, help="Print the JSON Schema of the data and exit.")
+@click.option("--schema", is_flag=True, help="Print the JSON Schema of a report and exit.")
 @click.pass_context
 def show(
     context: click.Context, /, results: Path | None, cases: bool, schema: bool, **files: Path | None
@@ -140,7 +140,7 @@ def show(
         click.echo(VALIDATION.schema_text(), nl=False)
         return
     if results is None:
-        raise click.UsageError("give the file of `urdfkin validate --json FILE`, or the folder of --store")
+        raise click.UsageError("name the file of `urdfkin validate --json FILE`, or the folder of `--store`")
     document = stored_document(results) if is_folder(results) else read_document(results)
     check_writable(*files.values())
     failed = write_reports(document, files)
@@ -165,10 +165,12 @@ def show(
     type=NumberFrom(1.0),
     default=2.0,
     show_default=True,
-    help="Factor by which a worst disagreement may grow without a regression.",
+    help="Factor by which a worst disagreement may grow before it counts as a regression.",
 )
 @click.option(
-    "--markdown", type=click.Path(path_type=Path), help="Write Markdown for a pull request comment."
+    "--markdown",
+    type=click.Path(path_type=Path),
+    help="Write the result as Markdown for a pull request comment.",
 )
 @answering(*TEXTS, "json")
 def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) -> Answer:

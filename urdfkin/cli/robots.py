@@ -22,10 +22,10 @@ _FAMILIES = sorted({entry.family for entry in catalogue().values()})
 
 
 @click.command("robots", epilog="Example: urdfkin robots --family arm")
-@click.option("--family", metavar="NAME", help=f"Show only one family: {', '.join(_FAMILIES)}.")
+@click.option("--family", metavar="NAME", help=f"Show only the robots of one family: {', '.join(_FAMILIES)}.")
 @answering()
 def robots_command(family: str | None) -> Answer:
-    """List the robots that have a short name.
+    """List the robots of the catalogue, which are loaded by name.
 
     They are the URDF files of example-robot-data and urdfkin's own. The base and tip of a robot's first limb
     are the defaults of --base, --tip and --frame.
@@ -35,7 +35,11 @@ def robots_command(family: str | None) -> Answer:
         raise click.UsageError(f"no robots of family {family!r}; the families are: {', '.join(_FAMILIES)}")
     heads = ("name", "family", "base", "tip")
     rows = [(entry.name, entry.family, entry.base or "", entry.tip or "") for entry in entries]
-    off = [f"{entry.name}: mimic rules are off: {entry.reason}" for entry in entries if entry.reason]
+    off = [
+        f"{entry.name}: mimic joints are loaded as free joints: {entry.reason}"
+        for entry in entries
+        if entry.reason
+    ]
     return Answer(
         lambda: TextDocument(
             "", [Table(heads, rows, left=4, names=(0, 2, 3)), f"{len(entries)} robots", *off]

@@ -127,7 +127,7 @@ def _study(
             base = draw_base(asked.samples, rng) if asked.moving_base else None
             return judge(robot.read(), samples=asked.samples, seed=asked.seed, base=base), True
         raise InputError(
-            "the file has changed since it was compared",
+            "the robot file has changed since its results were compared",
             remedy="start the validation again when the file no longer changes",
         )
     except Exception as error:
@@ -148,31 +148,41 @@ def _with_quantities(command: _T) -> _T:
 @_with_quantities
 @click.command(epilog=f"Example: {EXAMPLE}")
 @click.argument("robots", nargs=-1, metavar="[ROBOT]...", shell_complete=complete_robot)
-@click.option("--all", "all_", is_flag=True, help="All robots of example-robot-data in the catalogue.")
 @click.option(
-    "--samples", type=Whole(0), default=1000, show_default=True, help="Random configurations for each robot."
+    "--all", "all_", is_flag=True, help="Validate all robots of example-robot-data in the catalogue."
 )
 @click.option(
-    "--seed", type=Whole(0), default=0, show_default=True, help="The same seed gives the same numbers."
+    "--samples",
+    type=Whole(0),
+    default=1000,
+    show_default=True,
+    help="Number of random configurations for each robot.",
 )
-@click.option("--jobs", type=Whole(1), default=1, show_default=True, help="Local processes.")
-@mimic_option("Whether mimic joints follow their rule (default: they do).")
-@root_joint_option("Add a joint above the root link.")
+@click.option(
+    "--seed", type=Whole(0), default=0, show_default=True, help="Seed of the random configurations."
+)
+@click.option("--jobs", type=Whole(1), default=1, show_default=True, help="Number of local processes.")
+@mimic_option("Couple mimic joints to the mimicked joints (default).")
+@root_joint_option("Add a moving joint between the world and the root link.")
 @click.option(
     "--oracle",
     type=click.Choice(["pinocchio", "mujoco"]),
     default="pinocchio",
-    help="mujoco: also compare with MuJoCo.",
+    help="`mujoco`: also compare with MuJoCo.",
 )
-@click.option("--isolate", is_flag=True, help="Run each robot in its own process; a crash is its result.")
+@click.option(
+    "--isolate",
+    is_flag=True,
+    help="Run each robot in its own process; a crash is reported as that robot's result.",
+)
 @xacro_option
 @click.option(
     "--store",
     type=click.Path(path_type=Path),
-    help="Folder for results; the same command resumes an interrupted run.",
+    help="Folder for results. Repeat the same command to resume an interrupted run.",
 )
 @click.option("--retry", type=click.Choice(["failed"]), help="With --store: compute failed robots again.")
-@click.option("--shard", metavar="I/N", help="With --store: run only part I of N.")
+@click.option("--shard", metavar="I/N", help="With --store: run only part I of N parts of the validation.")
 @click.option(
     "--scheduler",
     metavar="ADDRESS",
@@ -183,12 +193,16 @@ def _with_quantities(command: _T) -> _T:
     "--judge",
     "judged",
     is_flag=True,
-    help="Accuracy study: compare both with values at 50 digits.",
+    help="Also run an accuracy study: compare urdfkin and Pinocchio with values at 50 digits.",
 )
 @click.option(
-    "--judge-samples", type=Whole(1), default=5, show_default=True, help="Random configurations for --judge."
+    "--judge-samples",
+    type=Whole(1),
+    default=5,
+    show_default=True,
+    help="Number of random configurations for --judge.",
 )
-@click.option("--judge-moving-base", is_flag=True, help="With --judge: random motion of the root link.")
+@click.option("--judge-moving-base", is_flag=True, help="With --judge: also move the root link at random.")
 @click.option("--json", "json_", type=click.Path(path_type=Path), help="Write the report as JSON.")
 @report_options
 @click.pass_context
@@ -222,7 +236,7 @@ def command(
     files = {name: options.pop(name) for name in FILES}
     store, shard, retry = (options[name] for name in ("store", "shard", "retry"))
     if bool(robots) == all_:
-        raise click.UsageError("give either robots or --all (every robot of example-robot-data)")
+        raise click.UsageError("name robots, or give --all (every robot of example-robot-data)")
     if (retry or shard) and store is None:
         raise click.UsageError("--retry and --shard need --store DIR")
     if scheduler and (options["jobs"] > 1 or options["isolate"]):
@@ -292,4 +306,4 @@ def _say_shard(report: ValidationReport, shard: str, store: Path | None) -> None
         f"shard {shard} of {store}: {counted(len(report.robots), 'robot')}, {results:,} results compared, "
         f"{sum(robot.failed for robot in report.robots):,} outside their bound, {report.seconds:.1f} s"
     )
-    say("next: urdfkin report merge DIR STORE..., then urdfkin report DIR")
+    say("next: run `urdfkin report merge DIR STORE...`, then `urdfkin report DIR`")

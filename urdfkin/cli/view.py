@@ -76,7 +76,9 @@ def command(
     played = None
     if trajectory is not None:
         if begin is not None:
-            raise click.UsageError("--q and --trajectory exclude each other: a trajectory has its own start")
+            raise click.UsageError(
+                "--q and --trajectory cannot be used together: a trajectory has its own start"
+            )
         played = read_trajectory(loaded, trajectory)
         for note in (*played.notes, *loaded.limit_violations(played.q)):
             say(f"warning: {note}", err=True)

@@ -28,7 +28,7 @@ def command() -> None:
     folder = cache_folder()
     if folder is None:
         raise SourceError(
-            "no folder to store kernels in",
+            "no folder to store compiled kernels in",
             remedy="set XDG_CACHE_HOME to a folder that only you can write to",
         )
     begin, before = time.perf_counter(), set(folder.glob("*.kernel"))
