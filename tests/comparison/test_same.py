@@ -254,16 +254,22 @@ FORGED: dict[str, Any] = {
     "has no interval": lambda d: d["frames"].pop(),
     "a frame has two intervals": lambda d: d["frames"].append(d["frames"][-1]),
     "rad there, not": lambda d: d["frames"][-1].update(radians_seen=0.1),
-    "remarks: not what the models give": lambda d: d["remarks"].append(d["differences"][0]),
-    "up_to: not what the models give": lambda d: d["up_to"].append("senses"),
-    "tools: not what the models give": lambda d: d["tools"].append(
+    "remarks: the entry differs from the one computed from the models": lambda d: d["remarks"].append(
+        d["differences"][0]
+    ),
+    "up_to: the entry differs from the one computed from the models": lambda d: d["up_to"].append("senses"),
+    "`tools`: the entries differ from those computed from the models": lambda d: d["tools"].append(
         {"a": "tool", "b": "tool", "pose": np.eye(4).tolist()}
     ),
-    "links: not what the models give": lambda d: d["links"].pop(),
-    "joints: not what the models give": lambda d: d["joints"].pop(),
-    "rounding: not what the models give": lambda d: d["rounding"].update(metres=1.0),
-    "base_links: not what the models give": lambda d: d.update(base_links=["tool"] * 2),
-    "base: not a rigid motion": lambda d: d["base"][2].__setitem__(2, -1.0),
+    "links: the entry differs from the one computed from the models": lambda d: d["links"].pop(),
+    "joints: the entry differs from the one computed from the models": lambda d: d["joints"].pop(),
+    "rounding: the entry differs from the one computed from the models": lambda d: d["rounding"].update(
+        metres=1.0
+    ),
+    "base_links: the entry differs from the one computed from the models": lambda d: d.update(
+        base_links=["tool"] * 2
+    ),
+    "`base`: the matrix is not a rigid motion": lambda d: d["base"][2].__setitem__(2, -1.0),
     "model A: its name is": lambda d: d["a"].update(name="another"),
     "differences: the size or a value is wrong": lambda d: d["differences"][0].update(radians=1e-6),
     "a value is wrong in": lambda d: d["differences"][0].update(metres=0.5),
@@ -336,7 +342,9 @@ def test_a_free_joint_goes_only_where_a_rigid_motion_takes_it(kind: str) -> None
 
 def test_a_certificate_of_other_texts_is_refused(compared: tuple[Robot, Robot, Any]) -> None:
     a, _, document = compared
-    with pytest.raises(urdfkin.InputError, match=r"model B: the certificate is about another text"):
+    with pytest.raises(
+        urdfkin.InputError, match=r"model B: the certificate belongs to another version of this robot"
+    ):
         recheck(document, a, a)
 
 

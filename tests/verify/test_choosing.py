@@ -229,7 +229,7 @@ def test_a_robot_may_be_loaded_to_check_samples_and_a_call_ask_for_more_or_less(
     (line,) = robot.certificate().lines
     assert (line.checked, line.unchecked) == (SAMPLE + 103 + 1, 3 + 1)
     assert robot.certificate().not_verified == (
-        "verify=False was asked for",
+        "the check was turned off by verify=False",
         'verify="sample" checks 100 configurations of a call',
     )
 

@@ -37,15 +37,17 @@ class Model(TypedDict):
     """One of the two models."""
 
     name: Annotated[str, says("The robot's name.")]
-    source: Annotated[str, says("Source: a path, a catalogue name, - for standard input, or <text>.")]
+    source: Annotated[
+        str, says("Source of the robot: a path, a catalogue name, - for standard input, or <text>.")
+    ]
 
 
 class Rule(TypedDict):
     """Mimic rule: the joint's value is multiplier * (value of `leader`) + offset."""
 
     leader: Annotated[str, says("Name of the mimicked joint.")]
-    multiplier: Annotated[float, says("Factor.")]
-    offset: Annotated[float, says("rad or m")]
+    multiplier: Annotated[float, says("Factor by which the mimicked joint's value is multiplied.")]
+    offset: Annotated[float, says("Offset that is added to the product, rad or m.")]
 
 
 #: Value of a parameter in one model.
@@ -55,35 +57,47 @@ Value = str | float | list[str | float | None] | Rule | None
 class DifferenceEntry(TypedDict):
     """A difference of the models at one place."""
 
-    place: Annotated[str, says("The joint or link of A.")]
-    what: Annotated[str, says("The parameter: axis, place, mimic rule, limits, ...")]
-    a: Annotated[Value, says("Its value in A; null: none.")]
-    b: Annotated[Value, says("Its value in B; null: none.")]
-    radians: Annotated[Size, says("Size as an angle; 0 if it has none.")]
-    metres: Annotated[Size, says("Size as a length; 0 if it has none.")]
+    place: Annotated[str, says("Name of the joint or link of A that differs.")]
+    what: Annotated[str, says("Name of the parameter that differs: axis, place, mimic rule, limits, ...")]
+    a: Annotated[Value, says("Value of the parameter in A; null: A has none.")]
+    b: Annotated[Value, says("Value of the parameter in B; null: B has none.")]
+    radians: Annotated[
+        Size, says("Size of the difference as an angle, radians; 0 if the difference has no angle.")
+    ]
+    metres: Annotated[
+        Size, says("Size of the difference as a length, metres; 0 if the difference has no length.")
+    ]
     detail: Annotated[
         Literal["", "alone", "converted"],
-        says("alone: the links behind the axis agree. converted: limits of B are in A's coordinate."),
+        says(
+            "`alone`: the links after the joint agree. `converted`: the limits of B are expressed in A's"
+            " coordinate."
+        ),
     ]
 
 
 class Conversion(TypedDict):
     """The pose of a planar or floating joint in B: before * (pose in A) * behind."""
 
-    before: Annotated[Matrix, says("(4, 4) M.")]
-    behind: Annotated[Matrix, says("(4, 4) N.")]
-    back: Annotated[bool, says("Whether the pose in A is inverted: one model's joint is reversed.")]
+    before: Annotated[Matrix, says("Matrix M (4, 4), multiplied from the left.")]
+    behind: Annotated[Matrix, says("Matrix N (4, 4), multiplied from the right.")]
+    back: Annotated[
+        bool, says("Whether the pose in A is inverted, because the joint is reversed in one model.")
+    ]
 
 
 class JointEntry(TypedDict):
     """A joint of A and its joint of B."""
 
-    a: Annotated[str, says("Name in A.")]
-    b: Annotated[str, says("Name in B.")]
-    sense: Annotated[Literal[1, -1], says("B's value is sense * A's + offset.")]
-    offset: Annotated[float, says("rad or m")]
+    a: Annotated[str, says("Name of the joint in A.")]
+    b: Annotated[str, says("Name of the joint in B.")]
+    sense: Annotated[Literal[1, -1], says("Factor `sense` in: value in B = `sense` * value in A + `offset`.")]
+    offset: Annotated[
+        float, says("Constant `offset` in: value in B = `sense` * value in A + `offset`, rad or m.")
+    ]
     conversion: Annotated[
-        Conversion | None, says("Conversion of a planar or floating joint; null: its poses are equal.")
+        Conversion | None,
+        says("Conversion of a planar or floating joint's pose; null: no conversion is needed."),
     ]
 
 
@@ -92,7 +106,7 @@ class ToolEntry(TypedDict):
 
     a: Annotated[str, says("Link of A.")]
     b: Annotated[str, says("Link of B.")]
-    pose: Annotated[Matrix, says("Pose of B's link in A's link.")]
+    pose: Annotated[Matrix, says("Pose of the link of B in the frame of the link of A.")]
 
 
 class Rounding(TypedDict):
@@ -107,23 +121,35 @@ class FrameEntry(TypedDict):
 
     frame: Annotated[str, says("Link of A.")]
     frame_b: Annotated[str, says("Link of B.")]
-    lower: Annotated[Size, says("Lower bound, metres: attained at q_a and q_b.")]
-    upper: Annotated[
-        Size | None, says("Upper bound, proven for all configurations within limits; null: no bound.")
+    lower: Annotated[
+        Size, says("Lower bound of the largest distance, metres; it is attained at `q_a` and `q_b`.")
     ]
-    radians: Annotated[Size | None, says("Upper bound of the angle between the orientations, proven.")]
-    radians_seen: Annotated[Size, says("The angle between the orientations at q_a and q_b.")]
-    q_a: Annotated[list[float], says("Configuration of A; empty if the frame does not differ.")]
-    q_b: Annotated[list[float], says("The corresponding configuration of B.")]
+    upper: Annotated[
+        Size | None,
+        says(
+            "Proven upper bound of the distance in all configurations within limits, metres; null: no bound."
+        ),
+    ]
+    radians: Annotated[
+        Size | None,
+        says("Proven upper bound of the angle between the orientations, radians; null: no bound."),
+    ]
+    radians_seen: Annotated[Size, says("Angle between the orientations at `q_a` and `q_b`, radians.")]
+    q_a: Annotated[
+        list[float], says("Configuration of A with this distance; empty if the frame does not differ.")
+    ]
+    q_b: Annotated[list[float], says("Configuration of B that corresponds to `q_a`.")]
 
 
 class Confirmed(TypedDict):
     """Pinocchio's confirmation of the bounds."""
 
     by: Annotated[str, says("Name and version of the oracle; empty without a confirmation.")]
-    configurations: Annotated[Count, says("Number of configurations at which it computed the distances.")]
-    metres: Annotated[Size, says("The largest of these distances.")]
-    reason: Annotated[str, says("Why it computed none; empty if it did.")]
+    configurations: Annotated[
+        Count, says("Number of configurations at which the oracle computed the distances.")
+    ]
+    metres: Annotated[Size, says("Largest distance that the oracle computed, metres.")]
+    reason: Annotated[str, says("Reason why the oracle computed no distances; empty if it computed them.")]
 
 
 class Certificate(Header):
@@ -133,27 +159,41 @@ class Certificate(Header):
     b: Model
     up_to: Annotated[
         list[Literal["base", "zeros", "senses", "free joints", "tools"]],
-        says("Kinds of changes of B after which the models agree best."),
+        says("Kinds of changes that are applied to B so that the models agree best."),
     ]
-    differences: Annotated[list[DifferenceEntry], says("The differences, from the base to the tips.")]
+    differences: Annotated[
+        list[DifferenceEntry], says("Differences between the models, in order from the base to the tips.")
+    ]
     remarks: Annotated[
         list[DifferenceEntry],
-        says("Differences that do not affect motion: limits, kinds, links of one model only."),
+        says("Differences without effect on motion: limits, joint kinds, and links that only one model has."),
     ]
-    joints: Annotated[list[JointEntry], says("The matched joints.")]
-    links: Annotated[list[Annotated[list[str], of_length(2)]], says("The matched links of A and B.")]
-    tools: Annotated[list[ToolEntry], says("The matched links that count as different tools.")]
+    joints: Annotated[list[JointEntry], says("Matched pairs of a joint of A and a joint of B.")]
+    links: Annotated[
+        list[Annotated[list[str], of_length(2)]], says("Matched pairs of a link of A and a link of B.")
+    ]
+    tools: Annotated[
+        list[ToolEntry], says("Matched links with different poses that count as different tools.")
+    ]
     orders: Annotated[
-        list[list[str]], says("Runs of joints of B that were taken in another order, which their axes allow.")
+        list[list[str]],
+        says("Lists of adjacent joints of B that were compared in another order, which their axes allow."),
     ]
-    base: Annotated[Matrix, says("Pose of B's root in A's root frame, in the zero configuration.")]
+    base: Annotated[Matrix, says("Pose of B's root link in A's root frame, in the zero configuration.")]
     base_links: Annotated[
-        list[str], of_length(2), says("The link of A and the link of B relative to which poses are compared.")
+        list[str], of_length(2), says("The link of A and the link of B in whose frames poses are compared.")
     ]
     rounding: Rounding
-    frames: Annotated[list[FrameEntry], says("The interval of each matched link, after the changes of B.")]
+    frames: Annotated[
+        list[FrameEntry],
+        says("Interval of the largest distance of each matched link, after the changes of B."),
+    ]
     as_written: Annotated[
-        FrameEntry | None, says("The interval of the farthest frame without changes; null: there are none.")
+        FrameEntry | None,
+        says(
+            "Interval of the largest distance of the farthest frame without any change of B; null: B"
+            " needs no change."
+        ),
     ]
     checked: Confirmed
 
@@ -222,7 +262,7 @@ def recheck(document: Certificate, a: Robot, b: Robot) -> list[str]:
     for k, robot in enumerate((a, b)):
         if (claimed := document["sha256"][k : k + 1]) != [robot.sha256]:
             raise InputError(
-                "the certificate is about another text",
+                "the certificate belongs to another version of this robot",
                 where=f"model {'AB'[k]}",
                 found=f"SHA-256 {robot.sha256[:12]}..., not {str(*claimed)[:12]}...",
                 remedy="compare the models again: urdfkin same A B",
@@ -231,7 +271,7 @@ def recheck(document: Certificate, a: Robot, b: Robot) -> list[str]:
         return list(_errors(document, Comparator((a, b), {}, bounds=True)))
     except UnknownNameError as error:
         raise InputError(
-            "the certificate names a joint or link that a model lacks", found=str(error)
+            "the certificate names a joint or link that one of the models does not have", found=str(error)
         ) from error
 
 
@@ -247,7 +287,7 @@ def _errors(document: Certificate, comparator: Comparator) -> Iterator[str]:
     yield from wrong
     claims = {(frame["frame"], frame["frame_b"]): frame for frame in document["frames"]}
     if len(claims) < len(document["frames"]):
-        yield "a frame has two intervals"
+        yield "`frames`: a frame has two intervals"
     search = comparator.search(found, variables)
     for frame, names in zip(found.frames, said.links, strict=True):
         if (claim := claims.pop(names, None)) is None:
@@ -269,20 +309,30 @@ def _statement_errors(document: Certificate, comparator: Comparator, said: Samen
     again = certificate(said)
     wrong = {_place(one): one for one in again["differences"]}
     claimed = {_place(one): one for one in document["differences"]}
-    yield from (f"not listed as a difference: {words_of(wrong[at])}" for at in wrong if at not in claimed)
-    yield from (f"no difference: {words_of(claimed[at])}" for at in claimed if at not in wrong)
+    yield from (
+        f"`differences`: this difference is missing: {words_of(wrong[at])}"
+        for at in wrong
+        if at not in claimed
+    )
+    yield from (
+        f"`differences`: this is not a difference: {words_of(claimed[at])}"
+        for at in claimed
+        if at not in wrong
+    )
     if len(claimed) < len(document["differences"]):
-        yield "differences: one is listed twice"
+        yield "`differences`: an entry is listed twice"
     for at, one in claimed.items():
         if at in wrong and not _same_difference(one, wrong[at], said.rounding):
-            yield f"differences: the size or a value is wrong in: {words_of(one)}"
+            yield f"`differences`: the size or a value is wrong in: {words_of(one)}"
     if not _equal(document["tools"], again["tools"], max(said.rounding)):
-        yield "tools: not what the models give"
+        yield "`tools`: the entries differ from those computed from the models"
     if document["verdict"] != said.verdict.value:
-        yield f"the verdict is {said.verdict.value}, not {document['verdict']}"
+        yield f"`verdict`: the models give {said.verdict.value}, not {document['verdict']}"
     parts, right = dict(document), dict(again)
     yield from (
-        f"{part}: not what the models give" for part in DERIVED if not _equal(parts[part], right[part])
+        f"{part}: the entry differs from the one computed from the models"
+        for part in DERIVED
+        if not _equal(parts[part], right[part])
     )
 
 
@@ -341,7 +391,7 @@ def _not_a_gauge(document: Certificate, gauge: Gauge, comparator: Comparator) ->
         a.tree.joint_index(joint["a"])
         b.tree.joint_index(joint["b"])
     if not is_pose(JointKind.FLOATING, gauge.X):
-        return "base: not a rigid motion"
+        return "`base`: the matrix is not a rigid motion"
     for name, made in gauge.conversions.items():
         if not made.holds_for(a.tree.joints[a.tree.joint_index(name)].kind):
             return f"joint {name}: its conversion is not possible for a joint of this kind"

@@ -234,10 +234,10 @@ class Comparison:
 class ChangeEntry(TypedDict):
     """One difference of two reports."""
 
-    robot: Annotated[str | None, says("The robot's source; null for the run as a whole.")]
+    robot: Annotated[str | None, says("Source of the robot; null for a value of the whole validation.")]
     what: Annotated[str, says("Name of the changed value.")]
-    old: Annotated[str, says("Old value; empty if it was missing.")]
-    new: Annotated[str, says("New value; empty if it is missing.")]
+    old: Annotated[str, says("Value in the old report; empty if the old report has none.")]
+    new: Annotated[str, says("Value in the new report; empty if the new report has none.")]
     regression: Annotated[bool, says("Whether the change is a regression.")]
 
 

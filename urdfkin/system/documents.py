@@ -36,11 +36,11 @@ def of_length(n: int) -> Meta:
 Count = Annotated[int, Meta(ge=0)]
 #: A number that is 0 or larger.
 Size = Annotated[float, Meta(ge=0)]
-#: 4 x 4 homogeneous transform as a list of rows, metres.
+#: Homogeneous transform (4, 4) as a list of rows, with the translation in metres.
 Matrix = Annotated[
     list[Annotated[list[float], of_length(4)]],
     of_length(4),
-    says("4 x 4 homogeneous transform as a list of rows, metres."),
+    says("Homogeneous transform (4, 4) as a list of rows, with the translation in metres."),
 ]
 #: The SHA-256 of a text.
 Sha256 = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
@@ -49,22 +49,22 @@ Sha256 = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 class Header(TypedDict):
     """The first entries of every certificate and report: its layout, its verdict and the basis of both."""
 
-    schema: Annotated[str, says("Name and version of this layout.")]
+    schema: Annotated[str, says("Name and version of the layout of this document.")]
     versions: Annotated[
-        dict[str, str], says("Versions of urdfkin, its libraries and the oracles: package to version.")
+        dict[str, str], says("Version of each package: urdfkin, its libraries and the oracles.")
     ]
     sha256: Annotated[
         list[Sha256 | None],
         says(
-            "SHA-256 of each robot's text as UTF-8, or of its MJCF file, in the document's order; "
+            "SHA-256 of each robot's text as UTF-8, or of its MJCF file, in the order of the robots; "
             "null: unknown."
         ),
     ]
-    verdict: Annotated[str, says("The verdict.")]
+    verdict: Annotated[str, says("Verdict of the document as a whole.")]
     command: Annotated[
         str | None,
         says(
-            "The command that makes the document again; null: unknown. Each set of options has its own line, "
+            "Command that makes the document again; null: unknown. Each set of options has its own line, "
             "and so has each robot that was given as text (`-`: standard input)."
         ),
     ]

@@ -20,38 +20,45 @@ Units = Annotated[
 class Limit(TypedDict):
     """Limits of a joint; null: no limit."""
 
-    lower: Annotated[float | None, says("rad or m")]
-    upper: Annotated[float | None, says("rad or m")]
-    velocity: Annotated[float | None, says("rad/s or m/s")]
-    effort: Annotated[float | None, says("N m or N")]
+    lower: Annotated[float | None, says("Lower position limit, rad or m; null: no limit.")]
+    upper: Annotated[float | None, says("Upper position limit, rad or m; null: no limit.")]
+    velocity: Annotated[float | None, says("Limit of the joint velocity, rad/s or m/s; null: no limit.")]
+    effort: Annotated[float | None, says("Limit of the joint torque or force, N m or N; null: no limit.")]
 
 
 class Mimic(TypedDict):
     """Mimic rule: the joint's value is multiplier * (value of `leader`) + offset."""
 
     leader: Annotated[str, says("Name of the mimicked joint.")]
-    multiplier: Annotated[float, says("Factor.")]
-    offset: Annotated[float, says("rad or m")]
+    multiplier: Annotated[float, says("Factor by which the mimicked joint's value is multiplied.")]
+    offset: Annotated[float, says("Offset that is added to the product, rad or m.")]
 
 
 class Kept(TypedDict):
     """The part of a joint's range in which its mimic joints stay within their limits; null: no such part."""
 
-    lower: Annotated[float | None, says("rad or m; null: no such part.")]
-    upper: Annotated[float | None, says("rad or m")]
-    by: Annotated[list[str], says("The mimic joints that narrow it.")]
+    lower: Annotated[
+        float | None, says("Lower end of this part of the range, rad or m; null: the part is empty.")
+    ]
+    upper: Annotated[
+        float | None, says("Upper end of this part of the range, rad or m; null: the part is empty.")
+    ]
+    by: Annotated[list[str], says("Names of the mimic joints that reduce the joint's range.")]
 
 
 class Joint(TypedDict):
     """A joint. Fixed joints are included."""
 
-    name: Annotated[str, says("Name in the URDF.")]
+    name: Annotated[str, says("Name of the joint in the URDF.")]
     kind: Annotated[
         Literal["revolute", "continuous", "prismatic", "fixed", "planar", "floating"],
         says("Kind of the joint."),
     ]
-    parent: Annotated[str, says("Parent link.")]
-    child: Annotated[str, says("Child link. Its frame is the joint's frame after the joint motion.")]
+    parent: Annotated[str, says("Name of the parent link.")]
+    child: Annotated[
+        str,
+        says("Name of the child link. The frame of this link is the joint's frame after the joint motion."),
+    ]
     placement: Annotated[Matrix, says("Pose of the joint's frame in the parent link's frame at q = 0.")]
     axis: Annotated[
         Annotated[list[float], of_length(3)] | None,
@@ -59,11 +66,16 @@ class Joint(TypedDict):
     ]
     q: Annotated[
         int | None,
-        says("Index of its first coordinate in q. A mimic joint has the index of its mimicked joint."),
+        says(
+            "Index of the joint's first coordinate in q. A mimic joint has the index of the mimicked"
+            " joint. null: the joint has no coordinate."
+        ),
     ]
-    v: Annotated[int | None, says("Index of its first number in v and a.")]
-    limit: Annotated[Limit | None, says("The joint's limits.")]
-    mimic: Annotated[Mimic | None, says("The mimic rule; null for other joints.")]
+    v: Annotated[
+        int | None, says("Index of the joint's first entry in v and in a. null: the joint has no coordinate.")
+    ]
+    limit: Annotated[Limit | None, says("The joint's limits; null: the joint has no limits.")]
+    mimic: Annotated[Mimic | None, says("The rule of a mimic joint; null for other joints.")]
     kept: Annotated[
         Kept | None,
         says(
@@ -77,47 +89,61 @@ class Model(TypedDict):
     """Links and joints of the robot, in Pinocchio's order."""
 
     name: Annotated[str, says("The robot's name.")]
-    source: Annotated[str, says("Source: a path, a catalogue name, - for standard input, or <text>.")]
-    path: Annotated[str | None, says("Path of the file; null for a robot given as text.")]
-    sha256: Annotated[Sha256, says("Digest of the URDF's text as UTF-8, or of the MJCF file.")]
-    mimic: Annotated[bool | None, says("Whether mimic joints follow their rule; null: the default.")]
+    source: Annotated[
+        str, says("Source of the robot: a path, a catalogue name, - for standard input, or <text>.")
+    ]
+    path: Annotated[str | None, says("Path of the robot's file; null for a robot given as text.")]
+    sha256: Annotated[Sha256, says("SHA-256 of the URDF's text as UTF-8, or of the MJCF file.")]
+    mimic: Annotated[
+        bool | None,
+        says("Whether mimic joints are coupled to the mimicked joints; null: the default of this robot."),
+    ]
     root_joint: Annotated[
-        Literal["floating", "planar"] | None, says("Kind of the joint above the root link; null: none.")
+        Literal["floating", "planar"] | None,
+        says("Kind of the joint between the world and the root link; null: there is no such joint."),
     ]
     nq: Annotated[Count, says("Number of coordinates (length of q).")]
-    nv: Annotated[Count, says("Length of v and of a.")]
-    base: Annotated[str, says("Default base frame of chains.")]
-    tip: Annotated[str, says("Default tip frame.")]
-    coordinates: Annotated[list[str], says("A name for each number of q.")]
-    rates: Annotated[list[str], says("A name for each number of v and a.")]
-    frames: Annotated[list[str], says("Every link and joint, under Pinocchio's names.")]
-    links: Annotated[list[str], says("Every link; links[i + 1] is the child of joints[i].")]
-    joints: Annotated[list[Joint], says("Every joint. A joint's parent link comes before its child link.")]
+    nv: Annotated[Count, says("Number of joint velocities (length of v and of a).")]
+    base: Annotated[str, says("Name of the default base frame of chains.")]
+    tip: Annotated[str, says("Name of the default tip frame of chains.")]
+    coordinates: Annotated[list[str], says("Name of each coordinate in q.")]
+    rates: Annotated[list[str], says("Name of each entry of v and a.")]
+    frames: Annotated[list[str], says("Names of all links and joints, as in Pinocchio.")]
+    links: Annotated[list[str], says("Names of all links; links[i + 1] is the child of joints[i].")]
+    joints: Annotated[
+        list[Joint], says("All joints. The parent link of a joint comes before its child link.")
+    ]
 
 
 class Finding(TypedDict):
     """A finding in the URDF file, as `urdfkin check` reports it."""
 
-    code: Annotated[str, says("Stable code; `urdfkin explain CODE` explains it.")]
-    severity: Annotated[
-        Literal["error", "warning", "note"], says("Severity. A file with an error is not compared.")
+    code: Annotated[
+        str, says("Code of the finding, such as URDF502; `urdfkin explain CODE` explains the code.")
     ]
-    message: Annotated[str, says("The problem.")]
-    found: Annotated[str | None, says("The text in the file that causes the problem.")]
-    remedy: Annotated[str | None, says("The remedy.")]
-    file: Annotated[str, says("Name of the file.")]
-    line: Annotated[Count, says("Counted from 1.")]
-    column: Annotated[Count, says("Counted from 1.")]
-    element: Annotated[str | None, says("Tag of the XML element.")]
-    name: Annotated[str | None, says("The name of the link or joint.")]
+    severity: Annotated[
+        Literal["error", "warning", "note"],
+        says("Severity of the finding. A file with an error is not compared with Pinocchio."),
+    ]
+    message: Annotated[str, says("Description of the problem.")]
+    found: Annotated[str | None, says("Text in the file that causes the problem; null: none.")]
+    remedy: Annotated[str | None, says("How to correct the file; null: no remedy is known.")]
+    file: Annotated[str, says("Name of the file with the problem.")]
+    line: Annotated[Count, says("Line number of the problem, counted from 1.")]
+    column: Annotated[Count, says("Column number of the problem, counted from 1.")]
+    element: Annotated[str | None, says("Tag of the XML element with the problem; null: none.")]
+    name: Annotated[str | None, says("Name of the link or joint with the problem; null: none.")]
     oracle: Annotated[
         Literal["refuses", "differs"] | None,
         says(
             "Pinocchio's behaviour if it differs from the specification: it refuses the file, or "
-            "reads it differently."
+            "reads another robot from it; null: neither."
         ),
     ]
-    also: Annotated[list[int], says("Lines of further findings of the same kind, merged into this one.")]
+    also: Annotated[
+        list[int],
+        says("Line numbers of further findings of the same kind, which are merged into this finding."),
+    ]
 
 
 class Row(TypedDict):
@@ -125,18 +151,32 @@ class Row(TypedDict):
 
     joint: Annotated[str, says("Name of the joint.")]
     kind: Annotated[Literal["revolute", "continuous", "prismatic"], says("Kind of the joint.")]
-    a: Annotated[float, says("Translation along x.")]
-    alpha: Annotated[float, says("Rotation about x.")]
-    beta: Annotated[float, says("Rotation about y after alpha; 0 except in a Hayati row.")]
-    d: Annotated[float, says("Translation along the axis. The value of a prismatic joint is added.")]
-    theta: Annotated[float, says("Rotation about the axis. The value of a revolute joint is added.")]
-    sense: Annotated[Literal[1, -1], says("Sign of the joint's value.")]
+    a: Annotated[float, says("DH parameter a: translation along x, metres.")]
+    alpha: Annotated[float, says("DH parameter alpha: rotation about x, radians.")]
+    beta: Annotated[
+        float, says("Hayati parameter beta: rotation about y after alpha, radians; 0 in other rows.")
+    ]
+    d: Annotated[
+        float,
+        says(
+            "DH parameter d: translation along the joint axis, metres. The value of a prismatic joint is"
+            " added to d."
+        ),
+    ]
+    theta: Annotated[
+        float,
+        says(
+            "DH parameter theta: rotation about the joint axis, radians. The value of a revolute joint"
+            " is added to theta."
+        ),
+    ]
+    sense: Annotated[Literal[1, -1], says("Sign of the joint's value in d or theta.")]
 
 
 class Table(TypedDict):
     """A table in one convention."""
 
-    rows: Annotated[list[Row], says("The rows from base to tip.")]
+    rows: Annotated[list[Row], says("Rows of the table from base to tip.")]
     base: Matrix
     tool: Matrix
 
@@ -144,33 +184,43 @@ class Table(TypedDict):
 class Chain(TypedDict):
     """A chain of the robot and its tables."""
 
-    limb: Annotated[str | None, says("Name in the catalogue.")]
-    base: Annotated[str, says("Base frame.")]
-    tip: Annotated[str, says("Tip frame.")]
+    limb: Annotated[str | None, says("Name of the limb in the catalogue; null: none.")]
+    base: Annotated[str, says("Name of the chain's base frame.")]
+    tip: Annotated[str, says("Name of the chain's tip frame.")]
     standard: Table
     modified: Table
     samples: Annotated[
         Count,
-        says("Number of configurations at which both tables were compared with Pinocchio; 0: not checked."),
+        says("Number of configurations at which both tables were compared with Pinocchio; 0: no comparison."),
     ]
     metres: Annotated[
-        float | None, says("The largest distance between the tip of a table and Pinocchio's tip, metres.")
+        float | None,
+        says(
+            "Largest distance between the tip of either table and Pinocchio's tip, metres; null: no"
+            " comparison."
+        ),
     ]
     worst: Annotated[
         Units,
         says(
             "The largest disagreement of the tip's placement, Jacobian and acceleration in eps * "
-            "scale, for both tables; also null if not checked."
+            "scale, for both tables. null: a result is NaN, or there is no comparison."
         ),
     ]
-    share_of_bound: Annotated[float | None, says("The largest ratio of these disagreements to their bound.")]
+    share_of_bound: Annotated[
+        float | None,
+        says(
+            "Largest ratio of a disagreement of the tables with Pinocchio to its bound. null: a result"
+            " is NaN, or there is no comparison."
+        ),
+    ]
 
 
 class Errors(TypedDict):
     """Errors of one library with respect to values at fifty digits, in eps * scale."""
 
-    worst: Annotated[float, says("The largest error.")]
-    typical: Annotated[float, says("Root mean square of the errors.")]
+    worst: Annotated[float, says("Largest error of all values, in eps * scale.")]
+    typical: Annotated[float, says("Root mean square of the errors of all values, in eps * scale.")]
 
 
 class Judged(TypedDict):
@@ -180,10 +230,11 @@ class Judged(TypedDict):
     reference: Annotated[
         Literal["local", "world", "local_world_aligned", "euler angles", "quaternion"] | None,
         says(
-            "Reference frame, as in a check. For analytical Jacobians: the representation of the orientation."
+            "Reference frame of the quantity; null for a placement. For analytical Jacobians: the"
+            " representation of the orientation."
         ),
     ]
-    numbers: Annotated[Count, says("Number of compared values.")]
+    numbers: Annotated[Count, says("Number of values compared with fifty-digit values.")]
     urdfkin: Errors
     pinocchio: Errors
 
@@ -192,10 +243,10 @@ class Judgement(TypedDict):
     """Result of the accuracy study: errors of both libraries with respect to values at fifty digits."""
 
     robot: Annotated[str, says("The robot's name.")]
-    samples: Annotated[Count, says("Number of configurations.")]
+    samples: Annotated[Count, says("Number of configurations in the accuracy study.")]
     seed: Annotated[int, says("Seed of the random samples.")]
-    moving_base: Annotated[bool, says("Whether the root link moved.")]
-    lines: Annotated[list[Judged], says("One line for each quantity and reference frame.")]
+    moving_base: Annotated[bool, says("Whether the root link had a random motion.")]
+    lines: Annotated[list[Judged], says("One entry for each quantity and reference frame.")]
 
 
 class Case(TypedDict):
@@ -203,32 +254,39 @@ class Case(TypedDict):
 
     sample: Annotated[
         Count,
-        says("Index of the sample. 0, 1 and 2 are the neutral configuration and the two ends of the limits."),
+        says(
+            "Index of the sample. Samples 0, 1 and 2 are the neutral configuration and the two ends of"
+            " the joint limits."
+        ),
     ]
     frame: Annotated[str, says("Name of the frame: link:NAME or joint:NAME.")]
     disagreement: Units
-    q: Annotated[list[float], says("Configuration.")]
-    v: Annotated[list[float], says("Joint velocities.")]
-    a: Annotated[list[float], says("Joint accelerations.")]
-    replay: Annotated[str, says("Command that computes the case again.")]
+    q: Annotated[list[float], says("Configuration of the sample.")]
+    v: Annotated[list[float], says("Joint velocities of the sample.")]
+    a: Annotated[list[float], says("Joint accelerations of the sample.")]
+    replay: Annotated[str, says("Command that reproduces the disagreement.")]
 
 
 class Pair(TypedDict):
     """Comparison of one library with a second oracle."""
 
-    failed: Annotated[Count, says("Number of results outside their bound.")]
+    failed: Annotated[Count, says("Number of results with a disagreement above the bound.")]
     worst: Units
     share_of_bound: Annotated[
-        float | None, says("The largest ratio of a disagreement to its bound; null as for a disagreement.")
+        float | None,
+        says(
+            "Largest ratio of a disagreement to its bound. null: a result is NaN, or two values that"
+            " must be equal differ."
+        ),
     ]
 
 
 class Alone(TypedDict):
     """Number of results in which one of the three differs and the two others agree."""
 
-    urdfkin: Annotated[Count, says("Only urdfkin differs.")]
-    pinocchio: Annotated[Count, says("Only Pinocchio differs.")]
-    witness: Annotated[Count, says("Only the second oracle differs.")]
+    urdfkin: Annotated[Count, says("Number of results in which only urdfkin differs.")]
+    pinocchio: Annotated[Count, says("Number of results in which only Pinocchio differs.")]
+    witness: Annotated[Count, says("Number of results in which only the second oracle differs.")]
 
 
 class Witness(TypedDict):
@@ -238,7 +296,9 @@ class Witness(TypedDict):
     urdfkin: Pair
     pinocchio: Pair
     alone: Alone
-    undecided: Annotated[Count, says("Number of results without a majority.")]
+    undecided: Annotated[
+        Count, says("Number of results in which all three libraries differ from each other.")
+    ]
 
 
 class Check(TypedDict):
@@ -247,40 +307,44 @@ class Check(TypedDict):
     quantity: Annotated[str, says("Name of the quantity: placement, velocity, jacobian, ...")]
     reference: Annotated[
         Literal["local", "world", "local_world_aligned"] | None,
-        says("Reference frame, under Pinocchio's name; null for a placement."),
+        says("Reference frame of the quantity, as named by Pinocchio; null for a placement."),
     ]
     results: Annotated[Count, says("Number of compared matrices or six-vectors.")]
-    failed: Annotated[Count, says("Number of results outside their bound.")]
+    failed: Annotated[Count, says("Number of results with a disagreement above the bound.")]
     median: Units
     p99: Units
     worst: Units
     share_of_bound: Annotated[
         float | None,
         says(
-            "The largest ratio of a disagreement to its bound; above 1: a failure. null as for a "
-            "disagreement."
+            "Largest ratio of a disagreement to its bound; above 1: a failure. null: a result is NaN, or two "
+            "values that must be equal differ."
         ),
     ]
     bound: Annotated[
         Annotated[list[float | None], of_length(2)],
-        says("Tightest and widest bound in eps * scale; null if nothing was compared."),
+        says("Tightest and widest bound of a disagreement in eps * scale; null if nothing was compared."),
     ]
     histogram: Annotated[
         list[Count],
         says(
-            "Number of results in each bin: below the first of histogram_edges, between each two "
-            "adjacent edges, above the last."
+            "Number of results in each bin: below the first of `histogram_edges`, between each two "
+            "adjacent edges, above the last edge."
         ),
     ]
     subjects: Annotated[
         Literal["frames", "joints", "columns"],
         says(
-            "The entries of worst_by_subject: the robot's frames, its joints, or the columns of the "
+            "Subjects of the entries of `worst_by_subject`: the robot's frames, its joints, or the"
+            " columns of the "
             "full Jacobian of all joints."
         ),
     ]
     worst_by_subject: Annotated[list[Units], says("The largest disagreement of each frame, joint or column.")]
-    worst_case: Annotated[Case | None, says("The worst case; null if nothing was compared.")]
+    worst_case: Annotated[
+        Case | None,
+        says("The sample with the largest ratio of disagreement to bound; null if nothing was compared."),
+    ]
     witness: NotRequired[Witness]
 
 
@@ -288,47 +352,61 @@ class Timings(TypedDict):
     """Computing times in seconds, summed over processes."""
 
     read: Annotated[
-        float, says("Reading the file, building both models and the tables; compiling, if needed.")
+        float,
+        says(
+            "Time to read the file and to build both models and the tables; includes compilation, if needed."
+        ),
     ]
-    urdfkin: Annotated[float, says("Computation with urdfkin.")]
-    pinocchio: Annotated[float, says("Computation with Pinocchio.")]
-    compare: Annotated[float, says("Bounds and comparison.")]
-    witness: NotRequired[Annotated[float, says("Computation with a second oracle, if there is one.")]]
+    urdfkin: Annotated[float, says("Time of computing with urdfkin.")]
+    pinocchio: Annotated[float, says("Time of computing with Pinocchio.")]
+    compare: Annotated[float, says("Time of computing the bounds and of the comparison.")]
+    witness: NotRequired[Annotated[float, says("Time of computing with the second oracle, if there is one.")]]
 
 
 class SecondReading(TypedDict):
     """Comparison of the tree with that of a second reader of the same text."""
 
-    by: Annotated[str, says("Name and version of the reader.")]
-    joints: Annotated[Count, says("Number of compared joints, fixed joints included.")]
-    differences: Annotated[list[str], says("Differences that are an error of one of the two readers.")]
-    known: Annotated[list[str], says("Known faults of the reader that explain a difference.")]
-    unread: Annotated[str | None, says("Why the reader cannot read the text; null if it can.")]
+    by: Annotated[str, says("Name and version of the second reader.")]
+    joints: Annotated[Count, says("Number of joints compared in both readings, fixed joints included.")]
+    differences: Annotated[
+        list[str], says("Differences between the two readings that are an error of one reader.")
+    ]
+    known: Annotated[list[str], says("Known faults of the second reader that explain a difference.")]
+    unread: Annotated[str | None, says("Reason why the second reader cannot read the text; null if it can.")]
 
 
 class Robot(TypedDict):
     """Report of one robot."""
 
-    source: Annotated[str, says("Source: a path, a catalogue name, - for standard input, or <text>.")]
+    source: Annotated[
+        str, says("Source of the robot: a path, a catalogue name, - for standard input, or <text>.")
+    ]
     name: Annotated[str, says("The robot's name in the URDF.")]
-    verdict: Annotated[Literal["verified", "disagrees", "not verified", "bad input"], says("The verdict.")]
-    reason: Annotated[str | None, says("Why the robot is not verified; null if it is.")]
-    error: Annotated[str | None, says("Traceback of an unexpected error, for a bug report.")]
+    verdict: Annotated[
+        Literal["verified", "disagrees", "not verified", "bad input"], says("Verdict on the robot.")
+    ]
+    reason: Annotated[str | None, says("Reason why the robot is not verified; null if it is verified.")]
+    error: Annotated[
+        str | None, says("Traceback of an unexpected error, for a bug report; null: no such error.")
+    ]
     joints: Annotated[list[str], says("Names of the moving joints, mimic joints included.")]
     frames: Annotated[list[str], says("Names of the compared links and joints.")]
     samples: Annotated[Count, says("Number of compared configurations, including the three special ones.")]
-    results: Annotated[Count, says("Number of compared results.")]
-    failed: Annotated[Count, says("Number of results outside their bound.")]
-    seconds: Annotated[float, says("Computing time, seconds.")]
-    timings: Annotated[Timings | None, says("Computing times of the parts.")]
-    model: Annotated[Model | None, says("Links and joints; null if the file could not be read.")]
-    findings: Annotated[list[Finding], says("Findings in the file.")]
-    chains: Annotated[list[Chain], says("Chains with their Denavit-Hartenberg tables.")]
+    results: Annotated[Count, says("Number of results compared with Pinocchio.")]
+    failed: Annotated[Count, says("Number of results with a disagreement above the bound.")]
+    seconds: Annotated[float, says("Computing time of this robot, seconds.")]
+    timings: Annotated[Timings | None, says("Computing times of the parts of the validation; null: unknown.")]
+    model: Annotated[Model | None, says("Links and joints of the robot; null if the file could not be read.")]
+    findings: Annotated[list[Finding], says("Findings of the linter in the robot's file.")]
+    chains: Annotated[list[Chain], says("Chains of the robot with their Denavit-Hartenberg tables.")]
     second_reader: Annotated[
-        SecondReading | None, says("Comparison with yourdfpy's tree of the same text; null if there is none.")
+        SecondReading | None,
+        says("Comparison with the tree that yourdfpy reads from the same text; null: no comparison."),
     ]
-    checks: Annotated[list[Check], says("The comparisons.")]
-    judge: Annotated[Judgement | None, says("With --judge: result of the accuracy study.")]
+    checks: Annotated[
+        list[Check], says("Comparisons with Pinocchio, one for each quantity and reference frame.")
+    ]
+    judge: Annotated[Judgement | None, says("Result of the accuracy study; null without `--judge`.")]
 
 
 class Document(Header):
@@ -337,15 +415,19 @@ class Document(Header):
     Within a version, entries may be added. They are never removed and never change their meaning.
     """
 
-    started: Annotated[str, says("Start time, ISO 8601, UTC.")]
-    seconds: Annotated[float, says("Wall time in seconds. For a store: the sum over its chunks.")]
+    started: Annotated[str, says("Start time of the validation, ISO 8601, UTC.")]
+    seconds: Annotated[
+        float, says("Wall time of the validation in seconds. For a store: the sum over the store's chunks.")
+    ]
     seed: Annotated[int, says("Seed of the random samples.")]
     samples: Annotated[Count, says("Number of random configurations for each robot.")]
-    histogram_edges: Annotated[list[float], says("Bin edges of all histograms, in eps * scale.")]
-    asked: Annotated[Count, says("Number of requested robots.")]
-    interrupted: Annotated[bool, says("Whether the run ended early, or the store is incomplete.")]
-    reason: Annotated[str | None, says("Why the run has not passed, in one line; null if it has.")]
-    robots: Annotated[list[Robot], says("The robots in the requested order.")]
+    histogram_edges: Annotated[list[float], says("Edges of the bins of all histograms, in eps * scale.")]
+    asked: Annotated[Count, says("Number of robots in the validation, including those without a report.")]
+    interrupted: Annotated[bool, says("Whether the validation ended early, or its store is incomplete.")]
+    reason: Annotated[
+        str | None, says("Reason why the validation has not passed, in one line; null if it has passed.")
+    ]
+    robots: Annotated[list[Robot], says("Reports of the robots in the requested order.")]
 
 
 #: The layout of the document. Entries may be added, but are never removed and never change their meaning.

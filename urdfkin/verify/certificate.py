@@ -25,7 +25,7 @@ from urdfkin.verify.oracles import versions
 from urdfkin.verify.quantities import QUANTITIES
 
 #: Reason in certificates for results of calls with verify=False.
-NOT_ASKED_FOR = "verify=False was asked for"
+NOT_ASKED_FOR = "the check was turned off by verify=False"
 #: Lock for all ledgers.
 _entering = lock_over_forks()
 
@@ -70,7 +70,7 @@ class VerificationError(UrdfkinError):
             f"the {quantity} of {frame} ({reference}) disagrees with {oracle}'s",
             where=f"sample {list(index)}" if index else None,
             found=f"a difference of {difference:.3g}, {units:.3g} eps*scale",
-            remedy=f"reproduce it with: {reproduce}",
+            remedy=f"reproduce the difference with: {reproduce}",
         )
         self.quantity, self.frame, self.reference, self.index = quantity, frame, reference, index
         self.ours, self.theirs, self.bound = ours, theirs, bound
@@ -155,8 +155,13 @@ class LineEntry(TypedDict):
 
     quantity: Annotated[str, says("Name of the quantity.")]
     checked: Annotated[Count, says("Number of results that the oracle confirmed.")]
-    worst: Annotated[Size | None, says("Largest difference among them, in eps * scale; null: not finite.")]
-    share: Annotated[Size | None, says("Largest ratio of a difference to its bound; null: it is not finite.")]
+    worst: Annotated[
+        Size | None,
+        says("Largest difference between a result and the oracle's, in eps * scale; null: not finite."),
+    ]
+    share: Annotated[
+        Size | None, says("Largest ratio of such a difference to its bound; null: the ratio is not finite.")
+    ]
     unchecked: Annotated[Count, says("Number of results that were returned without a check.")]
 
 
@@ -164,11 +169,15 @@ class CertificateDocument(Header):
     """The checked results of a robot, their agreement with the oracle, and the unchecked results."""
 
     robot: Annotated[str, says("The robot's name.")]
-    source: Annotated[str, says("Source: a path, a catalogue name, or <text>.")]
-    reading: Annotated[str, says("Result of the check of a conversion to URDF; empty for a URDF.")]
+    source: Annotated[str, says("Source of the robot: a path, a catalogue name, or <text>.")]
+    reading: Annotated[
+        str, says("Result of checking the conversion of the source to URDF; empty if the source is a URDF.")
+    ]
     oracle: Annotated[str, says("Name and version of the oracle.")]
-    lines: Annotated[list[LineEntry], says("One line for each computed quantity.")]
-    not_verified: Annotated[list[str], says("Reasons for unchecked results; empty if all were checked.")]
+    lines: Annotated[list[LineEntry], says("One entry for each computed quantity.")]
+    not_verified: Annotated[
+        list[str], says("Reasons why results were not checked; empty if all were checked.")
+    ]
 
 
 #: The layout of a saved certificate.
@@ -187,8 +196,8 @@ class Certificate(Displayable):
     Attributes:
         robot: The robot's name.
         oracle: Name and version of the oracle: "Pinocchio 4.1.0".
-        lines: One line for each computed quantity.
-        not_verified: Reasons for unchecked results; empty if all were checked.
+        lines: One entry for each computed quantity.
+        not_verified: Reasons why results were not checked; empty if all were checked.
         reading: Result of the check of a conversion from another format to URDF; empty for a URDF.
         source: Source of the robot: a path, a catalogue name or "<text>".
         sha256: Digest of the URDF text as UTF-8, or of the MJCF file.
