@@ -123,7 +123,7 @@ def test_a_name_that_is_pointed_at_this_machine_shows_a_refusal(viewer: Viewer, 
     browser.chrome.get(viewer.server.address.replace("127.0.0.1", "rebound.test"))
     assert (
         browser.js("return document.body.innerText").strip()
-        == "urdfkin: the Host name in the request is not the name of this viewer"
+        == "urdfkin: the Host header of the request does not name this viewer"
     )
 
 

@@ -165,7 +165,7 @@ def test_a_viser_that_begins_its_server_in_another_way_is_not_used(monkeypatch: 
 
 def test_a_page_with_other_scripts_than_known_is_not_served(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "_SCRIPTS", (("<script data-other=", "{nonce}"),))
-    with pytest.raises(UnguardedError, match="its page has unexpected scripts"):
+    with pytest.raises(UnguardedError, match="the page of viser has unexpected scripts"):
         new_server(port=free_port())
 
 

@@ -174,7 +174,7 @@ def test_as_many_numbers_as_parameters_leave_nothing_to_judge_by() -> None:
     assert found.written_parameters == ()
     out = io.StringIO()
     print_document(Console(file=out, width=200), document(found))
-    assert "noise: unknown, there are no redundant measurements" in out.getvalue()
+    assert "noise: unknown, because there are no redundant measurements" in out.getvalue()
     assert not np.isfinite(found.deviations[list(found.identification.kept)]).any()
     assert any("the fit cannot be checked" in line for line in doubts(found))
 

@@ -190,11 +190,14 @@ def test_a_cluster_with_the_settings_of_the_page_serves_who_has_its_key_and_nobo
         assert address.startswith("tls://127.0.0.1:")
         with dask.config.set({"distributed.comm.timeouts.connect": "2s"}):
             for other in (address, address.replace("tls", "tcp")):
-                with pytest.raises(ClusterError, match="no scheduler answers"), connected(other):
+                with (
+                    pytest.raises(ClusterError, match="no Dask scheduler answers at this address"),
+                    connected(other),
+                ):
                     pass
             with (
                 dask.config.set(key_of(stranger)),
-                pytest.raises(ClusterError, match="no scheduler answers"),
+                pytest.raises(ClusterError, match="no Dask scheduler answers at this address"),
                 connected(address),
             ):
                 pass
@@ -264,7 +267,10 @@ def test_a_robot_that_kills_its_process_is_blamed_and_none_of_its_neighbours(
     finally:
         two._client.run(_deadly, str(deaths), "urdfkin.validation.worker_processes")
     assert [i for i, robot in enumerate(report.robots) if robot.verdict != Verdict.VERIFIED] == [25]
-    reason = "ur5: the process that checked it crashed twice, the second time alone: found signal SIGSEGV"
+    reason = (
+        "ur5: the process that validated the robot crashed twice, the second time without other"
+        " work: found signal SIGSEGV"
+    )
     assert report.robots[25].reason == reason
     assert deaths.read_text() == "97"
     assert two._client.run(os.getpid) == workers
@@ -347,7 +353,7 @@ def test_another_version_is_refused_before_anything_is_sent(
     with pytest.raises(ClusterError, match=r"different versions of the code: found pin 4\S* there and 3.0.0"):
         cluster._demand_same(two._client)
     report = validate("planar_two_link", samples=0, executor=two)  # a worker that came later
-    assert "different versions of the code" in str(report.robots[0].reason)
+    assert "the cluster and this machine have different versions of the code" in str(report.robots[0].reason)
 
 
 @pytest.mark.parametrize("word", ["local:", "local:0", "local:-1", "local:two"])
@@ -361,7 +367,7 @@ def test_where_nobody_answers_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
 
     with (
         dask.config.set({"distributed.comm.timeouts.connect": "0.5s"}),
-        pytest.raises(ClusterError, match="no scheduler answers"),
+        pytest.raises(ClusterError, match="no Dask scheduler answers at this address"),
         connected("tcp://127.0.0.1:9"),
     ):
         pass

@@ -360,12 +360,15 @@ def _confirmation_errors(
     if claimed["reason"].startswith(REASONS) and claimed == {**_NOTHING, "reason": claimed["reason"]}:
         return
     if claimed["reason"] or claimed["configurations"] != CONFIRMED or not claimed["by"]:
-        yield f"checked: not a confirmation at {CONFIRMED} configurations, and no reason why there is none"
+        yield (
+            f"`checked`: there is neither a confirmation at {CONFIRMED} configurations, nor a reason"
+            " for its absence"
+        )
         return
     off = float(comparator.pinocchio_distances(found, variables).max(initial=0.0))
     rounding = comparator.rounding(found, variables)[0]
     if not math.isclose(claimed["metres"], off, rel_tol=_RELATIVE, abs_tol=rounding):
-        yield f"checked: Pinocchio finds at most {off:.2g} m, not {claimed['metres']:.2g} m"
+        yield f"`checked`: Pinocchio finds at most {off:.2g} m, not {claimed['metres']:.2g} m"
 
 
 def _gauge(document: Certificate) -> Gauge:
@@ -397,7 +400,7 @@ def _not_a_gauge(document: Certificate, gauge: Gauge, comparator: Comparator) ->
             return f"joint {name}: its conversion is not possible for a joint of this kind"
     for names in gauge.orders:
         if not b.may_be_taken(names, comparator.tolerance):
-            return f"orders: the axes do not allow {', '.join(names)}"
+            return f"`orders`: the axes do not allow {', '.join(names)}"
         b = b.in_order(names)
     return None
 
@@ -431,12 +434,12 @@ def _as_written_errors(
         (comparator.trees[0].links[frame.a], comparator.trees[1].links[frame.b]) for frame in written.frames
     ]
     if (claim["frame"], claim["frame_b"]) not in names:
-        yield f"as written: frame {claim['frame']} is not a common frame of the models"
+        yield f"`as_written`: frame {claim['frame']} is not a common frame of the models"
         return
     frame = written.frames[names.index((claim["frame"], claim["frame_b"]))]
     search, rounding = comparator.search(written, variables), comparator.rounding(written, variables)
     problems = _interval_errors(search, frame, claim, rounding, sharply=sharply)
-    yield from (f"as written: {line}" for line in problems)
+    yield from (f"`as_written`: {line}" for line in problems)
 
 
 def _interval_errors(

@@ -115,20 +115,20 @@ class Difference:
         match what:
             case "axis":
                 parts = " and ".join([*([f"tilted by {angle(self.radians)}"] if self.radians else []), *off])
-                alone = " (the links behind it are not)" if self.detail == "alone" else ""
+                alone = " (the links after this joint are not)" if self.detail == "alone" else ""
                 return f"{place}: its axis is {parts}{alone}"
             case "place":
                 parts = " and ".join([*off, *([f"turned by {angle(self.radians)}"] if self.radians else [])])
-                return f"{place} is {parts} on its body"
+                return f"{place} is {parts} on its rigid body"
             case "frame":
                 return f"{place}: its plane is tilted by {angle(self.radians)}"
             case "fixed":
                 moves, fixed = ("A", "B") if b == "fixed" else ("B", "A")
                 return f"{place} moves in {moves} and is fixed in {fixed}"
             case "mimic rule" if a is None and b is not None:
-                return f"{place} is free in A and a mimic joint in B: {_rule(b)}"
+                return f"{place} is an independent joint in A and a mimic joint in B: {_rule(b)}"
             case "mimic rule" if a is not None and b is None:
-                return f"{place} is a mimic joint in A and free in B: {_rule(a)}"
+                return f"{place} is a mimic joint in A and an independent joint in B: {_rule(a)}"
             case "mimic rule":
                 return f"{place} has another mimic rule: {_rule(a)} in A, {_rule(b)} in B"
             case "limits":
@@ -171,7 +171,7 @@ class Tool:
 
 
 #: First words of the reasons why there is no confirmation.
-REASONS = NOT_ASKED, NOT_VERIFIED = "not asked of Pinocchio: ", "not verified by Pinocchio: "
+REASONS = NOT_ASKED, NOT_VERIFIED = "not checked with Pinocchio: ", "not verified by Pinocchio: "
 
 
 @dataclass(frozen=True, slots=True)
@@ -441,7 +441,7 @@ def demand_joint_names(tree: KinematicTree, names: list[str], which: str) -> Non
         tree.joint_index(name)
     if len(set(names)) < len(names):
         double = next(name for i, name in enumerate(names) if name in names[:i])
-        raise InputError(f"a joint of {which} is given twice", where="map", found=repr(double))
+        raise InputError(f"a joint of {which} occurs twice", where="map", found=repr(double))
 
 
 def put_right(found: Alignment, rounding: Tolerance, *, tables: bool = False) -> tuple[tuple[str, str], ...]:
@@ -459,7 +459,7 @@ def put_right(found: Alignment, rounding: Tolerance, *, tables: bool = False) ->
         if mechanism.body_of[link]:
             root, base = mechanism.tree.links[0], mechanism.tree.links[link]
             lines.append(
-                ("base", f"{which}'s root is {root}; as seen from {base}, the joints between are reversed")
+                ("base", f"{which}'s root is {root}; the joints between {base} and this root are reversed")
             )
     if found.X is not IDENTITY:
         lines.append(("base", f"B's root is in A's root frame at {pose_words(found.X, rounding)}"))
@@ -493,7 +493,7 @@ def _tools_put_right(found: Alignment, rounding: Tolerance, *, tables: bool) -> 
                 continue  # its pose in the root frame is unchanged, so the line about the base is enough
         if (tool := found.frames[k].tool) is not IDENTITY:
             moved = pose_words(tool, rounding)
-            yield "tools", f"frame {links[1][frame.b]} is A's {links[0][frame.a]} moved by {moved}"
+            yield "tools", f"frame {links[1][frame.b]} is frame {links[0][frame.a]} of A, moved by {moved}"
 
 
 def _around(found: Alignment) -> set[tuple[int, int]]:

@@ -123,10 +123,10 @@ def _parse_given_map(given: Mapping[str, str] | None) -> dict[str, str]:
         not isinstance(name, str) for pair in given.items() for name in pair
     ):
         raise InputError(
-            "the map is not a mapping of joint names",
+            "`map` is not a mapping of joint names",
             where="map",
             found=repr(given),
-            remedy="give a dict of joints of A and their joints in B",
+            remedy="give a dict from each joint name of A to a joint name of B",
         )
     return dict(given)
 
@@ -262,7 +262,7 @@ class Comparator:
                     "these joints cannot be matched: their parent links are not matched",
                     where="map",
                     found=f"{ours!r} of A, {theirs!r} of B",
-                    remedy="also map the joints before them, or remove this pair",
+                    remedy="also map the joints before these joints, or remove this pair",
                 )
 
     def search(self, found: Alignment, variables: Variables) -> Search:

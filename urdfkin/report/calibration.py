@@ -44,7 +44,7 @@ def document(found: Calibration) -> TextDocument:
             )
             for k in sorted(identification.kept)
         ]
-        parts.append(Table(["parameter", "moved by", "standard deviation", "written"], rows))
+        parts.append(Table(["parameter", "changed by", "standard deviation", "written"], rows))
     if found.fitted is None or found.before is None:
         return TextDocument(title, parts)
     noise = found.fitted.noise
@@ -53,20 +53,25 @@ def document(found: Calibration) -> TextDocument:
     )
     every = sum(p in found.writable for p in identification.kept)
     few = found.written_fit is not None and len(found.written_parameters) < every
-    as_written = f"; as written: {_rms(found.written_fit)}" if few and found.written_fit is not None else ""
+    as_written = (
+        f"; with only the written parameters: {_rms(found.written_fit)}"
+        if few and found.written_fit is not None
+        else ""
+    )
     parts.append(f"rms error before the fit: {_rms(found.before)}; after: {_rms(found.fitted)}{as_written}")
     if few:
         parts.append(
-            f"written: {len(found.written_parameters)} of {every} parameters, those that moved by more than "
+            f"written: {len(found.written_parameters)} of {every} parameters, those that changed by more"
+            " than "
             "2 sigma"
         )
     if not found.stated and not found.fitted.is_judged:
-        parts.append("noise: unknown, there are no redundant measurements")
+        parts.append("noise: unknown, because there are no redundant measurements")
     elif found.stated:
         ratio = f"{found.fitted.ratio:.3g} +- {found.fitted.spread:.2g}"
-        parts.append(f"noise: {said} as stated; the residuals are {ratio} times as large")
+        parts.append(f"noise: {said} as stated; the residuals are {ratio} times as large as this noise")
     elif found.fitted.ratio < _ROUNDING:
-        parts.append("noise: none, the residuals are rounding")
+        parts.append("noise: none, the residuals are only rounding errors")
     else:
         parts.append(f"noise: {said}, estimated from the residuals")
     for name, T in (("base", found.base), ("tool", found.tool)):

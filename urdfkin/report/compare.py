@@ -130,7 +130,7 @@ def _exit(found: Comparison) -> str:
     """Return the exit code of the command, with its meaning."""
     if found.regressions:
         return "exit 1: a regression"
-    return "exit 0: no regression; only a regression gives exit 1" if found.changes else "exit 0"
+    return "exit 0: changes without a regression" if found.changes else "exit 0"
 
 
 def markdown_of(old: Document, new: Document, found: Comparison, limit: int = LIMIT) -> str:
@@ -141,14 +141,17 @@ def markdown_of(old: Document, new: Document, found: Comparison, limit: int = LI
     lines += [
         f"| {text(quantity_name(name))} | {_cell(a)} | {_cell(b)} |" for name, a, b in figures(old, new)
     ]
-    lines += ["", *(["| | what | old | new |", "| --- | --- | --- | --- |"] if found.changes else [])]
+    lines += [
+        "",
+        *(["| | changed value | old | new |", "| --- | --- | --- | --- |"] if found.changes else []),
+    ]
     left = limit - sum(len(line) + 1 for line in lines) - 100
     ordered = sorted(found.changes, key=lambda change: not change.regression)
     for shown, change in enumerate(ordered):
         row = _row(change)
         left -= len(row) + 1
         if left < 0:
-            lines += ["", f"{counted(len(ordered) - shown, 'further change')} did not fit."]
+            lines += ["", f"{counted(len(ordered) - shown, 'further change')} left out: the comment is full."]
             break
         lines.append(row)
     return "\n".join([*lines, ""])

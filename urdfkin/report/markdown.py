@@ -66,7 +66,8 @@ def _three_sides(robots: list[Robot]) -> list[str]:
         return []
     heads = ["quantity", *map(text, witness_heads(title))]
     lines = [
-        f"Comparison of urdfkin, Pinocchio and {text(title)}: the largest ratio to each pair's bound:",
+        f"Comparison of urdfkin, Pinocchio and {text(title)}: the largest ratio of a disagreement to its"
+        " bound, for each pair of libraries:",
         "",
         _row(heads),
         _row(["---", *["---:"] * (len(heads) - 2), "---"]),
@@ -87,7 +88,11 @@ def _body(robots: list[Robot], room: int) -> list[str]:
         if left < 0:
             rest = robots[shown:]
             good = sum(robot["verdict"] == "verified" for robot in rest)
-            tails += ["", f"{counted(len(rest), 'further robot')} did not fit; {good} of them verified."]
+            tails += [
+                "",
+                f"{counted(len(rest), 'further robot')} left out, because the comment is full; {good} of"
+                " them verified.",
+            ]
             break
         lines.append(row)
         tails += tail

@@ -30,7 +30,7 @@ class Cell:
         self._description, self._q = describe(robot), q.tolist()
 
     def __repr__(self) -> str:
-        return log_line(f"<a view of {self._name}: the last line of a notebook's cell shows it>")
+        return log_line(f"<a view of {self._name}, which is displayed as the last line of a notebook cell>")
 
     def page(self) -> str:
         """Return the HTML page."""

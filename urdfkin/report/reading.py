@@ -63,30 +63,36 @@ def model_contradictions(model: Model, chains: Sequence[Chain]) -> Iterator[str]
     links, joints = model["links"], model["joints"]
     names = [joint["name"] for joint in joints]
     if len(set(links)) != len(links) or len(set(names)) != len(names):
-        yield "model: a name occurs twice"
+        yield "`model`: a name occurs twice"
         return
     if links[1:] != [joint["child"] for joint in joints] or not links:
-        yield "model: the links are not the root and the children of the joints"
+        yield "`links` of `model` must be the root link and the child link of each joint"
         return
     for i, joint in enumerate(joints):
         if joint["parent"] not in links[: i + 1]:
-            yield f"model: joint {joint['name']}: parent link {joint['parent']} is not before the joint"
+            yield (
+                f"`model`: joint {joint['name']}: its parent link {joint['parent']} must come before"
+                " the joint"
+            )
         yield from _joint(joint, joints)
     yield from _numbering(model)
     frames = {*links, *names, *frame_names(model)}
     ends = [model["base"], model["tip"], *(end for chain in chains for end in (chain["base"], chain["tip"]))]
-    yield from (f"model: no frame {end}" for end in ends if end not in frames)
+    yield from (f"`model`: there is no frame {end}" for end in ends if end not in frames)
     kinds = {joint["name"]: joint["kind"] for joint in joints}
     for chain in chains:
         for row in (*chain["standard"]["rows"], *chain["modified"]["rows"]):
             if kinds.get(row["joint"]) != row["kind"]:
-                yield f"tables from {chain['base']} to {chain['tip']}: no {row['kind']} joint {row['joint']}"
+                yield (
+                    f"tables from {chain['base']} to {chain['tip']}: the model has no {row['kind']}"
+                    f" joint {row['joint']}"
+                )
 
 
 def _joint(joint: Joint, joints: Sequence[Joint]) -> Iterator[str]:
-    where, axis, mimic = f"model: joint {joint['name']}", joint["axis"], joint["mimic"]
+    where, axis, mimic = f"`model`: joint {joint['name']}", joint["axis"], joint["mimic"]
     if (axis is not None) != (joint["kind"] in _WITH_AXIS):
-        yield f"{where}: a {joint['kind']} joint {'with' if axis else 'without'} an axis"
+        yield f"{where}: a {joint['kind']} joint must {'not ' if axis else ''}have an axis"
     elif axis is not None and abs(math.hypot(*axis) - 1.0) > _ROUNDED:
         yield f"{where}: axis {axis} is not a unit vector"
     rows = joint["placement"]
@@ -114,9 +120,12 @@ def _numbering(model: Model) -> Iterator[str]:
     for joint in model["joints"]:
         owner = joint["mimic"]["leader"] if joint["mimic"] else joint["name"]
         if places.get(owner) != (joint["q"], joint["v"]):
-            yield f"model: joint {joint['name']}: wrong index in q or v"
+            yield f"`model`: joint {joint['name']}: wrong index in q or v"
     if (model["nq"], model["nv"]) != (q, v) or (len(model["coordinates"]), len(model["rates"])) != (q, v):
-        yield f"model: its joints have {q} coordinates and {v} joint velocities, not nq and nv"
+        yield (
+            f"`model`: the joints have {q} coordinates and {v} joint velocities, which differ from"
+            " `nq` and `nv`"
+        )
 
 
 #: Relative tolerance of recomputed quotients.
@@ -129,21 +138,21 @@ def contradictions(document: Document) -> Iterator[str]:
     """Yield the contradictions in a document that conforms to the schema, each with its location."""
     edges, robots = document["histogram_edges"], document["robots"]
     if not edges or any(a >= b for a, b in pairwise(edges)):
-        yield "histogram_edges: not in ascending order"
+        yield "`histogram_edges` are not in ascending order"
         return
     if document["asked"] < len(robots):
-        yield f"asked: {document['asked']}, but {len(robots)} robots have a report"
+        yield f"`asked` is {document['asked']}, but {len(robots)} robots have a report"
     found = outcome_of(document)
     if document["verdict"] != found.verdict:
-        yield f"verdict: {document['verdict']}, but {found.reason or 'every robot was verified'}"
+        yield f"`verdict` is {document['verdict']}, but {found.reason or 'every robot was verified'}"
     if (document["reason"] is None) != found.passed:
-        yield f"reason: {document['reason']}, but {found.reason or 'the run has passed'}"
+        yield f"`reason` is {document['reason']}, but {found.reason or 'the run has passed'}"
     if missing := [name for name in ("urdfkin", "pin", "python") if name not in document["versions"]]:
-        yield f"versions: none of {missing[0]}"
+        yield f"`versions` has no version of {missing[0]}"
     if document["command"] is None:
-        yield "command: none"
+        yield "`command` is missing"
     if document["sha256"] != [robot["model"]["sha256"] if robot["model"] else None for robot in robots]:
-        yield "sha256: not those of the robots"
+        yield "`sha256` differs from the digests of the robots"
     for i, robot in enumerate(robots):
         for contradiction in _robot(robot, document):
             yield f"robots[{i}] ({robot['source']}): {contradiction}"
@@ -153,21 +162,21 @@ def _robot(robot: Robot, document: Document) -> Iterator[str]:
     if robot["model"] is not None:
         yield from model_contradictions(robot["model"], robot["chains"])
     elif robot["checks"] or robot["chains"]:
-        yield "model: none, but something was compared"
+        yield "`model` is missing, but something was compared"
         return
     for what in ("results", "failed"):
         counted = sum(check["results" if what == "results" else "failed"] for check in robot["checks"])
         if robot["results" if what == "results" else "failed"] != counted:
-            yield f"{what}: not the {counted} of its checks"
+            yield f"`{what}` is not {counted}, the sum of the robot's checks"
     yield from _verdict(robot, document["samples"] + SPECIAL)
     names = [(check["quantity"], check["reference"]) for check in robot["checks"]]
     if len(set(names)) != len(names):
-        yield "checks: a quantity occurs twice"
+        yield "`checks`: a quantity occurs twice"
     subjects = _subjects(robot)
     if robot["checks"] and not (
         robot["joints"] == subjects["joints"] and robot["frames"] == subjects["frames"]
     ):
-        yield "joints or frames: not those of the model"
+        yield "`joints` or `frames` differ from those of the model"
         return
     for check in robot["checks"]:
         own = subjects[check["subjects"]]
@@ -199,39 +208,47 @@ def _verdict(robot: Robot, samples: int) -> Iterator[str]:
         or (reading is not None and reader_disagreement(reading) is not None)
     )
     if outside != (verdict is Verdict.DISAGREES):
-        yield f"verdict: {verdict}, but {'something lies' if outside else 'nothing lies'} outside its bound"
+        yield (
+            f"`verdict` is {verdict}, but {'something lies' if outside else 'nothing lies'} outside its bound"
+        )
     if verdict is Verdict.VERIFIED:
         if not robot["results"]:
-            yield "verdict: verified, but nothing was compared"
+            yield "`verdict` is verified, but nothing was compared"
         if reason is not None:
-            yield f"verdict: verified, but the reason says {reason}"
+            yield f"`verdict` is verified, but `reason` says {reason}"
         if robot["samples"] != samples:
-            yield f"verdict: verified, but on {robot['samples']} of {samples} samples"
+            yield f"`verdict` is verified, but only {robot['samples']} of {samples} samples were compared"
     elif verdict is not Verdict.DISAGREES and not reason:
-        yield f"verdict: {verdict}, but no reason"
+        yield f"`verdict` is {verdict}, but there is no `reason`"
     if robot["samples"] > samples:
-        yield f"samples: {robot['samples']}, but {samples} were requested"
+        yield f"`samples` is {robot['samples']}, but {samples} samples were requested"
 
 
 def _check(check: Check, subjects: list[str], robot: Robot, document: Document) -> Iterator[str]:
     results, histogram, edges = check["results"], check["histogram"], document["histogram_edges"]
     if results != robot["samples"] * len(subjects) or results > _MOST:
-        yield f"results: {results}, but {robot['samples']} samples of {len(subjects)} {check['subjects']}"
+        yield (
+            f"`results` is {results}, but there are {robot['samples']} samples of {len(subjects)}"
+            f" {check['subjects']}"
+        )
     if len(histogram) != len(edges) + 1 or sum(histogram) != results:
-        yield f"histogram: not of {results} results between its edges"
+        yield f"`histogram` does not contain {results} results, or has a wrong number of bins"
         return
     if len(check["worst_by_subject"]) != len(subjects):
-        yield f"worst_by_subject: not one for each of {len(subjects)} {check['subjects']}"
+        yield f"`worst_by_subject` must have one entry for each of {len(subjects)} {check['subjects']}"
         return
     if check["worst"] != worst(check["worst_by_subject"]):
-        yield f"worst: {check['worst']}, but {worst(check['worst_by_subject'])} by {check['subjects']}"
+        yield (
+            f"`worst` is {check['worst']}, but {worst(check['worst_by_subject'])} over all"
+            f" {check['subjects']}"
+        )
     last = max((i for i, count in enumerate(histogram) if count), default=0)
     if results and last != histogram_bin(_as_number(check["worst"]), edges):
-        yield f"worst: {check['worst']}, but the histogram ends elsewhere"
+        yield f"`worst` is {check['worst']}, which is not in the last bin of the histogram"
     for name, percent, stated in (("median", 50.0, check["median"]), ("p99", 99.0, check["p99"])):
         computed = percentile(histogram, edges, _as_number(check["worst"]), percent)
         if not _alike(_as_number(stated), computed):
-            yield f"{name}: {stated}, but {computed:g} by the histogram"
+            yield f"`{name}` is {stated}, but the histogram gives {computed:g}"
     yield from _share(check)
     yield from _case(check, subjects, robot, document["samples"] + SPECIAL)
 
@@ -241,24 +258,24 @@ def _share(check: Check) -> Iterator[str]:
     share, largest = _as_number(check["share_of_bound"]), _as_number(check["worst"])
     low, high = _as_number(check["bound"][0]), _as_number(check["bound"][1])
     if (share > 1.0) != (check["failed"] > 0) or check["failed"] > check["results"]:
-        yield f"failed: {check['failed']} of {check['results']}, but the largest share is {share:g}"
+        yield f"`failed` is {check['failed']} of {check['results']}, but `share_of_bound` is {share:g}"
     if low > high:
         if share or largest or check["worst_case"]:  # nothing was compared, so there is no bound
-            yield f"bound: {check['bound']}, but something was compared"
+            yield f"`bound` is {check['bound']}, but something was compared"
         return
     ends = (largest / high if high else math.inf, largest / low if low else math.inf)
     if not (ends[0] * (1.0 - _ALIKE) <= share <= ends[1] * (1.0 + _ALIKE)):
-        yield f"share_of_bound: {share:g}, but the worst is {largest:g} and the bound {low:g} to {high:g}"
+        yield f"`share_of_bound` is {share:g}, but `worst` is {largest:g} and `bound` is {low:g} to {high:g}"
 
 
 def _case(check: Check, subjects: list[str], robot: Robot, samples: int) -> Iterator[str]:
     case, model = check["worst_case"], robot["model"]
     if case is None:
         if check["worst"] != 0.0 or check["failed"]:
-            yield "worst_case: none, but something disagrees"
+            yield "`worst_case` is missing, but something disagrees"
         return
     if case["frame"] not in subjects:
-        yield f"worst_case: {case['frame']} is not one of its {check['subjects']}"
+        yield f"`worst_case`: {case['frame']} is not one of the compared {check['subjects']}"
         return
     of_frame = worst(
         units
@@ -266,25 +283,28 @@ def _case(check: Check, subjects: list[str], robot: Robot, samples: int) -> Iter
         if name == case["frame"]
     )
     if _as_number(case["disagreement"]) > _as_number(of_frame):
-        yield f"worst_case: {case['disagreement']} at {case['frame']}, but at most {of_frame} there"
+        yield (
+            f"`worst_case` has {case['disagreement']} at {case['frame']}, but its worst disagreement"
+            f" is {of_frame}"
+        )
     share, low, high = _as_number(check["share_of_bound"]), check["bound"][0] or 0.0, check["bound"][1] or 0.0
     units = _as_number(case["disagreement"])
     if math.isfinite(units) and not share * low * (1 - _ALIKE) <= units <= share * high * (1 + _ALIKE):
-        yield f"worst_case: {units:g} is not {share:g} times its bound"
+        yield f"`worst_case`: the disagreement {units:g} is not {share:g} times a bound"
     if model is not None and (len(case["q"]), len(case["v"]), len(case["a"])) != (
         model["nq"],
         model["nv"],
         model["nv"],
     ):
-        yield "worst_case: q, v or a has another length than the robot's"
+        yield "`worst_case`: the length of q, v or a differs from that of the robot"
     if case["sample"] >= samples:
-        yield f"worst_case: sample {case['sample']} of {samples}"
+        yield f"`worst_case`: there is no sample {case['sample']} among {samples} samples"
 
 
 def _chain(chain: Chain) -> Iterator[str]:
     figures = chain["metres"], chain["worst"], chain["share_of_bound"]
     if not chain["samples"] and any(figure is not None for figure in figures):
-        yield "not compared, but with results"
+        yield "the tables have results, but were not compared"
 
 
 def _as_number(units: Units) -> float:
@@ -331,6 +351,6 @@ def checked(data: object, where: str) -> Document:
             "the report contradicts itself",
             where=where,
             found="; ".join(against[:_SHOWN]) + more,
-            remedy=f"make it again: {VALIDATION.made_by}",
+            remedy=f"make the report again: {VALIDATION.made_by}",
         )
     return document

@@ -27,8 +27,8 @@ from urdfkin.robot import Robot
 #: Number of lines that are shown for each kind of difference without --all.
 SHOWN = 12
 #: First line where models differ and joints were not matched by name.
-GUESSED = "joints are matched by their axes, since names do not match; use --map to match other pairs"
-HEADS = ("frame", "at least", "at most", "turned at most")
+GUESSED = "joints are matched by their axes, because their names differ; use --map to match other joints"
+HEADS = ("frame", "at least", "at most", "angle at most")
 #: Attributes of an interval: the attained and the proven angle.
 TURNED = ("radians_seen", "radians")
 #: The default question: are both robots equivalent?
@@ -36,7 +36,7 @@ EQUIVALENT = Question()
 #: A bound up to this factor times the rounding counts as rounding, because sums add rounding errors.
 DUST = 1.001
 #: Heading of the list of joints whose mimic joints leave their limits.
-NARROWED = "limits of mimic joints, which intervals ignore"
+NARROWED = "limits of mimic joints, which the bounds of the distance ignore"
 
 
 def headline(found: Sameness, question: Question = EQUIVALENT) -> str:
@@ -60,7 +60,7 @@ def headline(found: Sameness, question: Question = EQUIVALENT) -> str:
 
 def _within(found: Sameness, most: float) -> str:
     """Return the answer to --within: do all frames stay within a distance? If not, which one leaves it?"""
-    limit = f"WITHIN {most:g} m and rad: as written, "
+    limit = f"WITHIN {most:g} m and rad without changes of B: "
     if found.within(most):
         return f"{limit}no frame is ever off by more than {_both(*found.written)}"
     if (beyond := next((one for one in found.differences if one.what not in BOUNDED), None)) is not None:
@@ -122,7 +122,7 @@ def as_written(found: Sameness) -> str:
     """Return how far a frame is off as written, in words; empty if that is rounding."""
     frame = found.as_written
     off = "" if frame is None else _off(frame, found.rounding)
-    return f"as written, {frame.frame} is {off} off" if frame is not None and off else ""
+    return f"without changes of B, {frame.frame} is {off} off" if frame is not None and off else ""
 
 
 def where(found: Sameness, frame: Interval) -> str:
@@ -186,12 +186,12 @@ def as_document(found: Sameness) -> TextDocument:
         ("Without effect on motion", [one.words for one in found.remarks]),
     ):
         parts += [f"{head}: {line}" for line in lines[:SHOWN] if line]
-        parts += [f"... and {len(lines) - SHOWN} more"] if len(lines) > SHOWN else []
+        parts += [f"... and {len(lines) - SHOWN} more lines"] if len(lines) > SHOWN else []
     if frames := far_frames(found):
         parts += [
             "Largest distance over all configurations within limits:", Table(HEADS, rows(frames[:SHOWN])),
         ]  # fmt: skip
-        parts += [f"... and {len(frames) - SHOWN} more"] if len(frames) > SHOWN else []
+        parts += [f"... and {len(frames) - SHOWN} more frames"] if len(frames) > SHOWN else []
         if off := attained(frames[0]):
             parts.append(f"{frames[0].frame} is {off} off at: {where(found, frames[0])}")
     return TextDocument(headline(found), [*parts, str(found.checked)])
@@ -296,9 +296,9 @@ def as_html(
             renamed=renamed(found),
             where=where(found, worst) if worst else "",
             pictures=pictures(found, robots, worst, written=written),
-            title=f"Where {worst.frame} is {attained(worst)} off{' as written' if written else ''}"
+            title=f"Where {worst.frame} is {attained(worst)} off{' without changes of B' if written else ''}"
             if worst and attained(worst)
-            else "Both, at the zero configuration",
+            else "Both robots in the zero configuration",
             style=as_is(asset("report.css")),
         )
     )

@@ -63,7 +63,11 @@ def print_report(document: Document, out: Console, *, cases: bool = False) -> No
         _print_robots(robots, out)
         _print_quantities(robots, out)
     if (title := witness_title(robots)) is not None:
-        out.print(f"urdfkin, Pinocchio and {title}: the largest ratio to each pair's bound", style="bold")
+        out.print(
+            f"urdfkin, Pinocchio and {title}: the largest ratio of a disagreement to its bound, for each"
+            " pair of libraries",
+            style="bold",
+        )
         print_table(out, _three_sides(robots, title))
     for robot in robots:
         _print_robot(robot, out, cases=cases)

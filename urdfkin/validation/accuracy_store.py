@@ -84,7 +84,10 @@ class AccuracyResult:
                 return None
             asked = typed(json.loads(content), Asked)
         except (OSError, ValueError, RecursionError) as error:
-            store.tell(f"{store.folder / JUDGE} cannot be read ({type(error).__name__}): no accuracy results")
+            store.tell(
+                f"{store.folder / JUDGE} cannot be read ({type(error).__name__}): the report has no"
+                " accuracy results"
+            )
             return None
         return cls(store, asked)
 
@@ -120,7 +123,7 @@ class AccuracyResult:
                 "the stores have accuracy results with different options",
                 where=str(other._store.folder),
                 found=f"{other._settings.words}, and {self._settings.words} in {self._store.folder}",
-                remedy="use the same options for all parts",
+                remedy="use the same options of the accuracy study for all stores",
             )
 
     def _key(self, robot: int) -> str:

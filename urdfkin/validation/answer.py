@@ -143,11 +143,11 @@ def unpacked(key: str, content: bytes) -> dict[str, Any]:
     if not content.startswith(_MAGIC):
         raise DamagedError("not a chunk of urdfkin")
     if hashlib.sha256(data).digest() != checksum:
-        raise DamagedError("its checksum does not match")
+        raise DamagedError("the checksum in the file does not match its content")
     try:
         body: dict[str, Any] = json.loads(zlib.decompressobj().decompress(data, _MOST))
         if body["key"] != key:
-            raise DamagedError("it belongs to another chunk")
+            raise DamagedError("the file belongs to another chunk")
     except (ValueError, KeyError, TypeError, zlib.error, RecursionError) as error:
         raise DamagedError(f"not a chunk of urdfkin ({type(error).__name__})") from error
     return body

@@ -104,11 +104,11 @@ def validate(
     shard = None if shard is None else as_str(shard, "shard")
     if retry is not None and as_str(retry, "retry") != "failed":
         raise InputError(
-            "retry: unknown value", found=f"retry={retry!r}", remedy='give retry="failed" or None'
+            "unknown value of `retry`", found=f"retry={retry!r}", remedy='give retry="failed" or None'
         )
     folder = None if store is None else _folder(store)
     if (retry or shard is not None) and store is None:
-        raise InputError("retry and shard need a store", remedy="give store=FOLDER")
+        raise InputError("`retry` and `shard` need `store`", remedy="give store=FOLDER")
     given = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
     started = datetime.datetime.now(datetime.UTC)
     pinocchio()  # once, before the work, so that a missing Pinocchio is an error at once
@@ -166,7 +166,9 @@ def _folder(store: str | os.PathLike[str]) -> Path:
     except (TypeError, ValueError):
         name = b""
     if not name or b"\0" in name:
-        raise InputError("store: not the path of a folder", found=safe_repr(store), remedy="give a path")
+        raise InputError(
+            "`store` must be the path of a folder", found=safe_repr(store), remedy="give the path of a folder"
+        )
     return Path(os.fsdecode(name))
 
 
@@ -293,7 +295,9 @@ def _shard(word: str) -> tuple[int, int]:
     match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", word)
     if match is None or not 1 <= int(match[1]) <= int(match[2]):
         raise InputError(
-            "shard: not of the form i/n", found=repr(word), remedy="for four parts give 1/4, ..., 4/4"
+            "`shard` must have the form i/n",
+            found=repr(word),
+            remedy="for a validation in four parts write 1/4, ..., 4/4",
         )
     return int(match[1]), int(match[2])
 

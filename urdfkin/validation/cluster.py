@@ -67,7 +67,7 @@ def connected(scheduler: str, tell: Callable[[str], None] = lambda _: None) -> I
         tell(f"{len(threads)} workers{watched}")
         if scheduler.startswith("tcp://"):
             tell(
-                "tcp:// needs no key: anyone who reaches the scheduler can run programs;"
+                "an address with tcp:// is not protected: anyone who reaches the scheduler can run programs;"
                 " docs/campaigns.md describes tls://"
             )
         yield Cluster(client)
@@ -82,17 +82,19 @@ def _client(scheduler: str) -> Iterator[Client]:
         except (OSError, ValueError, TypeError) as error:  # TypeError: tls:// without a certificate
             keyed = "; give Dask the cluster's certificate and key, as docs/campaigns.md describes"
             raise ClusterError(
-                "no scheduler answers",
+                "no Dask scheduler answers at this address",
                 where=scheduler,
                 found=str(error),
-                remedy="start one: dask scheduler" + (keyed if kind == "tls" else ""),
+                remedy="start a scheduler with: dask scheduler" + (keyed if kind == "tls" else ""),
             ) from error
         with client:
             yield client
         return
     if not number.isdecimal() or not int(number):
         raise InputError(
-            "scheduler: local:N without a number N of workers", found=repr(scheduler), remedy="give local:2"
+            "`scheduler`: N in local:N must be the number of workers",
+            found=repr(scheduler),
+            remedy="give local:2",
         )
     with _without_ports(int(number)) as cluster, Client(cluster, set_as_default=False) as client:
         yield client
@@ -155,7 +157,7 @@ def _demand_same(client: Client) -> None:
         if isinstance(found, BaseException):
             raise ClusterError(
                 "a worker cannot run urdfkin", where=worker, found=str(found),
-                remedy=f"install urdfkin {version('urdfkin')} there",
+                remedy=f"install urdfkin {version('urdfkin')} on the worker's machine",
             )  # fmt: skip
         _demand_code(worker, found)
     for name in _COMPARED:
@@ -164,13 +166,13 @@ def _demand_same(client: Client) -> None:
         except Exception:  # the scheduler computes nothing and does not need the package
             continue
         if found != version(name) and version(name) != "a checkout":
-            _refuse("scheduler", [f"{name} {found} there and {version(name)} here"])
+            _refuse("scheduler", [f"{name} {found} on the cluster and {version(name)} on this machine"])
 
 
 def _demand_code(worker: str, found: dict[str, str]) -> None:
     local = provenance()
     differences = [
-        f"{k} {found.get(k, 'none')[:12]} there and {local[k][:12]} here"
+        f"{k} {found.get(k, 'none')[:12]} on the cluster and {local[k][:12]} on this machine"
         for k in local
         if found.get(k) != local[k]
     ]
@@ -180,8 +182,9 @@ def _demand_code(worker: str, found: dict[str, str]) -> None:
 
 def _refuse(where: str, differences: list[str]) -> None:
     raise ClusterError(
-        "different versions of the code", where=where, found=", ".join(differences),
-        remedy="install the same versions everywhere; results of different versions are not mixed",
+        "the cluster and this machine have different versions of the"
+        " code", where=where, found=", ".join(differences),
+        remedy="install the same versions on all machines; results of different versions are not mixed",
     )  # fmt: skip
 
 

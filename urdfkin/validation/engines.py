@@ -194,8 +194,8 @@ def lost(what: str, error: Exception) -> Failure:
 
 
 #: Reasons for a robot that crashed its process.
-DIED = "the process that checked it crashed"
-DIED_TWICE = "the process that checked it crashed twice, the second time alone"
+DIED = "the process that validated the robot crashed"
+DIED_TWICE = "the process that validated the robot crashed twice, the second time without other work"
 
 
 def died(subject: RobotInput, how: str, cause: str) -> Failure:

@@ -52,7 +52,8 @@ def demand(tree: KinematicTree, samples: int, most: int | None) -> None:
     wanted = needed(tree, samples)
     if most is not None and wanted > most:
         raise OracleError(
-            f"not enough memory to check the robot (all processes of a validation use {SHARE:.0%} of the free"
+            f"not enough memory to check the robot (all processes of a validation may use {SHARE:.0%} of"
+            " the free"
             " memory)",
             where=tree.name,
             found=f"{_gigabytes(wanted)} needed, {_gigabytes(most)} allowed for each process",

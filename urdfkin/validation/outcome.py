@@ -71,7 +71,7 @@ def outcome(verdicts: Iterable[str], asked: int, interrupted: bool) -> Outcome:
     """
     counts = Counter(map(str, verdicts))
     unknown = sum(counts.values()) != asked
-    reasons = ["interrupted before everything was compared"] if interrupted else []
+    reasons = ["the validation was interrupted before everything was compared"] if interrupted else []
     reasons += [
         f"{counts[verdict]} of {_robots(asked)} {verdict.value}"
         for verdict in (Verdict.DISAGREES, Verdict.NOT_VERIFIED, Verdict.BAD_INPUT)

@@ -225,7 +225,7 @@ class ValidationReport(Displayable):
             figures = (f"{worst:.2g}", f"{share:.1%}") if tallies else ("", "")
             rows.append((robot.source, robot.verdict.value, str(robot.results), str(robot.failed), *figures))
         verified = sum(robot.verdict is Verdict.VERIFIED for robot in self.robots)
-        samples = f"{self.samples} samples of each, seed {self.seed}, in {self.seconds:.1f} s."
+        samples = f"{self.samples} samples of each robot, seed {self.seed}, in {self.seconds:.1f} s."
         reasons = [f"{robot.source}: {robot.reason}" for robot in self.robots if robot.reason]
         return TextDocument(
             f"{verified} of {self.asked} robots verified", (Table(heads, rows), samples, *reasons)

@@ -187,7 +187,10 @@ def chain_disagreement(chain: Chain) -> str | None:
         return None
     how = "by an infinite amount" if share is None else f"{share:.3g} times the bound"
     off = "" if chain["metres"] is None else f", tip {chain['metres']:.2g} m off"
-    return f"the Denavit-Hartenberg tables from {chain['base']} to {chain['tip']} disagree: {how}{off}"
+    return (
+        f"the Denavit-Hartenberg tables from {chain['base']} to {chain['tip']} disagree with"
+        f" Pinocchio: {how}{off}"
+    )
 
 
 def reader_disagreement(reading: SecondReading) -> str | None:

@@ -163,8 +163,8 @@ class Store:
             raise InputError(
                 "the store belongs to another campaign",
                 where=str(self.folder),
-                found=f"(there, and {where}) {'; '.join(differences)}",
-                remedy="use the options of that campaign, or another folder",
+                found=f"(in the store, and in {where}) {'; '.join(differences)}",
+                remedy="use the options of the stored campaign, or another folder",
             )
 
     def at_work(self) -> str | None:
@@ -341,7 +341,7 @@ def _lock_file(place: Path, how: int = os.O_RDWR | os.O_CREAT | os.O_APPEND) -> 
 
 def _no_lock(place: Path, found: str) -> SourceError:
     return SourceError(
-        "the store's lock is not a regular file", where=str(place), found=found, remedy="delete it"
+        "the store's lock is not a regular file", where=str(place), found=found, remedy="delete the lock"
     )
 
 
@@ -354,7 +354,7 @@ def _lock(file: IO[bytes], how: int, folder: Path) -> None:
         "another process uses this store",
         where=str(folder),
         found=_holder(file),
-        remedy="wait for it, end it, or use another folder",
+        remedy="wait until that process ends, or use another folder",
     )
 
 

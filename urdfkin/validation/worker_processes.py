@@ -89,7 +89,7 @@ def _cause(status: int) -> str:
         name = signal.Signals(-status).name
     except ValueError:
         name = str(-status)
-    return f"signal {name}" + (", as when memory runs out" if status == -signal.SIGKILL else "")
+    return f"signal {name}" + (", for example because memory ran out" if status == -signal.SIGKILL else "")
 
 
 _PR_SET_PDEATHSIG = 1
@@ -217,7 +217,7 @@ class _Crew:
             self._handle_crash(worker, task)
             return
         except Exception as error:
-            found = lost("its answer cannot be read", error)
+            found = lost("the answer of the worker process cannot be read", error)
         self._enter_answer(task, found)
         worker.task = None
         if (next_task := self._queue.next(worker.row)) is not None:

@@ -102,16 +102,16 @@ class RequestFilter:
             >>> requests = RequestFilter("127.0.0.1", "key")
             >>> requests.refusal("/key/", ["localhost:8080"], [], connects=False)
             >>> requests.refusal("/key/", ["rebound.example:8080"], [], connects=False)
-            'the Host name in the request is not the name of this viewer'
+            'the Host header of the request does not name this viewer'
             >>> requests.refusal("/key", ["localhost:8080"], ["http://localhost:3000"], connects=True)
-            'another page may not connect to this viewer'
+            'another web page may not connect to this viewer'
         """
         if len(hosts) != 1 or not self._is_known(hosts[0]):
-            return "the Host name in the request is not the name of this viewer"
+            return "the Host header of the request does not name this viewer"
         if not hmac.compare_digest(path.partition("?")[0].strip("/").encode(), self.key.encode()):
-            return "open the whole address that `urdfkin view` printed, with its key"
+            return "open the whole address that `urdfkin view` printed, including its key"
         if origins != [f"http://{hosts[0]}"] and (connects or origins):
-            return "another page may not connect to this viewer"
+            return "another web page may not connect to this viewer"
         return None
 
     def _is_known(self, host: str) -> bool:
@@ -192,7 +192,7 @@ class UnguardedError(UrdfkinError, RuntimeError):
         super().__init__(
             f"the viewer cannot be secured: {what}",
             where=f"viser {_version()}",
-            remedy="pip install 'viser==1.1.1', which can be secured, and report this",
+            remedy="pip install 'viser==1.1.1', which can be secured, and report this as an error of urdfkin",
         )
 
 
@@ -280,11 +280,11 @@ def _page() -> Callable[[str], bytes]:
     try:
         text = file.read_text(encoding="utf-8")
     except OSError as error:
-        raise UnguardedError("its page is not at the expected path") from error
+        raise UnguardedError("the page of viser is not at the expected path") from error
     if text.count("<script") != 1 or any(text.count(plain) != 1 for plain, _ in _SCRIPTS):
-        raise UnguardedError("its page has unexpected scripts")
+        raise UnguardedError("the page of viser has unexpected scripts")
     if text.count(_HEAD) != 1:
-        raise UnguardedError("its page has no head to add to")
+        raise UnguardedError("the page of viser has no <head> element")
     # Our script comes first: it names the controls, follows the browser's theme, and runs before viser's.
     ours = (Path(__file__).parent / "page.html").read_text(encoding="utf-8")
 
@@ -329,9 +329,9 @@ def _silence(server: Any) -> None:
                 known.unregister_handler(message)
         left = {message.__name__ for message in known._incoming_handlers}
     except (AttributeError, AssertionError) as error:
-        raise UnguardedError("its message handlers cannot be listed") from error
+        raise UnguardedError("the message handlers of viser cannot be listed") from error
     if left != set(_ACCEPTED):
-        raise UnguardedError(f"it accepts the messages {', '.join(sorted(left)) or '(none)'}")
+        raise UnguardedError(f"viser accepts the unexpected messages {', '.join(sorted(left)) or '(none)'}")
 
 
 def _test_the_filter(requests: RequestFilter, port: int) -> None:

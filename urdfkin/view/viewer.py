@@ -263,7 +263,7 @@ def missing_words(missing: Iterable[Shape]) -> str:
     remedy = (
         "Set `ROS_PACKAGE_PATH` to the folder that contains their packages."
         if packages
-        else "Put the files where the URDF says."
+        else "Put the files at the paths in the URDF."
     )
     what = f"{len(names)} mesh{'es' if len(names) > 1 else ''} not shown"
     return f"**! {what}**, so the skeleton is shown. {remedy}\n{shown}{more}"
@@ -363,9 +363,9 @@ class Viewer:
         self.sliders.build(self.q, degrees=True)
         with joints:
             if fixed := fixed_coordinates(robot):
-                gui.add_markdown(f"fixed by equal limits: {markdown_text(', '.join(fixed))}")
+                gui.add_markdown(f"joints fixed by equal limits: {markdown_text(', '.join(fixed))}")
             self.words_of_q = gui.add_text(
-                "q, to copy or type", "", hint="The forms of --q: 0.5, 30deg, ready, ready,elbow=30deg."
+                "q, to copy or type", "", hint="Write values as in --q: 0.5, 30deg, ready, ready,elbow=30deg."
             )
             self.wrong = gui.add_markdown("")
             neutral, random = gui.add_button("neutral, within the limits"), gui.add_button("random")
