@@ -33,7 +33,7 @@ def test_an_error_exits_1_with_its_place_and_where_to_read_on(folder: None) -> N
     assert lines[0].startswith("bad.urdf:3:9: URDF402 error: link 'a': another link has this name")
     assert lines[1:3] == ['  3 |   <link name="a"/>', "    |         ^^^^^^^^"]
     assert lines[3] == "1 error in 2 files"
-    assert lines[4].startswith("'urdfkin explain URDF402'")
+    assert lines[4].startswith("run 'urdfkin explain URDF402'")
 
 
 def test_a_warning_exits_0_and_1_when_strict(folder: None) -> None:

@@ -151,7 +151,7 @@ def test_a_comment_silences_and_the_reason_reaches_machines(here: Path) -> None:
     comment = "<!-- urdfkin: ignore[URDF503] the drawing gives two points -->"
     put("arm.urdf", LONG.replace("    <axis", f"    {comment}\n    <axis"))
     done = check("--strict", "arm.urdf")
-    assert (done.code, done.text) == (0, "no findings in 1 file (1 silenced by comments)\n")
+    assert (done.code, done.text) == (0, "no findings in 1 file (silenced by comments: 1)\n")
     data = check("--format", "json", "arm.urdf").data
     assert data["findings"] == []
     (silenced,) = data["silenced"]
@@ -231,14 +231,14 @@ def test_what_a_baseline_knows_blocks_nobody_and_what_is_new_does(here: Path) ->
     done = check("--strict", "--write-baseline", "known.json")
     assert (done.code, done.text, done.err) == (0, "", "wrote known.json: 2 findings in the baseline\n")
     done = check("--strict", "--baseline", "known.json")
-    assert (done.code, done.text) == (0, "no findings in 2 files (2 known before)\n")
+    assert (done.code, done.text) == (0, "no findings in 2 files (already known: 2)\n")
     arm.write_text("\n\n" + LONG.replace("<axis", '<axis  shade="3"'))  # known again on another line
     assert found("--baseline", "known.json") == [("robots/arm.urdf", "URDF208")]
     arm.write_text(LONG.replace("0 0 2", "0 0 3"))  # what is touched is new
     assert found("--baseline", "known.json") == [("robots/arm.urdf", "URDF503")]
     arm.write_text(GOOD)
     assert (
-        "(1 known before, 1 findings of the baseline no longer occur: write the baseline again)"
+        "(already known: 1, in the baseline but already fixed: 1; write the baseline again)"
         in check("--baseline", "known.json").text
     )
 
@@ -313,7 +313,7 @@ def repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_only_what_is_new_since_a_branch_is_told(repository: Path) -> None:
     done = check("--strict", "--changed-since", "main")
-    assert (done.code, done.text) == (0, "no findings in 0 files (2 files unchanged)\n")
+    assert (done.code, done.text) == (0, "no findings in 0 files (unchanged files: 2)\n")
     put("arm.urdf", "\n" + LONG.replace("<axis", '<axis  shade="3"'))
     put("new.urdf", LONG.replace('"r"', '"new"'))
     Path("hand.urdf").rename("left.urdf")
@@ -408,8 +408,8 @@ def test_fix_mends_files_and_what_is_left_is_told(here: Path) -> None:
     done = check("--fix")
     assert (done.code, done.text) == (0, "no findings in 1 file\n")
     assert done.err.splitlines() == [
-        "arm.urdf: fixed URDF208 unknown-attribute, line 4; the robot is the same",
-        "arm.urdf: fixed URDF503 axis-not-unit, line 5; the robot is the same",
+        "arm.urdf: fixed URDF208 unknown-attribute, line 4; the robot is unchanged",
+        "arm.urdf: fixed URDF503 axis-not-unit, line 5; the robot is unchanged",
     ]
     assert arm.read_text() == GOOD
     assert arm.stat().st_mode & 0o777 == 0o640
@@ -504,7 +504,7 @@ def test_a_patch_that_is_printed_below_the_top_of_a_repository_is_applied_there(
 def test_fixes_that_turn_a_joint_wait_for_unsafe_fixes(here: Path) -> None:
     text = LONG.replace("<axis", '<origin rpy="1.5708 0 0"/><axis')
     arm = put("arm.urdf", text)
-    assert "--unsafe-fixes fixes 1 more; these fixes rotate joints by more than rounding" in check().text
+    assert "--unsafe-fixes fixes 1 more, but rotates joints by more than rounding" in check().text
     done = check("--diff")
     assert done.err == "1 finding to fix in 1 file (1 more with --unsafe-fixes)\n"
     check("--fix")
@@ -551,7 +551,7 @@ def test_a_rounded_pi_says_how_far_it_turns(here: Path) -> None:
     arm = put("arm.urdf", GOOD.replace("<axis", '<origin rpy="1.5708 0 0"/><axis'))
     assert (
         check("--fix", "--unsafe-fixes").err
-        == "arm.urdf: fixed URDF601 rounded-pi, line 5; each joint rotated by at most 3.7e-06 rad each\n"
+        == "arm.urdf: fixed URDF601 rounded-pi, line 5; each joint rotated by at most 3.7e-06 rad\n"
     )
     assert 'rpy="1.5707963267948966 0 0"' in arm.read_text()
 
@@ -584,7 +584,7 @@ def test_the_settings_and_the_comment_on_the_page_are_good(here: Path) -> None:
     put("arm.urdf", LONG.replace('    <axis xyz="0 0 2"/>\n', comment))
     put("urdfkin-baseline.json", '{"schema": "urdfkin-baseline", "version": 1, "findings": []}')
     done = check()
-    assert (done.code, done.text) == (0, "no findings in 1 file (1 silenced by comments)\n")
+    assert (done.code, done.text) == (0, "no findings in 1 file (silenced by comments: 1)\n")
 
 
 def test_the_page_lists_the_codes_that_have_cures() -> None:

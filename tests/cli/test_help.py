@@ -151,7 +151,7 @@ def test_every_summary_and_module_is_there() -> None:
 
 def test_the_families_that_the_help_names_are_those_that_exist() -> None:
     page = " ".join(urdfkin("robots", "--help").text.split())
-    named = page.partition("Show only one family: ")[2].partition(".")[0].split(", ")
+    named = page.partition("Show only the robots of one family: ")[2].partition(".")[0].split(", ")
     assert named == sorted({entry.family for entry in catalogue().values()})
 
 

@@ -62,7 +62,7 @@ def test_so_does_the_command_that_explains_what_it_found(tmp_path: Path) -> None
     bad.write_text('<robot name="r"><link name="a"/><link name="b"/></robot>')
     done = bare("check", str(bad))
     assert done.returncode == 1, done.stderr
-    assert "'urdfkin explain URDF411' explains" in done.stdout
+    assert "run 'urdfkin explain URDF411' for details" in done.stdout
     assert bare("explain", "URDF411").returncode == 0
 
 

@@ -32,7 +32,7 @@ MISTAKES = {
     "no csv file": (["jacobian", "panda", "--q", "@nowhere.csv"], "nowhere.csv: cannot be read: found No"),
     "a binary csv file": (["jacobian", "panda", "--q", "@/bin/sh"], "/bin/sh: cannot be read: found text"),
     "an empty csv file": (["jacobian", "panda", "--q", "@/dev/null"], "no samples; write one line for each"),
-    "random:many": (["jacobian", "panda", "--q", "random:many"], "random:N needs a whole number"),
+    "random:many": (["jacobian", "panda", "--q", "random:many"], "N in random:N must be a whole number"),
     "random:0": (["jacobian", "panda", "--q", "random:0"], "N in random:N must be a whole number, at"
                                                            " least 1"),
     "a zero quaternion": (
@@ -61,8 +61,8 @@ MISTAKES = {
     "no value": (["jacobian", "ur5", "--q"], "Option '--q' requires an argument"),
     "no such family": (["robots", "--family", "armchair"], "no robots of family 'armchair'; the families"),
     "a negative seed": (["jacobian", "panda", "--seed", "-1"], "Invalid value for '--seed'"),
-    "no robot": (["validate"], "give either robots or --all"),
-    "robots and all": (["validate", "panda", "--all"], "give either robots or --all"),
+    "no robot": (["validate"], "name robots, or give --all"),
+    "robots and all": (["validate", "panda", "--all"], "name robots, or give --all"),
     "negative samples": (["validate", "panda", "--samples", "-1"], "Invalid value for '--samples'"),
     "no jobs": (["validate", "panda", "--jobs", "0"], "Invalid value for '--jobs'"),
     "an output nowhere": (["jacobian", "ur5", "-o", "/nowhere/J.csv"], "J.csv: cannot be written: found No"),

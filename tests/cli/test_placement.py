@@ -169,7 +169,7 @@ def test_a_batch_of_bases_goes_with_one_configuration_and_with_as_many(tmp_path:
         np.testing.assert_allclose(done.data["result"], expected, atol=1e-14)
     done = urdfkin("placement", "ur5", "--q", "random:3", "--base-placement", f"@{path}")
     assert done.code == 2
-    assert "batches of q, v, a and of the base have different lengths: found 3, 3, 3, 4, 1, 1" in done.err
+    assert "batches of q, v, a and the base motion have different lengths: found 3, 3, 3, 4, 1, 1" in done.err
 
 
 @pytest.mark.parametrize(

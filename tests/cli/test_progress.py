@@ -35,7 +35,8 @@ def test_what_was_kept_from_before_makes_nobody_fast() -> None:
     clock.now += 5.0
     assert pace.of(STANDING) == (4.0, 128.5)
     assert line(STANDING, pace) == (
-        "2 of 68 robots, 30 of 544 chunks (10 from before); 4 chunks/s, 2 min 8 s left, none failed; panda"
+        "2 of 68 robots, 30 of 544 chunks (10 from an earlier run); 4 chunks/s, 2 min 8 s left, none"
+        " failed; panda"
     )
     assert "3 failed" in line(replace(STANDING, failures=3), pace)
 
@@ -100,7 +101,7 @@ def test_a_shard_says_what_it_came_to_and_what_comes_next(tmp_path: Path) -> Non
     done = urdfkin(*words, "--shard", "2/2")
     assert done.code == 0
     assert f"shard 2/2 of {where}: 1 robot, " in done.text
-    assert "next: urdfkin report merge" in done.text
+    assert "next: run `urdfkin report merge" in done.text
     assert urdfkin("report", where).code == 130
     assert urdfkin(*words, "--shard", "1/2").code == 0
     assert urdfkin("report", where).code == 0

@@ -132,7 +132,7 @@ def test_compare_lists_a_changed_axis_and_states_that_changes_alone_exit_with_0(
     ("words", "message"),
     [
         (("report", "none.json"), "none.json: cannot be read"),
-        (("report",), "give the file"),
+        (("report",), "name the file"),
         (("report", "compare", "none.json", "none.json"), "cannot be read"),
         (("validate", "ur5", "--html", "/nowhere/a.html"), "/nowhere/a.html: cannot be written"),
         (("plot", "ur5", "-o", "a.svg"), "--to VALUES"),

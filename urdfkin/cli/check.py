@@ -128,10 +128,10 @@ def _print_terminal(outcome: Outcome, *, excerpts: bool) -> None:
 
 def _print_summary(outcome: Outcome) -> None:
     asides = [
-        f"{len(outcome.silenced)} findings silenced by comments" if outcome.silenced else "",
-        f"{outcome.unchanged} files unchanged" if outcome.unchanged else "",
-        f"{outcome.known[0]} findings known from before" if outcome.known[0] else "",
-        f"{outcome.known[1]} findings of the baseline no longer occur: write the baseline again"
+        f"silenced by comments: {len(outcome.silenced)}" if outcome.silenced else "",
+        f"unchanged files: {outcome.unchanged}" if outcome.unchanged else "",
+        f"already known: {outcome.known[0]}" if outcome.known[0] else "",
+        f"in the baseline but already fixed: {outcome.known[1]}; write the baseline again"
         if outcome.known[1]
         else "",
     ]

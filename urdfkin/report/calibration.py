@@ -44,7 +44,7 @@ def document(found: Calibration) -> TextDocument:
             )
             for k in sorted(identification.kept)
         ]
-        parts.append(Table(["parameter", "changed by", "standard deviation", "written"], rows))
+        parts.append(Table(["parameter", "change", "standard deviation", "written"], rows))
     if found.fitted is None or found.before is None:
         return TextDocument(title, parts)
     noise = found.fitted.noise
