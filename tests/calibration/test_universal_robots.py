@@ -178,14 +178,14 @@ def test_an_arm_with_other_joints_is_refused(file: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("a: [", "not a YAML file"),
-        ("joints: 1", "not a calibration of a Universal Robots arm"),
+        ("a: [", "this is not a YAML file"),
+        ("joints: 1", "this file is not a calibration of a Universal Robots arm"),
         ("kinematics: {shoulder: 1}", "no shoulder"),
         ("kinematics: {shoulder: {x: ten}}", "shoulder x"),
         ("kinematics: {shoulder: {x: .nan}}", "shoulder x"),
         ("kinematics: {shoulder: {y: 0}}", "shoulder x: not a finite number: found NoneType"),
         (BOMB, "shoulder x: not a finite number: found list"),
-        ("kinematics: " + "[" * 5000, "not a YAML file"),
+        ("kinematics: " + "[" * 5000, "this is not a YAML file"),
     ],
 )
 def test_another_file_is_told(text: str, words: str, tmp_path: Path) -> None:

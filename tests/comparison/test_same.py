@@ -327,7 +327,7 @@ def test_what_is_said_of_the_models_as_written_is_proven_again_too(end: str) -> 
     document = json.loads(json.dumps(certificate(urdfkin.same(a, b))))
     assert recheck(document, a, b) == []
     document["as_written"][end] *= 0.9 if end == "upper" else 1.1
-    assert any(line.startswith("as written: frame ") for line in recheck(document, a, b))
+    assert any(line.startswith("`as_written`: frame ") for line in recheck(document, a, b))
 
 
 @pytest.mark.parametrize("kind", ["planar", "floating"])

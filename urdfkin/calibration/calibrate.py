@@ -75,7 +75,9 @@ _READ_BACK = 4.0
 #: Number of parameters or poses that a warning names.
 _NAMED = 6
 #: Text of the error for a fit that no correction makes plausible.
-_NO_REASON = "degrees, shifted rows of q and reversed signs of joints do not explain it"
+_NO_REASON = (
+    "the reason is unknown: degrees, shifted rows of q or reversed signs of joints do not explain the error"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +192,7 @@ class ImplausibleError(InputError):
         model, judged = calibration.model, calibration.plausibility
         reason = f"likeliest reason: {judged.reason}" if judged.reason else _NO_REASON
         super().__init__(
-            "the calibration is refused",
+            "the calibration is not plausible and was refused",
             where=f"{calibration.robot.name}, {model.base} to {model.tip}",
             found="; ".join(judged.objections),
             remedy=f"{reason}; {remedy}",
@@ -264,7 +266,7 @@ def calibrate(
         every=as_bool(every, "every"),
     )
     if found.plausibility.objections and not as_bool(force, "force"):
-        raise ImplausibleError(found, "force=True returns the fit anyway")
+        raise ImplausibleError(found, "to return this fit anyway, pass force=True")
     return found
 
 
@@ -313,7 +315,7 @@ def fitted_model(
     )
     drop_odd, complete = as_bool(drop_odd, "drop_odd"), as_bool(complete, "complete")
     if (q is None) != (poses is None):
-        raise InputError("q and poses must be given together", found="only one of the two")
+        raise InputError("`q` and `poses` must be given together", found="only one of the two")
     given = None if q is None or poses is None else _check_measured(robot, model, q, poses)
     if given is not None:
         complete = given[1].complete
@@ -356,7 +358,8 @@ def _check_measured(
     values = model.coupling.values(path_q)
     if len(values) != len(T) or values.ndim != 2:
         raise InputError(
-            "each pose needs its configuration", found=f"{len(T)} poses, q of shape {np.shape(q)}"
+            "the number of poses and the number of configurations differ",
+            found=f"{len(T)} poses, q of shape {np.shape(q)}",
         )
     if not len(T):
         raise InputError("no poses", remedy="give more measured numbers than there are parameters")
@@ -446,10 +449,14 @@ def _add_identifiable(
 
 def _parse_noise(noise: tuple[float, float]) -> Noise:
     if not isinstance(noise, tuple | list) or len(noise) != 2:
-        raise InputError("noise must be two numbers, metres and radians", found=safe_repr(noise))
+        raise InputError("`noise` must be two numbers, in metres and radians", found=safe_repr(noise))
     metres, radians = (real_number(one, "noise") for one in noise)
     if min(metres, radians) <= 0.0:
-        raise InputError("noise must be positive", found=str(noise), remedy="omit it: it is then estimated")
+        raise InputError(
+            "`noise` must be positive",
+            found=str(noise),
+            remedy="omit `noise` to estimate it from the residuals",
+        )
     return Noise(metres, radians)
 
 
@@ -494,7 +501,7 @@ def _verify_written(found: Calibration, measured: Measured, q: ArrayLike) -> Cer
         raise UrdfkinError(
             "the written URDF disagrees with the fit",
             where=f"{found.robot.name}, {model.base} to {model.tip}",
-            found=f"{float(away.max()):.3g}, where rounding explains {bound:.3g}",
+            found=f"a difference of {float(away.max()):.3g} m or rad, but rounding explains only {bound:.3g}",
             remedy="please report this as an error of urdfkin, with the robot and the poses",
         )
     return found.written.loaded.certificate()
@@ -520,20 +527,20 @@ def _doubts(found: Calibration) -> Iterator[str]:
         worst = sorted(found.weak.items(), key=lambda one: -one[1])
         yield (
             "poorly observable: "
-            + _list(f"{name[k]} ({ratio:.0f} times as uncertain)" for k, ratio in worst)
-            + "; in brackets: compared with as many random configurations"
+            + _list(f"{name[k]} ({ratio:.0f} times the usual uncertainty)" for k, ratio in worst)
+            + "; the usual uncertainty is that with as many random configurations"
         )
     if not fitted.is_judged:
-        yield "the fit cannot be checked: there are as many parameters as measured numbers"
+        yield "the fit cannot be checked, because there are as many parameters as measured numbers"
     elif fitted.freedom < len(found.identification.kept):
         yield (
-            f"only {fitted.freedom:.0f} redundant measured numbers for "
+            f"there are only {fitted.freedom:.0f} redundant measured numbers for "
             f"{len(found.identification.kept)} parameters"
         )
     if found.stated and abs(fitted.ratio - 1.0) > _UNLIKELY * fitted.spread:
         yield (
             f"the residuals are {fitted.ratio:.3g} times the stated noise: "
-            "the noise differs, or the model is too simple"
+            "the true noise differs, or the model is too simple"
         )
     if found.odd and found.without_odd is not None:
         one = len(found.odd) == 1
@@ -548,7 +555,9 @@ def _doubts(found: Calibration) -> Iterator[str]:
             )
     gains = [k for k in found.identification.kept if found.parameters[k].what == "gain"]
     if gains:
-        yield f"a URDF cannot store gains: {_list(name[k] for k in gains)} are not written"
+        yield (
+            f"these gains are not written, because a URDF cannot store them: {_list(name[k] for k in gains)}"
+        )
 
 
 def _list(names: Iterable[str]) -> str:
@@ -612,7 +621,9 @@ def _table(
     part = [name for name in _QUATERNION if name in data]
     if 0 < len(part) < len(_QUATERNION):
         missing = ", ".join(name for name in _QUATERNION if name not in part)
-        raise InputError("a quaternion needs four columns", where=where, found=f"no {missing}")
+        raise InputError(
+            "a quaternion needs four columns: qx, qy, qz, qw", where=where, found=f"no {missing}"
+        )
     if kind is _MATRIX:
         rows = np.stack([data[name] for name in _MATRIX], axis=-1).reshape(s, 3, 4)
         T = np.concatenate([rows, np.broadcast_to([[0.0, 0.0, 0.0, 1.0]], (s, 1, 4))], axis=1)
@@ -628,7 +639,10 @@ def _archive(path: Path, nq: int) -> tuple[FloatArray, FloatArray]:
     if ("T" in data) == ("p" in data) or ("quat" in data and "p" not in data):
         found = ", ".join(data)
         raise InputError(
-            "measured poses must be q with T, q with p, or q with p and quat", where=str(path), found=found
+            "a file of measured poses must contain the arrays `q` and `T`, `q` and `p`, or `q`, `p` and"
+            " `quat`",
+            where=str(path),
+            found=found,
         )
     if "T" in data:
         return data["q"], _with_exact_rotations(data["T"], str(path))
@@ -674,4 +688,6 @@ def checked_poses(poses: ArrayLike) -> FloatArray:
         return array
     if array.ndim == 3 and array.shape[1:] == (4, 4):
         return _with_exact_rotations(array, "poses")
-    raise InputError("poses must be (n, 4, 4), or positions (n, 3)", found=f"shape {array.shape}")
+    raise InputError(
+        "`poses` must have the shape (n, 4, 4), or (n, 3) for positions", found=f"shape {array.shape}"
+    )

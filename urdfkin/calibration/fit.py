@@ -528,7 +528,7 @@ def demand_plausible(model: Model, measured: Measured) -> None:
     )
     if ours > 0.0 and theirs > _FARTHER * ours:
         raise InputError(
-            "measured positions spread much farther than the robot's tip",
+            "the measured positions are much farther apart than the positions of the robot's tip",
             found=f"{theirs:.4g} m, where the robot's tip moves {ours:.4g} m",
-            remedy="if they are in millimetres, add --unit mm (in Python, multiply them by 0.001)",
+            remedy="if the positions are in millimetres, add --unit mm (in Python, multiply them by 0.001)",
         )

@@ -121,12 +121,14 @@ def judge(model: Model, ended: Ended, *, radians: bool) -> Plausibility:
     if better is None:
         return Plausibility(tuple(objections))
     if not objections:
-        turned = f"a zero turned by half a turn, joint {_list(zeros)}; " if zeros else ""
+        turned = f"a joint zero changed by half a turn, joint {_list(zeros)}; " if zeros else ""
         objections = [
-            f"{turned}an rms error of {_rms(fitted)}, and of {_rms(better.ended.fitted)} with a correction"
+            f"{turned}an rms error of {_rms(fitted)}, but only {_rms(better.ended.fitted)} with a"
+            " correction of the data"
         ]
     return Plausibility(
-        tuple(objections), f"{better.correction.reason} (the rms error is then {_rms(better.ended.fitted)})"
+        tuple(objections),
+        f"{better.correction.reason} (after this correction the rms error is {_rms(better.ended.fitted)})",
     )
 
 
@@ -142,7 +144,7 @@ def _too_few(ended: Ended) -> list[str]:
     among = f" among {len(steps)} poses" if distinct < len(steps) else ""
     return [
         f"{distinct} distinct configuration{'s' * (distinct != 1)}{among} give {distinct * each} numbers "
-        f"for {rank} parameters: the fit cannot be checked"
+        f"for {rank} parameters, so the fit cannot be checked"
     ]
 
 
@@ -165,11 +167,12 @@ def _misfits(model: Model, ended: Ended) -> Iterator[str]:
     unexplained = metres > _CLOSE_BY * reach and metres > _UNEXPLAINED * spread
     if metres > _MISSED * reach or no_better or unexplained:
         yield (
-            f"an rms error of {length(metres)}, {metres / reach:.0%} of the reach of {length(reach)} "
+            f"a large rms error of {length(metres)}, which is {metres / reach:.0%} of the reach of"
+            f" {length(reach)} "
             f"(before the fit {length(metres_before)})"
         )
     if turn is not None and turn > _MISTURNED:
-        yield f"an rms error of the orientations of {angle(turn)}"
+        yield f"a large rms error of the orientations, {angle(turn)}"
 
 
 def _extreme_parameters(model: Model, ended: Ended) -> Iterator[str]:
@@ -181,9 +184,9 @@ def _extreme_parameters(model: Model, ended: Ended) -> Iterator[str]:
         if parameter.what == "gain" and surely > _GAINED:
             gained[parameter.where] = f"{parameter.where!r} by {1.0 + moved:.3g}"
     if tilted:
-        yield f"a tilted axis, joint {_list(tilted.values())}"
+        yield f"the fit tilts the axis of joint {_list(tilted.values())}"
     if gained:
-        yield f"scaled values, joint {_list(gained.values())}"
+        yield f"the fit scales the values of joint {_list(gained.values())}"
 
 
 def _turned_zeros(model: Model, ended: Ended) -> list[str]:
@@ -230,9 +233,9 @@ def _out_of_range(model: Model, q: FloatArray, *, radians: bool, misfit: bool) -
         elif far:
             outside[name] = f"{name!r} ({largest[name]:.4g}, limits {lower:.4g} to {upper:.4g})"
     if turned and not radians:
-        yield f"values beyond a turn look like degrees: joint {_list(turned.values())}"
+        yield f"joint values of more than one turn look like degrees: joint {_list(turned.values())}"
     if outside and misfit:
-        yield f"values far outside the limits: joint {_list(outside.values())}"
+        yield f"joint values are far outside the limits: joint {_list(outside.values())}"
 
 
 def _coordinates(model: Model) -> Iterator[tuple[str, bool, float, float]]:
@@ -269,7 +272,9 @@ def _corrections(model: Model, q: FloatArray) -> Iterator[_Correction]:
         )
     if not turning.all():
         if turning.any():
-            yield _Correction("all joint values are multiplied by 180/pi; undo it", np.radians(q))
+            yield _Correction(
+                "all joint values are multiplied by 180/pi; divide them by 180/pi", np.radians(q)
+            )
         yield _Correction(
             "prismatic joints are in millimetres; convert them to metres", np.where(turning, q, 1e-3 * q)
         )
@@ -277,7 +282,9 @@ def _corrections(model: Model, q: FloatArray) -> Iterator[_Correction]:
         if len(q) > abs(by) + 1:
             rows = "one row" if abs(by) == 1 else f"{abs(by)} rows"
             way = "later" if by > 0 else "earlier"
-            reason = f"q is shifted by {rows} against the poses; the q of each pose is {rows} {way}"
+            reason = (
+                f"q is shifted by {rows} relative to the poses; the correct q of each pose is {rows} {way}"
+            )
             if by > 0:
                 yield _Correction(reason, q[by:], 0, len(q) - by)
             else:

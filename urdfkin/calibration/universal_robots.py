@@ -77,14 +77,14 @@ def read_calibration(path: Path, order: str = "driver") -> dict[str, FloatArray]
         data = yaml.safe_load(read_text(path, pipes=True))
     except (yaml.YAMLError, RecursionError) as error:
         raise InputError(
-            "not a YAML file", where=str(path), found=" ".join(str(error).split())[:100]
+            "this is not a YAML file", where=str(path), found=" ".join(str(error).split())[:100]
         ) from None
     kinematics = data.get("kinematics") if isinstance(data, Mapping) else None
     if not isinstance(kinematics, Mapping):
         raise InputError(
-            "not a calibration of a Universal Robots arm",
+            "this file is not a calibration of a Universal Robots arm",
             where=str(path),
-            remedy="give the driver's file; it begins kinematics: shoulder: x: ...",
+            remedy="use the calibration file of the driver, which begins with kinematics: shoulder: x: ...",
         )
     return {joint: _origin(kinematics, link, ORDERS[order], str(path)) for link, joint in LINKS.items()}
 
@@ -92,7 +92,7 @@ def read_calibration(path: Path, order: str = "driver") -> dict[str, FloatArray]
 def _origin(kinematics: Mapping[Any, Any], link: str, sequence: str, where: str) -> FloatArray:
     entry = kinematics.get(link)
     if not isinstance(entry, Mapping):
-        raise InputError("the file lacks a link", where=where, found=f"no {link}")
+        raise InputError("the calibration file lacks a link", where=where, found=f"no {link}")
     six = []
     for name in _SIX:
         # The driver writes 0.00001 as 1e-05, and YAML 1.1 reads 1e-05 as a string. The error message never
@@ -101,7 +101,7 @@ def _origin(kinematics: Mapping[Any, Any], link: str, sequence: str, where: str)
         number = parse_float(str(value)) if isinstance(value, int | float | str) else None
         if number is None:
             found = repr(value)[:60] if isinstance(value, float | str) else type(value).__name__
-            raise InputError("not a finite number", where=f"{where}, {link} {name}", found=found)
+            raise InputError("this is not a finite number", where=f"{where}, {link} {name}", found=found)
         six.append(number)
     return pose(rotation_from_euler(sequence, six[3:]), six[:3])
 
@@ -150,10 +150,10 @@ def _fit_origins(robot: Robot, calibrated: FrameChain, tip: str, base: str) -> R
     own = robot.chain(tip, base).coupling
     if len(own.names) != len(calibrated.joint_names):
         raise InputError(
-            "the robot's path has not as many coordinates as the calibrated arm",
+            "the robot's path and the calibrated arm have different numbers of coordinates",
             where=f"{robot.name}, {base} to {tip}",
             found=f"{len(own.names)} and {len(calibrated.joint_names)}",
-            remedy="use a URDF of ur_description, with base and tool0",
+            remedy="use a URDF of ur_description, which has the frames base and tool0",
         )
     q = robot.sample(_FITTED, seed=_FITTED_SEED)
     values = own.select(robot.tree, q)
@@ -166,7 +166,8 @@ def _fit_origins(robot: Robot, calibrated: FrameChain, tip: str, base: str) -> R
             "no origins make the robot move like the calibrated arm",
             where=f"{robot.name}, {base} to {tip}",
             found=f"a residual of {left:.3g} m or rad",
-            remedy="compare the joints' order, kinds and senses with a nominal arm: urdfkin same",
+            remedy="compare the URDF with that of an uncalibrated arm of this type: urdfkin same A.urdf"
+            " B.urdf",
         )
     return found.written
 
@@ -200,8 +201,8 @@ def _verify_written(result: Rewritten, calibrated: FrameChain, prefix: str) -> C
         raise InputError(
             "the URDF's frames base and tool0 differ from those of the calibration",
             where=result.robot.name,
-            found=f"base to tool0 is off by {away:.3g} m or rad",
-            remedy="use a URDF of ur_description, with base and tool0",
+            found=f"the pose of tool0 in base is off by {away:.3g} m or rad",
+            remedy="use a URDF of ur_description, which has the frames base and tool0",
         )
     return written.certificate()
 

@@ -106,7 +106,7 @@ def _choice(kind: type[_Choice], name: str, value: str) -> _Choice:
         return kind(value)
     except ValueError:
         known = " or ".join(repr(member.value) for member in kind)
-        raise InputError(f"unknown value for {name}", found=repr(value), remedy=f"write {known}") from None
+        raise InputError(f"unknown value of `{name}`", found=repr(value), remedy=f"write {known}") from None
 
 
 def choices_of(

@@ -66,10 +66,10 @@ def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tu
             best, flip = key, reversed_
     if best[0] > _ANOTHER:
         raise InputError(
-            "the table for `like` describes another robot",
+            "the table of `like` describes another robot",
             where=f"{chain.robot}, {chain.base} to {chain.tip}",
-            found=f"cells that differ by {best[0]:.0%} of the reach, or by {best[0]:.2g} rad",
-            remedy="compare it with the URDF by --compare, which reports the differences",
+            found=f"cells of the table that differ by {best[0]:.0%} of the reach, or by {best[0]:.2g} rad",
+            remedy="compare the table with the URDF by --compare, which reports the differences",
             question=Question.DH_AND_URDF_DISAGREE,
         )
     return flip

@@ -155,7 +155,8 @@ def _grid(lines: list[str], split: Callable[[str], list[str]], mark: str = "") -
                     f"a row needs a cell for each of the {len(columns)} columns",
                     where=f"row {len(rows) + 1}",
                     found=f"{len(cells)}: {', '.join(cells)}"[:200],
-                    remedy=f"the columns are {', '.join(column.name or '-' for column in columns)}",
+                    remedy="the columns of the table are"
+                    f" {', '.join(column.name or '-' for column in columns)}",
                 )
             rows.append(cells)
         else:
@@ -173,10 +174,11 @@ def _no_header(lines: list[str]) -> InputError:
     missing = next((name for name in ORDER if name not in names), None)
     if missing is None:
         return InputError(
-            "the headings are not separated as one line of cells",
+            "the line of column headings is not separated like the other lines",
             where="header",
             found=", ".join(best)[:200],
-            remedy="separate them all by the same character: a comma, a semicolon, a tab or a bar",
+            remedy="separate the cells of all lines by the same character: a comma, a semicolon, a tab"
+            " or a bar",
         )
     return InputError(
         f"no column {missing!r}",
@@ -399,7 +401,7 @@ def _interpret_variables(data: dict[str, Any], named: list[str]) -> None:
             number = cell.variable or i + 1
             if number > len(names):
                 raise InputError(
-                    "no row has the variable of this row",
+                    "no row has the joint variable that this row mimics",
                     where=f"row {i + 1}, {name}",
                     found=row[name],
                 )
@@ -495,7 +497,9 @@ def mapping_from_text(text: str, suffix: str, where: str) -> Mapping[str, Any]:
         raise InputError(f"not valid {suffix[1:].upper()}", where=where, found=str(error)[:200]) from None
     if not isinstance(data, Mapping):
         raise InputError(
-            "a table must be a mapping with convention and rows", where=where, found=type(data).__name__
+            "a table must be a mapping with the keys `convention` and `rows`",
+            where=where,
+            found=type(data).__name__,
         )
     return data
 

@@ -40,7 +40,8 @@ class PrintedPrecision:
     def __str__(self) -> str:
         guaranteed = "" if self.bound is None else f", at most {at_most(self.bound)} m"
         return (
-            f"as printed, with {self.digits} digits: within {at_most(self.metres)} m of the exact table on"
+            f"the table printed with {self.digits} digits moves the tip by at most"
+            f" {at_most(self.metres)} m on"
             f" {self.samples} samples{guaranteed}"
         )
 

@@ -102,7 +102,7 @@ _KINDS = {
     "prismatic": JointKind.PRISMATIC,
 }
 _KEYS = ("joint", "kind", *ORDER, "sense", "beta", "mimic", "limit")
-_BY_NAME = "write {a = ..., alpha = ..., d = ..., theta = ...}, which has no order"
+_BY_NAME = "write {a = ..., alpha = ..., d = ..., theta = ...}, where the order does not matter"
 
 
 def written_row(row: Any, index: int, units: Units) -> DHRow:
@@ -206,7 +206,10 @@ def _check_keys(given: Mapping[str, Any], keys: Sequence[str], what: str, where:
     for key in given:
         if key not in keys:
             raise InputError(
-                f"unknown key in {what}", where=where, found=repr(key), remedy=f"keys are {', '.join(keys)}"
+                f"unknown key in {what}",
+                where=where,
+                found=repr(key),
+                remedy=f"the known keys are {', '.join(keys)}",
             )
 
 
@@ -225,14 +228,14 @@ def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mappin
             "the joint variable belongs in theta of a revolute joint, or in d of a prismatic joint",
             where=at,
             found=repr(written[name]),
-            remedy="write numbers into the other cells",
+            remedy="write a number into each other cell of the row",
         )
     if cell.times not in (1.0, -1.0) or cell.variable not in (None, index + 1) or "sense" in fields:
         raise InputError(
             f"the variable of row {index + 1} must be q{index + 1} or -q{index + 1}",
             where=at,
             found=repr(written[name]),
-            remedy="write mimic = {leader, multiplier, offset} for a mimic joint",
+            remedy="for a mimic joint write mimic = {leader, multiplier, offset}",
         )
     constant = f"{cell.number!r} {cell.unit or ''}"
     return {"kind": kind, **fields, name: constant, "sense": cell.times}
@@ -289,7 +292,7 @@ def _kind(value: Any, where: str) -> JointKind:
             "the kind of a row must be revolute, continuous or prismatic",
             where=f"{where}, kind",
             found=repr(value),
-            remedy="write R or P",
+            remedy="write R (revolute) or P (prismatic)",
         )
     return kind
 
@@ -298,10 +301,10 @@ def _sense(value: Any, where: str) -> int:
     number = read_number(value, f"{where}, sense")
     if number not in (1.0, -1.0):
         raise InputError(
-            "the sense must be 1 or -1",
+            "`sense` must be 1 or -1",
             where=f"{where}, sense",
             found=repr(value),
-            remedy="write -1 to reverse the joint; write another factor as the multiplier in mimic",
+            remedy="write -1 to reverse the joint; write another factor as `multiplier` in `mimic`",
         )
     return int(number)
 
@@ -316,7 +319,9 @@ def _mimic(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> M
     if value is None:
         return None
     if not isinstance(value, Mapping) or "leader" not in value:
-        raise InputError("mimic must be {leader, multiplier, offset}", where=where, found=repr(value))
+        raise InputError(
+            "`mimic` must have the form {leader, multiplier, offset}", where=where, found=repr(value)
+        )
     _check_keys(value, ("leader", "multiplier", "offset"), "mimic", where)
     return Mimic(
         name_of(value["leader"], f"{where}, leader"),
@@ -329,7 +334,9 @@ def _limit(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> L
     if value is None:
         return None
     if not isinstance(value, Mapping):
-        raise InputError("limit must be {lower, upper, velocity, effort}", where=where, found=repr(value))
+        raise InputError(
+            "`limit` must have the form {lower, upper, velocity, effort}", where=where, found=repr(value)
+        )
     _check_keys(value, ("lower", "upper", "velocity", "effort"), "limit", where)
     lower, upper, velocity = (
         _own(name, value[name], fields, units, where) if name in value else default
@@ -337,7 +344,7 @@ def _limit(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> L
     )
     if lower > upper:
         raise InputError(
-            "lower is above upper",
+            "`lower` is above `upper`",
             where=f"{where}, limit",
             found=f"{value['lower']!r} and {value['upper']!r}",
         )
@@ -431,7 +438,9 @@ def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
     for key in data:
         if key not in _TABLE_KEYS and key not in NOTES:
             raise InputError(
-                "unknown key in a table", found=repr(key), remedy=f"keys are {', '.join(_TABLE_KEYS)}"
+                "unknown key in a table",
+                found=repr(key),
+                remedy=f"the known keys are {', '.join(_TABLE_KEYS)}",
             )
     options = {key: data[key] for key in _TABLE_KEYS if key in data and key not in ("convention", "rows")}
     return table_from_rows(data.get("rows"), data["convention"], **options)
@@ -440,7 +449,9 @@ def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
 def _check_leaders(rows: Sequence[DHRow], coordinates: Any) -> None:
     """Check that each mimicked joint has a row or is in `coordinates`, and is not itself a mimic joint."""
     if not isinstance(coordinates, Sequence) or isinstance(coordinates, str):
-        raise InputError("coordinates must be a list of names", where="coordinates", found=repr(coordinates))
+        raise InputError(
+            "`coordinates` must be a list of names", where="coordinates", found=repr(coordinates)
+        )
     leads = {row.joint for row in rows if row.mimic is None}
     known = [*leads, *(name_of(name, "coordinates") for name in coordinates)]
     for i, row in enumerate(rows):
@@ -452,7 +463,7 @@ def _check_leaders(rows: Sequence[DHRow], coordinates: Any) -> None:
                 "a joint cannot mimic a mimic joint",
                 where=where,
                 found=repr(row.mimic.leader),
-                remedy="name the joint that the other one mimics, and multiply the multipliers",
+                remedy="name the joint that the mimicked joint itself mimics, and multiply both multipliers",
             )
         error = UnknownNameError("joint", row.mimic.leader, known, where=where)
         error.remedy = f"{error.remedy}; name a mimicked joint without a row in coordinates = [...]"

@@ -293,7 +293,7 @@ def screws_from(
     home = np.asarray(M, dtype=np.float64)
     if S.ndim != 2 or S.shape[1] != 6 or home.shape not in ((4, 4), (3, 4)) or frame not in ("space", "body"):
         raise InputError(
-            "screws must be (n, 6) with a zero pose M (4, 4), and the frame space or body",
+            "screws must have the shape (n, 6), with a zero pose M (4, 4) and the frame `space` or `body`",
             found=f"{S.shape}, {home.shape}, {frame!r}",
         )
     if not (np.isfinite(S).all() and np.isfinite(home).all()):
@@ -304,23 +304,26 @@ def screws_from(
         S = np.hstack([w, S[:, 3:] @ pose[:3, :3].T + np.cross(pose[:3, 3], w)])
     names = tuple(joints) or tuple(f"joint_{i + 1}" for i in range(len(S)))
     if len(names) != len(S):
-        raise InputError("each screw needs a name", found=f"{len(names)} names, {len(S)} screws")
+        raise InputError(
+            "the number of names and the number of screws differ",
+            found=f"{len(names)} names, {len(S)} screws",
+        )
     made = []
     for i, name in enumerate(names):
         turns = bool(S[i, :3].any())
         size = float(np.linalg.norm(S[i, :3] if turns else S[i, 3:]))
         if abs(size - 1.0) > _WRITTEN:
             raise InputError(
-                "an axis must have length 1",
+                "the axis w of a screw must have length 1",
                 where=f"screw {i + 1}",
                 found=f"{size:.6g}",
-                remedy="write (w, v), angular first",
+                remedy="write a screw as (w, v), angular part first",
             )
         S[i] /= size
         pitch = float(S[i, :3] @ S[i, 3:])
         if abs(pitch) > _WRITTEN:
             raise InputError(
-                "a joint is revolute or prismatic, not both", where=f"screw {i + 1}",
+                "the screw of a joint must be a pure rotation or a pure translation", where=f"screw {i + 1}",
                 found=f"a pitch of {pitch:.3g} m/rad", remedy="make w . v = 0 for a revolute joint",
             )  # fmt: skip
         S[i, 3:] -= pitch * S[i, :3]
@@ -337,10 +340,16 @@ def screws_of_mapping(data: Mapping[str, Any]) -> ProductOfExponentials:
     known = ("robot", "base_frame", "tip_frame", "joints", "M", "space", "body")
     for key in data:
         if key not in known:
-            raise InputError("unknown key in screws", found=repr(key), remedy=f"keys are {', '.join(known)}")
+            raise InputError(
+                "unknown key in the table of screws",
+                found=repr(key),
+                remedy=f"the known keys are {', '.join(known)}",
+            )
     frame = next((one for one in ("space", "body") if one in data), None)
     if frame is None:
-        raise InputError("no screws", where="space", remedy="write space = [[w, v], ...], or body")
+        raise InputError(
+            "no screws", where="space", remedy="write space = [[w, v], ...], or body = [[w, v], ...]"
+        )
     named = {key: data[key] for key in known[:4] if key in data}
     try:
         return screws_from(data[frame], data["M"], frame=frame, **named)

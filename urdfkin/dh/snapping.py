@@ -44,7 +44,9 @@ def checked_tolerance(snap: float) -> float:
     """Return the tolerance (rad) as a float; raise InputError unless it is between 0 and 5 degrees."""
     tolerance = real_number(snap, "snap")
     if not 0.0 <= tolerance <= LARGEST_TOLERANCE:
-        raise InputError("snap must be an angle in radians between 0 and 0.087 (5 degrees)", found=repr(snap))
+        raise InputError(
+            "`snap` must be an angle in radians between 0 and 0.087 (5 degrees)", found=repr(snap)
+        )
     return tolerance
 
 
@@ -282,5 +284,5 @@ def snap_hint(table: DHTable, snapped: Callable[[float], DHTable]) -> str | None
     many = f"{len(noisy)} cells look" if len(noisy) > 1 else "a cell looks"
     return (
         f"{many} like angles that the file rounded ({cell} of {joint}: {size:.2g} {unit}):"
-        f" --snap {best:.0e} leaves {left[best] or 'none'} and reports the effect"
+        f" --snap {best:.0e} leaves {left[best] or 'none'} of them and reports the effect on the tip"
     )

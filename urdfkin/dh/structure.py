@@ -388,7 +388,7 @@ def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
             "the arm is not ortho-parallel with a spherical wrist (OPW)",
             where=where,
             found=reason,
-            remedy="run `urdfkin structure` to see its properties, or allow a larger tolerance",
+            remedy="run `urdfkin structure` to see the properties of the arm, or allow a larger tolerance",
         )
     return best[2]
 

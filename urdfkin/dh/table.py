@@ -60,7 +60,7 @@ def convention_of(name: str) -> Convention:
         raise InputError(
             "unknown convention",
             found=repr(name),
-            remedy="write 'standard' or 'modified'",
+            remedy="write convention = 'standard' or 'modified'",
             question=Question.WHICH_DH_CONVENTION,
         ) from None
 
@@ -107,7 +107,7 @@ class DHRow:
                     f"{name} is not a finite number", where=where, found=str(getattr(self, name))
                 )
         if self.sense not in (1, -1):
-            raise InputError("the sense must be +1 or -1", where=where, found=str(self.sense))
+            raise InputError("`sense` must be +1 or -1", where=where, found=str(self.sense))
         if not self.kind.has_axis:
             raise InputError(
                 "the joint of a row must be revolute, continuous or prismatic",

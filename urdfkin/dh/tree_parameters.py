@@ -200,7 +200,8 @@ def tree_parameters(tree: KinematicTree) -> TreeParameters:
             raise InputError(
                 f"a {joint.kind.value} joint has no single axis and no row",
                 where=f"joint {joint.name}",
-                remedy="load the robot without root_joint, or take tables of the parts on either side",
+                remedy="load the robot without root_joint, or derive tables of the paths on either side"
+                " of this joint",
             )
     links = _links(tree)
     steps, own = _steps(tree, links)

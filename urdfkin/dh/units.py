@@ -116,7 +116,7 @@ def units_of(angles: str = "radians", lengths: str = "metres", digits: int = 10)
             "unknown unit",
             where="angles or lengths",
             found=f"{angles!r}, {lengths!r}",
-            remedy="write radians or degrees, metres or millimetres",
+            remedy="write `radians` or `degrees` for angles, `metres` or `millimetres` for lengths",
         ) from None
 
 
@@ -153,7 +153,7 @@ def read_number(value: object, where: str) -> float:
         number = _number(value)
     except (ValueError, TypeError, OverflowError, ZeroDivisionError):
         raise InputError(
-            "not a number", where=where, found=safe_repr(value), remedy="write 1.5708 or pi/2"
+            "this is not a number", where=where, found=safe_repr(value), remedy="write 1.5708 or pi/2"
         ) from None
     if not math.isfinite(number):
         raise InputError("not a finite number", where=where, found=safe_repr(value))
@@ -347,5 +347,5 @@ def _terms(text: str) -> list[_Term]:
             terms[-1].take(token, kind)
             signed = False
     if signed or terms[-1].operator or terms[-1].is_empty:
-        raise NoCellError("it ends too early" if text else "it is empty")
+        raise NoCellError("the expression ends too early" if text else "the expression is empty")
     return terms

@@ -178,7 +178,7 @@ def check_joints(chain: FrameChain, reference: DHTable) -> None:
             "the table and the path have different joints",
             where=f"{chain.robot}, {chain.base} to {chain.tip}",
             found=f"{words[0]} in the table, {words[1]} in the URDF",
-            remedy="choose base and tip with exactly the table's joints between them",
+            remedy="choose a base and a tip so that the path has exactly the joints of the table",
         )
     demand_squares_of(chain, reference)
 

@@ -230,9 +230,12 @@ def document(found: Comparison, units: Units) -> TextDocument:
     title, *verdict = _verdict(found)
     parts: Parts = [*verdict, *(_mistakes(found, units) if found.mistakes else _cells(found, units))]
     if found.residual > EXPLAINED * found.reach and not found.mistakes:
-        parts.append(f"No change of cells explains the difference: {found.residual * 1e3:.3g} mm remain.")
+        parts.append(
+            f"No change of cells explains the whole difference: {found.residual * 1e3:.3g} mm remain"
+            " unexplained."
+        )
         if not found.fitted:
-            parts.append("The table may have other frames. Omit --no-fit to fit base and tool.")
+            parts.append("The table may have another base frame or tool. Omit --no-fit to fit base and tool.")
     if found.agrees or not found.mistakes:
         parts += _fitted(found, units)
     if not found.agrees:
@@ -250,7 +253,7 @@ def _fitted(found: Comparison, units: Units) -> Parts:
         if sense < 0 or abs(offset) > fine
     ]
     if moved:
-        parts += ["", "The table's joint variables in terms of the URDF's:", *moved]
+        parts += ["", "Joint variables of the table in terms of those of the URDF:", *moved]
     for what, T in (("base", table.base), ("tool", table.tool)):
         rounded = np.round(T / fine) * fine
         if np.abs(rounded - np.eye(4)).max() > fine:
@@ -267,11 +270,11 @@ def _verdict(found: Comparison) -> list[str]:
     off = _off(found.metres, found.radians)
     proof = f"{found.samples} samples; proven for all values of the joints: {_proven(found)}"
     if found.as_written:
-        return [f"The table {verdict} as it is written: {path}: {off}", f"({proof})."]
+        return [f"The table {verdict} without a fit: {path}: {off}", f"({proof})."]
     if not found.fitted:
         return [
             f"The table {verdict}: {path}: {off}",
-            f"({proof}; nothing fitted: base, tool and joint variables as written).",
+            f"({proof}; base, tool and joint variables are not fitted).",
         ]
     fine = resolution(found.metres / found.reach, found.radians)
     ends = [
@@ -281,24 +284,25 @@ def _verdict(found: Comparison) -> list[str]:
     ]
     zeros = sum(abs(offset) > fine for offset in found.offsets)
     if zeros:
-        ends.append(f"the zeros of {zeros} joint{'s' if zeros > 1 else ''} (below)")
+        ends.append(f"the zeros of {zeros} joint{'s' if zeros > 1 else ''} (listed below)")
     reversed_ = sum(sense < 0 for sense in found.senses)
     if reversed_:
         ends.append(
-            f"the senses of {reversed_} joints (below)" if reversed_ > 1 else "the sense of 1 joint (below)"
+            f"the signs of {reversed_} joints (listed below)"
+            if reversed_ > 1
+            else "the sign of 1 joint (listed below)"
         )
     once = " after a fit of base, tool and joint offsets" if found.agrees and ends else ""
     fitted = "" if found.agrees else "; after a fit of base, tool and joint offsets"
     lines = [f"The table {verdict}{once}: {path}: {off}", f"({proof}{fitted})."]
-    lines.append(f"As it is written: {_off(found.written_metres, found.written_radians)}.")
+    lines.append(f"Without a fit, {_off(found.written_metres, found.written_radians)}.")
     if ends:
-        lines.append(
-            f"The fit changed {', '.join(ends)}. Use --no-fit to compare the table as it is written."
-        )
+        lines.append(f"The fit changed {', '.join(ends)}. Use --no-fit to compare the table without a fit.")
         moved = [max(end.metres / found.reach, end.radians) > fine for end in (found.base, found.tool)]
         if found.agrees and not found.mistakes and (all(moved) or zeros or reversed_):
             lines.append(
-                "These changes can hide a wrong sign. Write base, tool and zeros into the table to find it."
+                "These changes can hide a wrong sign. To find a wrong sign, write base, tool and zeros"
+                " into the table."
             )
     return lines
 
@@ -323,14 +327,16 @@ def _is_moved(change: AbsorbedOffset, found: Comparison) -> bool:
 def _mistakes(found: Comparison, units: Units) -> list[str]:
     """Return lines with the likely mistakes."""
     first = found.mistakes[0]
-    left = "as written" if not first.fitted.count else f"after a fit of only {first.fitted}"
+    left = "without a fit" if not first.fitted.count else f"after a fit of only {first.fitted}"
     count = "One change makes" if len(found.mistakes) == 1 else "Each of these changes makes"
     lines = ["", f"{count} the table right {left}:"]
     for one in found.mistakes:
         off = _off(one.metres, one.radians)
         lines.append(f"  {_change(one, found.reference, units)}; {off}")
     if found.agrees:
-        lines.append("Correct the table. If its base, tool and zeros are intended, write them into it.")
+        lines.append(
+            "Correct the table. If the fitted base, tool and zeros are intended, write them into the table."
+        )
     return lines
 
 
@@ -358,11 +364,11 @@ def _cells(found: Comparison, units: Units) -> Parts:
         rounded = sum(one.is_rounding for one in found.differences)
         if rounded:
             all_ = "All" if rounded == len(found.differences) else f"{rounded} of {len(found.differences)}"
-            parts.append(f"{all_} within the last digit of the table (*).")
+            parts.append(f"{all_} differ only within the last digit of the table (*).")
     elif found.as_written:
         parts.append("Every cell agrees with the URDF.")
     elif found.exact:
-        parts.append("No cell differs, except those that the fit can replace.")
+        parts.append("No cell differs, except cells that the fit of base, tool and offsets can replace.")
     if found.hidden and not found.as_written:
         cells = ", ".join(f"{cell}{row + 1}" for row, cell in found.hidden)
         parts.append(f"Not compared, because base, tool and offsets can replace them: {cells}.")

@@ -60,7 +60,8 @@ class CommonMistake:
 
     def __str__(self) -> str:
         return (
-            f"this fits to {self.metres * 1e3:.3g} mm and {self.radians:.3g} rad when read as"
+            f"the table agrees with the URDF to {self.metres * 1e3:.3g} mm and {self.radians:.3g} rad"
+            " when it is read as"
             f" {self.reading.words(self.said)}"
         )
 
@@ -283,23 +284,25 @@ def doubts(table: DHTable) -> list[str]:
     Example:
         >>> from urdfkin.dh.rows import table_from_rows
         >>> doubts(table_from_rows([[425, 0, 0, 0], [392.25, 0, 0, 0]], "standard"))
-        ["lengths up to 425 m look like millimetres: write lengths = 'millimetres' if they are"]
+        ["lengths up to 425 m look like millimetres: if they are millimetres, write lengths = 'millimetres'"]
     """
     found = []
     lengths = [abs(cell) for row in table.rows for cell in (row.a, row.d) if cell]
     if lengths and max(lengths) > _LONGEST and all(length > _SHORTEST * 1e3 for length in lengths):
         found.append(
             f"lengths up to {max(lengths):.4g} m look like millimetres:"
-            " write lengths = 'millimetres' if they are"
+            " if they are millimetres, write lengths = 'millimetres'"
         )
     elif lengths and max(lengths) < _SHORTEST * 2.0:
         found.append(
             f"lengths of {max(lengths) * 1e3:.3g} mm at most look like metres:"
-            " write lengths = 'metres' if they are"
+            " if they are metres, write lengths = 'metres'"
         )
     angles = [cell for row in table.rows for cell in (row.alpha, row.theta) if cell]
     if angles and all(looks_round(math.degrees(cell)) for cell in angles):
-        found.append("angles of 1.57 degrees look like radians: write angles = 'radians' if they are")
+        found.append(
+            "angles of 1.57 degrees look like radians: if they are radians, write angles = 'radians'"
+        )
     for length, angle in (("a", "alpha"), ("d", "theta")):
         called_lengths, called_angles = (
             [getattr(row, name) for row in table.rows if getattr(row, name)] for name in (length, angle)
@@ -311,6 +314,7 @@ def doubts(table: DHTable) -> list[str]:
             and not any(map(looks_round, called_angles))
         ):
             found.append(
-                f"the columns {length} and {angle} look exchanged: {length} contains the round angles"
+                f"the columns {length} and {angle} look exchanged: column {length} contains multiples of"
+                " common angles"
             )
     return found
