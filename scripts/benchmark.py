@@ -134,12 +134,14 @@ def _operations() -> Iterator[tuple[str, int]]:
 def main(words: Sequence[str] | None = None) -> int:
     """Run the benchmark; return 1 if results differ."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
-    parser.add_argument("--quick", action="store_true", help="use few configurations and rounds")
+    parser.add_argument(
+        "--quick", action="store_true", help="make a short run with few configurations and rounds"
+    )
     parser.add_argument("--json", type=Path, help="write the measurements to a file")
     parser.add_argument("--plot", type=Path, help="plot the measurements: svg, png or pdf")
     parser.add_argument("--only", nargs="+", choices=SECTIONS, default=SECTIONS, help="some sections")
     parser.add_argument("--no-peers", action="store_true", help="compare only urdfkin and Pinocchio")
-    parser.add_argument("--rounds", type=int, help="number of times that each library is timed")
+    parser.add_argument("--rounds", type=int, help="number of measurements of each library")
     arguments = parser.parse_args(words)
     plan = QUICK if arguments.quick else Plan()
     if arguments.rounds:

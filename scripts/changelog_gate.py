@@ -80,7 +80,10 @@ def main(root: Path = ROOT, base: str | None = None) -> int:
         print(f"changelog not checked: {error}")
         return 0
     if problem:
-        print(f"{problem}: add a line under the unreleased version, or to a commit `No-changelog: REASON`")
+        print(
+            f"{problem}: add a line under the unreleased version, or write `No-changelog: REASON` into a"
+            " commit message"
+        )
     return 1 if problem else 0
 
 
@@ -88,5 +91,5 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--base", help="revision to compare with")
+    parser.add_argument("--base", help="revision to compare with HEAD")
     sys.exit(main(base=parser.parse_args().base))

@@ -119,7 +119,7 @@ def differing(subject: Subject) -> Iterator[str]:
         rows = list(zip(*inputs, strict=True))
         single = np.stack([computed(subject, quantity, reference, frame, row) for row in rows])
         if not np.isfinite(single).all():
-            yield f"{what}: not finite"
+            yield f"{what}: a result is not finite"
         fast = getattr(subject.robot.prepare(frame, reference), quantity.method, None)
         if fast is not None:
             out = np.empty_like(single)
@@ -207,7 +207,8 @@ def compared(name: str, now: Arrays, stored: Arrays) -> tuple[str, float]:
     worst = max(others, key=lambda what: others[what])
     where = worst.removeprefix(f"{name}/")
     return (
-        f"{len(others)} of {len(shares)} differ, by at most {others[worst]:.2g} of the bound ({where})",
+        f"{len(others)} of {len(shares)} results differ, by at most {others[worst]:.2g} of the bound"
+        f" ({where})",
         others[worst],
     )
 
@@ -215,11 +216,14 @@ def compared(name: str, now: Arrays, stored: Arrays) -> tuple[str, float]:
 def main(words: Sequence[str] | None = None) -> int:
     """Run the checks; return 1 if results differ unexpectedly."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
-    parser.add_argument("robots", nargs="*", help="names of the catalogue (default: all)")
+    parser.add_argument("robots", nargs="*", help="names of robots in the catalogue (default: all robots)")
     parser.add_argument("--write", type=Path, help="store the results in this file (.npz)")
     parser.add_argument("--against", type=Path, help="compare the results with those in this file")
     parser.add_argument(
-        "--within", type=float, default=0.0, help="allowed difference, as a fraction of the bound"
+        "--within",
+        type=float,
+        default=0.0,
+        help="allowed difference of two results, as a fraction of their bound",
     )
     given = parser.parse_args(words)
     before = None if given.against is None else np.load(given.against)
@@ -236,7 +240,7 @@ def main(words: Sequence[str] | None = None) -> int:
         said, most = ("", 0.0) if before is None else compared(name, now, before)
         print(f"{name:28} {digest(now)} {said}", *found[:3], sep="\n    " if found else " ", flush=True)
         wrong += bool(found) or most > given.within
-    print(f"{'all of them':28} {digest(everything)} {wrong} wrong")
+    print(f"{'all robots':28} {digest(everything)} {wrong} wrong")
     if given.write is not None:
         np.savez_compressed(given.write, **everything)
     return int(wrong > 0)

@@ -118,7 +118,8 @@ def tell(lines: Sequence[dict[str, Any]]) -> int:
     leaves = {(name, tree.frame_name(leaf)) for name, tree in trees.items() for leaf in tree.leaves()}
     tips = len(found - leaves)
     print(
-        f"{len(found & leaves)} of {len(leaves)} leaves of {len(trees)} robots, {tips} tips that are none;"
+        f"{len(found & leaves)} of {len(leaves)} leaves of {len(trees)} robots, {tips} tips that are not"
+        " leaves;"
         f" {len(wrong)} outside the bound or unverified; worst error as a share of the bound: {worst}"
     )
     return bool(wrong)
@@ -154,11 +155,13 @@ def page(text: str) -> str:
 def main(words: Sequence[str] | None = None) -> int:
     """Run the checks; return 1 for an error."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
-    parser.add_argument("--keep", type=Path, help="file of results, one per line, to continue")
-    parser.add_argument("--tell", action="store_true", help="only summarise the stored results")
-    parser.add_argument("--tips", action="store_true", help="check one leaf of each robot")
     parser.add_argument(
-        "--sizes", action="store_true", help="write the sizes of three robots' code into docs/export.md"
+        "--keep", type=Path, help="file for the results, one per line; an existing file is continued"
+    )
+    parser.add_argument("--tell", action="store_true", help="only print a summary of the stored results")
+    parser.add_argument("--tips", action="store_true", help="check only one leaf link of each robot")
+    parser.add_argument(
+        "--sizes", action="store_true", help="write the sizes of the code of three robots into docs/export.md"
     )
     arguments = parser.parse_args(words)
     warnings.simplefilter("ignore", urdfkin.UrdfWarning)

@@ -91,8 +91,8 @@ def fits(form: str, table: DHTable) -> bool:
 def main(words: Sequence[str] | None = None) -> int:
     """Run the checks; return 1 for an error."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
-    parser.add_argument("--leaves", action="store_true", help="check every leaf, not only the tips")
-    parser.add_argument("--toolbox", metavar="PYTHON", help="interpreter with roboticstoolbox")
+    parser.add_argument("--leaves", action="store_true", help="check every leaf link, not only the tips")
+    parser.add_argument("--toolbox", metavar="PYTHON", help="Python interpreter that has roboticstoolbox")
     parser.add_argument(
         "--forms", nargs="+", choices=(*RUN, "latex"), default=(*RUN, "latex"), metavar="FORM"
     )

@@ -22,8 +22,14 @@ from scripts.growing.kinds import KINDS
 def main() -> None:
     """Print one Markdown row for each kind of content."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("words", nargs="*", help="kinds with one of these words in the name (default: all)")
-    parser.add_argument("--sizes", default="1,4,16,64", help="sizes in megabytes, separated by commas")
+    parser.add_argument(
+        "words",
+        nargs="*",
+        help="measure only the kinds of documents with one of these words in the name (default: all)",
+    )
+    parser.add_argument(
+        "--sizes", default="1,4,16,64", help="sizes of the documents in megabytes, separated by commas"
+    )
     parser.add_argument("--patience", type=float, default=600.0, help="time limit of one document in seconds")
     options = parser.parse_args()
     sizes = [float(size) for size in options.sizes.split(",")]

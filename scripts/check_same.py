@@ -106,7 +106,10 @@ def summary(some: list[dict[str, Any]]) -> Iterator[str]:
         if widths:
             above = f"{statistics.median(widths) - 1:.1%} (median), {max(widths) - 1:.1%} (most)"
             below = f"{1 - min(found):.1%}"
-            yield f"{what}: {len(widths)}; at most is above the search's by {above}, at least {below} below"
+            yield (
+                f"{what}: {len(widths)}; the upper bound is {above} above the result of the search,"
+                f" the lower {below} below"
+            )
     seconds = [one["seconds"] for one in some if one["change"] in UNLIKE]
     if seconds:
         yield f"seconds with bounds: median {statistics.median(seconds):.1f}, most {max(seconds):.1f}"
@@ -118,8 +121,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("robots", nargs="*", help="names of the catalogue (default: all)")
-    parser.add_argument("--keep", type=Path, required=True, help="file of results, one per line")
+    parser.add_argument("robots", nargs="*", help="names of robots in the catalogue (default: all robots)")
+    parser.add_argument("--keep", type=Path, required=True, help="file for the results, one per line")
     parser.add_argument("--tell", action="store_true", help="only print the stored results")
     options = parser.parse_args()
     warnings.simplefilter("ignore", urdfkin.UrdfWarning)

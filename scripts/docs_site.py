@@ -224,7 +224,11 @@ def _purpose(name: str) -> str:
 def commands_page() -> str:
     """Return the page of all commands with the text of `--help`."""
     parent = click.Context(cli, info_name="urdfkin", terminal_width=80, **cli.context_settings)
-    parts = ["# Commands", "`urdfkin COMMAND --help` prints each of these.", *_help(cli, parent, "##")]
+    parts = [
+        "# Commands",
+        "`urdfkin COMMAND --help` prints the help of a command.",
+        *_help(cli, parent, "##"),
+    ]
     return "\n\n".join(parts) + "\n"
 
 

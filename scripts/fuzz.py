@@ -191,15 +191,18 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--mutants", type=int, default=2000, help="number of mutants")
-    parser.add_argument("--robots", type=int, default=2000, help="number of random robots of all families")
+    parser.add_argument("--mutants", type=int, default=2000, help="number of mutated files to test")
+    parser.add_argument("--robots", type=int, default=2000, help="number of random robots, over all families")
     parser.add_argument(
-        "--family", action="append", choices=FAMILIES, help="family to test; repeatable (default: all)"
+        "--family",
+        action="append",
+        choices=FAMILIES,
+        help="family of robots to test; repeatable (default: all families)",
     )
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--timeout", type=float, default=30.0, help="time limit of one robot in seconds")
-    parser.add_argument("--only", type=int, help="test only this number of the family")
+    parser.add_argument("--only", type=int, help="test only the robot with this number in its family")
     parser.add_argument(
         "--keep", type=Path, default=Path("artefacts/fuzz"), help="folder for files that cause a failure"
     )
@@ -212,7 +215,7 @@ def main() -> int:
     asked = shares(families, options.mutants, options.robots)
     if options.only is not None:
         if len(families) != 1:
-            parser.error("--only needs one --family")
+            parser.error("--only needs exactly one --family")
         asked = [(families[0], options.only)]
     start = time.perf_counter()
     counts = fuzz(asked, options.seed, options.jobs, options.timeout, options.keep)
@@ -221,7 +224,7 @@ def main() -> int:
     for word, count in counts.most_common():
         print(f"{count:8d}  {word}")
     bad = total - sum(counts[word] for word in GOOD)
-    print(f"{bad} went wrong" + (f": see {options.keep}" if bad else ""))
+    print(f"{bad} robots caused a failure" + (f": see {options.keep}" if bad else ""))
     return 1 if bad else 0
 
 

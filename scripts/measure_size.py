@@ -102,7 +102,12 @@ def page(text: str, inserted: str) -> str:
 def main() -> None:
     """Print the largest packages, the sums and the extras, and write the page."""
     parser = argparse.ArgumentParser(description="Measure the size of an installation.")
-    parser.add_argument("--print", action="store_true", dest="only_print", help="do not write the page")
+    parser.add_argument(
+        "--print",
+        action="store_true",
+        dest="only_print",
+        help="print the sizes without writing them into the page",
+    )
     options = parser.parse_args()
     core = closure("urdfkin") | {"urdfkin": own()}
     lean = closure("urdfkin", without="yourdfpy") | {"urdfkin": own()}
@@ -110,7 +115,7 @@ def main() -> None:
     for name, size in sorted(core.items(), key=lambda item: -item[1])[:10]:
         print(f"{size / 1e6:7.0f} MB  {name}")
     print(f"{sum(core.values()) / 1e6:7.0f} MB  urdfkin and the {len(core) - 1} packages that it needs")
-    print(f"{sum(lean.values()) / 1e6:7.0f} MB  the same {len(lean)} packages without yourdfpy's")
+    print(f"{sum(lean.values()) / 1e6:7.0f} MB  these without the packages of yourdfpy: {len(lean)} packages")
     print(f"{sum(closure('pin').values()) / 1e6:7.0f} MB  of these for pin, which is Pinocchio")
     print(f"{(own() + core['click']) / 1e6:7.0f} MB  urdfkin and click, which `urdfkin check` needs")
     for name, (count, size) in extras.items():

@@ -25,9 +25,9 @@ def main() -> None:
     print(f"a chunk of {chunk.configurations} samples: {_cost(lambda _: run_chunk(chunk), 3):.0f} ms")
     manifest = Manifest.of([robot], cut.samples, 0, "now")
     with tempfile.TemporaryDirectory() as folder, opened(Path(folder) / "s", manifest, print) as store:
-        print(f"to keep: {_cost(lambda i: store.keep(0, i, found), 100):.2f} ms")
-        print(f"to read: {_cost(lambda i: store.answer(0, i), 100):.2f} ms")
-    print(f"to add:  {_cost(lambda _: found + found, 100):.2f} ms")
+        print(f"time to store it: {_cost(lambda i: store.keep(0, i, found), 100):.2f} ms")
+        print(f"time to read it: {_cost(lambda i: store.answer(0, i), 100):.2f} ms")
+    print(f"time to add two: {_cost(lambda _: found + found, 100):.2f} ms")
 
 
 def _cost(work: Callable[[int], object], times: int) -> float:

@@ -162,18 +162,24 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("parts", nargs="*", help="beginnings of paths below urdfkin/ (default: all)")
-    parser.add_argument("--sample", type=int, help="number of random mutants (default: all)")
+    parser.add_argument(
+        "parts", nargs="*", help="prefixes of paths below urdfkin/, such as dh/ (default: all files)"
+    )
+    parser.add_argument("--sample", type=int, help="number of randomly chosen mutants (default: all mutants)")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument(
         "--timeout", type=float, default=300.0, help="time limit of one mutant's tests in seconds"
     )
-    parser.add_argument("--slow", action="store_true", help="also run the slow tests near the file")
-    parser.add_argument("--whole", action="store_true", help="also run the whole quick suite")
-    parser.add_argument("--only", help="run only this mutant")
     parser.add_argument(
-        "--named", action="store_true", help="run the named mutants (of these parts), each with its own test"
+        "--slow",
+        action="store_true",
+        help="also run the slow tests that mention the mutated module or belong to its package",
+    )
+    parser.add_argument("--whole", action="store_true", help="also run all tests that are not slow")
+    parser.add_argument("--only", help="run only the mutant with this name")
+    parser.add_argument(
+        "--named", action="store_true", help="run only the mutants listed by name, each with its own test"
     )
     parser.add_argument("--count", action="store_true", help="print the number of mutants and exit")
     parser.add_argument("--json", type=Path, help="file for the results of all mutants")
@@ -183,7 +189,7 @@ def main() -> int:
     except ValueError as error:
         parser.error(str(error))
     if not asks:
-        print("there is no such mutant; see --count", file=sys.stderr)
+        print("no mutant was selected; --count prints the number of mutants", file=sys.stderr)
         return 1
     if options.count:
         print(len(asks))

@@ -100,7 +100,7 @@ def test_every_mutator_is_used_and_nearly_all_change_something() -> None:
     [
         (arm(), "verified"),
         (arm(axis='<axis xyz="0 0 0"/>'), "refused"),
-        (arm(origin='<origin xyz="0\t0 1"/>'), "not verified, with a finding that says why"),
+        (arm(origin='<origin xyz="0\t0 1"/>'), "not verified, with a finding that states the reason"),
         (
             arm(
                 follow='<mimic joint="j1" multiplier="1e300"/>',
@@ -119,7 +119,7 @@ def test_the_judge_tells_what_happened(text: str, word: str) -> None:
 
 def test_a_check_that_is_blind_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(urdfkin, "check", lambda data, **options: [], raising=False)
-    assert judge(arm(axis='<axis xyz="0 0 0"/>')).word == "load refuses what check does not"
+    assert judge(arm(axis='<axis xyz="0 0 0"/>')).word == "load refuses a file that check accepts"
     assert judge(arm(origin='<origin xyz="0\t0 1"/>')).word not in GOOD
 
 
@@ -139,7 +139,7 @@ def test_what_pinocchio_refuses_though_check_found_nothing_is_a_finding_of_its_o
 
     monkeypatch.setattr(pinocchio, "buildModelFromXML", refuses)
     outcome = judge(arm())
-    assert outcome.word == "Pinocchio refuses what passed check"
+    assert outcome.word == "Pinocchio refuses a file that check accepts"
     assert "no reason" in outcome.details
     assert "please report this" in outcome.details
     assert outcome.word not in GOOD
@@ -152,7 +152,7 @@ def test_numbers_that_differ_between_two_ways_are_noticed(monkeypatch: pytest.Mo
         return np.nextafter(right(*arguments), 1.0)  # type: ignore[arg-type]
 
     monkeypatch.setattr(PreparedFrame, "velocity", nudged)
-    assert judge(arm()).word == "the same number twice, and it is not the same"
+    assert judge(arm()).word == "two computations of one result differ"
 
 
 WORKER = "import os, sys, time; print('ready', flush=True); sys.stdin.readline(); {}"
@@ -222,7 +222,7 @@ def test_a_reading_of_mjcf_that_is_not_mujocos_is_noticed(monkeypatch: pytest.Mo
         return output.splitlines(keepends=True)[0], status
 
     monkeypatch.setattr(mjcf_check, "ask_python", without_shapes)
-    assert judge(text).word == "MuJoCo has another robot"
+    assert judge(text).word == "MuJoCo reads another robot"
 
 
 @pytest.mark.parametrize("family", mjcf.FAMILIES)

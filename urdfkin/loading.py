@@ -225,7 +225,7 @@ def _load_model(source: Any, xacro_args: Mapping[str, object] | None, **how: Unp
 
 def _refuse_arguments(xacro_args: Mapping[str, object] | None, found: str) -> None:
     if xacro_args:
-        raise InputError("xacro_args go with the path of a .xacro file", found=found)
+        raise InputError("`xacro_args` needs the path of a .xacro file", found=found)
 
 
 def robot_of(

@@ -102,7 +102,7 @@ def _contest(section: str, title: str, rows: list[Entry]) -> Words:
     return Words(
         section,
         f"{title}: {rows[0]['numbers']} numbers, ns for one configuration",
-        ("", "median", "minimum", ratio, *([_SHARE] if ceiling else ()), "at a time"),
+        ("", "median", "minimum", ratio, *([_SHARE] if ceiling else ()), "configurations per call"),
         [tuple(cells(row)) for row in rows],
         remarks,
     )
@@ -146,7 +146,7 @@ def _summary(rows: list[Entry]) -> Words:
         "the same, compiled for this robot, 1 thread",
         _SHARE,
         "fastest other library, ns",
-        "times that, 1 thread",
+        "urdfkin, 1 thread, times faster",
     )
     return Words("summary", "urdfkin against the others, medians", ("", *heads), found)
 
@@ -174,10 +174,12 @@ def _floor(rows: list[Entry], operations: Mapping[str, int]) -> Words:
         "fill, ns",
         "operations",
         "urdfkin, 1 thread, ns",
-        "bytes a ns",
-        "operations a ns",
+        "bytes per ns",
+        "operations per ns",
     )
-    return Words("floor", "the floor: bytes and operations of one configuration", ("", *heads), found)
+    return Words(
+        "floor", "lower limit of the time: bytes and operations of one configuration", ("", *heads), found
+    )
 
 
 def _tables_of(rows: list[Entry]) -> Iterator[tuple[str, list[Entry]]]:
@@ -199,7 +201,7 @@ def _where(title: str, entries: Sequence[Entry]) -> Words:
         return f"{number(ns)} ({100 * ns / entry['ns']:.0f} %)"
 
     rows = [(part, *(cell(entry, part) for entry in entries)) for part in parts]
-    rows.append(("in all", *(number(entry["ns"]) for entry in entries)))
+    rows.append(("total", *(number(entry["ns"]) for entry in entries)))
     heads = (f"{entry['robot']}, {entry['quantity']}" for entry in entries)
     return Words("where", title, ("", *heads), rows)
 
@@ -208,7 +210,7 @@ def _first(entries: Sequence[Entry]) -> Words:
     return Words(
         "first",
         f"{entries[0]['robot']}: processor time of a first use, s",
-        ("", "nothing compiled before", "kernels on disk"),
+        ("", "without stored kernels", "with stored kernels"),
         [(entry["what"], *(number(entry[key] / 1e3) for key in (EMPTY, KEPT))) for entry in entries],
     )
 
@@ -220,7 +222,7 @@ def _joints(rows: list[Entry]) -> Words:
     return Words(
         "joints",
         "chains: the tip's result, one thread",
-        ("", "joints", "ns for one configuration", "for one joint", "for one number written"),
+        ("", "joints", "ns for one configuration", "ns per joint", "ns per number of the output"),
         [
             (
                 f"{row['quantity']}, {row['who']}",
@@ -238,7 +240,7 @@ def _frames(rows: list[Entry]) -> Words:
     return Words(
         "frames",
         f"{rows[0]['robot']}: placements of several links, one thread",
-        ("", "links", "ns for one configuration", "for one link"),
+        ("", "links", "ns for one configuration", "ns per link"),
         [
             (row["who"], str(row["size"]), number(row["median_ns"]), number(row["median_ns"] / row["size"]))
             for row in _together(rows)
@@ -250,7 +252,7 @@ def _sizes(rows: list[Entry]) -> Words:
     return Words(
         "sizes",
         f"{rows[0]['robot']}: batches of several sizes, one thread, out= given",
-        ("", "configurations", "ns for one, median", "minimum"),
+        ("", "configurations", "ns for one configuration, median", "minimum"),
         [
             (
                 f"{row['quantity']}, {row['who']}",
@@ -277,7 +279,7 @@ def _memory(entries: list[Entry]) -> Words:
     return Words(
         "memory",
         f"{entries[0]['robot']}: memory of a batch, output included",
-        ("", "configurations", "output, MB", "at the most, MB", "beyond the output"),
+        ("", "configurations", "output, MB", "peak, MB", "beyond the output"),
         [
             (
                 f"{entry['quantity']}, {'out= given' if entry['out'] else 'no out='}",

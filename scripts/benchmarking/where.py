@@ -28,7 +28,7 @@ from urdfkin.model.tree import FloatArray
 PARTS: Mapping[str, frozenset[Op]] = {
     "reading inputs": frozenset(),
     "sines and cosines": frozenset(),
-    "the walk": frozenset(Op) - {Op.END, Op.KEEP, Op.COLUMN, Op.EMIT},
+    "forward recursion": frozenset(Op) - {Op.END, Op.KEEP, Op.COLUMN, Op.EMIT},
     "columns": frozenset((Op.KEEP, Op.COLUMN)),
     "writing results": frozenset((Op.EMIT,)),
 }
@@ -90,11 +90,11 @@ def parts_of_calls(n: int, rounds: int) -> Iterator[dict[str, Any]]:
         loop, function, refused, array, computed, prepared, method = _times(works, rounds).values()
         parts = {
             "Python's call of a method": function - loop,
-            "its call of the walk": refused - loop,
-            "the walk": computed - refused,
-            "prepared, beside these": prepared - computed - (function - loop),
+            "its call of the forward recursion": refused - loop,
+            "forward recursion": computed - refused,
+            "rest of the prepared evaluator": prepared - computed - (function - loop),
             "NumPy's new array": array - loop,
-            "the robot's method, beside all that": method - prepared - (array - loop),
+            "rest of the robot's method": method - prepared - (array - loop),
         }
         yield _entry("single", subject, quantity, parts, method - loop)
 

@@ -8,7 +8,7 @@ COMPARED = "read and compared"
 GOOD = (
     "refused",
     "verified",
-    "not verified, with a finding that says why",
+    "not verified, with a finding that states the reason",
     "too large to compute, with a finding",
     COMPARED,
 )

@@ -49,9 +49,9 @@ def _judge(case: Case) -> Outcome:
         except UrdfError as error:
             if errors:
                 return Outcome("refused", errors[0].code)
-            return Outcome("load refuses what check does not", str(error))
+            return Outcome("load refuses a file that check accepts", str(error))
         if errors:
-            return Outcome("load takes what check refuses", str(errors[0]))
+            return Outcome("load accepts a file that check refuses", str(errors[0]))
         return _computed(robot, findings, warned) or _unverified(robot, findings, warned)
 
 
@@ -63,16 +63,16 @@ def _judge_mjcf(case: Case) -> Outcome:
             robot = urdfkin.load(case.data, mimic=case.mimic)
         except InputError as error:
             known = model is None or error.remedy is not None
-            return Outcome("refused" if known else "load refuses what MuJoCo takes", str(error))
+            return Outcome("refused" if known else "load refuses a file that MuJoCo accepts", str(error))
         if model is not None and (found := mjcf.difference(robot, model, 0)) is not None:
-            return Outcome("MuJoCo has another robot", found)
+            return Outcome("MuJoCo reads another robot", found)
         return _computed(robot, robot.findings, warned) or _unverified(robot, robot.findings, warned)
 
 
 def _computed(robot: Robot, findings: list[Finding], warned: list[warnings.WarningMessage]) -> Outcome | None:
     """Return the outcome of computing everything; None if some results are not verified."""
     big = bool(_SIZES & {finding.code for finding in findings})
-    too_large = "too large to compute, with a finding" if big else "a result that is no number"
+    too_large = "too large to compute, with a finding" if big else "a result is not a finite number"
     try:
         for what, result in ask(robot, seed=0):
             if not np.isfinite(result).all():
@@ -88,7 +88,7 @@ def _computed(robot: Robot, findings: list[Finding], warned: list[warnings.Warni
     except RangeError as error:
         return Outcome(too_large, str(error))
     except MismatchError as error:
-        return Outcome("the same number twice, and it is not the same", str(error))
+        return Outcome("two computations of one result differ", str(error))
     return Outcome("verified") if verified else None
 
 
@@ -96,7 +96,9 @@ def _unverified(robot: Robot, findings: list[Finding], warned: list[warnings.War
     """Return the outcome of unverified results: did urdfkin report a reason for them or not?"""
     marked = [finding for finding in findings if finding.oracle is not None]
     if marked:
-        return Outcome("not verified, with a finding that says why", marked[0].code)
+        return Outcome("not verified, with a finding that states the reason", marked[0].code)
     if (reason := robot.verifier.cannot()) is not None:
-        return Outcome("Pinocchio refuses what passed check", reason)
-    return Outcome("not verified, and nothing says why", "; ".join(str(w.message) for w in warned))
+        return Outcome("Pinocchio refuses a file that check accepts", reason)
+    return Outcome(
+        "not verified, without a finding that states the reason", "; ".join(str(w.message) for w in warned)
+    )

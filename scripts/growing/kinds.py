@@ -139,7 +139,7 @@ KINDS: dict[str, Kind] = {
     "a chain": lambda n: _tree(n, lambda i: i),
     "a star": lambda n: _tree(n, lambda i: 0),
     "one place for all joints": lambda n: _tree(n, lambda i: 0, "continuous"),
-    "a chain of followers": lambda n: _tree(n, lambda i: i, "continuous", '<mimic joint="j{}"/>'),
+    "a chain of mimic joints": lambda n: _tree(n, lambda i: i, "continuous", '<mimic joint="j{}"/>'),
     "a loop": lambda n: _tree(n, lambda i: i).replace(b'<child link="l1"/>', b'<child link="l0"/>', 1),
     "several parents": lambda n: _robot(
         '<link name="a"/><link name="b"/>'

@@ -81,7 +81,7 @@ def test_a_document_four_times_as_long_takes_about_four_times_the_memory(kind: s
 
 @pytest.mark.long
 def test_a_chain_of_followers_is_read_in_linear_time_both_times() -> None:
-    documents = {size: KINDS["a chain of followers"](size) for size in (100_000, 400_000)}
+    documents = {size: KINDS["a chain of mimic joints"](size) for size in (100_000, 400_000)}
 
     def read(size: int) -> None:
         tree = tree_of(documents[size])

@@ -114,7 +114,7 @@ def test_a_kept_file_in_another_folder_of_its_name_is_noticed(tmp_path: Path) ->
         place.parent.mkdir()
     put(first, b"of the first")
     second.write_bytes(first.read_bytes())
-    with pytest.warns(CacheWarning, match="its checksum does not match its content and its name"):
+    with pytest.warns(CacheWarning, match="the checksum of the file does not match its content and its name"):
         assert get(second) is None
     assert get(first) == b"of the first"
     first.parent.rename(tmp_path / "moved")

@@ -15,7 +15,7 @@ MISTAKES = {
     "no such name": (["jacobian", "pandaa"], "unknown robot 'pandaa'; did you mean panda"),
     "no such file": (["info", "./nowhere.urdf"], "nowhere.urdf: no such file"),
     "no such folder": (["info", "nowhere/arm.urdf"], "no such file; the folder nowhere does not exist"),
-    "a folder": (["info", "."], "this is a folder, not a file; name the .urdf file in it"),
+    "a folder": (["info", "."], "this is a folder, not a file; name the .urdf file in this folder"),
     "nothing": (["info", ""], "the robot's name is empty"),
     "no urdf": (["info", __file__], "URDF105 error: not well-formed XML"),
     "an empty file": (["info", "/dev/null"], "URDF101 error: the file is empty"),

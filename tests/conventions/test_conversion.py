@@ -169,11 +169,11 @@ def test_a_users_file_has_order_names_signs_units_and_motor_zeros(tmp_path: Path
         ("[joint.joint_1]\nunit = 'mm'", "joint joint_1: the unit is for a joint with a length"),
         ("[joint.joint_1]\nunit = -1", "unit must be positive"),
         ("[joint.joint_1]\nzero = nan", "zero must be a finite number"),
-        ('joints = ["joint_1", "end"]', "a fixed joint has no column: found end"),
+        ('joints = ["joint_1", "end"]', "the order of joints contains a fixed joint: found end"),
         ('quaternion = "wxzy"', "quaternion must be one of: xyzw, wxyz: found 'wxzy'"),
-        ("joints = 3", "joints must be a list of names"),
+        ("joints = 3", "`joints` must be a list of names"),
         ("joint = 3", "joint must hold tables"),
-        ("=", "not a TOML file"),
+        ("=", "this is not a TOML file"),
     ],
 )
 def test_a_wrong_file_is_one_error_with_its_place(text: str, words: str, tmp_path: Path) -> None:

@@ -182,7 +182,7 @@ def test_casadis_and_sympys_symbols_differentiate_to_the_jacobian(tmp_path: Path
 def test_what_is_not_a_file_of_ours_is_refused(tmp_path: Path) -> None:
     other = tmp_path / "other.c"
     other.write_text("int main(void) { return 0; }\n")
-    with pytest.raises(InputError, match="not a file of urdfkin export"):
+    with pytest.raises(InputError, match="this file was not written by `urdfkin export`"):
         check(other)
     mine = file(code(urdfkin.load("planar_two_link")), "numpy", tmp_path)
     broken = mine.with_name("broken.py")

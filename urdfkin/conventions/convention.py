@@ -140,7 +140,7 @@ def find_convention(name: str | Path | Convention) -> Convention:
     if isinstance(name, Convention):
         return name
     if not isinstance(name, str | Path):
-        raise InputError("a convention is a name or a TOML file", found=safe_repr(name))
+        raise InputError("a convention must be a name or a TOML file", found=safe_repr(name))
     if (known := _built_in().get(str(name))) is not None:
         return known
     path = Path(name)
@@ -159,7 +159,7 @@ def read_convention(text: str, where: str, name: str) -> Convention:
     try:
         found = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InputError("not a TOML file", where=where, found=str(error)) from None
+        raise InputError("this is not a TOML file", where=where, found=str(error)) from None
     like = found.pop("like", "urdf")
     if like not in _built_in():
         raise UnknownNameError("convention", str(like), BUILT_IN, where=where)
@@ -171,12 +171,14 @@ def read_convention(text: str, where: str, name: str) -> Convention:
     joints = found.pop("joints", None)
     if joints is not None:
         if not isinstance(joints, list) or not all(isinstance(joint, str) for joint in joints):
-            raise InputError("joints must be a list of names", where=where, found=safe_repr(joints))
+            raise InputError("`joints` must be a list of names", where=where, found=safe_repr(joints))
         changes |= {"order": "given", "joints": tuple(joints)}
         _demand_once(joints, where)
     rules = found.pop("joint", {})
     if not isinstance(rules, dict) or not all(isinstance(rule, dict) for rule in rules.values()):
-        raise InputError("joint must hold tables, such as [joint.elbow]", where=where, found=safe_repr(rules))
+        raise InputError(
+            "`joint` must contain tables, such as [joint.elbow]", where=where, found=safe_repr(rules)
+        )
     changes["rules"] = {joint: _rule(rule, f"{where}: joint {joint}") for joint, rule in rules.items()}
     columns = [rule.name for rule in changes["rules"].values() if rule.name is not None]
     _demand_once(columns, where)
@@ -185,7 +187,7 @@ def read_convention(text: str, where: str, name: str) -> Convention:
             raise UnknownNameError("key", key, (*_CHOICES, "like", "joints", "joint", "title"), where=where)
         if value not in _CHOICES[key]:
             words = ", ".join(map(str, _CHOICES[key]))
-            raise InputError(f"{key} must be one of: {words}", where=where, found=safe_repr(value))
+            raise InputError(f"`{key}` must be one of: {words}", where=where, found=safe_repr(value))
         changes[key] = value
     return replace(base, **changes)
 
@@ -193,18 +195,18 @@ def read_convention(text: str, where: str, name: str) -> Convention:
 def _demand_once(names: list[str], where: str) -> None:
     if len(set(names)) != len(names):
         double = next(name for i, name in enumerate(names) if name in names[:i])
-        raise InputError("two columns have the same name", where=where, found=repr(double))
+        raise InputError("two joints have the same name in the convention", where=where, found=repr(double))
 
 
 def _text(value: object, word: str, where: str) -> str:
     if not isinstance(value, str):
-        raise InputError(f"{word} must be a text", where=where, found=safe_repr(value))
+        raise InputError(f"`{word}` must be a text", where=where, found=safe_repr(value))
     return value
 
 
 def _number(value: object, word: str, where: str) -> float:
     if not is_real(value) or not math.isfinite(value):
-        raise InputError(f"{word} must be a finite number", where=where, found=safe_repr(value))
+        raise InputError(f"`{word}` must be a finite number", where=where, found=safe_repr(value))
     return float(value)
 
 
@@ -216,7 +218,7 @@ def _rule(rule: dict[str, Any], where: str) -> JointRule:
     name = _text(rule["name"], "name", where) if "name" in rule else None
     sign = _number(rule.get("sign", 1), "sign", where)
     if abs(sign) != 1.0:
-        raise InputError("sign must be 1 or -1", where=where, found=safe_repr(rule["sign"]))
+        raise InputError("`sign` must be 1 or -1", where=where, found=safe_repr(rule["sign"]))
     zero = _number(rule.get("zero", 0.0), "zero", where)
     unit = rule.get("unit")
     if unit is None:
@@ -227,5 +229,7 @@ def _rule(rule: dict[str, Any], where: str) -> JointRule:
         return JointRule(name, sign * _UNITS[unit], zero, sign, "length" if unit in _LENGTHS else "angle")
     per_turn = _number(unit, "unit", where)
     if per_turn <= 0.0:
-        raise InputError("unit must be positive: units of one turn", where=where, found=safe_repr(unit))
+        raise InputError(
+            "`unit` must be positive: the number of units in one turn", where=where, found=safe_repr(unit)
+        )
     return JointRule(name, sign * per_turn / math.tau, zero, sign, "angle")

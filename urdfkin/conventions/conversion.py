@@ -100,7 +100,9 @@ class Conversion:
         self.joint_names = tuple(names)
         if len(set(names)) != len(names):
             double = next(name for k, name in enumerate(names) if name in names[:k])
-            raise InputError("two columns have the same name", where=convention.name, found=repr(double))
+            raise InputError(
+                "two joints have the same name in the convention", where=convention.name, found=repr(double)
+            )
         self._prepare()
 
     def __repr__(self) -> str:
@@ -122,21 +124,26 @@ class Conversion:
         how = self.convention
         if not how.joints:
             raise InputError(
-                f"{how.title} has no order of its own",
+                f"{how.title} has no known order of joints",
                 where=how.name,
-                remedy="pass the names in its order: joints=[...], or joints in a TOML file",
+                remedy="pass the joint names in the order of this tool: joints=[...], or `joints` in a"
+                " TOML file",
             )
         own = {rule.name: joint for joint, rule in how.rules.items() if rule.name is not None}
         order = [self.tree.joint_index(own.get(name, name)) for name in how.joints]
         for name, i in zip(how.joints, order, strict=True):
             if i not in moving:
-                raise InputError("a fixed joint has no column", where=how.name, found=name)
+                raise InputError("the order of joints contains a fixed joint", where=how.name, found=name)
         if len(set(order)) != len(order):
-            raise InputError("two columns have the same name", where=how.name, found=", ".join(how.joints))
+            raise InputError(
+                "two joints have the same name in the convention", where=how.name, found=", ".join(how.joints)
+            )
         missing = [self.tree.joints[i].name for i in sorted(moving - set(order))]
         missing = [name for name in missing if not self.tree.joints[self.tree.joint_index(name)].mimic]
         if missing:
-            raise InputError("a joint has no column", where=how.name, found=", ".join(missing[:8]))
+            raise InputError(
+                "the order of joints lacks a joint", where=how.name, found=", ".join(missing[:8])
+            )
         return order
 
     def _all_in_order(self) -> list[int]:
@@ -201,7 +208,7 @@ class Conversion:
         rule = self.convention.rules.get(joint.name)
         if rule is not None and (rule.factor is not None or rule.zero or rule.sign != 1.0):
             raise InputError(
-                "sign, zero and unit need a joint with one coordinate",
+                "`sign`, `zero` and `unit` need a joint with one coordinate",
                 where=f"{self.convention.name}: joint {joint.name}",
                 found=joint.kind.value,
             )
@@ -210,7 +217,7 @@ class Conversion:
         how, turns = self.convention, joint.kind.turns
         if rule.of and (rule.of == "angle") != turns:
             raise InputError(
-                f"the unit is for a joint with {'an angle' if rule.of == 'angle' else 'a length'}",
+                f"this `unit` is for a joint with {'an angle' if rule.of == 'angle' else 'a length'}",
                 where=f"{how.name}: joint {joint.name}",
                 found=joint.kind.value,
             )
@@ -411,7 +418,7 @@ class Conversion:
         [0.5, -1.0]
         """
         if a is not None and v is None:
-            raise InputError("a needs v")
+            raise InputError("`a` can only be converted together with `v`")
         ours = [self._from_q(self._theirs(q, "q"))]
         if v is not None:
             ours.append(self._from_rates(ours[0], self._theirs(v, "v")))
@@ -421,7 +428,7 @@ class Conversion:
 
     def _ours(self, *given: Given | None) -> list[FloatArray]:
         if given[1] is None and given[2] is not None:
-            raise InputError("a needs v")
+            raise InputError("`a` can only be converted together with `v`")
         letters = zip("qva", given, strict=True)
         return [configuration.checked(self.tree, x, letter) for letter, x in letters if x is not None]
 
@@ -463,7 +470,9 @@ class Conversion:
                 norm = np.linalg.norm(pair, axis=-1)
                 if (np.abs(norm - 1.0) > NORM_TOLERANCE).any():
                     raise InputError(
-                        "cosine and sine must have norm 1", where=column.name, found=f"{norm.max():.6g}"
+                        "the cosine and sine of a joint must have norm 1",
+                        where=column.name,
+                        found=f"{norm.max():.6g}",
                     )
                 angle = np.arctan2(pair[..., 1], pair[..., 0])
                 found[..., at] = (angle - column.zero) / column.factor
@@ -478,9 +487,9 @@ class Conversion:
             apart = float(np.abs(theirs[..., k] - expected[..., k]).max(initial=0.0))
             if apart > _MIMIC_TOLERANCE * max(1.0, abs(column.factor)):
                 raise InputError(
-                    "a mimic joint does not follow its rule",
+                    "the value of a mimic joint contradicts its mimic rule",
                     where=column.name,
-                    found=f"{apart:.3g} apart",
+                    found=f"{apart:.3g} rad or m from the rule",
                     remedy="correct the value, or load with mimic=False (--no-mimic)",
                     question=Question.MIMIC_JOINTS,
                 )
@@ -611,7 +620,7 @@ class Conversion:
         """
         array = np.asarray(x, dtype=np.float64)
         if array.ndim < 1 or array.shape[axis] != 6:
-            raise InputError("a six-vector has six numbers", found=f"shape {array.shape}")
+            raise InputError("a six-vector must have six numbers", found=f"shape {array.shape}")
         return np.take(array, _SWAPPED, axis) if self.angular_first else array
 
     def jacobian(self, q: Given, J: ArrayLike) -> FloatArray:
@@ -692,8 +701,9 @@ class Conversion:
         if self._v_copies:
             name = self._v_names[min(self._v_copies)]
             raise InputError(
-                f"{self.convention.title or self.convention.name} has a column for each mimic joint, and ours"
-                " are added up",
+                f"{self.convention.title or self.convention.name} has a Jacobian column for each mimic"
+                " joint, but urdfkin"
+                " adds it to that of the mimicked joint",
                 where=f"joint {name}",
                 remedy="load with mimic=False (--no-mimic)",
                 question=Question.MIMIC_JOINTS,

@@ -181,7 +181,7 @@ def _no_header(lines: list[str]) -> InputError:
             " or a bar",
         )
     return InputError(
-        f"no column {missing!r}",
+        f"the table has no column {missing!r}",
         where="header",
         found=", ".join(best)[:200] or "nothing",
         remedy=f"write a line of headings above the rows, with {', '.join(ORDER)}",
@@ -252,7 +252,7 @@ def _columns(cells: list[str]) -> tuple[_Column, ...] | None:
         return None
     double = [name for name in names if name and names.count(name) > 1]
     if double:
-        raise InputError(f"the column {double[0]!r} is there twice", where="header", found=", ".join(cells))
+        raise InputError(f"the column {double[0]!r} occurs twice", where="header", found=", ".join(cells))
     return columns
 
 

@@ -20,11 +20,11 @@ _LONGEST = 2000
 
 #: Pattern of a rejected text -> its remedy; the first match counts.
 _REMEDIES = (
-    (r"", "it is empty: write a number"),
+    (r"", "the text is empty: write a number"),
     (r"[+-]?(nan|inf|infinity)", "write a finite number"),
     (r".*[^\x00-\x7f].*", "write ASCII digits and signs"),
     (r".*_.*", "write the digits without underscores"),
-    (r"0[xXbBoO].*", "write it in decimal digits"),
+    (r"0[xXbBoO].*", "write the number in decimal digits"),
     (r".*;.*", "separate numbers by commas"),
 )
 

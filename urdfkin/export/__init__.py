@@ -14,14 +14,14 @@ if TYPE_CHECKING:
 #: Language -> (module of `write`, suffix of files, one-line summary).
 LANGUAGES: dict[str, tuple[str, str, str]] = {
     "c": ("urdfkin.export.c", ".c", "C99, single or double precision, one configuration or a batch"),
-    "cpp": ("urdfkin.export.cpp", ".hpp", "C++11, a header of templates on the number"),
+    "cpp": ("urdfkin.export.cpp", ".hpp", "C++11, a header of templates for any number type"),
     "numpy": ("urdfkin.export.python", "_numpy.py", "Python on NumPy, whole batches"),
     "numba": ("urdfkin.export.python", "_numba.py", "Python that Numba compiles"),
     "jax": ("urdfkin.export.python", "_jax.py", "Python on JAX, for jit, vmap and grad"),
     "casadi": ("urdfkin.export.python", "_casadi.py", "Python on CasADi's SX, MX and DM"),
     "sympy": ("urdfkin.export.python", "_sympy.py", "Python on SymPy's symbols"),
     "matlab": ("urdfkin.export.matlab", "_kinematics.m", "MATLAB and Octave"),
-    "latex": ("urdfkin.export.latex", ".tex", "formulas of a document, in the textbook's symbols"),
+    "latex": ("urdfkin.export.latex", ".tex", "LaTeX formulas in the textbook's symbols"),
 }
 #: Quantities that are exported by default.
 QUANTITIES = ("placement", "jacobian", "acceleration")

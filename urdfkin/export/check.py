@@ -61,7 +61,7 @@ def check(file: Path) -> Checked:
     text = read_text(file)
     head = text[:_HEAD]
     if _MARK not in head:
-        raise InputError("not a file of urdfkin export", where=str(file))
+        raise InputError("this file was not written by `urdfkin export`", where=str(file))
     with tempfile.TemporaryDirectory() as folder:
         runs = {".c": _run_compiled, ".hpp": _run_compiled, ".py": _run_imported, ".m": _run_octave}
         if (run := runs.get(file.suffix)) is None:
@@ -84,9 +84,12 @@ def _doubts(text: str) -> Iterator[str]:
         yield "these expressions were not compared with Pinocchio when they were written"
     sealed = is_sealed(text)
     if sealed is None:
-        yield "the file has no seal, so its head may belong to other numbers; export it again"
+        yield (
+            "the file has no seal (checksum), so its header may belong to other numbers; export the"
+            " file again"
+        )
     elif not sealed:
-        yield "the file was changed after it was written; export it again"
+        yield "the file was changed after it was written; export the file again"
 
 
 def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[list[str]]:

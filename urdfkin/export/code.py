@@ -58,7 +58,7 @@ class Code:
     def proof(self) -> Proof:
         """The proof of the functions."""
         if self.vouched is None:
-            raise ValueError("code without a proof is not exported")
+            raise ValueError("code that was not verified is not exported")
         return self.vouched
 
     @property
@@ -120,7 +120,7 @@ def code_of(
             "the Jacobian has no columns",
             where=tree.name,
             found="no moving joint",
-            remedy="export the placement",
+            remedy="export the placement instead",
         )
     code = bare(tree, plan, frame, rows, reference, title("", name) if name else title(tree.name, frame))
     return replace(code, vouched=prove(verifier, plan_of, frame, reference, code.functions, verify))

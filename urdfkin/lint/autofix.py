@@ -74,7 +74,10 @@ def mend(
             break
         code = candidates[0].code
         if error := next((f.code for f in now.findings if f.severity is Severity.ERROR), None):
-            kept |= {finding.code: f"the file has an error ({error}), fix it first" for finding in candidates}
+            kept |= {
+                finding.code: f"the file has an error ({error}); correct this error first"
+                for finding in candidates
+            }
             break
         by_fix = {id(f.fix): f for f in candidates if f.code == code}
         data, applied = apply(now.text.data, (f.fix for f in by_fix.values() if f.fix))
@@ -99,12 +102,12 @@ def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> It
         for seen in (before, after)
     )
     if appeared := new - old:
-        yield f"it would cause {min(code for code, *_ in appeared)}"
+        yield f"the fix would cause {min(code for code, *_ in appeared)}"
     if sum(f.count for f in before.findings) - sum(f.count for f in after.findings) < len(fixable):
-        yield f"{code} would still be there"
+        yield f"{code} would remain after the fix"
     if before.robot is None or after.robot is None:
         if before.robot is not after.robot:
-            yield "the result would not be a URDF"
+            yield "the fixed file would not be a URDF"
         return
     turns = defaultdict[str, float](float)
     for finding in fixable:
@@ -121,11 +124,11 @@ def differences(a: RobotRecord, b: RobotRecord, turns: Mapping[str, float]) -> I
         turns: Joint -> bound on the rotation (rad) of its frame.
     """
     if (a.version, [*a.links], len(a.joints)) != (b.version, [*b.links], len(b.joints)):
-        yield "links or joints would not be the same"
+        yield "the fix would change the links or joints"
         return
     for one, other in zip(a.joints, b.joints, strict=True):
         if what := _difference(one, other, turns.get(one.name, 0.0)):
-            yield f"joint {one.name} would have another {what}"
+            yield f"the fix would change the {what} of joint {one.name}"
 
 
 def _difference(a: JointRecord, b: JointRecord, turns: float) -> str | None:

@@ -308,5 +308,6 @@ def _check_single_axis(tree: KinematicTree, joint: Joint, base: str, tip: str) -
         f"a {joint.kind.value} joint has no single axis and cannot be on a path of axes",
         where=f"joint {joint.name}",
         found=f"it lies between {base} and {tip}",
-        remedy=f"choose base and tip on the same side of it: both from {child!r} outwards, or both before it",
+        remedy=f"choose base and tip on the same side of this joint: both from {child!r} outwards, or"
+        " both before it",
     )

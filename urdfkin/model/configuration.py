@@ -104,7 +104,7 @@ def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
             Question.MIMIC_JOINTS,
         )
         if joint.mimic
-        else Hint("it is fixed: leave it out", Question.FIXED_JOINTS)
+        else Hint("leave out this fixed joint", Question.FIXED_JOINTS)
         for joint in tree.joints
         if not joint.nv
     }
@@ -386,7 +386,7 @@ def _check_mimic_rule(joint: Joint, leader: FloatArray, values: FloatArray) -> N
         raise InputError(
             f"the mimic joint must be {rule.multiplier:g} * {rule.leader} + {rule.offset:g}",
             where=f"joint {joint.name}",
-            found=f"it is off by {np.abs(off).max():.3g}",
+            found=f"the value is off by {np.abs(off).max():.3g}",
             remedy="load with mimic=False to give it its own coordinate",
             question=Question.MIMIC_JOINTS,
         )

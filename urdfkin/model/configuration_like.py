@@ -103,7 +103,9 @@ keeps: 'neutral, elbow=...'
         for name, number in named:
             if name is None or name in values:
                 wrong = f"{name!r} twice" if name else repr(number[:60])
-                raise InputError("give all numbers in order, or each with its name", where=where, found=wrong)
+                raise InputError(
+                    "give all numbers in order, or each number with its name", where=where, found=wrong
+                )
             values[name] = number
         return self._by_name(values, where, pose)
 
@@ -169,7 +171,7 @@ keeps: 'neutral, elbow=...'
         return InputError(
             f"no value for {listed(missing)}",
             where=where,
-            remedy=f"name {them} too, or begin with a pose that {keeps}: {begun}",
+            remedy=f"give {them} too, or begin with a pose that {keeps}: {begun}",
         )
 
     def _number(self, text: str, where: str, unit: str | None) -> float:
@@ -218,7 +220,7 @@ def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
                 "a list of tables with labels is not accepted",
                 where=where,
                 found=f"{len(value)} of them",
-                remedy="give one table, or numbers in order",
+                remedy="give one table, or numbers without names in order",
             )
         return None
     labels = _labels(value)

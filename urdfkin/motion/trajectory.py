@@ -103,10 +103,10 @@ def _check_names(path: Path, names: Sequence[str], shapes: Shapes, required: Seq
     if unknown or missing:
         wrong = {"unknown": unknown, "missing": missing}
         raise InputError(
-            "the arrays are not those of a trajectory",
+            "the arrays in the file are not those of a trajectory",
             where=str(path),
             found="; ".join(f"{word}: {', '.join(found)}" for word, found in wrong.items() if found),
-            remedy=f"the names are {', '.join(shapes)}; required: {', '.join(required)}",
+            remedy=f"the possible names are {', '.join(shapes)}; required: {', '.join(required)}",
         )
 
 
@@ -394,7 +394,7 @@ def _check_columns(
             f"the first line must name the columns of {what}",
             where=where,
             found="; ".join(f"{word}: {listed(found)}" for word, found in wrong.items() if found),
-            remedy=f"name them {listed(required)}{also}",
+            remedy=f"name the columns {listed(required)}{also}",
         )
 
 

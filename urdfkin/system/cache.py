@@ -151,7 +151,7 @@ def get(place: Path) -> bytes | None:
         return None
     checksum, data = content[:_DIGEST], content[_DIGEST:]
     if _checksum(place, data) != checksum:
-        report_damaged(place, "its checksum does not match its content and its name")
+        report_damaged(place, "the checksum of the file does not match its content and its name")
         return None
     return data
 

@@ -219,7 +219,7 @@ def _too_large(where: str, most: int) -> SourceError:
         "too large",
         where=where,
         found=f"more than {most} bytes",
-        remedy="split it, or leave out what is not needed",
+        remedy="split the file, or remove the parts that are not needed",
     )
 
 

@@ -90,7 +90,8 @@ def version_before(reference: str, folder: Path) -> Version:
             "git finds no common version of this commit and HEAD",
             where=reference,
             found=error.found,
-            remedy="fetch it first, with its history; in GitHub's actions/checkout set fetch-depth: 0",
+            remedy="fetch this commit first, with its history; in GitHub's actions/checkout set"
+            " fetch-depth: 0",
         ) from None
     rows = _git("ls-tree", "-r", "-z", "--full-tree", merge_base, cwd=root).split(b"\0")
     parts = (row.partition(b"\t") for row in rows if row)
@@ -117,7 +118,9 @@ def _git(*words: str, cwd: Path) -> bytes:
             cwd=cwd, env=environ, stdin=subprocess.DEVNULL, capture_output=True, check=False,
         )  # fmt: skip
     except FileNotFoundError:
-        raise SourceError("git is not installed", remedy="install it, or leave out --changed-since") from None
+        raise SourceError(
+            "git is not installed", remedy="install git, or leave out --changed-since"
+        ) from None
     if result.returncode:
         found = result.stderr.decode("utf-8", "replace").strip().removeprefix("fatal: ")
         raise SourceError("git failed", where=str(cwd), found=found or None)

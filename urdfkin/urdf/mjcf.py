@@ -496,7 +496,10 @@ class _Reader:
         if kind == kinds.mjJNT_FREE:
             place = ", ".join(f"{x:g}" for x in m.qpos0[at : at + 3])
             if m.qpos0[at : at + 3].any() or m.qpos0[at + 3] != 1.0:
-                what = f"qpos0 places it at ({place}); in the neutral configuration it is at the origin"
+                what = (
+                    f"qpos0 places this body at ({place}); in the neutral configuration the body is"
+                    " at the origin"
+                )
                 self.listed.append(Listed(what, f"joint {name}"))
             return Joint(name, JointKind.FLOATING, 0, np.eye(4), np.array([1.0, 0.0, 0.0])), np.eye(4)
         zero, turns = float(m.qpos0[at]), kind == kinds.mjJNT_HINGE
@@ -516,7 +519,8 @@ class _Reader:
         if turns:
             return JointKind.CONTINUOUS, None
         note = Listed(
-            f"a slide without limits: the URDF, which requires some, has +-{UNBOUNDED:g} m", f"joint {name}"
+            f"a slide joint without limits: the URDF, which requires limits, has +-{UNBOUNDED:g} m",
+            f"joint {name}",
         )
         if note not in self.listed:
             self.listed.append(note)

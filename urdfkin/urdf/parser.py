@@ -86,7 +86,7 @@ def utf8_bytes(report: Reporter, data: bytes) -> bytes | None:
     """
     if not data.strip():
         what = "the file is empty" if not data else "the file contains only white space"
-        report.add(EMPTY, what, remedy="check the program that wrote it")
+        report.add(EMPTY, what, remedy="check the program that wrote the file")
         return None
     wide = next((name for mark, name in (*_MARKS, *_WIDE) if data.startswith(mark)), None)
     if wide is not None:
@@ -98,7 +98,11 @@ def utf8_bytes(report: Reporter, data: bytes) -> bytes | None:
     if not (_is_utf8(report, text, declared) and _agrees(report, text, declared)):
         return None
     if marked:
-        report.add(BYTE_ORDER_MARK, "the text begins with a byte order mark", remedy="remove it if you can")
+        report.add(
+            BYTE_ORDER_MARK,
+            "the text begins with a byte order mark",
+            remedy="remove the byte order mark if you can",
+        )
     return text
 
 
@@ -362,7 +366,8 @@ class _Builder:
                 INSTRUCTION,
                 "a processing instruction is not at the beginning of the file; urdfdom refuses the file",
                 found=quoted(f"<?{target} {text}".strip() + "?>"),
-                remedy="remove it, or move it to the beginning; only other instructions may precede it",
+                remedy="remove the instruction, or move it to the beginning, where only other"
+                " instructions may precede it",
                 position=self.here(),
             )
 
@@ -376,7 +381,7 @@ class _Builder:
                 DOCTYPE,
                 "a document type declaration has no use in a URDF",
                 found=quoted(f"<!DOCTYPE {name}>"),
-                remedy="remove it; it is ignored",
+                remedy="remove the declaration, which is ignored",
                 position=position,
             )
             return
@@ -386,7 +391,7 @@ class _Builder:
             ENTITY,
             f"the document type declaration {what}",
             found=found,
-            remedy="remove it and write the values directly; nothing was expanded or opened",
+            remedy="remove the declaration and write the values directly; nothing was expanded or opened",
             position=position,
         )
         raise _Stop
@@ -457,7 +462,7 @@ _REASONS: dict[str, tuple[str, str | None]] = {
     ),
     expat.errors.XML_ERROR_JUNK_AFTER_DOC_ELEMENT: (
         "there is content after the closing tag of the root element",
-        "a file contains one robot",
+        "write only one robot into a file",
     ),
 }
 
@@ -623,7 +628,7 @@ _REMEDIES = (
     (r"[\[({].*|.*[\])}]", "write the numbers without brackets"),
     (r"[+-]?[0-9.]+e[+-]?", "write digits after the e"),
     (r"[+-]?[0-9.]+[a-z]+", "write the number without a unit"),
-    (r"", "it is empty; write a number, or remove the attribute"),
+    (r"", "the attribute is empty; write a number, or remove the attribute"),
 )
 
 
@@ -690,13 +695,13 @@ def read_robot(report: Reporter, root: Element) -> RobotRecord | None:
 #: Root element of another format -> remedy.
 _FORMATS = {
     "sdf": "this is an SDF file; convert it to a URDF first",
-    "mujoco": "this is MJCF, which `load` and all other commands read; a file of it ends in .xml or .mjcf",
+    "mujoco": "this is an MJCF file; `load` and all other commands read it if its suffix is .xml or .mjcf",
     "mujocoinclude": "this is a part of an MJCF file; load the file that includes it",
     "model": "this is a part of an SDF file; convert it to a URDF first",
     "world": "this is a part of an SDF file; convert it to a URDF first",
     "collada": "this is a COLLADA file",
     "html": "this is a web page, not the file it shows",
-    "launch": "this is a launch file; the URDF is what it loads",
+    "launch": "this is a launch file; name the URDF that the launch file loads",
     "package": "this is a package manifest; the URDF is another file",
     "drake": "this is a Drake file; convert it to a URDF first",
 }
@@ -719,7 +724,7 @@ def _version(report: Reporter, root: Element) -> tuple[int, int]:
         return (1, 0)
     match = _VERSION.fullmatch(written)
     version = (int(match[1]), int(match[2])) if match and len(written) < 20 else None
-    rule, remedy = VERSION, 'write version="1.0" if the file follows it, or remove the attribute'
+    rule, remedy = VERSION, 'write version="1.0" if the file follows URDF 1.0, or remove the attribute'
     if version is None:
         message = "a URDF version has the form 1.0"
     elif version > NEWEST:

@@ -46,6 +46,6 @@ def order_words(urdf: str, joints: Sequence[str]) -> str:
     ours_is = "order of joints: Pinocchio's (depth first, siblings by name), for q, v and columns"
     first = next((k for k, pair in enumerate(zip(written, ours, strict=False)) if pair[0] != pair[1]), None)
     if first is None:
-        return f"{ours_is}; the file has the same"
-    differs = f"{written[first]} is number {first + 1} there, {ours[first]} here"
-    return f"{ours_is}; the file's differs: {differs}; {Question.JOINT_ORDER}"
+        return f"{ours_is}; the file has the same order"
+    differs = f"{written[first]} is number {first + 1} in the file and {ours[first]} here"
+    return f"{ours_is}; the order in the file differs: {differs}; {Question.JOINT_ORDER}"

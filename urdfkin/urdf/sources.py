@@ -144,14 +144,14 @@ def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, objec
         InputError: the type of the source is wrong.
     """
     if xacro_args is not None and not isinstance(xacro_args, Mapping):
-        raise InputError("xacro_args must be a mapping from names to values", found=safe_repr(xacro_args))
+        raise InputError("`xacro_args` must be a mapping from names to values", found=safe_repr(xacro_args))
     if isinstance(source, str) and "://" in source and (address := split_uri(source)) is not None:
         source = _in_package(*address)
     if is_xacro(source):
         return _expand_xacro(at_home(source), xacro_args or {})
     if xacro_args:
         raise InputError(
-            "xacro_args go with the path of a .xacro file", found=", ".join(map(str, xacro_args))
+            "`xacro_args` needs the path of a .xacro file", found=", ".join(map(str, xacro_args))
         )
     if isinstance(source, bytes):
         return Text(source, "<bytes>", "<bytes>")
@@ -229,7 +229,7 @@ def _in_package(name: str, path: str) -> Path:
         raise SourceError(
             f"the package {name!r} is not found",
             where=f"package://{name}/{path}",
-            remedy="put its folder into ROS_PACKAGE_PATH, or name the file by its path",
+            remedy="add the folder of the package to ROS_PACKAGE_PATH, or name the file by its path",
             question=Question.PACKAGES_AND_MESHES,
         )
     return folder / path
@@ -249,7 +249,7 @@ def _read_file(path: Path, most: int) -> Text:
             raise SourceError("no such file", where=str(path), remedy=_nearest_file(path)) from None
         if isinstance(error.__cause__, IsADirectoryError):
             raise SourceError(
-                "this is a folder, not a file", where=str(path), remedy="name the .urdf file in it"
+                "this is a folder, not a file", where=str(path), remedy="name the .urdf file in this folder"
             ) from None
         raise
 

@@ -83,7 +83,7 @@ def _limit(joint: Joint, limit: Limit | None) -> Iterable[str]:
             "a URDF needs finite position limits for a revolute or prismatic joint",
             where=f"joint {joint.name}",
             found="none" if limit is None else f"{limit.lower} to {limit.upper}",
-            remedy="give it limits, or make a joint that rotates without limits continuous",
+            remedy="give the joint limits, or make it continuous if it rotates without limits",
         )
     if limit is None:
         return

@@ -140,7 +140,7 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
         raise XacroError(
             "a .xacro file needs the package xacrodoc",
             where=str(path),
-            remedy='install it with "urdfkin[xacro]", or expand the file with: xacro FILE > robot.urdf',
+            remedy='install xacrodoc with "urdfkin[xacro]", or expand the file with: xacro FILE > robot.urdf',
             question=Question.XACRO,
         )
     command = own_python("from urdfkin.urdf.expanding import serve; serve()", options=("-B", "-X", "utf8"))
@@ -154,7 +154,7 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
         takes = answer.get("takes")
         check_arguments(path, arguments, [str(name) for name in takes] if isinstance(takes, list) else None)
         return str(answer["urdf"]).encode()
-    reason = answer.get("error") or f"its process ended with status {status}"
+    reason = answer.get("error") or f"the process of xacro ended with status {status}"
     raise XacroError(
         "xacro cannot expand the file",
         where=str(path),

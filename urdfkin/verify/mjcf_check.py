@@ -130,10 +130,10 @@ def _ask(request: Mapping[str, Any], patience: float) -> tuple[list[dict[str, An
     output, status = ask_python(command, json.dumps(request).encode(), patience, MOST)
     answers = [json.loads(line) for line in output.splitlines(keepends=True) if _is_answer(line)]
     if status is None:
-        return answers, f"it did not finish within {patience:g} s"
+        return answers, f"MuJoCo did not finish within {patience:g} s"
     if len(output) > MOST:
         return answers, f"an answer of more than {MOST} bytes"
-    return answers, f"its process ended with status {status}: perhaps {TOO_MUCH}"
+    return answers, f"MuJoCo's process ended with status {status}: perhaps {TOO_MUCH}"
 
 
 def _is_answer(line: bytes) -> bool:
@@ -195,7 +195,8 @@ def _demand_the_rules(name: str, answer: Mapping[str, Any]) -> float | None:
         first = min(different)
         what = f"mimic joint {rules[first]}" if first in rules else f"equality {first}"
         raise _error(
-            f"{name}, {what}", f"MuJoCo {version()} {'has' if first in active else 'does not have'} it"
+            f"{name}, {what}",
+            f"MuJoCo {version()} {'has' if first in active else 'does not have'} this constraint",
         )
     if not rules:
         return None
@@ -237,12 +238,12 @@ def _pinocchios(read: MjcfReading, ours: FloatArray, bound: Bound) -> str:
     """Return a phrase about the placements by Pinocchio's MJCF reader."""
     if read.path is None:
         return "not compared with Pinocchio's MJCF reader, which needs a file"
-    found = read.pinocchio or {"error": "its process ended"}
+    found = read.pinocchio or {"error": "the process of the reader ended"}
     if "error" in found:
         return f"not compared with Pinocchio's MJCF reader ({found['error']})"
     names = list(found["bodies"])
     if not names:
-        return "Pinocchio's MJCF reader finds no body either"
+        return "Pinocchio's MJCF reader also finds no body"
     places = [name for name, _ in read.answer["frames"]]
     bodies, theirs = [places.index(name) for name in names], _whole(found["placements"])
     share = _shares(ours[:, bodies], theirs, Bound(bound.scale[:, bodies], bound.k[:, bodies]))

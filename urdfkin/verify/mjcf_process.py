@@ -170,13 +170,13 @@ def _pinocchio_placements(
     try:
         model = pin.buildModelFromMJCF(path)
     except Exception as error:  # the exceptions of its parsers
-        raise OracleError("it does not accept the file", found=str(error).strip()) from error
+        raise OracleError("the reader does not accept the file", found=str(error).strip()) from error
     joints = dict(_numbered(model, list(coordinates)))
     if joints.keys() != coordinates.keys():
         found = ", ".join(sorted(joints.keys() ^ coordinates.keys())[:_NAMED])
-        raise OracleError("it finds other joints", found=found)
+        raise OracleError("the reader finds other joints", found=found)
     if missing := [name for name in bodies if not model.existFrame(name)]:
-        raise OracleError("it finds no such body", found=missing[0])
+        raise OracleError("the reader does not find a body of the file", found=missing[0])
     data, out = model.createData(), np.empty((len(qpos), len(bodies), 4, 4))
     ids = [int(model.getFrameId(name, pin.FrameType.BODY)) for name in bodies]
     for k, numbers in enumerate(qpos):

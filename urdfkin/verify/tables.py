@@ -156,10 +156,10 @@ def _loss(table: DHTable) -> str:
     )
     tilts = [abs(math.sin(row.alpha)) for row in table.rows if row.alpha not in (0.0, math.pi)]
     tilt = math.asin(min(tilts, default=1.0))
-    snap = f"take --snap {10.0 ** math.ceil(math.log10(tilt)):.0e}, or " if tilt <= LARGEST_TOLERANCE else ""
+    snap = f"use --snap {10.0 ** math.ceil(math.log10(tilt)):.0e}, or " if tilt <= LARGEST_TOLERANCE else ""
     return (
         f"{cell} of {joint} is {length:.3g} m, which rounds by {EPS * length * 1e3:.2g} mm;"
-        f" {snap}take Hayati rows"
+        f" {snap}use Hayati rows"
     )
 
 

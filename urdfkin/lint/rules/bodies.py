@@ -53,7 +53,7 @@ def _check_inertial(report: Reporter, inertial: Element, numbers: NumberReader) 
             "the inertial is incomplete",
             inertial,
             found=f"no {', '.join(missing)}",
-            remedy="write mass and all six moments, or no inertial",
+            remedy="write <mass> and all six moments of <inertia>, or remove <inertial>",
         )
     lever = None
     if origin is not None:
@@ -77,7 +77,7 @@ def _check_mass(
             inertial.first("mass"),
             attribute="value",
             found=f"{mass:g}",
-            remedy="write kilograms",
+            remedy="write the mass in kilograms",
             weight=1.0,
         )
     heavy = mass is not None and abs(mass) > HEAVIEST
@@ -85,10 +85,10 @@ def _check_mass(
         what = f"mass {mass:g} kg" if heavy else f"centre of mass {max(abs(x) for x in lever or ()):g} m away"
         report.add(
             INERTIAL_SCALE,
-            "the inertial is far too large",
+            "the mass or the centre of mass is far too large",
             inertial,
             found=what,
-            remedy="write kilograms and metres",
+            remedy="write the mass in kilograms and the centre of mass in metres",
         )
 
 
@@ -99,7 +99,7 @@ def _check_moments(report: Reporter, tensor: Element, moments: list[float], mass
             INERTIAL_IMPOSSIBLE,
             "the body has moments of inertia, but no mass",
             tensor,
-            remedy="write kilograms, or no moments",
+            remedy="write the mass in kilograms, or remove the moments",
         )
         return
     if 0.0 < kilograms < NEGLIGIBLE:
@@ -118,7 +118,7 @@ def _check_moments(report: Reporter, tensor: Element, moments: list[float], mass
         f"no body has this inertia: {what}",
         tensor,
         found=found,
-        remedy="check units and signs; kinematics does not use them",
+        remedy="check the units and signs of the moments; kinematics does not use them",
     )
 
 
@@ -182,10 +182,10 @@ def _check_geometry(report: Reporter, owner: Element, numbers: NumberReader) -> 
         lacks = "no <geometry>" if geometry is None else "an empty <geometry>"
         report.add(
             GEOMETRY,
-            f"the {owner.tag} has no shape of URDF",
+            f"the {owner.tag} contains no shape that URDF defines",
             geometry or owner,
             found=lacks if shape is None else f"<{shape.tag}>",
-            remedy="the shapes are box, cylinder, sphere and mesh",
+            remedy="write a <box>, <cylinder>, <sphere> or <mesh>",
         )
         return
     for attribute, count, required in _SHAPES[shape.tag]:

@@ -89,7 +89,7 @@ def _check_namespaces(report: Reporter, root: Element, prefixes: dict[str, str])
                 "the file includes another file",
                 element,
                 found=quoted(element.attributes.get("href", f"<{element.tag}>")),
-                remedy="insert its content here; the other file was not opened",
+                remedy="insert the content of the other file here; urdfkin did not open it",
             )
     if not _check_macros(report, root, macros):
         _check_expressions(report, root)
@@ -546,7 +546,7 @@ def _check_lookalikes(report: Reporter, named: list[tuple[str, Element]]) -> Non
                 element,
                 attribute="name",
                 found=ascii(name) + " and " + ascii(first),
-                remedy="use one of the two",
+                remedy="use only one of the two spellings",
             )
 
 
@@ -606,6 +606,6 @@ def check_unused(report: Reporter) -> None:
                     UNUSED_COMMENT,
                     f"{code} is silenced, but there is no such warning or note here",
                     found=quoted(f"<!--{silence.comment.text}-->"),
-                    remedy="remove it; an error cannot be silenced",
+                    remedy="remove the code from the comment; an error cannot be silenced",
                     position=(silence.comment.line, silence.comment.column),
                 )

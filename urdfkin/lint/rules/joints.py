@@ -67,7 +67,7 @@ def _ends_exist(report: Reporter, robot: RobotRecord, joint: JointRecord) -> boo
             joint.element.first("child"),
             attribute="link",
             found=quoted(joint.parent),
-            remedy="name another parent or child",
+            remedy="name another parent link or child link",
         )
         return False
     return joint.parent in robot.links and joint.child in robot.links
@@ -317,7 +317,7 @@ def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, versi
                 limit.element,
                 attribute=attribute,
                 found=quoted(limit.element.attributes[attribute]),
-                remedy="write its magnitude",
+                remedy="write the limit without its sign",
             )
     if joint.kind == "continuous":
         _check_continuous(report, limit)
@@ -336,7 +336,7 @@ def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, versi
             limit.element,
             attribute="lower",
             found=found if len(written) == 2 else f"{found} (a missing bound is 0)",
-            remedy="swap the two" if len(written) == 2 else "write both limits",
+            remedy="swap the limits" if len(written) == 2 else "write both limits",
         )
     elif lower == upper and bounded:
         report.add(
@@ -358,7 +358,7 @@ def _check_continuous(report: Reporter, limit: LimitRecord) -> None:
             limit.element,
             attribute=written[0],
             found=" ".join(f"{name}={quoted(limit.element.attributes[name])}" for name in written),
-            remedy='remove them, or write type="revolute"',
+            remedy='remove the limits, or write type="revolute"',
             fix=lambda: report.without(limit.element, *written),
         )
 
@@ -481,7 +481,7 @@ class _MimicChecker:
                 " joint only",
                 mimic,
                 "joint",
-                'write type="revolute" for it',
+                'write type="revolute" for the mimic joint',
             )
         if leader.mimic is not None:
             self.add(
@@ -769,7 +769,7 @@ def _check_places(report: Reporter, robot: RobotRecord) -> None:
                 SAME_PLACE,
                 f"the joint has the same origin and axis as joint {quoted(first.name)}",
                 joint.element,
-                remedy="ignore this if it is intended",
+                remedy="ignore this finding if both joints are intended",
             )
 
 
