@@ -306,7 +306,7 @@ class KinematicTree:
             raise InputError(
                 f"frame {name!r} is the name of a link and of a joint at different places",
                 where=self.name,
-                remedy=f"write {' or '.join(map(repr, ways))}" if ways else "rename one of the two",
+                remedy=f"write {' or '.join(map(repr, ways))}" if ways else "rename the link or the joint",
             )
         return link if link is not None else self._joint_index[name] + 1
 
@@ -365,7 +365,7 @@ def with_root_joint(tree: KinematicTree, kind: JointKind) -> KinematicTree:
             raise InputError(
                 f"the robot uses the name {name!r}, which a root joint needs",
                 where=tree.name,
-                remedy="rename it in the URDF or load without root_joint",
+                remedy="rename it in the URDF, or load the robot without root_joint",
             )
     root = Joint("root_joint", kind, 0, np.eye(4), np.array([1.0, 0.0, 0.0]))
     moved = [replace(joint, parent=joint.parent + 1) for joint in tree.joints]

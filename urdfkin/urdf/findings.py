@@ -190,7 +190,7 @@ class Finding:
     >>> import urdfkin
     >>> finding = urdfkin.check('<robot name="r"><link name="a"/><link name="a"/></robot>')[0]
     >>> print(finding)
-    <text>:1:39: URDF402 error: link 'a': another link has this name; the first is on line 1; rename one
+    <text>:1:39: URDF402 error: link 'a': another link has this name; the first is on line 1; rename one link
     """
 
     code: str
@@ -250,7 +250,7 @@ class Finding:
         >>> import urdfkin
         >>> finding = urdfkin.check('<robot name="r"><link name="a"/><link name="a"/></robot>')[0]
         >>> finding.sentence
-        "link 'a': another link has this name; the first is on line 1; rename one"
+        "link 'a': another link has this name; the first is on line 1; rename one link"
         """
         subject = f"{self.subject}: " if self.element and self.name is not None else ""
         found = f": found {self.found}" if self.found else ""

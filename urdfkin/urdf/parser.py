@@ -455,7 +455,10 @@ _REASONS: dict[str, tuple[str, str | None]] = {
     expat.errors.XML_ERROR_BAD_CHAR_REF: ("a character that XML does not allow", None),
     expat.errors.XML_ERROR_TAG_MISMATCH: ("a closing tag does not match the open element", None),
     expat.errors.XML_ERROR_NO_ELEMENTS: ("the file has no element", "a URDF begins with <robot ...>"),
-    expat.errors.XML_ERROR_DUPLICATE_ATTRIBUTE: ("an attribute is given twice", "remove one of the two"),
+    expat.errors.XML_ERROR_DUPLICATE_ATTRIBUTE: (
+        "an attribute occurs twice",
+        "remove one of these attributes",
+    ),
     expat.errors.XML_ERROR_MISPLACED_XML_PI: (
         "the XML declaration is not at the very beginning of the file",
         "remove the text before <?xml",
@@ -712,7 +715,7 @@ def _other_format(report: Reporter, root: Element) -> None:
     if local == "robot" and prefix:
         remedy = f"write <robot> without the prefix {prefix!r}"
     elif local.lower() == "robot":
-        remedy = "write it in lower case"
+        remedy = "write <robot> in lower case"
     else:
         remedy = _FORMATS.get(local.lower(), "a URDF begins with <robot name=...>")
     report.add(NOT_URDF, "the root element is not <robot>", root, found=f"<{root.tag}>", remedy=remedy)
@@ -763,7 +766,7 @@ def report_duplicate(report: Reporter, element: Element, first: Element) -> None
         f"another {element.tag} has this name",
         element,
         attribute="name",
-        remedy=f"the first is on line {first.line}; rename one",
+        remedy=f"the first is on line {first.line}; rename one {element.tag}",
     )
 
 
@@ -804,7 +807,8 @@ class JointReader:
         if value is None or not (value or number):
             self.report.add(
                 MISSING_ATTRIBUTE,
-                f"<{element.tag}> needs {attribute}" + ("" if value is None else ", and it is empty"),
+                f"<{element.tag}> needs the attribute {attribute}"
+                + ("" if value is None else ", which is empty"),
                 element,
                 attribute=attribute,
                 found=quoted(element.text) if element.text else None,
@@ -861,7 +865,7 @@ class JointReader:
             return
         both, zero = "rpy" in origin.attributes, not SHORTEST < sum(map(abs, quaternion)) < LONGEST
         if both:
-            add(BAD_QUATERNION, "rpy and quat_xyzw are both given", "remove one of the two")
+            add(BAD_QUATERNION, "rpy and quat_xyzw are both given", "remove one of these attributes")
         elif zero:
             add(BAD_QUATERNION, "the quaternion has no direction", 'the identity is "0 0 0 1"')
         else:
@@ -928,13 +932,16 @@ class JointReader:
         dynamics = joint.element.first("dynamics")
         if dynamics is not None:
             if not {"damping", "friction"} & dynamics.attributes.keys():
-                self.required(dynamics, "damping", '<dynamics damping="0"/>, or remove it')
+                self.required(dynamics, "damping", '<dynamics damping="0"/>, or remove <dynamics>')
             for attribute in ("damping", "friction"):
                 self.numbers.scalar(dynamics, attribute)
         safety = joint.element.first("safety_controller")
         if safety is not None:
             self.required(
-                safety, "k_velocity", '<safety_controller k_velocity="0"/>, or remove it', number=True
+                safety,
+                "k_velocity",
+                '<safety_controller k_velocity="0"/>, or remove <safety_controller>',
+                number=True,
             )
             for attribute in ("k_velocity", "k_position", "soft_lower_limit", "soft_upper_limit"):
                 self.numbers.scalar(safety, attribute)

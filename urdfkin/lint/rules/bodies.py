@@ -50,7 +50,7 @@ def _check_inertial(report: Reporter, inertial: Element, numbers: NumberReader) 
     if missing:
         report.add(
             INERTIAL_INCOMPLETE,
-            "the inertial is incomplete",
+            "<inertial> is incomplete",
             inertial,
             found=f"no {', '.join(missing)}",
             remedy="write <mass> and all six moments of <inertia>, or remove <inertial>",
@@ -248,7 +248,7 @@ def _materials(report: Reporter, robot: RobotRecord) -> set[str]:
                 material,
                 attribute="name",
                 found=quoted(name),
-                remedy=f"the first is on line {defined[name].line}; remove one",
+                remedy=f"the first is on line {defined[name].line}; remove one of these materials",
             )
         defined.setdefault(name, material)
     inside = {
@@ -330,7 +330,7 @@ def check_address(report: Reporter, mesh: Element) -> None:
             mesh,
             attribute="filename",
             found=quoted(filename),
-            remedy="copy it into a package",
+            remedy="copy the mesh into a package",
         )
 
 

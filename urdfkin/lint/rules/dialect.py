@@ -95,7 +95,7 @@ def _check_namespaces(report: Reporter, root: Element, prefixes: dict[str, str])
         _check_expressions(report, root)
 
 
-_EXPAND = "expand it first: xacro FILE > robot.urdf, or install urdfkin[xacro] and pass the .xacro file"
+_EXPAND = "expand the file first: xacro FILE > robot.urdf, or install urdfkin[xacro] and pass the .xacro file"
 _HARMLESS = "; kinematics does not use it"
 
 
@@ -277,13 +277,17 @@ def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) ->
             f"the value inside <{element.tag}> is skipped",
             element,
             found=quoted(element.text),
-            remedy=f"write it as an attribute, as in {_EXAMPLES[parent.tag]}",
+            remedy=f"write the value as an attribute, as in {_EXAMPLES[parent.tag]}",
             severity=Severity.ERROR,
         )
         return
     foreign = element.tag in _FOREIGN
     remedy = (
-        f"write {_EXAMPLES['origin']}" if foreign else f"did you mean <{close}>?" if close else "remove it"
+        f"write {_EXAMPLES['origin']}"
+        if foreign
+        else f"did you mean <{close}>?"
+        if close
+        else "remove the element"
     )
     report.add(
         UNKNOWN_ELEMENT,
@@ -352,7 +356,7 @@ def _check_text(report: Reporter, element: Element) -> None:
         f"text inside <{element.tag}> is skipped",
         element,
         found=quoted(element.text),
-        remedy=f"write it as an attribute, as in {example}" if example else "remove it",
+        remedy=f"write the value as an attribute, as in {example}" if example else "remove the text",
         severity=Severity.ERROR if lost else None,
     )
 
@@ -378,7 +382,7 @@ def _check_repeats(report: Reporter, element: Element) -> None:
                 DUPLICATE_ELEMENT,
                 f"a second <{child.tag}> is skipped; the first, on line {seen[child.tag].line}, is used",
                 child,
-                remedy="remove one of the two",
+                remedy="remove one of these elements",
             )
         seen.setdefault(child.tag, child)
 
@@ -518,7 +522,7 @@ def _check_reserved(report: Reporter, name: str, element: Element, root_joint: s
             "Pinocchio uses this name for the world and does not find the joint",
             element,
             attribute="name",
-            remedy="rename it",
+            remedy="rename the joint",
         )
     elif (element.tag, name) in (("link", "universe"), ("joint", "root_joint")):
         what = "the world" if name == "universe" else "the joint of a free or planar base"
@@ -527,7 +531,9 @@ def _check_reserved(report: Reporter, name: str, element: Element, root_joint: s
             f"the name is reserved for {what}",
             element,
             attribute="name",
-            remedy="rename it" if root_joint else "rename it, or load without root_joint",
+            remedy="rename the link or joint"
+            if root_joint
+            else "rename the link or joint, or load without root_joint",
             severity=Severity.ERROR if root_joint else None,
         )
 

@@ -150,7 +150,7 @@ def _one_root(report: Reporter, robot: RobotRecord) -> bool:
                 f"the link has no parent, and neither has {quoted(main)}",
                 robot.links[root],
                 attribute="name",
-                remedy="connect it with a joint, or remove it",
+                remedy="connect this link with a joint, or remove it",
             )
     return False
 
@@ -246,7 +246,7 @@ def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], 
             element,
             attribute="xyz",
             found=_written(joint),
-            remedy=f'write xyz="{written}"; if you mean the tilt, write the vector twice as long',
+            remedy=f'write xyz="{written}"; if the tilt is intended, double all three numbers',
             weight=tilt,
         )
 
@@ -285,7 +285,7 @@ def _check_planar(report: Reporter, joint: JointRecord) -> None:
     at = joint.axis_element or joint.element
     report.add(
         PLANAR_AXIS,
-        "a planar joint moves in the XY plane of its frame, whatever its axis says",
+        "a planar joint moves in the XY plane of its frame, independent of <axis>",
         at,
         attribute="xyz",
         found=_written(joint),
@@ -430,13 +430,13 @@ class _MimicChecker:
                 "a fixed joint cannot mimic; its <mimic> is ignored",
                 mimic,
                 "joint",
-                "remove it",
+                "remove <mimic>",
                 lambda: self.report.without_element(mimic.element),
             )
             return
         if joint.kind in ("planar", "floating"):
             message = f"a {joint.kind} joint cannot mimic another: it has several coordinates"
-            self.add(MIMIC_LEADER, message, mimic, "joint", "remove it")
+            self.add(MIMIC_LEADER, message, mimic, "joint", "remove <mimic>")
             return
         leader = self.joints.get(mimic.leader)
         if leader is None:
@@ -506,16 +506,16 @@ class _MimicChecker:
         low, high = kept_range(rule, Limit(*limits, math.inf, math.inf), *moving)
         if rule.multiplier == 0.0 or high - low >= (1.0 - LEAST_LOST) * (moving[1] - moving[0]):
             return
-        allowed = f"only from {range_words((low, high))}" if low < high else "nowhere"
+        allowed = f"only {range_words((low, high))}" if low < high else "no value"
         message = f"the mimic joint leaves its limits: {leader.name!r} moves from {range_words(moving)}, "
         ends = sorted(rule.multiplier * end + rule.offset for end in moving)
         self.report.add(
             MIMIC_RANGE,
-            f"{message}but may move {allowed}",
+            f"{message}but these limits allow {allowed}",
             limit.element,
             attribute="lower",
             found=f'lower="{limits[0]:g}" upper="{limits[1]:g}"',
-            remedy=f'write lower="{ends[0]:.6g}" upper="{ends[1]:.6g}", the range of the rule',
+            remedy=f'write lower="{ends[0]:.6g}" upper="{ends[1]:.6g}", as the mimic rule demands',
             severity=None if self.enabled else Severity.NOTE,
         )
 
@@ -641,7 +641,7 @@ def _degrees(report: Reporter, joint: JointRecord, what: str, found: str) -> Non
         joint.origin_element if rpy else joint.limit.element if joint.limit else joint.element,
         attribute="rpy" if rpy else "lower",
         found=found,
-        remedy="write radians",
+        remedy="write angles in radians",
     )
 
 
@@ -666,7 +666,7 @@ def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], rea
         origin,
         attribute="rpy",
         found=quoted(text),
-        remedy=f"write {meant!r} if you mean {_as_pi(multiple)}; the written value is used",
+        remedy=f"write {meant!r} if you mean {_as_pi(multiple)}; urdfkin uses the value in the file",
         severity=Severity.WARNING if off * reach > NOTICEABLE else None,
         weight=off * reach,
         fix=lambda: report.rewritten(origin, "rpy", _replace_words(report.raw(origin, "rpy"), whole), turns),
@@ -720,7 +720,7 @@ def _check_lengths(report: Reporter, joint: JointRecord) -> None:
             joint.origin_element,
             attribute="xyz",
             found=f"xyz={quoted(joint.origin_element.attributes.get('xyz', ''))}",
-            remedy="write metres",
+            remedy="write lengths in metres",
             weight=max(abs(x) for x in joint.xyz),
         )
     limit = joint.limit
@@ -733,7 +733,7 @@ def _check_lengths(report: Reporter, joint: JointRecord) -> None:
                 limit.element,
                 attribute="lower" if far[0] == limit.lower else "upper",
                 found=f"{far[0]:g}",
-                remedy="write metres",
+                remedy="write lengths in metres",
                 weight=abs(far[0]),
             )
 
@@ -809,5 +809,5 @@ def _check_sums(report: Reporter, robot: RobotRecord, reach: dict[str, float]) -
             f"the sum of all lengths of the robot is {_metres(whole)}",
             robot.element,
             found=None,
-            remedy="write metres",
+            remedy="write lengths in metres",
         )
