@@ -126,7 +126,7 @@ def test_a_robot_that_does_not_fit_is_not_verified_and_pinocchio_is_not_asked(
     assert robot.verdict is Verdict.NOT_VERIFIED
     assert robot.reason is not None
     assert (
-        "not enough memory to check the robot (all processes of a validation use 50% of the free memory)"
+        "not enough memory to check the robot (all processes of a validation may use 50% of the free memory)"
         in robot.reason
     )
     assert "GB needed, 0.002 GB allowed for each process" in robot.reason

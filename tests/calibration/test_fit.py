@@ -92,7 +92,10 @@ def test_gains_are_found_and_not_written() -> None:
     found = calibrate(true.robot, true.q, true.T, tip="tool0", base="base", fit=["gains"])
     np.testing.assert_allclose(found.values, true.truth, atol=1e-14)
     assert found.written.text == true.robot.urdf.encode()
-    assert any(line.startswith("a URDF cannot store gains: ") for line in doubts(found))
+    assert any(
+        line.startswith("these gains are not written, because a URDF cannot store them: ")
+        for line in doubts(found)
+    )
 
 
 @pytest.mark.parametrize("convention", list(Convention))
@@ -182,7 +185,7 @@ def test_as_many_numbers_as_parameters_leave_nothing_to_judge_by() -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"poses": np.zeros((3, 2))}, "positions (n, 3)"),
+        ({"poses": np.zeros((3, 2))}, "(n, 3) for positions"),
         ({"poses": np.zeros((2, 4, 4))}, "a pose must be a rotation"),
         ({"poses": np.zeros((2, 3))}, "the number of poses and the number of configurations differ"),
         ({"q": np.zeros((0, 6)), "poses": np.zeros((0, 3))}, "no poses"),

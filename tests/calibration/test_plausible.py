@@ -85,7 +85,9 @@ def test_rows_of_q_that_are_shifted_are_named(name: str, by: int, complete: bool
     said = reason(name, np.roll(arm(name).q, by, axis=0), complete=complete)
     rows = "one row" if abs(by) == 1 else "2 rows"
     way = "later" if by > 0 else "earlier"
-    assert said.startswith(f"q is shifted by {rows} against the poses; the q of each pose is {rows} {way}")
+    assert said.startswith(
+        f"q is shifted by {rows} relative to the poses; the correct q of each pose is {rows} {way}"
+    )
 
 
 @pytest.mark.parametrize("fit", [ALL, ["origins"]], ids=["anywhere", "origins"])
@@ -168,7 +170,7 @@ def test_other_wrong_data_are_refused_without_a_reason() -> None:
     q = np.random.default_rng(0).permutation(arm("ur5").q)
     said = refused("ur5", q)
     assert "of the reach" in said
-    assert "do not explain it" in said
+    assert "do not explain the error" in said
 
 
 def test_few_distinct_configurations_are_refused() -> None:
@@ -189,7 +191,7 @@ def test_values_beyond_a_turn_are_taken_for_degrees_unless_they_are_said_to_be_r
     q = true.q.copy()
     q[:, true.robot.coordinate_names.index("four")] += 4.0 * np.pi  # a continuous joint, wound up
     said = refused("branched", q, fit=["origins"])
-    assert "values beyond a turn look like degrees: joint 'four'" in said
+    assert "joint values of more than one turn look like degrees: joint 'four'" in said
     found = fitted("branched", q, fit=["origins"], radians=True)
     assert not found.plausibility.objections
 

@@ -105,7 +105,7 @@ def test_a_file_whose_head_was_changed_is_not_verified(change: str, exported: st
     assert done.code == 3
     assert "good placement: 4 test vectors" in done.text
     assert "UNVERIFIED: the file " in done.err
-    assert "export it again" in done.err
+    assert "export the file again" in done.err
 
 
 @pytest.mark.slow

@@ -60,7 +60,9 @@ def test_numbers_of_another_rotation_are_a_disagreement(monkeypatch: pytest.Monk
     assert (done.code, done.out) == (1, b"")
     assert "the orientation of tool0 (rpy) disagrees with Pinocchio's" in done.err
     (again,) = [
-        line.partition("reproduce it with: ")[2] for line in done.err.splitlines() if "reproduce" in line
+        line.partition("reproduce the difference with: ")[2]
+        for line in done.err.splitlines()
+        if "reproduce" in line
     ]
     monkeypatch.undo()
     assert urdfkin(*again.split()[1:]).code == 0

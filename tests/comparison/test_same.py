@@ -261,27 +261,27 @@ FORGED: dict[str, Any] = {
     "`tools`: the entries differ from those computed from the models": lambda d: d["tools"].append(
         {"a": "tool", "b": "tool", "pose": np.eye(4).tolist()}
     ),
-    "links: the entry differs from the one computed from the models": lambda d: d["links"].pop(),
-    "joints: the entry differs from the one computed from the models": lambda d: d["joints"].pop(),
-    "rounding: the entry differs from the one computed from the models": lambda d: d["rounding"].update(
+    "`links`: the entry differs from the one computed from the models": lambda d: d["links"].pop(),
+    "`joints`: the entry differs from the one computed from the models": lambda d: d["joints"].pop(),
+    "`rounding`: the entry differs from the one computed from the models": lambda d: d["rounding"].update(
         metres=1.0
     ),
-    "base_links: the entry differs from the one computed from the models": lambda d: d.update(
+    "`base_links`: the entry differs from the one computed from the models": lambda d: d.update(
         base_links=["tool"] * 2
     ),
     "`base`: the matrix is not a rigid motion": lambda d: d["base"][2].__setitem__(2, -1.0),
     "model A: its name is": lambda d: d["a"].update(name="another"),
-    "differences: the size or a value is wrong": lambda d: d["differences"][0].update(radians=1e-6),
+    "`differences`: the size or a value is wrong": lambda d: d["differences"][0].update(radians=1e-6),
     "a value is wrong in": lambda d: d["differences"][0].update(metres=0.5),
     "value is wrong in: joint": lambda d: d["differences"][0].update(a=0.5),
     "or a value is wrong in: joint": lambda d: d["differences"][0].update(detail="alone"),
-    "one is listed twice": lambda d: d["differences"].append(d["differences"][0]),
-    "not a confirmation": lambda d: d.update(checked=confirmed(configurations=7)),
-    "not a confirmation at": lambda d: d.update(checked=confirmed(reason="no need")),
-    "and no reason why": lambda d: d.update(checked=confirmed(reason="not asked of Pinocchio: I was lazy")),
-    "no reason why there is none": lambda d: d.update(checked=confirmed(by="")),
-    "checked: Pinocchio finds at most": lambda d: d.update(checked=confirmed()),
-    "orders: the axes do not allow": lambda d: d["orders"].append(["joint_2", "joint_1"]),
+    "an entry is listed twice": lambda d: d["differences"].append(d["differences"][0]),
+    "neither a confirmation": lambda d: d.update(checked=confirmed(configurations=7)),
+    "neither a confirmation at": lambda d: d.update(checked=confirmed(reason="no need")),
+    "nor a reason": lambda d: d.update(checked=confirmed(reason="not checked with Pinocchio: I was lazy")),
+    "nor a reason for its absence": lambda d: d.update(checked=confirmed(by="")),
+    "`checked`: Pinocchio finds at most": lambda d: d.update(checked=confirmed()),
+    "`orders`: the axes do not allow": lambda d: d["orders"].append(["joint_2", "joint_1"]),
 }
 
 

@@ -172,7 +172,7 @@ def test_a_users_file_has_order_names_signs_units_and_motor_zeros(tmp_path: Path
         ('joints = ["joint_1", "end"]', "the order of joints contains a fixed joint: found end"),
         ('quaternion = "wxzy"', "quaternion must be one of: xyzw, wxyz: found 'wxzy'"),
         ("joints = 3", "`joints` must be a list of names"),
-        ("joint = 3", "joint must hold tables"),
+        ("joint = 3", "`joint` must contain tables"),
         ("=", "this is not a TOML file"),
     ],
 )
@@ -225,7 +225,7 @@ def test_a_mimic_joint_has_a_column_that_must_follow_its_rule() -> None:
     assert (mujoco.nq, panda.nq) == (9, 8)
     assert q[7] == q[8]
     q[8] += 0.01
-    with pytest.raises(InputError, match="does not follow its rule"):
+    with pytest.raises(InputError, match="contradicts its mimic rule"):
         mujoco.from_(q)
     with pytest.raises(InputError, match="mimic=False"):
         panda.with_convention("mujoco").jacobian(mujoco.to("ready"))

@@ -142,5 +142,5 @@ def test_a_urdf_that_is_not_the_tables_is_refused(monkeypatch: pytest.MonkeyPatc
 
 
 def test_a_table_takes_no_xacro_arguments() -> None:
-    with pytest.raises(InputError, match="xacro_args go with"):
+    with pytest.raises(InputError, match="`xacro_args` needs"):
         load(read_table(references()["ur5"]), xacro_args={"arm": "left"})

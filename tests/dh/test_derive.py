@@ -364,7 +364,10 @@ def test_sliding_joints_may_stand_anywhere(kinds: str) -> None:
 @pytest.mark.parametrize(
     ("option", "message"),
     [
-        ({"convention": "craig"}, r"unknown convention: found 'craig'; write 'standard' or 'modified'"),
+        (
+            {"convention": "craig"},
+            r"unknown convention: found 'craig'; write convention = 'standard' or 'modified'",
+        ),
         ({"near_parallel": "drop"}, r"near_parallel: found 'drop'; write 'hayati' or 'strict'"),
         ({"last": "hand"}, r"last: found 'hand'; write 'tip' or 'flange'"),
         ({"parallel_offset": "none"}, r"write 'last' or 'first' or 'each'"),

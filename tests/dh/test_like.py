@@ -95,7 +95,7 @@ def test_kinovas_sheet_comes_out_with_its_zeros_and_the_urdfs_lengths() -> None:
 
 def test_another_robots_table_is_refused() -> None:
     other = table_from_rows([[0.1, 1.0, 0.2, 0.0]] * 6, "standard")
-    with pytest.raises(InputError, match=r"another robot.*compare it with the URDF by --compare"):
+    with pytest.raises(InputError, match=r"another robot.*compare the table with the URDF by --compare"):
         dh_table(elbow(), "tip", like=other)
     with pytest.raises(InputError, match="the table and the path have different joints"):
         dh_table(elbow(), "tip", like=replace(other, rows=other.rows[:3]))

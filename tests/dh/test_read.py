@@ -67,14 +67,14 @@ def test_a_file_is_read_by_its_ending(tmp_path: Path) -> None:
             "row 1, kind: the kind of a row must be revolute, continuous or prismatic",
         ),
         ({"convention": "standard", "rows": [{"a": 0, "alhpa": 1}]}, "unknown key in a row: found 'alhpa'"),
-        ({"convention": "standard", "rows": [{"a": "wide"}]}, "row 1, a: not a number: found 'wide'"),
-        ({"convention": "standard", "rows": [{"a": 0, "sense": 0}]}, "the sense must be"),
+        ({"convention": "standard", "rows": [{"a": "wide"}]}, "row 1, a: this is not a number: found 'wide'"),
+        ({"convention": "standard", "rows": [{"a": 0, "sense": 0}]}, "`sense` must be"),
         (
             {"convention": "standard", "rows": ROWS, "base": [[1, 0], [0, 1]]},
             "base: the base must be a matrix of numbers, 4 x 4",
         ),
         ({"convention": "standard", "rows": ROWS, "tool": "none"}, "the tool must be a matrix of numbers"),
-        ({"convention": "standard", "rows": [{"mimic": "j1"}]}, "mimic must be {leader"),
+        ({"convention": "standard", "rows": [{"mimic": "j1"}]}, "`mimic` must have the form {leader"),
     ],
 )
 def test_an_inconsistent_table_says_where(data: dict[str, object], message: str) -> None:
@@ -92,5 +92,5 @@ def test_a_broken_or_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"must have the suffix .toml, .json, .csv, .tsv"):
         read_table(tmp_path / "arm.xls")
     (tmp_path / "bad.toml").write_text('convention = "standard"\nrows = [["x", 0, 0, 0]]')
-    with pytest.raises(InputError, match=r"bad.toml, row 1, a: not a number"):
+    with pytest.raises(InputError, match=r"bad.toml, row 1, a: this is not a number"):
         read_table(tmp_path / "bad.toml")

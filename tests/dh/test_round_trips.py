@@ -109,7 +109,7 @@ def test_a_leader_off_the_path_stays_a_coordinate_in_the_tree() -> None:
     ("change", "message"),
     [
         ({"a": float("nan")}, "row of joint j: a is not a finite number"),
-        ({"sense": 2}, r"the sense must be \+1 or -1"),
+        ({"sense": 2}, r"`sense` must be \+1 or -1"),
         ({"kind": JointKind.FLOATING}, "revolute, continuous or prismatic"),
     ],
 )

@@ -154,9 +154,9 @@ def test_code_has_the_screws_as_columns(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("screws", "home", "message"),
     [
-        ([[0, 0, 2, 0, 0, 0]], M, "screw 1: an axis must have length 1: found 2"),
-        ([[0, 0, 1, 0, 0, 0.1]], M, "is revolute or prismatic, not both: found a pitch of 0.1"),
-        ([[0, 0, 1]], M, r"screws must be \(n, 6\)"),
+        ([[0, 0, 2, 0, 0, 0]], M, "screw 1: the axis w of a screw must have length 1: found 2"),
+        ([[0, 0, 1, 0, 0, 0.1]], M, "must be a pure rotation or a pure translation: found a pitch of 0.1"),
+        ([[0, 0, 1]], M, r"screws must have the shape \(n, 6\)"),
         ([[0, 0, 1, 0, 0, 0]], np.ones((4, 4)), "M must be a rotation"),
         ([[0, 0, 1, 0, 0, np.nan]], M, "finite"),
     ],

@@ -49,12 +49,12 @@ def test_multiples_of_pi_are_read(text: str, value: float) -> None:
 
 @pytest.mark.parametrize("value", ["p", "pi/", "", "1,5", None, True, [1]])
 def test_what_is_no_number_is_refused_with_its_place(value: object) -> None:
-    with pytest.raises(InputError, match=r"row 2, alpha: not a number"):
+    with pytest.raises(InputError, match=r"row 2, alpha: this is not a number"):
         read_number(value, "row 2, alpha")
 
 
 def test_units_are_named() -> None:
     assert units_of("degrees", "millimetres") == Units(Angles.DEGREES, Lengths.MILLIMETRES)
-    with pytest.raises(InputError, match="radians or degrees"):
+    with pytest.raises(InputError, match="`radians` or `degrees`"):
         units_of("grad")
     assert fraction_text(pi_fraction(-math.pi / 12) or pytest.fail("no fraction")) == "-pi/12"

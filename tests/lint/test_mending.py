@@ -109,12 +109,12 @@ def test_what_takes_judgement_is_left(text: str) -> None:
 @pytest.mark.parametrize(
     ("damage", "objection"),
     [
-        (b'"0 0 2"', "joint j1 would have another axis"),
-        (b'effort="10"', "joint j1 would have another limit"),
-        (b'<origin xyz="0 0 0.3"', "joint j1 would have another origin"),
-        (b'rpy="0.1 0.2', "joint j1 would have another orientation"),
+        (b'"0 0 2"', "the fix would change the axis of joint j1"),
+        (b'effort="10"', "the fix would change the limit of joint j1"),
+        (b'<origin xyz="0 0 0.3"', "the fix would change the origin of joint j1"),
+        (b'rpy="0.1 0.2', "the fix would change the orientation of joint j1"),
         (b'<link name="l1"', "the fix would change the links or joints"),
-        (b"</robot>", "it would cause URDF105"),
+        (b"</robot>", "the fix would cause URDF105"),
     ],
 )
 def test_a_fix_that_does_more_than_it_says_is_not_made(damage: bytes, objection: str) -> None:

@@ -191,8 +191,8 @@ def test_a_file_with_everything_is_verified_and_says_what_it_does_not_hold(tmp_p
         "tendons: tendons have no effect here",
     } <= said
     noted = " ".join(f.message for f in robot.findings if f.code == "MJCF102")
-    assert "joint root: qpos0 places it at (0, 0, 1)" in noted
-    assert "joint out: a slide without limits" in noted
+    assert "joint root: qpos0 places this body at (0, 0, 1)" in noted
+    assert "joint out: a slide joint without limits" in noted
     assert "2 actuators, 1 tendons" in noted
     assert "1 geoms" in noted
     robot.placement(robot.sample(3), robot.link_frames)
@@ -263,7 +263,9 @@ def test_what_is_mjcf_is_told_by_its_root(tmp_path: Path) -> None:
     assert [is_mjcf(tmp_path / name) for name in texts] == [True, False, True, False]
     assert loaded(tmp_path / "b.xml").nq == 2
     assert not is_mjcf(tmp_path / "nothing.xml")
-    with pytest.raises(urdfkin.UrdfError, match="this is MJCF, which `load` and all other commands read"):
+    with pytest.raises(
+        urdfkin.UrdfError, match="this is an MJCF file; `load` and all other commands read it"
+    ):
         urdfkin.load(tmp_path / "d.urdf")
 
 
@@ -571,7 +573,9 @@ def test_memory_that_a_file_sets_apart_for_its_dynamics_is_not_taken() -> None:
 
 def test_a_process_that_dies_is_one_clear_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mjcf_check, "ask_python", lambda *arguments: (b'{"urdf": "half', -11))
-    with pytest.raises(InputError, match="<text>: MuJoCo cannot compile this MJCF: found its process ended"):
+    with pytest.raises(
+        InputError, match="<text>: MuJoCo cannot compile this MJCF: found MuJoCo's process ended"
+    ):
         loaded(free_body())
 
 

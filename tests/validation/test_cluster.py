@@ -336,7 +336,7 @@ def test_workers_may_come_and_go(monkeypatch: pytest.MonkeyPatch) -> None:
             if "workers; dashboard: http://127.0.0.1:" in said:
                 counts.append(int(said[0]))
             else:
-                assert said.startswith("tcp:// needs no key")
+                assert said.startswith("an address with tcp:// is not protected")
 
         with connected(there.scheduler_address, tell) as engine:
             found = numbers(validate(KILLED, samples=400, executor=engine, progress=count))

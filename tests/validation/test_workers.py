@@ -55,7 +55,7 @@ def test_processes_change_no_number(how: dict[str, Any]) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("how", "words"),
-    [(HOW[0], "crashed twice, the second time alone"), (HOW[1], "crashed"), (HOW[2], "crashed")],
+    [(HOW[0], "crashed twice, the second time without other work"), (HOW[1], "crashed"), (HOW[2], "crashed")],
 )
 def test_a_death_is_that_robots_result_and_the_others_go_on(
     how: dict[str, Any], words: str, deaths: Path
@@ -67,7 +67,7 @@ def test_a_death_is_that_robots_result_and_the_others_go_on(
         Verdict.NOT_VERIFIED,
         Verdict.VERIFIED,
     ]
-    reason = f"ur5: the process that checked it {words}: found signal SIGSEGV"
+    reason = f"ur5: the process that validated the robot {words}: found signal SIGSEGV"
     assert report.robots[1].reason == reason
     assert not report.passed
     assert report.exit_code == 3

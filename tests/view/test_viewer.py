@@ -150,7 +150,7 @@ def test_missing_meshes_are_named_with_the_remedy() -> None:
     assert [markdown_text(name) in words for name in addresses] == [True] * 5 + [False] * 2
     assert "and 2 more" in words
     alone = [Shape("l", "mesh", (1.0, 1.0, 1.0), np.eye(4), None, None, "meshes/a.stl")]
-    assert "Put the files where the URDF says" in missing_words(alone)
+    assert "Put the files at the paths in the URDF" in missing_words(alone)
 
 
 @pytest.mark.parametrize("aspect", [0.5, 1.0, 2.0])
@@ -411,7 +411,7 @@ def test_a_start_and_a_trajectory_exclude_each_other(tmp_path: Path) -> None:
     words = ["planar_two_link", "--q", "0,0", "--trajectory", str(file), "--no-browser"]
     found = CliRunner().invoke(command, words)
     assert found.exit_code == 2
-    assert "--q and --trajectory exclude each other" in found.output
+    assert "--q and --trajectory cannot be used together" in found.output
 
 
 @pytest.mark.slow

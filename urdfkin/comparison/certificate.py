@@ -330,7 +330,7 @@ def _statement_errors(document: Certificate, comparator: Comparator, said: Samen
         yield f"`verdict`: the models give {said.verdict.value}, not {document['verdict']}"
     parts, right = dict(document), dict(again)
     yield from (
-        f"{part}: the entry differs from the one computed from the models"
+        f"`{part}`: the entry differs from the one computed from the models"
         for part in DERIVED
         if not _equal(parts[part], right[part])
     )

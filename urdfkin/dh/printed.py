@@ -38,11 +38,11 @@ class PrintedPrecision:
     samples: int
 
     def __str__(self) -> str:
-        guaranteed = "" if self.bound is None else f", at most {at_most(self.bound)} m"
+        proven = "" if self.bound is None else f", and proven within {at_most(self.bound)} m"
         return (
-            f"the table printed with {self.digits} digits moves the tip by at most"
-            f" {at_most(self.metres)} m on"
-            f" {self.samples} samples{guaranteed}"
+            f"printed with {self.digits} digits, the table gives the tip within {at_most(self.metres)} m"
+            " of its"
+            f" exact position on {self.samples} samples{proven}"
         )
 
 

@@ -86,7 +86,12 @@ CASES = [
     Mjcf(
         "a-slide-without-limits",
         _two(joint='type="slide"'),
-        (("MJCF102", "joint b: a slide without limits: the URDF, which requires some, has +-1000 m"),),
+        (
+            (
+                "MJCF102",
+                "joint b: a slide joint without limits: the URDF, which requires limits, has +-1000 m",
+            ),
+        ),
     ),
     Mjcf(
         "a-free-body-that-stands-elsewhere",
@@ -94,7 +99,8 @@ CASES = [
         (
             (
                 "MJCF102",
-                "joint b: qpos0 places it at (0, 0, 1); in the neutral configuration it is at the origin",
+                "joint b: qpos0 places this body at (0, 0, 1); in the neutral configuration the body is"
+                " at the origin",
             ),
         ),
     ),
