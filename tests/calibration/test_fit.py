@@ -192,7 +192,7 @@ def test_as_many_numbers_as_parameters_leave_nothing_to_judge_by() -> None:
         ({"poses": None}, "`q` and `poses` must be given together"),
         ({"q": np.eye(3, 6), "poses": 1e3 * np.eye(3)}, "add --unit mm"),
         ({"noise": (0.0, 1.0)}, "`noise` must be positive"),
-        ({"noise": 1.0}, "noise must be two numbers"),
+        ({"noise": 1.0}, "`noise` must be two numbers"),
         ({"fit": []}, "no parameters to fit"),
         ({"fit": "origins"}, "must be a list of names"),
         ({"tip": 5}, "tip must be a name"),

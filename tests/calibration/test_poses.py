@@ -78,7 +78,7 @@ def test_what_is_wrong_with_columns_is_told(header: str, words: str, tmp_path: P
 
 def test_what_is_wrong_with_arrays_is_told(tmp_path: Path) -> None:
     np.savez(tmp_path / "x.npz", q=Q, T=T, p=T[:, :3, 3])
-    with pytest.raises(InputError, match="q with T, q with p, or q with p and quat: found q, T, p"):
+    with pytest.raises(InputError, match="`q` and `T`, `q` and `p`, or `q`, `p` and `quat`: found q, T, p"):
         read_poses(tmp_path / "x.npz", NAMES, NAMES)
 
 

@@ -158,19 +158,25 @@ def test_a_users_file_has_order_names_signs_units_and_motor_zeros(tmp_path: Path
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ('joints = ["joint_1"]', "a joint has no column: found joint_2"),
-        ('joints = ["joint_1", "joint_1"]', "two columns have the same name: found 'joint_1'"),
+        ('joints = ["joint_1"]', "the order of joints lacks a joint: found joint_2"),
+        (
+            'joints = ["joint_1", "joint_1"]',
+            "two joints have the same name in the convention: found 'joint_1'",
+        ),
         (
             '[joint.joint_1]\nname = "m"\n[joint.joint_2]\nname = "m"',
-            "two columns have the same name: found 'm'",
+            "two joints have the same name in the convention: found 'm'",
         ),
-        ('[joint.joint_1]\nname = "joint_2"', "two columns have the same name: found 'joint_2'"),
-        ("[joint.joint_1]\nsign = 2", "joint joint_1: sign must be 1 or -1: found 2"),
-        ("[joint.joint_1]\nunit = 'mm'", "joint joint_1: the unit is for a joint with a length"),
-        ("[joint.joint_1]\nunit = -1", "unit must be positive"),
-        ("[joint.joint_1]\nzero = nan", "zero must be a finite number"),
+        (
+            '[joint.joint_1]\nname = "joint_2"',
+            "two joints have the same name in the convention: found 'joint_2'",
+        ),
+        ("[joint.joint_1]\nsign = 2", "joint joint_1: `sign` must be 1 or -1: found 2"),
+        ("[joint.joint_1]\nunit = 'mm'", "joint joint_1: this `unit` is for a joint with a length"),
+        ("[joint.joint_1]\nunit = -1", "`unit` must be positive"),
+        ("[joint.joint_1]\nzero = nan", "`zero` must be a finite number"),
         ('joints = ["joint_1", "end"]', "the order of joints contains a fixed joint: found end"),
-        ('quaternion = "wxzy"', "quaternion must be one of: xyzw, wxyz: found 'wxzy'"),
+        ('quaternion = "wxzy"', "`quaternion` must be one of: xyzw, wxyz: found 'wxzy'"),
         ("joints = 3", "`joints` must be a list of names"),
         ("joint = 3", "`joint` must contain tables"),
         ("=", "this is not a TOML file"),
@@ -213,7 +219,7 @@ def test_an_unknown_convention_is_an_error_with_the_nearest() -> None:
 
 def test_a_tool_without_an_order_asks_for_one() -> None:
     arm = urdfkin.load("planar_two_link", verify=False)
-    with pytest.raises(InputError, match="no order of its own"):
+    with pytest.raises(InputError, match="no known order of joints"):
         arm.convention("idyntree")
     assert arm.convention("idyntree", ["joint_2", "joint_1"]).to([1.0, 2.0]).tolist() == [2.0, 1.0]
 

@@ -368,12 +368,12 @@ def test_sliding_joints_may_stand_anywhere(kinds: str) -> None:
             {"convention": "craig"},
             r"unknown convention: found 'craig'; write convention = 'standard' or 'modified'",
         ),
-        ({"near_parallel": "drop"}, r"near_parallel: found 'drop'; write 'hayati' or 'strict'"),
-        ({"last": "hand"}, r"last: found 'hand'; write 'tip' or 'flange'"),
+        ({"near_parallel": "drop"}, r"`near_parallel`: found 'drop'; write 'hayati' or 'strict'"),
+        ({"last": "hand"}, r"`last`: found 'hand'; write 'tip' or 'flange'"),
         ({"parallel_offset": "none"}, r"write 'last' or 'first' or 'each'"),
-        ({"snap": -1.0}, r"snap must be (an angle|a finite)"),
-        ({"snap": math.nan}, r"snap must be (an angle|a finite)"),
-        ({"snap": 1.0}, r"snap must be (an angle|a finite)"),
+        ({"snap": -1.0}, r"`snap` must be (an angle|a finite)"),
+        ({"snap": math.nan}, r"snap must be a finite"),
+        ({"snap": 1.0}, r"`snap` must be (an angle|a finite)"),
     ],
 )
 def test_an_unknown_choice_says_what_there_is(option: dict[str, object], message: str) -> None:

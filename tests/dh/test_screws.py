@@ -172,5 +172,5 @@ def test_a_file_of_screws_with_a_slip_says_where(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"arm.toml, space: screws and M must be lists of numbers"):
         load(path)
     path.write_text("M = [[1,0,0,0],[0,1,0,0],[0,0,1,0]]\nscrews = []\n")
-    with pytest.raises(InputError, match="unknown key in screws: found 'screws'"):
+    with pytest.raises(InputError, match="unknown key in the table of screws: found 'screws'"):
         load(path)

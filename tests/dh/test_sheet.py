@@ -145,7 +145,10 @@ def test_the_printed_form_of_any_robot_is_read(tree: KinematicTree, convention: 
     [
         ("i  a  alpha  d  theta\n1  0  pi/2  0.1  q1\n", "does not name its convention"),
         ("# anlges: degrees\na,alpha,d,theta\n0,0,0,0\n", "unknown key in a table: found 'anlges'"),
-        ('a,alpha,d,theta\n"0,3",0,0,0\n', "row 1, a: not a number.*by semicolons if commas are decimal"),
+        (
+            'a,alpha,d,theta\n"0,3",0,0,0\n',
+            "row 1, a: this is not a number.*by semicolons if commas are decimal",
+        ),
         ("a;alpha;d;phi\n0;0;0;0\n", "header: the table has no column 'theta'"),
         ("a;alpha;d;theta\n0;0;0\n", "row 1: a row needs a cell for each of the 4 columns: found 3"),
         ("a;alpha;d;theta\n0;q1;0;0\n", "joint variable belongs in theta of a revolute joint, or in d"),

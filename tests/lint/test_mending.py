@@ -140,7 +140,7 @@ def test_a_fix_that_does_more_than_it_says_is_not_made(damage: bytes, objection:
     assert done.text.data == text.encode()
     assert done.fixed == ()
     assert done.kept["URDF503"].startswith(
-        (objection, "URDF503 would remain after the fix", "it would cause")
+        (objection, "URDF503 would remain after the fix", "the fix would cause")
     )
 
 
@@ -217,7 +217,7 @@ def test_the_differences_that_are_looked_for_are_all_there_are() -> None:
 
 def test_a_file_with_an_error_has_no_meaning_to_keep() -> None:
     done = mended(limit('lower="1" upper="-1" effort="1" velocity="1"').replace("<axis ", '<axis shade="3" '))
-    assert done.kept == {"URDF208": "the file has an error (URDF507), fix it first"}
+    assert done.kept == {"URDF208": "the file has an error (URDF507); correct this error first"}
 
 
 @pytest.mark.slow

@@ -361,7 +361,7 @@ def _number(cell: str, column: _Column, where: str, commas: bool) -> str:
     except NoCellError as error:
         decimal = "separate cells by semicolons if commas are decimal" if "," in cell else f"{error}"
         raise InputError(
-            "not a number",
+            "this is not a number",
             where=where,
             found=safe_repr(cell),
             remedy=f"{decimal}: write 1.5708, pi/2 or 90 deg",

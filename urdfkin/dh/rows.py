@@ -253,7 +253,7 @@ def _read(text: str, where: str) -> Cell:
         return cell_of(text)
     except NoCellError as error:
         raise InputError(
-            "not a number",
+            "this is not a number",
             where=where,
             found=safe_repr(text),
             remedy=f"{error}: write 1.5708, pi/2 or 90 deg",
