@@ -85,7 +85,7 @@ def of_rows(rows: str, **keys: str) -> str:
         ("[{kind = 3}]", {}, "row 1, kind: the kind of a row must be revolute, .*: found 3"),
         ("[{a = 1}]", {"robot": "7"}, "robot: a name must be text: found 7"),
         ("[{a = 1}]", {"base_frame": "''"}, "base_frame: a name must be text: found ''"),
-        ("[{a = 1}]", {"base": "[[1,0,0,'0'], [0,1,0,'x'], [0,0,1,0]]"}, "base, row 2, column 4: this is not a"),
+        ("[{a = 1}]", {"base": "[[1,0,0,'0'], [0,1,0,'x'], [0,0,1,0]]"}, "base, row 2, column 4: this is"),
         ("[{a = 1}]", {"tool": "[1, 2, 3]"}, "tool: the tool must be a matrix of numbers, 4 x 4 or 3 x 4"),
         ("[{a = 1}]", {"angles": "['deg']"}, "unknown unit"),
         ("[{a = 1}]", {"coordinates": "'q'"}, "coordinates: `coordinates` must be a list of names"),

@@ -44,7 +44,7 @@ def _delete(entry: Callable[[Any], Any], key: Any) -> Callable[[Any], None]:
 EDITED: dict[str, tuple[Callable[[Any], None], str]] = {
     "verdict of the run": (
         _set(lambda d: d, verdict="not verified"),
-        "verdict: not verified, but every robot was verified",
+        "`verdict` is not verified, but every robot was verified",
     ),
     "digest of a text": (
         lambda d: d["sha256"].__setitem__(0, 64 * "0"),
@@ -64,7 +64,7 @@ EDITED: dict[str, tuple[Callable[[Any], None], str]] = {
     "asked for fewer": (_set(lambda d: d, asked=1), "`asked` is 1, but 2 robots"),
     "reason of the run": (_set(lambda d: d, reason="none"), "`reason` is none, but the run has passed"),
     "results": (_less(_check, "results"), "samples of"),
-    "results of the robot": (_less(_first, "results"), "`results` is not"),
+    "results of the robot": (_less(_first, "results"), "`results` is not "),
     "failed": (_set(_check, failed=1), "`failed` is 1 of"),
     "failed of the robot": (_set(_first, failed=1), "`failed` is not 0"),
     "samples": (_less(lambda d: d, "samples"), "`samples` is 9, but 8 samples were requested"),

@@ -72,5 +72,7 @@ def test_what_fits_is_shown_and_what_does_not_is_counted() -> None:
     whole = markdown_of(old, new, found)
     room = len(whole) + 100  # what is kept free for the last line
     assert markdown_of(old, new, found, room) == whole
-    assert markdown_of(old, new, found, room - 1).endswith("\n1 further change did not fit.\n")
+    assert markdown_of(old, new, found, room - 1).endswith(
+        "\n1 further change left out: the comment is full.\n"
+    )
     assert len(markdown_of(old, new, found, room - 1)) <= room - 1

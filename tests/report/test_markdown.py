@@ -53,4 +53,4 @@ def test_a_thousand_robots_still_fit_a_comment_and_the_rest_is_counted() -> None
     document["robots"] = [copy.deepcopy(document["robots"][0]) for _ in range(1000)]
     markdown = as_markdown(document)
     assert len(markdown) <= LIMIT < GITHUB_LIMIT
-    assert "further robots did not fit" in markdown
+    assert "further robots left out" in markdown

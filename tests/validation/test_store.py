@@ -339,7 +339,7 @@ def test_the_parts_cover_everything_once(robots: int, samples: int, parts: int) 
 
 @pytest.mark.parametrize("word", ["0/4", "5/4", "1", "a/b", "1/0", "-1/4", "1/4/2", " 1/4"])
 def test_what_is_no_part_is_refused(word: str, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="not of the form i/n"):
+    with pytest.raises(InputError, match="must have the form i/n"):
         validate("ur5", samples=0, store=tmp_path, shard=word)
 
 

@@ -249,7 +249,7 @@ class Sameness(Displayable):
     >>> import urdfkin
     >>> found = urdfkin.same("ur5", "ur10")
     >>> bool(found), found.verdict.value, found.differences[0].words
-    (False, 'differs', 'link shoulder_link is 38.14 mm off on its body')
+    (False, 'differs', 'link shoulder_link is 38.14 mm off on its rigid body')
     """
 
     names: tuple[str, str]
@@ -493,7 +493,10 @@ def _tools_put_right(found: Alignment, rounding: Tolerance, *, tables: bool) -> 
                 continue  # its pose in the root frame is unchanged, so the line about the base is enough
         if (tool := found.frames[k].tool) is not IDENTITY:
             moved = pose_words(tool, rounding)
-            yield "tools", f"frame {links[1][frame.b]} is frame {links[0][frame.a]} of A, moved by {moved}"
+            yield (
+                "tools",
+                f"frame {links[1][frame.b]} of B is frame {links[0][frame.a]} of A, moved by {moved}",
+            )
 
 
 def _around(found: Alignment) -> set[tuple[int, int]]:

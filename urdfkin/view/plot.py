@@ -95,7 +95,7 @@ def parts(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
     used = [k for k in range(len(KINDS)) if sizes[:, k].any()]
     names = tuple(KINDS[k] for k in used)
     _lines(axes, t, np.column_stack([sizes[:, used], total]), (*names, "sum"))
-    axes.set_ylabel("norm of each part [m/s²]")
+    axes.set_ylabel("norms of the parts [m/s²]")
 
 
 def singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit: str) -> None:
