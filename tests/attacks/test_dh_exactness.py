@@ -60,7 +60,7 @@ def checked(robot: urdfkin.Robot, table: DHTable) -> TableCheck:
 
 def test_a_strict_table_that_loses_more_than_the_robots_rounding_says_how_many_millimetres() -> None:
     robot = robot_of(leaning(TWELVE_DIGITS))
-    with pytest.warns(urdfkin.NotVerifiedWarning, match=r"LOSES .* mm .* take --snap 1e-12"):
+    with pytest.warns(urdfkin.NotVerifiedWarning, match=r"LOSES .* mm .* use --snap 1e-12"):
         table = robot.dh("tip", "l0", near_parallel="strict")
     with pytest.warns(urdfkin.NotVerifiedWarning):
         check = checked(robot, table)

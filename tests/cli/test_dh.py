@@ -115,7 +115,7 @@ def test_unverified_tables_exit_3() -> None:
         ),
         (("ur5", "--compare", "ur6"), UnknownNameError, "unknown reference table 'ur6'"),
         (("panda", "--compare", "ur5"), InputError, "choose base and tip"),
-        (("ur5", "--snap", "1"), InputError, "snap must be an angle"),
+        (("ur5", "--snap", "1"), InputError, "`snap` must be an angle"),
         (("ur5", "--flip", "elbow"), UnknownNameError, "did you mean elbow_joint"),
     ],
 )

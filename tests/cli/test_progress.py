@@ -82,7 +82,7 @@ def test_a_log_gets_a_line_now_and_then_and_a_short_run_none(monkeypatch: pytest
         (["--store", "s", "--shard", "1/2", "--json", "x"], "a shard has no report"),
         (["--store", "s", "--shard", "3/2"], "not of the form i/n"),
         (["--scheduler", "local:2", "--jobs", "2"], "--scheduler cannot be combined"),
-        (["--scheduler", "local:none"], "without a number N"),
+        (["--scheduler", "local:none"], "N in local:N must be the number"),
     ],
 )
 def test_options_that_do_not_go_together_are_refused(

@@ -124,7 +124,7 @@ def test_two_changes_that_explain_a_table_equally_well_are_both_named() -> None:
     found = compare(chain(tree, right.tip_frame, right.base_frame), wrong)
     assert [one[:2] for one in named(found)] == [(1, "d"), (2, "d")]
     assert found.differences == ()
-    assert "Each of these changes makes the table right as written:" in document(found, units_of()).text()
+    assert "Each of these changes makes the table right without a fit:" in document(found, units_of()).text()
 
 
 def test_a_wrong_sign_is_named_beside_a_difference_that_is_smaller() -> None:
@@ -151,7 +151,7 @@ def test_the_command_fails_for_a_wrong_sign_and_says_what_to_do(tmp_path: Path) 
     result = run("ur5", "--compare", str(file), "--millimetres")
     assert result.exit_code == 1
     assert "agrees only after a fit of base, tool and joint offsets" in result.stdout
-    assert "One change makes the table right as written:" in result.stdout
+    assert "One change makes the table right without a fit:" in result.stdout
     assert "  row 4, wrist_1_joint: d = 109.15 mm, not -109.15 (its sign)" in result.stdout
     data = json.loads(run("ur5", "--compare", str(file), "--format", "json").stdout)
     assert data["agrees"]
@@ -159,4 +159,4 @@ def test_the_command_fails_for_a_wrong_sign_and_says_what_to_do(tmp_path: Path) 
     assert data["likely_mistakes"][0]["cell"]["urdf"] == 0.10915
     without = run("ur5", "--compare", str(file), "--no-fit")
     assert without.exit_code == 1
-    assert "One change makes the table right as written:" in without.stdout
+    assert "One change makes the table right without a fit:" in without.stdout

@@ -114,9 +114,12 @@ def test_the_command_says_what_would_fit_and_still_exits_1(tmp_path: Path) -> No
     file.write_text('convention = "modified"\nangles = "degrees"\n' + text)
     result = run(*arguments)
     assert result.exit_code == 1
-    assert "rad when read as standard, millimetres\n" in result.stdout
+    assert "rad when it is read as standard, millimetres\n" in result.stdout
     file.write_text('convention = "standard"\n' + text)
-    with pytest.raises(InputError, match=r"more than one turn.*this fits to .* read as millimetres, degrees"):
+    with pytest.raises(
+        InputError,
+        match=r"more than one turn.*the table agrees with the URDF to .* read as millimetres, degrees",
+    ):
         run(*arguments)
 
 

@@ -553,7 +553,7 @@ def test_a_file_that_replicates_without_end_is_given_up() -> None:
     for _ in range(9):
         inside = f'<replicate count="1000" offset="1 0 0">{inside}</replicate>'
     began = time.monotonic()
-    with pytest.raises(InputError, match="cannot compile this MJCF: found it did not finish within 3 s"):
+    with pytest.raises(InputError, match="cannot compile this MJCF: found MuJoCo did not finish within 3 s"):
         mjcf_check.read_mjcf(f"<mujoco><worldbody>{inside}</worldbody></mujoco>", patience=3.0)
     assert time.monotonic() - began < 20.0
 

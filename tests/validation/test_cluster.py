@@ -358,7 +358,7 @@ def test_another_version_is_refused_before_anything_is_sent(
 
 @pytest.mark.parametrize("word", ["local:", "local:0", "local:-1", "local:two"])
 def test_a_local_cluster_has_a_number_of_workers(word: str) -> None:
-    with pytest.raises(InputError, match="without a number N"), connected(word):
+    with pytest.raises(InputError, match="N in local:N must be the number"), connected(word):
         pass
 
 
