@@ -51,7 +51,7 @@ def test_an_option_that_does_nothing_is_an_error(words: tuple[str, ...]) -> None
     done = command("dh", *words)
     assert done.code == 2
     idle = next(word for word in reversed(words) if word.startswith("--"))
-    assert re.search(rf"{idle}\S* does nothing .*; leave it out", done.err)
+    assert re.search(rf"{idle}\S* does nothing .*; leave out this option", done.err)
 
 
 def test_what_stands_at_its_default_is_not_refused() -> None:

@@ -201,7 +201,7 @@ def test_settings_beyond_the_repository_are_not_taken(here: Path, monkeypatch: p
         ("ignore = 'URDF503'", "[tool.urdfkin]: ignore must be a list of strings: found 'URDF503'"),
         ("ignore = ['URDF5O3']", "[tool.urdfkin]: ignore: unknown code 'URDF5O3'; did you mean"),
         ("per-file-ignores = { x = 'URDF503' }", "per-file-ignores must be a table of lists of strings"),
-        ("baseline = 'no.json'", "no.json: no such baseline; "),
+        ("baseline = 'no.json'", "no.json: the baseline file does not exist; "),
         ("ignore = [", "pyproject.toml: this file is not TOML: found "),
     ],
 )

@@ -282,7 +282,7 @@ FORGED: dict[str, Any] = {
     "an entry is listed twice": lambda d: d["differences"].append(d["differences"][0]),
     "neither a confirmation": lambda d: d.update(checked=confirmed(configurations=7)),
     "neither a confirmation at": lambda d: d.update(checked=confirmed(reason="no need")),
-    "nor a reason": lambda d: d.update(checked=confirmed(reason="not checked with Pinocchio: I was lazy")),
+    "nor a reason": lambda d: d.update(checked=confirmed(reason="not asked of Pinocchio: I was lazy")),
     "nor a reason for its absence": lambda d: d.update(checked=confirmed(by="")),
     "`checked`: Pinocchio finds at most": lambda d: d.update(checked=confirmed()),
     "`orders`: the axes do not allow": lambda d: d["orders"].append(["joint_2", "joint_1"]),

@@ -120,7 +120,7 @@ def reject_unused_options(context: click.Context, idle: Collection[str], because
     for parameter in context.command.params:
         if parameter.name in idle and typed(context, parameter.name):
             name = "/".join([*parameter.opts[:1], *parameter.secondary_opts[:1]])
-            raise InputError(f"{name} does nothing {because}", remedy="leave it out")
+            raise InputError(f"{name} does nothing {because}", remedy="leave out this option")
 
 
 _F = TypeVar("_F", bound=Callable[..., Any])

@@ -171,7 +171,7 @@ class Tool:
 
 
 #: First words of the reasons why there is no confirmation.
-REASONS = NOT_ASKED, NOT_VERIFIED = "not checked with Pinocchio: ", "not verified by Pinocchio: "
+REASONS = NOT_ASKED, NOT_VERIFIED = "not asked of Pinocchio: ", "not verified by Pinocchio: "
 
 
 @dataclass(frozen=True, slots=True)

@@ -110,7 +110,7 @@ def read_baseline(path: Path) -> Baseline:
         raise InputError(
             "this file is not a baseline of urdfkin",
             where=str(path),
-            remedy="write one with: urdfkin check --write-baseline FILE ...",
+            remedy="write a baseline with: urdfkin check --write-baseline FILE ...",
         ) from None
     return Baseline(counts, path.parent)
 
@@ -241,7 +241,9 @@ def _check_settings(file: Path, table: Any) -> Settings:
             except UnknownNameError as error:
                 raise InputError(f"{name}: {error.what}", where=where, remedy=error.remedy) from None
     if "baseline" in table and not exists(baseline := file.parent / table["baseline"]):
-        raise SourceError("no such baseline", where=str(baseline), remedy=f"change the setting in {where}")
+        raise SourceError(
+            "the baseline file does not exist", where=str(baseline), remedy=f"change the setting in {where}"
+        )
     return Settings(file, table)
 
 

@@ -61,7 +61,7 @@ class _Names:
             suffix = name.removeprefix(joint).lstrip(".:")
             if name.startswith(joint) and suffix in own:
                 return at + own.index(suffix)
-        raise OracleError("no number has this name", found=repr(name[:60]))
+        raise OracleError("the robot has no coordinate with this name", found=repr(name[:60]))
 
     def pairs(self, text: str) -> list[tuple[str, str]]:
         """Return the pairs (name, number) of a text with `NAME=NUMBER`."""
@@ -82,7 +82,7 @@ def _number(text: str) -> float:
     found = parse_quantity(text)
     value = parse_float(text) if found is None else found.value
     if value is None:
-        raise OracleError("a number reads differently", found=repr(text[:60]))
+        raise OracleError("the two readers read this number differently", found=repr(text[:60]))
     return value
 
 
@@ -192,5 +192,7 @@ class OracleQuery:
         """
         own, several = result.shape[result.ndim - axes :], () if self._is_one else (len(self.frames),)
         if result.shape != (*self.shape, *several, *own):
-            raise OracleError("a result's batch shape does not match the arguments", found=str(result.shape))
+            raise OracleError(
+                "the batch shape of a result does not match that of the arguments", found=str(result.shape)
+            )
         return result.reshape(self.n, len(self.frames), *own)
