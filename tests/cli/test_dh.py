@@ -114,7 +114,7 @@ def test_unverified_tables_exit_3() -> None:
             "--compare does not support the format 'c'",
         ),
         (("ur5", "--compare", "ur6"), UnknownNameError, "unknown reference table 'ur6'"),
-        (("panda", "--compare", "ur5"), InputError, "choose base and tip"),
+        (("panda", "--compare", "ur5"), InputError, "choose a base and a tip"),
         (("ur5", "--snap", "1"), InputError, "`snap` must be an angle"),
         (("ur5", "--flip", "elbow"), UnknownNameError, "did you mean elbow_joint"),
     ],

@@ -80,7 +80,7 @@ def test_a_log_gets_a_line_now_and_then_and_a_short_run_none(monkeypatch: pytest
         (["--retry", "failed"], "need --store"),
         (["--shard", "1/2"], "need --store"),
         (["--store", "s", "--shard", "1/2", "--json", "x"], "a shard has no report"),
-        (["--store", "s", "--shard", "3/2"], "not of the form i/n"),
+        (["--store", "s", "--shard", "3/2"], "must have the form i/n"),
         (["--scheduler", "local:2", "--jobs", "2"], "--scheduler cannot be combined"),
         (["--scheduler", "local:none"], "N in local:N must be the number"),
     ],
