@@ -153,7 +153,7 @@ def test_no_mutant_at_all_is_a_failure(
 ) -> None:
     monkeypatch.setattr(sys, "argv", ["mutate.py", *words])
     assert main() == 1
-    assert "no such mutant" in capsys.readouterr().err
+    assert "no mutant was selected" in capsys.readouterr().err
 
 
 def test_every_part_that_the_page_names_exists() -> None:

@@ -104,7 +104,7 @@ def test_cells_that_explain_nothing_are_not_blamed() -> None:
     assert not found.agrees
     assert found.differences == ()
     text = document(found, units_of()).text()
-    assert "No change of cells explains the difference" in text
+    assert "No change of cells explains the whole difference" in text
     assert "Omit --no-fit" in text
 
 

@@ -170,7 +170,9 @@ def test_a_stores_lock_that_is_a_link_leaves_what_it_leads_to_as_it_is(tmp_path:
     mine.write_text("precious")
     store.mkdir()
     (store / "lock").symlink_to(mine)
-    with pytest.raises(SourceError, match="the store's lock is not a regular file: found a link; delete it"):
+    with pytest.raises(
+        SourceError, match="the store's lock is not a regular file: found a link; delete the lock"
+    ):
         validate("planar_two_link", samples=10, store=store)
     assert mine.read_text() == "precious"
 

@@ -41,4 +41,4 @@ def test_a_robot_whose_motion_needs_no_xacro_is_loaded_and_verified(text: str) -
 def test_where_motion_depends_on_it_the_robot_is_refused(text: str) -> None:
     (error,) = [f for f in urdfkin.check(text) if f.code == "URDF202" and f.severity is Severity.ERROR]
     assert error.remedy is not None
-    assert "expand it first" in error.remedy
+    assert "expand the file first" in error.remedy

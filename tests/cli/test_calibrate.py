@@ -44,7 +44,7 @@ def test_a_calibration_that_is_not_plausible_is_written_by_force_alone(tmp_path:
     words = ["calibrate", f"{tmp_path}/arm.urdf", "--tip", "hand", "--poses", f"{tmp_path}/poses.npz"]
     done = urdfkin(*words, "-o", str(out))
     assert done.code == 3
-    assert "likeliest reason: q is shifted by one row against the poses" in done.err
+    assert "likeliest reason: q is shifted by one row relative to the poses" in done.err
     assert "verified" not in done.text
     assert not out.exists()
     data = urdfkin(*words, "--format", "json").data

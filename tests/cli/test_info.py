@@ -74,7 +74,7 @@ def test_a_follower_names_its_leader_and_an_axis_its_letter() -> None:
 
 def test_a_file_with_another_order_is_told_with_the_first_joint_that_differs() -> None:
     urdf = to_urdf(forked())
-    assert urdfkin("info", urdf).text.splitlines()[-1].endswith("the file has the same")
+    assert urdfkin("info", urdf).text.splitlines()[-1].endswith("the file has the same order")
     swapped = urdf.replace('joint name="a"', 'joint name="z"')  # its place in the file stays, ours moves
     assert "differs: z is number 1 there, b here; " in urdfkin("info", swapped).text.splitlines()[-1]
     # A root joint stands in no file.

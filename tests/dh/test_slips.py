@@ -180,7 +180,10 @@ def test_a_table_that_names_no_convention_is_compared_in_the_one_that_fits(
 def test_a_table_without_convention_and_units_is_told_both(tmp_path: Path) -> None:
     file = nameless(tmp_path / "ur5.toml", "modified")
     file.write_text(file.read_text().replace('"-pi/2"', "-90").replace('"pi/2"', "90"))
-    with pytest.raises(InputError, match=r"more than one turn.*this fits to .* when read as degrees"):
+    with pytest.raises(
+        InputError,
+        match=r"more than one turn.*the table agrees with the URDF to .* when it is read as degrees",
+    ):
         run(*UR5, "--compare", str(file))
 
 

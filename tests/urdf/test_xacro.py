@@ -119,7 +119,7 @@ def test_arguments_for_a_plain_urdf_are_a_mistake() -> None:
 
 
 def test_xacro_that_comes_as_text_says_what_to_do() -> None:
-    with pytest.raises(urdfkin.UrdfError, match="expand it first"):
+    with pytest.raises(urdfkin.UrdfError, match="expand the file first"):
         urdfkin.load(f'<robot name="r" {NAMESPACE}><link name="a"/><xacro:b/></robot>')
 
 

@@ -84,7 +84,7 @@ class CoordinateLayout:
         ([0.0, 2.0], [[0.5, 1.0], [0.5, 2.0]])
         >>> arm.read("elbow=30deg")
         Traceback (most recent call last):
-        urdfkin.errors.InputError: q: no value for shoulder; name it too, or begin with a pose that it \
+        urdfkin.errors.InputError: q: no value for shoulder; give it too, or begin with a pose that it \
 keeps: 'neutral, elbow=...'
         """
         where = where or self.what
