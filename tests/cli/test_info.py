@@ -76,7 +76,7 @@ def test_a_file_with_another_order_is_told_with_the_first_joint_that_differs() -
     urdf = to_urdf(forked())
     assert urdfkin("info", urdf).text.splitlines()[-1].endswith("the file has the same order")
     swapped = urdf.replace('joint name="a"', 'joint name="z"')  # its place in the file stays, ours moves
-    assert "differs: z is number 1 there, b here; " in urdfkin("info", swapped).text.splitlines()[-1]
+    assert "differs: z is number 1 in the file and b here; " in urdfkin("info", swapped).text.splitlines()[-1]
     # A root joint stands in no file.
     assert urdfkin("info", urdf, "--root-joint", "planar").text.splitlines()[-1].endswith("has the same")
 
