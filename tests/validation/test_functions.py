@@ -448,9 +448,28 @@ def test_the_command_checks_a_function_of_a_file(tmp_path: Path) -> None:
     assert "urdfkin jacobian ur5 --frame tool0" in bad.text
 
 
+def test_all_functions_of_a_file_are_checked(tmp_path: Path) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(
+        "import urdfkin\nfrom urdfkin import load\nrobot = load('ur5', verify=False)\n"
+        "def tool_jacobian(q):\n    return robot.jacobian(q, 'tool0')\n"
+        "def placement(q):\n    return robot.placement(q, 'tool0')\n"
+        "def velocity(q, v):\n    return robot.velocity(q, -v, 'tool0')\n"
+        "def helper():\n    pass\n"
+    )
+    done = run("verify", str(file), "ur5", "--samples", "10", "--format", "json")
+    assert done.code == 1
+    found = {check["function"]: check["agrees"] for check in done.data["checks"]}
+    assert found == {"tool_jacobian": True, "placement": True, "velocity": False}
+    text = run("verify", str(file), "ur5", "--samples", "10").text
+    assert "tool_jacobian: agrees" in text
+    assert "velocity: DISAGREES" in text
+
+
 def test_a_bad_target_is_one_line(tmp_path: Path) -> None:
     file = tmp_path / "mine.py"
     file.write_text("def jacobian(q):\n    return q\n\n\ncompute = jacobian\n")
+    (tmp_path / "empty.py").write_text("x = 1\n")
     broken = tmp_path / "broken.py"
     broken.write_text("1 / 0\n")
     for target, words in (
@@ -458,6 +477,7 @@ def test_a_bad_target_is_one_line(tmp_path: Path) -> None:
         (f"{tmp_path / 'none.py'}:jacobian", "no such file"),
         (f"{file}:jacobean", "jacobian"),
         (f"{file}:compute", "pass --quantity"),
+        (str(tmp_path / "empty.py"), "no function of the file"),
         (f"{broken}:jacobian", "ZeroDivisionError"),
     ):
         done = run("verify", target, "ur5")

@@ -24,9 +24,13 @@ from urdfkin.cli.options import (
 )
 from urdfkin.cli.output import TEXTS, Answer, answering, compiling
 from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
+from urdfkin.errors.display import Strong, TextDocument
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
+    from types import ModuleType
+
+    from urdfkin.validation.functions import FunctionCheck
 
 #: Quantities of a function: commands of the table that have one result for each configuration.
 _QUANTITIES = ("placement", "velocity", "jacobian", "jacobian-rate", "hessian", "acceleration", "imu")
@@ -82,10 +86,10 @@ def verify_command(
 ) -> Answer:
     """Check a function or a program of yours against urdfkin, Pinocchio and the derived bound.
 
-    TARGET is FILE.py:FUNCTION. The function takes q (nq,), and v and a (nv,) if the quantity needs them, in
-    rad, m and seconds. It returns the result as an array. --program checks a program in any language: it
-    reads lines of JSON and answers each with a line {"result": [...]}. The file and the program run with your
-    rights.
+    TARGET is FILE.py:FUNCTION, or FILE.py for all its functions with the name of a quantity. A function takes
+    q (nq,), and v and a (nv,) if the quantity needs them, in rad, m and seconds. It returns the result as an
+    array. --program checks a program in any language: it reads lines of JSON and answers each with a line
+    {"result": [...]}. The file and the program run with your rights.
 
     The configurations are the zero configuration, the joint limits and random ones. A wrong function is
     explained by a usual mistake where one fits: another reference frame, joint order, sign, unit, frame or
@@ -95,25 +99,25 @@ def verify_command(
     from urdfkin.validation.programs import Program  # noqa: PLC0415
 
     loaded = load_robot(robot, oracle=oracle)
+    checks: list[FunctionCheck] = []
     with ExitStack() as stack:
-        function: Callable[..., object]
+        stack.enter_context(compiling())
+        functions: dict[str, Callable[..., object]]
         if program:
             if batch:
                 raise click.UsageError("--batch is for a function in Python, and --program for a program")
-            name = (quantity or "jacobian").replace("-", " ")
+            name = quantity or "jacobian"
             of = None if name in ("placement", "imu") else reference
-            words = shlex.split(target)
             at = frame or loaded.tip_frame
-            function = stack.enter_context(Program(words, loaded.urdf, name, at, of, timeout))
+            command = Program(shlex.split(target), loaded.urdf, name.replace("-", " "), at, of, timeout)
+            functions = {name: stack.enter_context(command)}
         else:
-            path, _, attribute = target.rpartition(":")
-            function = _function(path, attribute)
-            name = (quantity or _quantity_of(attribute)).replace("-", " ")
-        with compiling():
+            functions = _functions(target)
+        for name, function in functions.items():
             check = verify_function(
                 function,
                 loaded,
-                name,
+                (quantity or _quantity_of(name)).replace("-", " "),
                 frame=frame,
                 reference=reference,
                 convention=convention,
@@ -122,28 +126,76 @@ def verify_command(
                 factor=factor,
                 batch=batch,
             )
-    code = (3 if check.oracle_share is None else 0) if check.agrees else 1
-    return Answer(check._sheet, {"json": check.as_dict}, "", code)
+            checks.append(check)
+    codes = [(3 if check.oracle_share is None else 0) if check.agrees else 1 for check in checks]
+    code = 1 if 1 in codes else max(codes)
+    return Answer(lambda: _document(checks), {"json": lambda: _data(checks)}, "", code)
 
 
-def _quantity_of(function: str) -> str:
-    for name in sorted(_QUANTITIES, key=len, reverse=True):
-        if name.replace("-", "_") in function:
-            return name
-    raise click.UsageError(
-        f"the name of the function {function!r} states no quantity; pass --quantity, one of"
-        f" {', '.join(_QUANTITIES)}"
+def _document(checks: Sequence[FunctionCheck]) -> TextDocument:
+    """Return one check as it is, or all of them below each other."""
+    sheets = [check._sheet() for check in checks]
+    if len(sheets) == 1:
+        return sheets[0]
+    return TextDocument(
+        "", [part for sheet in sheets for part in (Strong(sheet.title), *sheet.parts, "")][:-1]
     )
 
 
-def _function(path: str, name: str) -> Callable[..., object]:
-    """Return a function of a Python file, which is run."""
-    if not path.endswith(".py") or not name:
-        raise InputError(
-            "a target is FILE.py:FUNCTION",
-            found=f"{path}:{name}" if path else name,
-            remedy="or use --program",
+def _data(checks: Sequence[FunctionCheck]) -> dict[str, Any]:
+    if len(checks) == 1:
+        return checks[0].as_dict()
+    return {"agrees": all(check.agrees for check in checks), "checks": [check.as_dict() for check in checks]}
+
+
+def _quantity_of(function: str) -> str:
+    name = _stated(function)
+    if name is None:
+        raise click.UsageError(
+            f"the name of the function {function!r} states no quantity; pass --quantity, one of"
+            f" {', '.join(_QUANTITIES)}"
         )
+    return name
+
+
+def _stated(function: str) -> str | None:
+    """Return the quantity that a function's name states: `jacobian_rate_of_tool0` states jacobian-rate."""
+    names = sorted(_QUANTITIES, key=len, reverse=True)
+    return next((name for name in names if name.replace("-", "_") in function), None)
+
+
+def _functions(target: str) -> dict[str, Callable[..., object]]:
+    """Return the function of FILE.py:FUNCTION, or all functions of FILE.py with the name of a quantity."""
+    path, _, name = target.rpartition(":") if not target.endswith(".py") else (target, "", "")
+    if not path.endswith(".py"):
+        raise InputError(
+            "a target is FILE.py or FILE.py:FUNCTION",
+            found=target,
+            remedy="--program checks the command of a program",
+        )
+    module = _module(path)
+    own = {
+        key: value
+        for key, value in vars(module).items()
+        if callable(value) and not key.startswith("_") and getattr(value, "__module__", "") == module.__name__
+    }
+    if not name:
+        found = {key: value for key, value in own.items() if _stated(key)}
+        if not found:
+            raise InputError(
+                "no function of the file has the name of a quantity",
+                where=path,
+                found=", ".join(own) or "no function",
+                remedy=f"name a function {' or '.join(_QUANTITIES[:3])}, or pass FILE.py:FUNCTION",
+            )
+        return found
+    if not callable(getattr(module, name, None)):
+        raise UnknownNameError("function", name, own)
+    return {name: getattr(module, name)}
+
+
+def _module(path: str) -> ModuleType:
+    """Return a Python file as a module; this runs the file."""
     file = Path(path).resolve()
     if not file.is_file():
         raise SourceError("no such file", where=path)
@@ -161,9 +213,4 @@ def _function(path: str, name: str) -> Callable[..., object]:
         raise InputError(
             "the file raises an exception", where=path, found=f"{type(error).__name__}: {error}"
         ) from error
-    found = getattr(module, name, None)
-    if not callable(found):
-        known = [x for x in vars(module) if callable(getattr(module, x)) and not x.startswith("_")]
-        raise UnknownNameError("function", name, known)
-    function: Callable[..., object] = found
-    return function
+    return module
