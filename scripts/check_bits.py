@@ -3,12 +3,13 @@
     python scripts/check_bits.py [ROBOT ...]           # compare single, prepared, batched, joint, interpreted
     python scripts/check_bits.py --write before.npz    # also store the results
     python scripts/check_bits.py --against before.npz  # also compare with stored results
+    python scripts/check_bits.py --enclosures --write before.npz    # store enclosures, or compare them
 
 The script checks every robot of the catalogue, every quantity and all three reference frames. Fused
 multiply-adds are explicit, and urdfkin has its own sine and cosine, so digests are equal on every machine.
 If results differ from the stored ones, the script prints the largest difference as a fraction of the stored
-bound. Exit 1: a bit differs unexpectedly, or, with `--within SHARE`, a result differs by more than this
-fraction of its bound.
+bound. An enclosure must lie in the stored one. Exit 1: a bit differs unexpectedly, an interval is not within
+the stored one, or, with `--within SHARE`, a result differs by more than this fraction of its bound.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import sys
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -29,12 +31,14 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that i
 import urdfkin
 from urdfkin.compiled.preload import Way, only
 from urdfkin.kinematics.roundings import EPS
+from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.verify.call import Call
 from urdfkin.verify.quantities import Quantity, walked
+from urdfkin.verify.sampling import draw_base
 from urdfkin.verify.verifier import bound_of
 
 #: Sizes of batches: less than a block of eight, one block, more, and many blocks with a remainder.
@@ -213,6 +217,48 @@ def compared(name: str, now: Arrays, stored: Arrays) -> tuple[str, float]:
     )
 
 
+# -- enclosures ------------------------------------------------------------------------------------------
+
+
+#: Digits of enclosures: those of a double, and the default.
+_DIGITS = (15, None)
+
+
+def enclosures(subject: Subject) -> dict[str, Any]:
+    """Return the ends (2, ...) of all intervals of one sample, at 15 digits and at the default."""
+    q, v, a = (batch[0] for batch in subject.inputs)
+    found = {f"{subject.name}/{name}": batch[:1] for name, batch in zip("qva", subject.inputs, strict=True)}
+    found[f"{subject.name}/frames"] = np.array(subject.frames)
+    drawn = draw_base(1, np.random.default_rng(1))
+    base = BaseMotion(np.round(drawn.placement[0], 9), drawn.velocity[0], drawn.acceleration[0])
+    for reference, digits, moves in product(Reference, _DIGITS, (None, base)):
+        proof = subject.robot.enclose(q, v, a, subject.frames[0], reference, base=moves, digits=digits)
+        for part in (
+            proof.placement,
+            proof.velocity,
+            proof.acceleration,
+            proof.jacobian,
+            proof.jacobian_rate,
+        ):
+            what = f"{subject.name}/{part.quantity}/{reference.name}/{digits}/{moves is not None}"
+            found[what] = np.stack((part.lower, part.upper))
+    return found
+
+
+def nested(name: str, now: Arrays, stored: Arrays) -> tuple[str, float]:
+    """Compare intervals with stored ones; return a line and the number of those that are outside."""
+    words, wrong = [], 0
+    for digits in _DIGITS:
+        names = [what for what in now if what.startswith(f"{name}/") and f"/{digits}/" in what]
+        new, old = (np.concatenate([x[what].reshape(2, -1) for what in names], axis=1) for x in (now, stored))
+        outside = (new[0] < old[0]) | (new[1] > old[1])
+        inside = ~outside & ((new[0] > old[0]) | (new[1] < old[1]))
+        counts = f"{new.shape[1]} intervals, {inside.sum()} narrower, {outside.sum()} outside"
+        words.append(f"{digits or 'default'}: {counts}")
+        wrong += int(outside.sum())
+    return "; ".join(words), float(wrong)
+
+
 def main(words: Sequence[str] | None = None) -> int:
     """Run the checks; return 1 if results differ unexpectedly."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
@@ -225,6 +271,7 @@ def main(words: Sequence[str] | None = None) -> int:
         default=0.0,
         help="allowed difference of two results, as a fraction of their bound",
     )
+    parser.add_argument("--enclosures", action="store_true", help="store or compare enclosures, not results")
     given = parser.parse_args(words)
     before = None if given.against is None else np.load(given.against)
     known = catalogue() if before is None else dict.fromkeys(name.partition("/")[0] for name in before)
@@ -232,12 +279,17 @@ def main(words: Sequence[str] | None = None) -> int:
     wrong = 0
     for name in given.robots or known:
         subject = Subject.of(name, before)
-        with only("compiled"):
-            now = to_keep(subject)
-            found = [*differing(subject), *differing_in_one_pass(subject, now)]
-        found += differing_interpreted(subject)
+        found: list[str] = []
+        if given.enclosures:
+            now = enclosures(subject)
+        else:
+            with only("compiled"):
+                now = to_keep(subject)
+                found += [*differing(subject), *differing_in_one_pass(subject, now)]
+            found += differing_interpreted(subject)
+        compare = nested if given.enclosures else compared
         everything |= now
-        said, most = ("", 0.0) if before is None else compared(name, now, before)
+        said, most = ("", 0.0) if before is None else compare(name, now, before)
         print(f"{name:28} {digest(now)} {said}", *found[:3], sep="\n    " if found else " ", flush=True)
         wrong += bool(found) or most > given.within
     print(f"{'all robots':28} {digest(everything)} {wrong} wrong")
