@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import urdfkin
+from urdfkin.compiled.preload import only
 from urdfkin.robot import Robot
 from urdfkin.verify.exact.enclosure import Enclosure, Enclosures
 from urdfkin.verify.pinocchio_module import version
@@ -46,21 +47,24 @@ print(proof)
 
 The textbook's equations (`urdfkin/kinematics/equations.py`) are evaluated with interval arithmetic. The
 inputs are exact: the decimals in the URDF text, multipliers of mimic joints and lengths of axes included, and
-the doubles of q, v, a and a moving base. Each sum, product and quotient is rounded outward, so the interval
-always contains the true value. At the end the interval is rounded outward to doubles. With enough digits its
-two ends are neighbouring doubles. A double inside is then one of the two doubles around the true value.
-Some results of urdfkin and Pinocchio lie outside, because they round at each step.
+the doubles of q, v, a and a moving base. Each sum, product and quotient is widened by its rounding error, so
+the interval always contains the true value. At the end the interval is rounded outward to doubles. With
+enough digits its two ends are neighbouring doubles. A double inside is then one of the two doubles around the
+true value. Some results of urdfkin and Pinocchio lie outside, because they round at each step.
 
-The proof does *not* cover the equations themselves; the agreement with Pinocchio supports those. The proof
-uses integer arithmetic, and mpmath's sums, products, quotients and integer powers of intervals, which are
-exact and rounded once. mpmath's other functions have no proof, so `urdfkin/verify/exact/intervals.py`
-replaces them:
+The proof does *not* cover the equations themselves; the agreement with Pinocchio supports those. The
+intervals are balls of [Arb](https://flintlib.org/doc/arb.html): a midpoint and a radius. Arb proves the
+radius of each sum, product, quotient, square root, sine and cosine. Other parts have their own proofs in
+`urdfkin/verify/exact/numbers.py`:
 
-| Function | Method |
+| Part | Method |
 |---|---|
-| sine, cosine | Taylor's series with a bound on its remainder |
-| square root | Heron's rule |
 | the rotation nearest to a base's matrix of nine digits | Newton's iteration with a bound on its residual |
+| the ends as doubles | the nearest double, then the next one if it lies inside the ball |
+
+The [accuracy study](judge.md) and the test vectors of [exported code](export.md) use the same balls.
+Arb has one precision for the whole process. So `enclose` in several threads computes one sample at a time,
+and restores the precision afterwards.
 
 ## Width of the intervals
 
@@ -68,10 +72,12 @@ The table is for the tip of each robot, {samples} samples, all five quantities i
 Pinocchio {version}. Of numbers that are the same for every q, only those that are not doubles are counted.
 
 - *Widest*: width of the widest interval, in steps between doubles at the quantity's largest number.
-- *Digits*: 15, as a double has, and the default of `enclose`, 30 plus one for each joint.
-- *Inside*: share of the numbers within their intervals. With 15 digits the width shows the possible rounding
-  error of doubles in world axes. Nearly all numbers then lie inside.
-- *Seconds*: processor time.
+- *Digits*: 15, as a double has, and the default of `enclose`, 30 plus one for each joint. Fifteen digits have
+  two bits more than a double.
+- *Inside*: share of the numbers within their intervals. With 15 digits the intervals are about as wide as the
+  rounding errors of doubles in world axes. Most numbers then lie inside.
+- *ms*: processor time of one sample after the first, milliseconds, with compiled kernels. Until kernels are
+  loaded, urdfkin's own results take 3 to 5 ms more.
 
 {robots}
 
@@ -90,23 +96,28 @@ infinity.
 
 def main() -> None:
     """Measure and write the page."""
+    with only("compiled"):
+        PAGE.write_text(_page(), encoding="utf-8")
+    print(PAGE)
+
+
+def _page() -> str:
     robot = urdfkin.load("panda")
     example = robot.enclose(robot.sample(1, seed=0)[0], [0.1] * 8, [0.2] * 8, "panda_hand")
-    PAGE.write_text(
-        TEXT.format(example=example, samples=SAMPLES, version=version(), robots=_robots(), chains=_chains()),
-        encoding="utf-8",
+    return TEXT.format(
+        example=example, samples=SAMPLES, version=version(), robots=_robots(), chains=_chains()
     )
-    print(PAGE)
 
 
 def _robots() -> str:
     rows = [
-        "| robot | joints | digits | widest, steps | urdfkin inside | Pinocchio inside | seconds |",
+        "| robot | joints | digits | widest, steps | urdfkin inside | Pinocchio inside | ms |",
         "|---|---:|---:|---:|---:|---:|---:|",
     ]
     for name in ROBOTS:
         robot = urdfkin.load(name)
         depth = len(robot.tree.path(robot.tree.frame_link(robot.tip_frame)))
+        _proof(robot, 0, None)
         for digits in (15, None):
             begin = time.process_time()
             proofs = [_proof(robot, seed, digits) for seed in range(SAMPLES)]
@@ -114,7 +125,9 @@ def _robots() -> str:
             parts = [part for proof in proofs for part in _parts(proof)]
             steps = max(float((part.width / np.spacing(_larger_end(part))).max()) for part in parts)
             inside = " | ".join(_inside(parts, side) for side in ("urdfkin", "pinocchio"))
-            rows.append(f"| {name} | {depth} | {proofs[0].digits} | {steps:.3g} | {inside} | {seconds:.2f} |")
+            rows.append(
+                f"| {name} | {depth} | {proofs[0].digits} | {steps:.3g} | {inside} | {1e3 * seconds:.1f} |"
+            )
     return "\n".join(rows)
 
 
@@ -139,20 +152,21 @@ def _inside(parts: list[Enclosure], side: str) -> str:
 
 
 def _chains() -> str:
-    rows = ["| joints | digits | acceleration | widest interval | seconds |", "|---:|---:|---:|---:|---:|"]
+    rows = ["| joints | digits | acceleration | widest interval | ms |", "|---:|---:|---:|---:|---:|"]
     for length in LENGTHS:
-        robot = urdfkin.load(_askew(length), verify=False)
+        robot = urdfkin.load(askew(length), verify=False)
+        _proof(robot, 0, None)
         for digits in (15, 50, None):
             begin = time.process_time()
             proof = _proof(robot, 0, digits)
             seconds = time.process_time() - begin
             size = float(np.abs(proof.acceleration.urdfkin).max())
             widest = float(proof.acceleration.width.max())
-            rows.append(f"| {length} | {proof.digits} | {size:.1e} | {widest:.1e} | {seconds:.2f} |")
+            rows.append(f"| {length} | {proof.digits} | {size:.1e} | {widest:.1e} | {1e3 * seconds:.1f} |")
     return "\n".join(rows)
 
 
-def _askew(length: int) -> str:
+def askew(length: int) -> str:
     """Return a chain of continuous joints with oblique axes."""
     joints = "".join(
         f'<link name="l{i + 1}"/><joint name="j{i}" type="continuous"><parent link="l{i}"/>'

@@ -6,17 +6,24 @@ than a double has, whatever the function is made of.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
+from unittest.mock import patch
 
 import mpmath
 import numpy as np
 
 from urdfkin.kinematics.inputs import FloatArray
+from urdfkin.model.base_motion import BaseMotion
+from urdfkin.model.recursion import State
+from urdfkin.robot import Robot
+from urdfkin.verify.exact import numbers
+from urdfkin.verify.exact.recursion import Motion, move
 
 #: Work with this many digits wherever `mp` is used.
 mp = mpmath.mp.clone()
 mp.dps = 60
+mp.mpf.sin_cos = lambda angle: (mp.sin(angle), mp.cos(angle))  # as a ball has it
 
 Matrix = Any
 _STEP = mp.mpf(10) ** -18
@@ -75,3 +82,29 @@ def angular_acceleration(R: Callable[[Any], Matrix], t: float) -> Matrix:
     """The rate of w: R-dot-dot R^T + R-dot R-dot^T is S(alpha)."""
     first = rate(R, t)
     return unskewed(second_rate(R, t) * R(mp.mpf(t)).T + first * first.T)
+
+
+# -- the true motion of a robot, without Arb ------------------------------------------------------------
+
+
+def true_motion(robot: Robot, x: Sequence[FloatArray], base: BaseMotion | None = None) -> Motion:
+    """The motion of one sample by the same recursion, on mpmath's numbers instead of balls."""
+    with patch.object(numbers, "arb", mp.mpf):
+        joints, on = numbers.read_exact(robot.urdf, robot.tree), None if base is None else root_state(base)
+        return move(robot.tree, joints, *x, base=on)
+
+
+def root_state(base: BaseMotion) -> State:
+    """The state of the root link that moves so."""
+    T, six, six_2 = base.placement, base.velocity, base.acceleration
+    first, second, third = map(tuple, orthogonal_factor(T[:3, :3]).tolist())
+    vectors: Any = (T[:3, 3], six[3:], six[:3], six_2[3:], six_2[:3])
+    return State((first, second, third), *(tuple(map(mp.mpf, vector)) for vector in vectors))
+
+
+def orthogonal_factor(M: FloatArray) -> Matrix:
+    """U of M = U H by Higham's iteration, (X + X^-T) / 2."""
+    X = mp.matrix(M.tolist())
+    for _ in range(12):
+        X = (X + (X**-1).T) / 2
+    return X

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -15,24 +15,20 @@ from urdfkin.kinematics import equations as eq
 from urdfkin.kinematics.rotation import axis_aligning
 from urdfkin.loading import load
 from urdfkin.model.pose import inverse
+from urdfkin.model.recursion import IDENTITY, ZERO, Matrix, Number, Vector
 from urdfkin.model.tree import FloatArray, JointKind
-from urdfkin.verify.exact.numbers import (
-    IDENTITY,
-    ZERO,
-    ExactJoint,
-    Matrix,
-    Number,
-    Vector,
-    about,
-    exact,
-    mp,
-    read_exact,
-)
+from urdfkin.verify.exact.numbers import ExactJoint, about, exact, precision, read_exact
 from urdfkin.verify.exact.recursion import move
 
-#: Small enough that its square is no digit of a double, large enough to keep twenty of fifty digits.
-STEP = mp.mpf(10) ** -20
+#: Small enough that its square is no digit of a double, large enough to keep thirty of fifty digits.
+STEP = exact(2.0**-66)
 Pose = tuple[Matrix, Vector]
+
+
+@pytest.fixture(autouse=True)
+def fifty_digits() -> Iterator[None]:
+    with precision(50):
+        yield
 
 
 def vector(x: FloatArray) -> Vector:
@@ -54,7 +50,7 @@ def back(T: Pose) -> Pose:
 
 def elementary(turns: bool, axis: int, value: Number) -> Pose:
     if turns:
-        return about(IDENTITY[axis], value, mp), ZERO
+        return about(IDENTITY[axis], value), ZERO
     x, y, z = eq.times(value, IDENTITY[axis])
     return IDENTITY, (x, y, z)
 
@@ -105,7 +101,7 @@ def test_a_urdfs_columns_are_the_difference_quotients_of_its_text_at_fifty_digit
     def place(moved: dict[int, Number]) -> Pose:
         names = [robot.tree.joints[i].name for i in joints]
         changed = {i: moved_joint(n, own, moved) for (i, own), n in zip(joints.items(), names, strict=True)}
-        states = move(robot.tree, changed, list(map(exact, q)), [0] * robot.nv, [0] * robot.nv).states
+        states = move(robot.tree, changed, q, [0] * robot.nv, [0] * robot.nv).states
         ends = [states[robot.tree.frame_link(name)] for name in (base, tip)]
         way = joined(back((ends[0].R, ends[0].p)), (ends[1].R, ends[1].p))
         return joined(joined(six(model, "base", moved), way), six(model, "tool", moved))

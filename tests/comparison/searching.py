@@ -14,7 +14,7 @@ from urdfkin.comparison.result import Interval
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind
 from urdfkin.robot import Robot
-from urdfkin.verify.exact.numbers import mp, read_exact
+from urdfkin.verify.exact.numbers import DIGITS, precision, read_exact
 from urdfkin.verify.exact.recursion import move
 from urdfkin.verify.quantities import PLACEMENT
 
@@ -22,19 +22,17 @@ from urdfkin.verify.quantities import PLACEMENT
 def placed(robot: Robot, q: FloatArray, frame: str) -> list[Any]:
     """A frame's place at fifty digits, from the decimals of the text."""
     tree, link = robot.tree, robot.tree.link_index(frame)
-    zeros = [mp.mpf(0)] * tree.nv
-    numbers = [mp.mpf(float(x)) for x in q]
-    exact = read_exact(robot.urdf, tree, mp, tree.path(link))
-    motion = move(tree, exact, numbers, zeros, zeros, base=None, context=mp)
+    zeros = [0.0] * tree.nv
+    motion = move(tree, read_exact(robot.urdf, tree, tree.path(link)), q, zeros, zeros)
     T = PLACEMENT.truth(motion, link, Reference.LOCAL_WORLD_ALIGNED)
     return [T[i][3] for i in range(3)]
 
 
 def far(a: Robot, b: Robot, q_a: FloatArray, q_b: FloatArray, interval: Interval) -> float:
     """How far a frame is off at a configuration, at fifty digits."""
-    places = placed(a, q_a, interval.frame), placed(b, q_b, interval.frame_b)
-    with mp.workdps(50):
-        return float(mp.sqrt(sum((x - y) ** 2 for x, y in zip(*places, strict=True))))
+    with precision(DIGITS):
+        places = placed(a, q_a, interval.frame), placed(b, q_b, interval.frame_b)
+        return math.hypot(*(float(x - y) for x, y in zip(*places, strict=True)))
 
 
 def within(robot: Robot, q: FloatArray) -> NDArray[np.bool_]:

@@ -10,14 +10,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from flint import arb
 
 import urdfkin
 from tests.export.writing import ALL, built, code, file, need, ran
+from tests.high_precision import mp, true_motion
 from tests.laws.subjects import robot_of, state
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.export import LANGUAGES, write
 from urdfkin.export.check import check
+from urdfkin.export.proof import decimal
 from urdfkin.model.reference import Reference
+from urdfkin.verify.exact.numbers import precision
+from urdfkin.verify.quantities import QUANTITIES
 
 RUN = [to for to in LANGUAGES if to != "latex"]
 _THREE = ("placement", "jacobian", "acceleration")
@@ -40,6 +45,38 @@ def test_an_arms_file_computes_its_fifty_digit_values(to: str, tmp_path: Path) -
     found = check(file(code(urdfkin.load("ur5", verify=False), quantities=_THREE), to, tmp_path))
     assert found.good, found.lines
     assert len(found.lines) == len(_THREE) * (2 if to in ("c", "cpp") else 1)
+
+
+def test_the_fifty_digits_of_a_test_vector_are_those_of_the_true_value() -> None:
+    robot = urdfkin.load("ur5", verify=False)
+    vector, link = code(robot, quantities=_THREE).proof.vectors[0], robot.tree.frame_link(robot.tip_frame)
+    motion = true_motion(robot, [np.array(x) for x in vector.inputs])
+    for name, digits in vector.results.items():
+        true = QUANTITIES[name.replace("_", " ")].truth(motion, link, Reference.LOCAL_WORLD_ALIGNED)
+        for text, value in zip(digits, true.ravel(), strict=True):
+            assert abs(mp.mpf(text) - value) <= max(abs(value) * mp.mpf(10) ** -49, mp.mpf(10) ** -58)
+
+
+@pytest.mark.parametrize(
+    ("number", "text"),
+    [
+        (0, "0.0"),
+        (1, "1.0"),
+        (-0.375, "-0.375"),
+        ("0.1", "0.1"),
+        ("1e70", "1.0e+70"),
+        ("-2.5e-7", "-2.5e-7"),
+        ("0.6666666666666666666666666666666666666666666666666666666", f"0.{'6' * 49}7"),
+    ],
+)
+def test_a_ball_is_written_with_fifty_digits_and_without_zeros_at_the_end(
+    number: str | float, text: str
+) -> None:
+    with precision(90):
+        ball = arb(number)
+        assert decimal(ball) == text
+        assert decimal(ball - ball) == "0.0"
+        assert decimal(1 / (1 / (ball + 3)) - 3) == text
 
 
 @pytest.mark.slow

@@ -18,11 +18,11 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind
 from urdfkin.robot import Robot
 from urdfkin.verify.exact import recursion
-from urdfkin.verify.exact.numbers import about, exact, from_quaternion, mp, read_exact
+from urdfkin.verify.exact.numbers import about, exact, from_quaternion, precision, read_exact
 from urdfkin.verify.quantities import HESSIAN, JACOBIAN
 
-_STEP = mp.mpf(10) ** -18
-#: Of the quotients: their truncation goes with the square of the step, fifty digits lose eighteen.
+_STEP = exact(2.0**-60)
+#: Of the quotients: their truncation goes with the square of the step, eighty digits lose eighteen.
 _ROOM = 1e-30
 _Z = (0, 0, 1)
 
@@ -34,15 +34,15 @@ def stepped(robot: Robot, q: FloatArray, rate: int, step: Any) -> list[Any]:
     for joint, at, rate_at in zip(tree.joints, tree.q_index, tree.v_index, strict=True):
         if joint.mimic is not None or not rate_at <= rate < rate_at + joint.kind.nv:
             continue
-        unit = [step if c == rate - rate_at else mp.mpf(0) for c in range(joint.kind.nv)]
+        unit = [step if c == rate - rate_at else 0.0 for c in range(joint.kind.nv)]
         if joint.kind is JointKind.PLANAR:
-            R = about(_Z, out[at + 2], mp)
+            R = about(_Z, out[at + 2])
             x, y, _ = eq.rotate(R, (unit[0], unit[1], 0))
             out[at : at + 3] = [out[at] + x, out[at + 1] + y, out[at + 2] + unit[2]]
         elif joint.kind is JointKind.FLOATING:
             quaternion = tuple(out[at + 3 : at + 7])
             x, y, z, w = quaternion
-            slide = eq.rotate(from_quaternion(quaternion, mp), tuple(unit[:3]))
+            slide = eq.rotate(from_quaternion(quaternion), tuple(unit[:3]))
             half = tuple(part / 2 for part in unit[3:])
             turn = eq.plus(eq.times(w, half), eq.cross((x, y, z), half))
             moved = [*eq.plus(tuple(out[at : at + 3]), slide), *eq.plus((x, y, z), turn)]
@@ -54,12 +54,12 @@ def stepped(robot: Robot, q: FloatArray, rate: int, step: Any) -> list[Any]:
 
 def truths(robot: Robot, q: FloatArray, link: int, reference: Reference) -> tuple[NDArray[Any], NDArray[Any]]:
     """(6, nv, nv) of the equations, and by difference quotients of the Jacobian, both at fifty digits."""
-    joints, still = read_exact(robot.urdf, robot.tree, mp, robot.tree.path(link)), [mp.mpf(0)] * robot.nv
+    joints, still = read_exact(robot.urdf, robot.tree, robot.tree.path(link)), [0.0] * robot.nv
 
     def at(x: list[Any]) -> recursion.Motion:
         return recursion.move(robot.tree, joints, x, still, still)
 
-    found = HESSIAN.truth(at([exact(x) for x in q]), link, reference)
+    found = HESSIAN.truth(at(list(q)), link, reference)
     quotients = np.empty_like(found)
     for j in range(robot.nv):
         ahead, behind = (
@@ -77,8 +77,9 @@ def test_it_is_the_difference_quotient_of_the_jacobian_at_fifty_digits(
 ) -> None:
     robot = robot_of(name)
     q, link = state(robot, 1, 3)[0][0], robot.tree.frame_link(robot.tip_frame)
-    found, quotients = truths(robot, q, link, reference)
-    assert max(abs(x - y) for x, y in zip(found.ravel(), quotients.ravel(), strict=True)) < _ROOM
+    with precision(80):
+        found, quotients = truths(robot, q, link, reference)
+        assert all(abs(x - y) < _ROOM for x, y in zip(found.ravel(), quotients.ravel(), strict=True))
     ours = robot.hessian(q, robot.tip_frame, reference)
     size = max(1.0, float(np.abs(ours).max()))
     assert np.abs(ours - found.astype(float)).max() < 100.0 * EPS * size

@@ -42,6 +42,15 @@ def test_it_holds_every_urdf_of_example_robot_data_but_the_one_that_is_none() ->
     assert {path.name for path in shipped - set(listed)} == {"ur3.urdf"}
 
 
+def test_the_ends_of_an_enclosure_are_neighbouring_doubles(robot: Robot) -> None:
+    v, a = np.random.default_rng(1).standard_normal((2, robot.nv))
+    proof = robot.enclose(robot.sample(1, 1)[0], v, a, robot.link_frames[-1])
+    for one in (proof.placement, proof.velocity, proof.acceleration, proof.jacobian, proof.jacobian_rate):
+        # Where the true number is a double by a sum that intervals cannot see through, two steps; or is 0.
+        few = one.upper <= np.nextafter(np.nextafter(one.lower, np.inf), np.inf)
+        assert (few | ((one.width < 1e-28) & one.contains(np.zeros_like(one.width)))).all()
+
+
 def test_it_is_found_without_importing_pinocchio() -> None:
     code = (
         "import sys; from urdfkin.urdf.catalogue import catalogue; "

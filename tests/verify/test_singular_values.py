@@ -9,17 +9,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import urdfkin
+from tests.high_precision import mp
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.verify.exact.numbers import exact, mp, read_exact
+from urdfkin.verify.exact.numbers import precision, read_exact
 from urdfkin.verify.exact.recursion import move
 from urdfkin.verify.quantities import JACOBIAN
 from urdfkin.verify.singular_values import Between, SingularValues, _skew, singular_values
 
+#: The numbers of an array, without rounding.
+exact = np.vectorize(mp.mpf, otypes=[object])
 ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
 
 
@@ -29,10 +32,11 @@ def true_values(A: np.ndarray) -> list[mpmath.mpf]:
 
 
 def true_jacobian(robot: Robot, q: FloatArray, frame: str) -> np.ndarray:
-    link, still = robot.tree.frame_link(frame), [mp.mpf(0)] * robot.nv
-    joints = read_exact(robot.urdf, robot.tree, mp, robot.tree.path(link))
-    motion = move(robot.tree, joints, [exact(x) for x in q], still, still)
-    return JACOBIAN.truth(motion, link, Reference.LOCAL_WORLD_ALIGNED)
+    link, still = robot.tree.frame_link(frame), [0.0] * robot.nv
+    with precision(60):
+        motion = move(robot.tree, read_exact(robot.urdf, robot.tree, robot.tree.path(link)), q, still, still)
+        found: np.ndarray = exact(JACOBIAN.truth(motion, link, Reference.LOCAL_WORLD_ALIGNED))
+        return found
 
 
 def holds(found: Between, true: list[mpmath.mpf]) -> bool:
@@ -85,7 +89,7 @@ def test_any_matrixs_lie_between_whatever_their_size_and_rank(
     if deficient:
         A[-1] = A[0]
     found = singular_values(A, np.zeros(shape), np.ones(shape[1], dtype=bool))
-    true = true_values(np.vectorize(exact, otypes=[object])(A))
+    true = true_values(exact(A))
     assert holds(found.values, true)
     assert (found.values.upper - found.values.lower <= 1e-12 * found.values.value[0]).all()
 
@@ -99,7 +103,7 @@ def test_they_lie_between_however_small_or_large_the_matrix_is(exponent: int, de
     A = np.ldexp(A, exponent)
     found = singular_values(A, np.abs(A) * 2.0**-52, np.ones(4, dtype=bool))
     unit = mp.mpf(2) ** exponent
-    scaled = np.vectorize(lambda x: exact(x) / unit, otypes=[object])(A)
+    scaled = exact(A) / unit
     true = [x * unit for x in true_values(scaled)]
     assert holds(found.values, true)
     assert holds(Between(*(np.array([x]) for x in found.manipulability)), [mp.fprod(true)])
@@ -145,7 +149,7 @@ def test_a_product_lies_between_where_a_part_of_it_is_beyond_all_numbers(
     bounds = Between(values, values * (1.0 - 1e-15), values * (1.0 + 1e-15))
     found = SingularValues(slice(None), bounds, np.eye(len(sizes)), np.eye(len(sizes)))
     assert holds(Between(*(np.array([x]) for x in found.manipulability)), [product])
-    assert holds(Between(*(np.array([x]) for x in found.condition)), [exact(values[0]) / exact(values[-1])])
+    assert holds(Between(*(np.array([x]) for x in found.condition)), [mp.mpf(values[0]) / mp.mpf(values[-1])])
 
 
 # -- each term of the bounds is needed -----------------------------------------------------------------
@@ -155,11 +159,11 @@ def test_what_the_matrix_may_be_off_by_is_in_the_bounds() -> None:
     A, off = np.diag([2.0, 1.0]), np.full((2, 2), 1e-6)
     found = singular_values(A, off, np.ones(2, dtype=bool))
     for sign in (1.0, -1.0):
-        true = true_values(np.vectorize(exact, otypes=[object])(A + sign * off))
+        true = true_values(exact(A + sign * off))
         assert holds(found.values, true)
     # All of it: what is off by the same in every number moves one of them by its norm.
     alone = singular_values(np.zeros((2, 2)), off, np.ones(2, dtype=bool))
-    assert holds(alone.values, true_values(np.vectorize(exact, otypes=[object])(off)))
+    assert holds(alone.values, true_values(exact(off)))
     assert alone.values.upper[0] == pytest.approx(2e-6, rel=1e-12)
 
 
@@ -174,7 +178,7 @@ def holds_with(
     monkeypatch: pytest.MonkeyPatch, A: FloatArray, svd: tuple[FloatArray, FloatArray, FloatArray]
 ) -> bool:
     """Whether the true values lie between the bounds that are made of this decomposition of a matrix."""
-    true = true_values(np.vectorize(exact, otypes=[object])(A))
+    true = true_values(exact(A))
     with monkeypatch.context() as patched:
         patched.setattr(np.linalg, "svd", lambda *_, **__: svd)
         return holds(singular_values(A, np.zeros(A.shape), np.ones(A.shape[1], dtype=bool)).values, true)
@@ -231,14 +235,14 @@ def test_the_bounds_are_rounded_outward() -> None:
     generator = np.random.default_rng(1)
     for x, y in generator.uniform(1.0, 2.0, (50, 2)):
         off = singular_values(np.zeros((1, 3)), np.full((1, 3), x), np.ones(3, dtype=bool))
-        assert exact(float(off.values.upper[0])) ** 2 >= 3 * exact(x) ** 2
+        assert mp.mpf(float(off.values.upper[0])) ** 2 >= 3 * mp.mpf(x) ** 2
         values = np.array([max(x, y), min(x, y)])
         found = SingularValues(slice(None), Between(values, values, values), np.eye(2), np.eye(2))
         for between, true in (
-            (found.manipulability, exact(x) * exact(y)),
-            (found.condition, exact(values[0]) / exact(values[1])),
+            (found.manipulability, mp.mpf(x) * mp.mpf(y)),
+            (found.condition, mp.mpf(values[0]) / mp.mpf(values[1])),
         ):
-            assert exact(float(between.lower)) < true < exact(float(between.upper))
+            assert mp.mpf(float(between.lower)) < true < mp.mpf(float(between.upper))
 
 
 def test_what_is_beyond_all_numbers_bounds_nothing() -> None:

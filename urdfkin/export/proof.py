@@ -20,12 +20,13 @@ from urdfkin.compiled.plan import CompiledTree
 from urdfkin.export.function import Function
 from urdfkin.export.naming import quiet
 from urdfkin.kinematics.roundings import SMALLEST
+from urdfkin.model.recursion import Number
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.lazy_import import own_version
 from urdfkin.verify.call import Call
 from urdfkin.verify.certificate import Certificate
-from urdfkin.verify.exact.numbers import DIGITS, exact, mp, read_exact
+from urdfkin.verify.exact.numbers import DIGITS, enough_digits, exact, precision, read_exact
 from urdfkin.verify.exact.recursion import move
 from urdfkin.verify.sampling import draw
 from urdfkin.verify.verifier import Verifier, bound_of
@@ -125,26 +126,24 @@ def _vectors(
 ) -> tuple[Vector, ...]:
     tree = verifier.tree
     link = tree.frame_link(frame)
-    path = tree.path(link)
-    joints = read_exact(verifier.text, tree, mp, path)
     drawn = draw(tree, VECTORS, np.random.default_rng(1), with_special=False)
     inputs = tuple(_single(x) for x in (drawn.q, drawn.v, drawn.a))
     whole = Call(tree, plan_of, frame, reference, None, inputs)
     part = whole.part(slice(0, VECTORS))
     within = {f.name: _within(f, part) for f in functions}
-    found = []
-    for k in range(VECTORS):
-        numbers = [[exact(x) for x in row[k]] for row in inputs]
-        motion = move(tree, joints, *numbers)
-        true = {f.name: f.quantity.truth(motion, link, reference).ravel() for f in functions}
-        results = {name: [_decimal(x) for x in values] for name, values in true.items()}
-        found.append(
-            Vector(
-                tuple(row[k].tolist() for row in inputs),
-                results,
-                {name: [_rounded_down(x) for x in values[k]] for name, values in within.items()},
+    path, found = tree.path(link), []
+    with precision(DIGITS + enough_digits(len(path))):
+        joints = read_exact(verifier.text, tree, path)
+        for k in range(VECTORS):
+            motion = move(tree, joints, *(x[k] for x in inputs))
+            true = {f.name: f.quantity.truth(motion, link, reference).ravel() for f in functions}
+            found.append(
+                Vector(
+                    tuple(x[k].tolist() for x in inputs),
+                    {name: [decimal(x) for x in values] for name, values in true.items()},
+                    {name: [_rounded_down(x) for x in values[k]] for name, values in within.items()},
+                )
             )
-        )
     return tuple(found)
 
 
@@ -161,9 +160,14 @@ def _within(function: Function, part: object) -> FloatArray:
     return np.asarray(np.broadcast_to(scale * bound.k, shape)).reshape(n, -1)
 
 
-def _decimal(x: object) -> str:
-    text: str = mp.nstr(mp.mpf(x), DIGITS)
-    return text
+def decimal(x: Number) -> str:
+    """Return the first fifty digits of a ball, without zeros at the end; a ball around 0 is 0."""
+    ball = exact(x)
+    if ball.contains(0):
+        return "0.0"
+    digits, e, exponent = ball.str(DIGITS, radius=False).partition("e")
+    whole, _, fraction = digits.partition(".")
+    return f"{whole}.{fraction.rstrip('0') or '0'}{e}{exponent}"
 
 
 def _rounded_down(x: float) -> str:

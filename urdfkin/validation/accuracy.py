@@ -1,4 +1,6 @@
-"""Accuracy study: the errors of urdfkin and of Pinocchio with respect to values at fifty digits.
+"""Accuracy study: the errors of urdfkin and of Pinocchio with respect to values with fifty digits or more.
+
+The values are balls that contain the true values, as in an enclosure. So an error is never too small.
 
 Errors are in eps * scale. The scale is the one that verification uses, so you can compare the numbers with
 those of a report.
@@ -8,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,6 +22,7 @@ from urdfkin.kinematics.rotation.euler import NEAREST, SEQUENCES, euler_of, sing
 from urdfkin.kinematics.rotation.quaternion import quaternion_of
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
 from urdfkin.model.base_motion import BaseMotion
+from urdfkin.model.recursion import Number
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
@@ -31,7 +35,7 @@ from urdfkin.verify.bounds import (
     result_k,
 )
 from urdfkin.verify.call import Call
-from urdfkin.verify.exact.numbers import exact, mp, read_exact
+from urdfkin.verify.exact.numbers import DIGITS, enough_digits, exact, precision, read_exact
 from urdfkin.verify.exact.recursion import move, on_base
 from urdfkin.verify.oracle_query import BaseRows
 from urdfkin.verify.pinocchio_inputs import BaseNumbers, davenport
@@ -40,7 +44,7 @@ from urdfkin.verify.sampling import Samples, draw
 from urdfkin.verify.verifier import bound_of, theirs_of, urdfkins
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
-_FIFTY_DIGITS = np.vectorize(mp.mpf, otypes=[object])
+_BALLS = np.vectorize(exact, otypes=[object])
 #: Name of a line of the study -> the representations of an orientation that it covers.
 _REPRESENTATIONS = {
     "euler angles": tuple(name for name in SEQUENCES if name.isupper()),
@@ -136,8 +140,12 @@ def judge(robot: Robot, *, samples: int = 5, seed: int = 0, base: BaseMotion | N
         OracleError: Pinocchio does not accept the robot.
         InputError: The number of base motions is neither one nor the number of samples.
     """
-    work = _Work(robot, draw(robot.tree, samples, np.random.default_rng(seed), with_special=False), base)
-    return Judgement(robot.name, samples, seed, tuple(work.lines()), base is not None)
+    drawn = draw(robot.tree, samples, np.random.default_rng(seed), with_special=False)
+    longest = max(len(robot.tree.path(link)) for link in range(len(robot.tree.links)))
+    with precision(max(DIGITS, enough_digits(longest))):
+        return Judgement(
+            robot.name, samples, seed, tuple(_Work(robot, drawn, base).lines()), base is not None
+        )
 
 
 class _Compared(NamedTuple):
@@ -168,7 +176,7 @@ class _Work:
             move(
                 robot.tree,
                 joints,
-                *([exact(number) for number in row[k]] for row in self.part.asked.inputs),
+                *(batch[k] for batch in self.part.asked.inputs),
                 base=None if moves is None else on_base(_one(moves, k)),
             )
             for k in range(len(x.q))
@@ -207,7 +215,7 @@ class _Work:
         jacobian = JACOBIAN.bound(plan, size, _ALIGNED)
         R, R_theirs = poses.urdfkin[..., :3, :3], poses.pinocchio[..., :3, :3]
         moving = _moving_columns(J_v.scale)
-        R_true, J_true = map(_FIFTY_DIGITS, (poses.true[..., :3, :3], _columns(J_v.true, moving)))
+        R_true, J_true = map(_BALLS, (poses.true[..., :3, :3], _columns(J_v.true, moving)))
         for name in representations:
             if name == QUATERNION:
                 bound, quat = quaternion_jacobian_bound(jacobian), quaternion_of(R)
@@ -256,13 +264,16 @@ def _line(quantity: str, reference: str | None, compared: Sequence[_Compared]) -
     for ours, theirs, true, scale in compared:
         counted = scale > 0.0
         units = np.maximum(EPS * scale[counted], LEAST_UNIT)
-        # Subtract the true value's leading double (exact for close doubles), then its other digits.
-        high = true[counted].astype(float)
-        low = (true[counted] - high).astype(float)
         for errors, side in zip(sides, (ours, theirs), strict=True):
-            errors.append(np.abs((side[counted] - high) - low) / units)
+            errors.append(_error(side[counted], true[counted]) / units)
     own_errors, their_errors = map(np.concatenate, sides)
     return Line(quantity, reference, len(own_errors), _errors(own_errors), _errors(their_errors))
+
+
+@partial(np.vectorize, otypes=[float])
+def _error(x: float, true: Number) -> float:
+    """Return the largest distance of a double from a ball."""
+    return float(abs(exact(true) - x).upper())
 
 
 def _errors(units: FloatArray) -> Errors:

@@ -130,8 +130,8 @@ class AccuracyResult:
         manifest = self._store.manifest
         origin, stamp = manifest.robots[robot]
         origin = replace(origin, oracle=None)  # a second oracle does not affect the study
-        numbers = [manifest.provenance, version("mpmath"), asdict(self._settings), asdict(origin), stamp]
-        return hashlib.sha256(json.dumps([LAYOUT, "judge", *numbers], sort_keys=True).encode()).hexdigest()
+        parts = [manifest.provenance, version("python-flint"), asdict(self._settings), asdict(origin), stamp]
+        return hashlib.sha256(json.dumps([LAYOUT, "judge", *parts], sort_keys=True).encode()).hexdigest()
 
 
 def _read(key: str, content: bytes) -> Judgement | NotJudged:

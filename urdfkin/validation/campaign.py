@@ -216,7 +216,7 @@ def _judgements(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Jud
     """Return the accuracy result of each compared robot, if requested, and whether all robots have one."""
     if not store.has_judge:
         return (), True
-    from urdfkin.validation.accuracy_store import AccuracyResult, NotJudged  # noqa: PLC0415  needs mpmath
+    from urdfkin.validation.accuracy_store import AccuracyResult, NotJudged  # noqa: PLC0415  needs python-flint
 
     if (results := AccuracyResult.of(store)) is None:
         return (), True

@@ -2,17 +2,21 @@
 
 import io
 import re
+import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import redirect_stdout
 from fractions import Fraction
 from pathlib import Path
 
+import flint
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 import urdfkin
 from tests.attacks.test_judged_quaternions import quaternions, text
+from tests.high_precision import mp, true_motion
 from tests.laws.everything import by_the_robot
 from tests.laws.subjects import robot_of, state
 from tests.laws.test_mutation import with_a_slip
@@ -23,7 +27,6 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.verify.exact import recursion
 from urdfkin.verify.exact.enclosure import Enclosure, Enclosures
-from urdfkin.verify.exact.numbers import exact, mp, read_exact
 from urdfkin.verify.quantities import QUANTITIES
 
 pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
@@ -59,17 +62,10 @@ def quantities(enclosed: Enclosures) -> Iterator[Enclosure]:
     )
 
 
-def at_fifty_digits(robot: Robot, x: Sample, base: BaseMotion | None) -> recursion.Motion:
-    numbers = ([exact(number) for number in row] for row in x)
-    joints = read_exact(robot.urdf, robot.tree)
-    on = None if base is None else recursion.on_base(base)
-    return recursion.move(robot.tree, joints, *numbers, base=on)
-
-
 def holds(enclosure: Enclosure, true: NDArray[np.object_]) -> bool:
-    """Whether the true numbers, of 50 digits, lie inside."""
+    """Whether the true numbers, of 60 digits, lie inside."""
     rows = zip(enclosure.lower.flat, true.flat, enclosure.upper.flat, strict=True)
-    return all(exact(low) <= mp.mpf(number) <= exact(high) for low, number, high in rows)
+    return all(mp.mpf(low) <= mp.mpf(number) <= mp.mpf(high) for low, number, high in rows)
 
 
 @pytest.mark.slow
@@ -79,7 +75,7 @@ def test_every_number_at_fifty_digits_lies_in_its_interval_at_any_precision(name
     robot = robot_of(name)
     x, base = sample(robot), moving_base(3) if moves else None
     link = int(np.random.default_rng(len(robot.tree.links)).integers(1, len(robot.tree.links)))
-    motion = at_fifty_digits(robot, x, base)
+    motion = true_motion(robot, x, base)
     for reference in Reference:
         widest = np.inf
         for digits in (15, 40):
@@ -98,7 +94,7 @@ def test_quaternions_in_the_file_and_joints_that_the_root_hangs_from_are_enclose
         robot_of("one_joint", root_joint="planar"),
     ):
         x = sample(robot)
-        motion = at_fifty_digits(robot, x, None)
+        motion = true_motion(robot, x)
         for one in quantities(robot.enclose(*x, robot.tip_frame, "local")):
             link = robot.tree.frame_link(robot.tip_frame)
             assert holds(one, QUANTITIES[one.quantity].truth(motion, link, Reference.LOCAL)), one
@@ -219,7 +215,7 @@ def test_an_error_is_rounded_outward() -> None:
 def test_a_hessian_is_enclosed_where_it_is_asked_for(name: str) -> None:
     robot = robot_of(name)
     x, link = sample(robot), robot.tree.frame_link(robot.tip_frame)
-    motion = at_fifty_digits(robot, x, None)
+    motion = true_motion(robot, x)
     assert robot.enclose(*x, robot.tip_frame).hessian is None
     for reference in Reference:
         one = robot.enclose(*x, robot.tip_frame, reference, hessian=True).hessian
@@ -253,10 +249,29 @@ def test_a_hessian_behind_mimic_joints_is_enclosed_and_counts_both_their_multipl
     assert one is not None
     assert one.error(robot.hessian(q, "d", reference)).max() < 1e-14
     # The rate of the Jacobian by the robot's own recursion: with one rate, J-dot = H v.
-    motion = at_fifty_digits(robot, (q, v, a), None)
+    motion = true_motion(robot, (q, v, a))
     link = robot.tree.frame_link("d")
     rate = QUANTITIES["jacobian rate"].truth(motion, link, reference)
     assert np.abs((one.lower[..., 0] - rate).astype(float)).max() < 1e-15
+
+
+def test_threads_that_ask_for_other_digits_do_not_disturb_each_other_nor_the_users_precision() -> None:
+    robot = robot_of("panda")
+    x, asked = sample(robot), (15, 300) * 20
+
+    def ends(digits: int) -> bytes:
+        return robot.enclose(*x, robot.tip_frame, digits=digits).acceleration.upper.tobytes()
+
+    alone = {digits: ends(digits) for digits in asked}
+    assert len(set(alone.values())) == 2
+    before, interval = flint.ctx.prec, sys.getswitchinterval()
+    sys.setswitchinterval(1e-5)
+    try:
+        with ThreadPoolExecutor(4) as pool:
+            assert list(pool.map(ends, asked)) == [alone[digits] for digits in asked]
+    finally:
+        sys.setswitchinterval(interval)
+    assert flint.ctx.prec == before
 
 
 def test_a_robot_that_pinocchio_refuses_is_enclosed_all_the_same() -> None:

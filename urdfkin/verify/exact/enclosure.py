@@ -1,6 +1,6 @@
 """Enclosures: intervals that provably contain the true values of one sample.
 
-`urdfkin.kinematics.equations` is evaluated with interval arithmetic (`urdfkin.verify.exact.intervals`). The
+`urdfkin.kinematics.equations` is evaluated with interval arithmetic (`urdfkin.verify.exact.numbers`). The
 inputs are the decimals in the URDF text and the exact values of q, v and a. An enclosure proves a bound on
 the rounding error. It does not prove the equations; the agreement with Pinocchio supports the equations.
 """
@@ -24,8 +24,7 @@ from urdfkin.model.configuration_like import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, frozen
 from urdfkin.verify.call import Call
-from urdfkin.verify.exact.intervals import ends, of_digits
-from urdfkin.verify.exact.numbers import exact, read_exact
+from urdfkin.verify.exact.numbers import ends, enough_digits, precision, read_exact
 from urdfkin.verify.exact.recursion import move, on_base
 from urdfkin.verify.quantities import (
     ACCELERATION,
@@ -40,9 +39,8 @@ from urdfkin.verify.verifier import Verifier, theirs_of, urdfkins
 
 #: Smallest and largest accepted number of digits. A double has 15 digits; more than 10,000 take too long.
 LEAST_DIGITS, MOST_DIGITS = 15, 10_000
-#: Default number of digits, twice that of a double. One digit is added for each joint. A joint with an
-#: oblique axis loses a third of a digit.
-ENOUGH_DIGITS = 30
+
+_ENDS = np.vectorize(ends, otypes=[float, float])
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -190,33 +188,21 @@ def enclose(
         checked(tree, x, name)
     link, part = call.links[0], call.part(slice(0, 1))
     path = tree.path(link)
-    digits = digits or ENOUGH_DIGITS + len(path)
-    context = of_digits(digits)
-    numbers = ([exact(x, context) for x in rows[0]] for rows in part.asked.inputs)
-    motion = move(
-        tree,
-        read_exact(verifier.text, tree, context, path),
-        *numbers,
-        base=None if base is None else on_base(base, context, context.nearest_rotation),
-        context=context,
-    )
+    digits = digits or enough_digits(len(path))
+    with precision(digits):
+        motion = move(
+            tree,
+            read_exact(verifier.text, tree, path),
+            *(batch[0] for batch in part.asked.inputs),
+            base=None if base is None else on_base(base),
+        )
+        rows = (PLACEMENT, VELOCITY, ACCELERATION, JACOBIAN, JACOBIAN_RATE, *([HESSIAN] if hessian else []))
+        bounds = [(row, *_ENDS(row.truth(motion, link, call.reference))) for row in rows]
     oracle = None if verifier.cannot(base) else verifier.oracle(base)
 
-    def enclosed(row: Quantity) -> Enclosure:
-        true = row.truth(motion, link, call.reference)
-        lower, upper = np.vectorize(ends, otypes=[float, float])(true)
+    def enclosed(row: Quantity, lower: FloatArray, upper: FloatArray) -> Enclosure:
         ours = frozen(urdfkins(row, part)[0, 0])
         theirs = None if oracle is None else frozen(theirs_of(row, oracle, part.asked)[0, 0])
         return Enclosure(row.name, frozen(lower), frozen(upper), ours, theirs)
 
-    return Enclosures(
-        frame,
-        call.reference,
-        digits,
-        enclosed(PLACEMENT),
-        enclosed(VELOCITY),
-        enclosed(ACCELERATION),
-        enclosed(JACOBIAN),
-        enclosed(JACOBIAN_RATE),
-        enclosed(HESSIAN) if hessian else None,
-    )
+    return Enclosures(frame, call.reference, digits, *(enclosed(*found) for found in bounds))

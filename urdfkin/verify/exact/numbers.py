@@ -1,7 +1,7 @@
-"""Vectors and rotations of exact numbers, and the exact decimals of a URDF text.
+"""Balls that contain true values, vectors and rotations of them, and the exact decimals of a URDF text.
 
-A context determines the kind of number: `mp` of mpmath for fifty digits, `urdfkin.verify.exact.intervals` for
-intervals. Vectors are triples of numbers.
+A ball is an interval: a midpoint with many digits, and a radius. Arb (python-flint) proves that the result of
+each sum, product, quotient, root, sine and cosine contains the true value. Vectors are triples of balls.
 
 `read_exact` reads the decimals of a URDF text without rounding them to doubles. Names and order of the joints
 come from the tree. `urdfkin.lint` has already checked the text.
@@ -9,50 +9,82 @@ come from the tree. `urdfkin.lint` has already checked the text.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from functools import lru_cache
 from xml.etree.ElementTree import Element
 
-import mpmath
+from flint import arb, ctx
 
 from urdfkin.errors import InputError
 from urdfkin.kinematics import equations as eq
+from urdfkin.model.recursion import IDENTITY, ZERO, Matrix, Number, Vector
 from urdfkin.model.tree import Joint, JointKind, KinematicTree
+from urdfkin.system.locks import lock_over_forks
 from urdfkin.urdf.plain_xml import plain_xml
 
 #: Number of digits in the accuracy study. A double has 16 digits, so fifty digits are enough to measure an
 #: error in its last digit.
 DIGITS = 50
+#: Twice the number of digits of a double.
+_TWO_DOUBLES = 30
+#: Bits of a digit, and bits beyond the digits. Fifteen digits have 55 bits, two more than a double: a ball at
+#: 53 bits is up to four times as wide as an interval whose ends have 53 bits.
+_BITS, _MORE_BITS = math.log2(10.0), 5
+#: Additional bits of precision during iterations.
+_SPARE = 30
 
-#: A separate mpmath context, so that urdfkin does not change the precision of mpmath's global context.
-mp = mpmath.mp.clone()
-mp.dps = DIGITS
-
-Context = Any
-Number = Any
-Vector = tuple[Number, Number, Number]
-Matrix = tuple[Vector, Vector, Vector]
-
-# A vector of integers can be combined with every kind of number.
-ZERO: Vector = (0, 0, 0)
-IDENTITY: Matrix = (1, 0, 0), (0, 1, 0), (0, 0, 1)
+_ONE_THREAD = lock_over_forks()
 
 
-def exact(value: float, context: Context = mp) -> Number:
-    """Return the exact value of a double."""
-    return context.mpf(float(value))
+def enough_digits(joints: int) -> int:
+    """Return the number of digits for balls that are smaller than the last digit of a double.
+
+    One digit is added for each joint before the frame. A joint with an oblique axis loses a third of a digit.
+    """
+    return _TWO_DOUBLES + joints
 
 
-def unit(x: Vector, context: Context) -> Vector:
+@contextmanager
+def precision(digits: int) -> Iterator[None]:
+    """Compute with midpoints of at least so many decimal digits in a `with` block; 15 are those of a double.
+
+    Arb has one precision for the whole process. Therefore, one thread at a time is in such a block.
+    """
+    with _ONE_THREAD, ctx.workprec(math.ceil(digits * _BITS) + _MORE_BITS):
+        yield
+
+
+def exact(value: Number) -> Number:
+    """Return the ball of a double or an integer, which is exact; a ball is returned as it is."""
+    return arb(value)
+
+
+def ends(x: Number) -> tuple[float, float]:
+    """Return the ends of a ball or an integer, rounded outward to doubles."""
+    if isinstance(x, int):  # most numbers of a large robot are zeros
+        return float(x), float(x)
+    return _outward(x.lower(), -math.inf), _outward(x.upper(), math.inf)
+
+
+def _outward(end: arb, towards: float) -> float:
+    """Return the double nearest to an exact number, or the next one if that is on the wrong side."""
+    found = float(end)
+    inside = arb(found) > end if towards < 0.0 else arb(found) < end
+    return math.nextafter(found, towards) if inside else found
+
+
+def unit(x: Vector) -> Vector:
     """Return `x` divided by its length."""
-    length = context.sqrt(eq.dot(x, x))
+    length = eq.dot(x, x).sqrt()
     return x[0] / length, x[1] / length, x[2] / length
 
 
-def about(axis: Vector, angle: Number, context: Context) -> Matrix:
+def about(axis: Vector, angle: Number) -> Matrix:
     """Return the rotation about a unit axis, R_k(phi) (eq. 7.28)."""
-    c, s = context.cos_sin(angle)
+    s, c = exact(angle).sin_cos()
     columns = (
         eq.plus(
             eq.plus(eq.times(c, e), eq.times((1 - c) * eq.dot(axis, e), axis)), eq.times(s, eq.cross(axis, e))
@@ -63,35 +95,38 @@ def about(axis: Vector, angle: Number, context: Context) -> Matrix:
     return found
 
 
-def from_rpy(rpy: Vector, context: Context) -> Matrix:
+def from_rpy(rpy: Vector) -> Matrix:
     """Return Rz(yaw) Ry(pitch) Rx(roll)."""
-    x, y, z = ((sine, cosine, 0, 1) for cosine, sine in map(context.cos_sin, rpy))
+    x, y, z = ((*angle.sin_cos(), 0, 1) for angle in rpy)
     found: Matrix = eq.product(eq.product(eq.about_z(*z), eq.about_y(*y)), eq.about_x(*x))
     return found
 
 
-def from_quaternion(quaternion: tuple[Number, ...], context: Context) -> Matrix:
+def from_quaternion(quaternion: Sequence[Number]) -> Matrix:
     """Return the rotation of a quaternion (x, y, z, w) of any length."""
-    length = context.sqrt(sum(x * x for x in quaternion))
+    length = sum(x * x for x in quaternion).sqrt()
     found: Matrix = eq.rotation_of_quaternion(*(x / length for x in quaternion))
     return found
 
 
 def nearest_rotation(M: Matrix) -> Matrix:
-    """Return the rotation nearest to M. It is the orthogonal factor U of the polar decomposition M = U H.
+    """Return the rotation nearest to M, which must be close to one: the orthogonal factor U of M = U H.
 
-    M must be close to a rotation. Each step of Newton's iteration X - X (X^T X - I)/2 doubles the number of
-    correct digits.
+    Each step of Newton's iteration X - X (X^T X - I)/2 doubles the number of correct digits. It returns
+    X = U (1 + E) with the same orthogonal factor U. X^T X - 1 = 2 E + E^2. The eigenvalues of E are above -1,
+    so |E| <= |2 E + E^2| and |X - U| <= |X^T X - 1|. This bound is added to the radius of each number.
     """
-    for _ in range(6):
-        x, y, z = (
-            eq.minus(row, eq.times(0.5, step)) for row, step in zip(M, eq.product(M, defect(M)), strict=True)
-        )
-        M = x, y, z
-    return M
+    with ctx.workprec(ctx.prec + _SPARE):
+        for _ in range(6):
+            steps = eq.product(M, _defect(M))
+            x, y, z = (eq.minus(row, eq.times(0.5, step)) for row, step in zip(M, steps, strict=True))
+            M = x, y, z
+        bound = arb(0, sum(abs(number) for row in _defect(M) for number in row).upper())
+        x, y, z = ((a + bound, b + bound, c + bound) for a, b, c in M)
+    return x, y, z
 
 
-def defect(M: Matrix) -> Matrix:
+def _defect(M: Matrix) -> Matrix:
     """Return M^T M - I, which is 0 for a rotation."""
     gram = eq.product(eq.transposed(M), M)
     x, y, z = (eq.minus(row, unit) for row, unit in zip(gram, IDENTITY, strict=True))
@@ -121,40 +156,40 @@ class ExactJoint:
     offset: Number
 
 
-def read_exact(
-    text: str, tree: KinematicTree, context: Context = mp, among: Iterable[int] | None = None
-) -> dict[int, ExactJoint]:
+def read_exact(text: str, tree: KinematicTree, among: Iterable[int] | None = None) -> dict[int, ExactJoint]:
     """Return the exact numbers of joints by their index in the tree, from the URDF text.
 
     Args:
         text: The URDF text.
         tree: The tree of the same text. Its `root_joint`, if any, is not in the text.
-        context: The number context.
         among: Indices of the joints to read; None: all.
 
     Raises:
         InputError: a joint of the tree is not in the text.
     """
-    words = _Text(text, tree.name, context)
-    return {i: words.joint_of(tree.joints[i]) for i in (range(len(tree.joints)) if among is None else among)}
+    words = _Text(text)
+    return {
+        i: words.joint_of(tree.joints[i], tree.name)
+        for i in (range(len(tree.joints)) if among is None else among)
+    }
 
 
+@lru_cache(maxsize=1)  # to parse the text of a large robot takes longer than to enclose a sample
 class _Text:
-    """Reader of the joints of a URDF text in one number context."""
+    """Reader of the joints of a URDF text."""
 
-    def __init__(self, text: str, name: str, context: Context) -> None:
+    def __init__(self, text: str) -> None:
         root = plain_xml(text)
-        self.name, self.context = name, context
         self.elements = {str(element.get("name")): element for element in root.findall("joint")}
         self.quaternions = tuple(map(int, root.get("version", "1.0").split("."))) >= _WITH_QUATERNIONS
 
-    def joint_of(self, joint: Joint) -> ExactJoint:
+    def joint_of(self, joint: Joint, robot: str) -> ExactJoint:
         element = self.elements.get(joint.name)
         if element is not None:
             return self.joint(element, has_axis=joint.kind.has_axis, is_mimic=joint.mimic is not None)
         if joint.kind in (JointKind.FLOATING, JointKind.PLANAR):
             return ExactJoint(IDENTITY, ZERO, IDENTITY[0], 1, 0)
-        raise InputError("a joint is not in the URDF text", where=self.name, found=joint.name)
+        raise InputError("a joint is not in the URDF text", where=robot, found=joint.name)
 
     def joint(self, element: Element, *, has_axis: bool, is_mimic: bool) -> ExactJoint:
         axis = self.vector(element.find("axis"), "xyz", "1 0 0")
@@ -162,14 +197,14 @@ class _Text:
         return ExactJoint(
             R=self.rotation(element.find("origin")),
             p=self.vector(element.find("origin"), "xyz", "0 0 0"),
-            axis=unit(axis, self.context) if has_axis else axis,
+            axis=unit(axis) if has_axis else axis,
             multiplier=multiplier,
             offset=offset,
         )
 
     def numbers(self, element: Element | None, name: str, default: str) -> tuple[Number, ...]:
         written = default if element is None else element.get(name, default)
-        return tuple(self.context.mpf(word) for word in written.split())
+        return tuple(arb(word) for word in written.split())
 
     def vector(self, element: Element | None, name: str, default: str) -> Vector:
         x, y, z = self.numbers(element, name, default)
@@ -178,12 +213,12 @@ class _Text:
     def rotation(self, origin: Element | None) -> Matrix:
         """Return the rotation of rpy or, from URDF 1.1 on, of `quat_xyzw`, a quaternion of any length."""
         if self.quaternions and origin is not None and "quat_xyzw" in origin.attrib:
-            return from_quaternion(self.numbers(origin, "quat_xyzw", ""), self.context)
-        return from_rpy(self.vector(origin, "rpy", "0 0 0"), self.context)
+            return from_quaternion(self.numbers(origin, "quat_xyzw", ""))
+        return from_rpy(self.vector(origin, "rpy", "0 0 0"))
 
     def rule(self, name: str) -> tuple[Number, Number]:
         """Return multiplier and offset of a mimic joint relative to the independent joint."""
-        multiplier, offset = self.context.mpf(1), self.context.mpf(0)
+        multiplier, offset = exact(1), exact(0)
         elements = self.elements
         while (rule := elements[name].find("mimic")) is not None and elements[name].get("type") != "fixed":
             (factor,), (constant,) = self.numbers(rule, "multiplier", "1"), self.numbers(rule, "offset", "0")

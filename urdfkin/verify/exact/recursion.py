@@ -1,4 +1,4 @@
-"""The forward recursion of section 7.7 with exact numbers: fifty digits or intervals.
+"""The forward recursion of section 7.7 on balls that contain the true values.
 
 The equations are those of `urdfkin.kinematics.equations`, in world axes as in the textbook. The inputs are
 the URDF's decimals and the exact values of q, v and a. The results are reference values that measure rounding
@@ -7,7 +7,7 @@ errors. They do not check the equations; the comparison with Pinocchio does.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,16 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urdfkin.kinematics import equations
-from urdfkin.model.recursion import IDENTITY, Column, Matrix, Number, Recursion, State, Vector
+from urdfkin.model.recursion import IDENTITY, Column, Number, Recursion, State, Vector
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree
 from urdfkin.verify.exact.numbers import (
-    Context,
     ExactJoint,
     about,
     exact,
     from_quaternion,
-    mp,
     nearest_rotation,
 )
 from urdfkin.verify.pinocchio_inputs import BaseNumbers
@@ -32,23 +30,19 @@ from urdfkin.verify.pinocchio_inputs import BaseNumbers
 _RECURSION = Recursion(equations)
 
 
-def on_base(
-    base: BaseNumbers, context: Context = mp, nearest: Callable[[Matrix], Matrix] = nearest_rotation
-) -> State:
+def on_base(base: BaseNumbers) -> State:
     """Return the state of a moving root link, from the user's numbers.
 
     Args:
-        base: (4, 4) placement, (6,) velocity and acceleration.
-        context: The number context.
-        nearest: Function that returns the rotation nearest to the matrix of the placement. The matrix is a
-            rotation to nine digits.
+        base: (4, 4) placement, (6,) velocity and acceleration. The placement's matrix is a rotation to nine
+            digits; the rotation nearest to it is used.
     """
 
     def vector(x: FloatArray) -> Vector:
-        return exact(x[0], context), exact(x[1], context), exact(x[2], context)
+        return exact(x[0]), exact(x[1]), exact(x[2])
 
     T, six, six_2 = base.placement, base.velocity, base.acceleration
-    R = nearest((vector(T[0]), vector(T[1]), vector(T[2])))
+    R = nearest_rotation((vector(T[0]), vector(T[1]), vector(T[2])))
     return State(R, *map(vector, (T[:3, 3], six[3:], six[:3], six_2[3:], six_2[:3])))
 
 
@@ -70,24 +64,23 @@ class Motion:
 def move(
     tree: KinematicTree,
     joints: Mapping[int, ExactJoint],
-    q: Sequence[Number],
-    v: Sequence[Number],
-    a: Sequence[Number],
+    q: Iterable[Number],
+    v: Iterable[Number],
+    a: Iterable[Number],
     *,
     base: State | None = None,
-    context: Context = mp,
 ) -> Motion:
     """Return the motion of the root and of the child link of each joint, for one sample.
 
     Args:
         tree: The robot.
         joints: Exact numbers of the joints, by index. A joint comes after all joints on its path to the root.
-        q: (nq,) coordinates, in numbers of the context.
+        q: (nq,) coordinates, as doubles or balls.
         v: (nv,) joint velocities.
         a: (nv,) joint accelerations.
         base: State of the root link; None: fixed at the world origin.
-        context: The number context.
     """
+    q, v, a = (list(map(exact, numbers)) for numbers in (q, v, a))
     states = {0: base or State()}
     columns: dict[int, tuple[Column, ...]] = {0: ()}
     for i, own in joints.items():
@@ -99,14 +92,14 @@ def move(
             rates = own.multiplier * v[rate_at], own.multiplier * a[rate_at]
             z = _RECURSION.seen(placed, own.axis)
             if kind.turns:
-                moved = _RECURSION.revolute(placed, own.axis, about(own.axis, coordinate, context), *rates)
+                moved = _RECURSION.revolute(placed, own.axis, about(own.axis, coordinate), *rates)
             else:
                 moved = _RECURSION.prismatic(placed, own.axis, coordinate, *rates)
             new: tuple[Column, ...] = (Column(z, kind.turns, moved, i, rate_at, own.multiplier),)
         elif kind is JointKind.FIXED:
             moved, new = placed, ()
         else:
-            moved, axes = _moved_freely(placed, kind, (q[at:], v[rate_at:], a[rate_at:]), context)
+            moved, axes = _moved_freely(placed, kind, (q[at:], v[rate_at:], a[rate_at:]))
             z_of = equations.transposed(moved.R)
             new = tuple(Column(z_of[k], turns, moved, i, rate_at + c, 1) for c, (k, turns) in enumerate(axes))
         states[i + 1], columns[i + 1] = moved, (*columns[joint.parent], *new)
@@ -114,17 +107,17 @@ def move(
 
 
 def _moved_freely(
-    placed: State, kind: JointKind, numbers: tuple[Sequence[Number], ...], context: Context
+    placed: State, kind: JointKind, numbers: tuple[Sequence[Number], ...]
 ) -> tuple[State, tuple[tuple[int, bool], ...]]:
     """Return the state after a planar or floating joint, and (axis, is_revolute) of each joint velocity."""
     q, v, a = numbers
     if kind is JointKind.PLANAR:
-        slide, S = (q[0], q[1], 0), about(IDENTITY[2], q[2], context)
+        slide, S = (q[0], q[1], 0), about(IDENTITY[2], q[2])
         rates: list[Vector] = [x for y in (v, a) for x in ((y[0], y[1], 0), (0, 0, y[2]))]
         return _RECURSION.free(placed, slide, S, rates), ((0, False), (1, False), (2, True))
     if kind is not JointKind.FLOATING:
         raise NotImplementedError(f"the motion of a {kind} joint")
-    slide, S = (q[0], q[1], q[2]), from_quaternion((q[3], q[4], q[5], q[6]), context)
+    slide, S = (q[0], q[1], q[2]), from_quaternion((q[3], q[4], q[5], q[6]))
     rates = [x for y in (v, a) for x in ((y[0], y[1], y[2]), (y[3], y[4], y[5]))]
     moved = _RECURSION.free(placed, slide, S, rates)
     return moved, tuple((k, turns) for turns in (False, True) for k in range(3))
