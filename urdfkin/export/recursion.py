@@ -95,15 +95,12 @@ class TreeRecursion(Recursion):
         (kind, at, rate_at), (q, v, a) = self.plan.steps[i].tolist(), self.inputs
         multiplier, constant = self.plan.geometry[i, Geometry.MULTIPLIER :].tolist()
         if kind == Motion.PLANAR:
-            x, y, angle = q[at : at + 3]
-            rates = [u for z in (v, a) for u in ((z[rate_at], z[rate_at + 1], 0), (0, 0, z[rate_at + 2]))]
-            return self.free(s, (x, y, 0), self._about_z(angle), rates)
+            return self.planar(s, q[at:], self._about_z(q[at + 2]), v[rate_at:], a[rate_at:])
         if kind == Motion.FLOATING:
-            x, y, z, *quaternion = q[at : at + 7]
+            quaternion = q[at + 3 : at + 7]
             length = self.kind.root(sum(c * c for c in quaternion))
             S = self.eq.rotation_of_quaternion(*(c / length for c in quaternion))
-            rates = [tuple(r[rate_at + k : rate_at + k + 3]) for r in (v, a) for k in (0, 3)]
-            return self.free(s, (x, y, z), S, rates)
+            return self.floating(s, q[at:], S, v[rate_at:], a[rate_at:])
         value, rate, rate_2 = multiplier * q[at] + constant, multiplier * v[rate_at], multiplier * a[rate_at]
         if kind == Motion.TURN:
             return self.revolute(s, _Z, self._about_z(value), rate, rate_2)

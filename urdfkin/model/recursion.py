@@ -16,6 +16,8 @@ Number = Any
 Vector = tuple[Number, Number, Number]
 Matrix = tuple[Vector, Vector, Vector]
 Six = tuple[Number, ...]
+#: Coordinates or rates from a joint's first one on.
+Numbers = Sequence[Number]
 
 ZERO: Vector = (0, 0, 0)
 IDENTITY: Matrix = (1, 0, 0), (0, 1, 0), (0, 0, 1)
@@ -101,8 +103,18 @@ class Recursion:
         acc = self.eq.sliding_acceleration(s.acc, s.w, z, v, a)
         return replace(s, vel=self.eq.sliding_velocity(s.vel, z, v), acc=acc)
 
-    def free(self, s: State, slide: Vector, S: Matrix, rates: Sequence[Vector]) -> State:
-        """Return the state after a planar or floating joint; `rates` are given in the child link's axes."""
+    def planar(self, s: State, q: Numbers, S: Matrix, v: Numbers, a: Numbers) -> State:
+        """Return the state after a planar joint, with its rotation S."""
+        rates = [x for u in (v, a) for x in ((u[0], u[1], 0), (0, 0, u[2]))]
+        return self._free(s, (q[0], q[1], 0), S, rates)
+
+    def floating(self, s: State, q: Numbers, S: Matrix, v: Numbers, a: Numbers) -> State:
+        """Return the state after a floating joint, with its rotation S."""
+        rates = [(u[k], u[k + 1], u[k + 2]) for u in (v, a) for k in (0, 3)]
+        return self._free(s, (q[0], q[1], q[2]), S, rates)
+
+    def _free(self, s: State, slide: Vector, S: Matrix, rates: Sequence[Vector]) -> State:
+        """Return the state after a free motion; `rates` are given in the child link's axes."""
         eq, s = self.eq, self.turned(self.carried(s, slide), S)
         u, o, u_rate, o_rate = (self.seen(s, x) for x in rates)
         return replace(

@@ -29,6 +29,12 @@ from urdfkin.verify.pinocchio_inputs import BaseNumbers
 
 _RECURSION = Recursion(equations)
 
+#: Axis of the child link, and whether the rate is a rotation, of each rate of a planar or floating joint.
+_FREE_AXES = {
+    JointKind.PLANAR: ((0, False), (1, False), (2, True)),
+    JointKind.FLOATING: tuple((k, turns) for turns in (False, True) for k in range(3)),
+}
+
 
 def on_base(base: BaseNumbers) -> State:
     """Return the state of a moving root link, from the user's numbers.
@@ -86,7 +92,7 @@ def move(
     for i, own in joints.items():
         joint, at, rate_at = tree.joints[i], tree.q_index[i], tree.v_index[i]
         placed = _RECURSION.turned(_RECURSION.carried(states[joint.parent], own.p), own.R)
-        kind, axes = joint.kind, tuple[tuple[int, bool], ...]()
+        kind, new = joint.kind, tuple[Column, ...]()
         if kind.has_axis:
             coordinate = own.multiplier * q[at] + own.offset
             rates = own.multiplier * v[rate_at], own.multiplier * a[rate_at]
@@ -95,32 +101,25 @@ def move(
                 moved = _RECURSION.revolute(placed, own.axis, about(own.axis, coordinate), *rates)
             else:
                 moved = _RECURSION.prismatic(placed, own.axis, coordinate, *rates)
-            new: tuple[Column, ...] = (Column(z, kind.turns, moved, i, rate_at, own.multiplier),)
+            new = (Column(z, kind.turns, moved, i, rate_at, own.multiplier),)
         elif kind is JointKind.FIXED:
-            moved, new = placed, ()
+            moved = placed
+        elif kind is JointKind.PLANAR:
+            S = about(IDENTITY[2], q[at + 2])
+            moved = _RECURSION.planar(placed, q[at:], S, v[rate_at:], a[rate_at:])
+        elif kind is JointKind.FLOATING:
+            S = from_quaternion(q[at + 3 : at + 7])
+            moved = _RECURSION.floating(placed, q[at:], S, v[rate_at:], a[rate_at:])
         else:
-            moved, axes = _moved_freely(placed, kind, (q[at:], v[rate_at:], a[rate_at:]))
-            z_of = equations.transposed(moved.R)
-            new = tuple(Column(z_of[k], turns, moved, i, rate_at + c, 1) for c, (k, turns) in enumerate(axes))
+            raise NotImplementedError(f"the motion of a {kind} joint")
+        if kind in _FREE_AXES:
+            axes = equations.transposed(moved.R)
+            new = tuple(
+                Column(axes[k], turns, moved, i, rate_at + c, 1)
+                for c, (k, turns) in enumerate(_FREE_AXES[kind])
+            )
         states[i + 1], columns[i + 1] = moved, (*columns[joint.parent], *new)
     return Motion(states, columns, tree.nv)
-
-
-def _moved_freely(
-    placed: State, kind: JointKind, numbers: tuple[Sequence[Number], ...]
-) -> tuple[State, tuple[tuple[int, bool], ...]]:
-    """Return the state after a planar or floating joint, and (axis, is_revolute) of each joint velocity."""
-    q, v, a = numbers
-    if kind is JointKind.PLANAR:
-        slide, S = (q[0], q[1], 0), about(IDENTITY[2], q[2])
-        rates: list[Vector] = [x for y in (v, a) for x in ((y[0], y[1], 0), (0, 0, y[2]))]
-        return _RECURSION.free(placed, slide, S, rates), ((0, False), (1, False), (2, True))
-    if kind is not JointKind.FLOATING:
-        raise NotImplementedError(f"the motion of a {kind} joint")
-    slide, S = (q[0], q[1], q[2]), from_quaternion((q[3], q[4], q[5], q[6]))
-    rates = [x for y in (v, a) for x in ((y[0], y[1], y[2]), (y[3], y[4], y[5]))]
-    moved = _RECURSION.free(placed, slide, S, rates)
-    return moved, tuple((k, turns) for turns in (False, True) for k in range(3))
 
 
 # -- quantities of a frame, in the shapes that `Robot` returns -----------------------------------------
