@@ -61,7 +61,7 @@ def test_a_change_is_told_as_a_share_of_the_bound_and_allowed_within_what_is_giv
     capsys.readouterr()
     assert check_bits.main(["--against", str(file)]) == 1
     said = capsys.readouterr().out
-    assert "3 of 16 differ, by at most 0." in said
+    assert "3 of 16 results differ, by at most 0." in said
     assert check_bits.main(["--against", str(file), "--within", "1"]) == 0
 
 
