@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import ModuleType
+from types import MappingProxyType, ModuleType
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack, cast
+
+from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError
 from urdfkin.lint.rules.joints import MIMIC_CONTINUOUS, tilts
@@ -41,6 +43,8 @@ class How(TypedDict):
     mimic: bool | None
     root_joint: str | None
     oracle: WitnessName
+    lock: str | Mapping[str, ArrayLike]
+    joints: Sequence[str] | None
 
 
 def load(
@@ -51,6 +55,8 @@ def load(
     root_joint: str | None = None,
     xacro_args: Mapping[str, object] | None = None,
     oracle: WitnessName = "pinocchio",
+    lock: str | Mapping[str, ArrayLike] = MappingProxyType({}),
+    joints: Sequence[str] | None = None,
 ) -> Robot:
     """Return a robot from a URDF, an MJCF file, a table or an object of another library.
 
@@ -74,6 +80,8 @@ def load(
         root_joint: "floating" or "planar" connects the root link to the world by that joint. None: fixed.
         xacro_args: Arguments for a .xacro file, which is expanded first (needs the extra `xacro`).
         oracle: Oracle that checks quantities, "pinocchio" or "mujoco" (needs the extra `mujoco`).
+        lock: Value (rad or m) of each joint to lock, such as `{"finger": 0.04}`; see `Robot.locked`.
+        joints: The joints that remain movable; see `Robot.locked`.
 
     Returns:
         The robot. Each warning about the file is issued as an `UrdfWarning`, except for catalogue robots.
@@ -83,6 +91,7 @@ def load(
         SourceError: the source cannot be read.
         UnknownNameError: no file and no robot has that name; the message lists the nearest names.
         TableError: the URDF made from a table has other placements of the tip than the table itself.
+        InputError: an argument has an invalid value.
 
     >>> arm = load("planar_two_link")
     >>> arm.placement([0.0, 0.0], "tip")[:3, 3].tolist()
@@ -96,7 +105,14 @@ def load(
     >>> float(robot.placement([0.0, 0.0], "tip")[0, 3])
     0.7
     """
-    how: How = {"verify": verify, "mimic": mimic, "root_joint": root_joint, "oracle": oracle}
+    how: How = {
+        "verify": verify,
+        "mimic": mimic,
+        "root_joint": root_joint,
+        "oracle": oracle,
+        "lock": lock,
+        "joints": joints,
+    }
     if is_urdf_path(source) or (isinstance(source, str) and entry_of(source)):
         return robot_of(read_source(source, xacro_args=xacro_args), **how)
     from urdfkin.dh.parse_table import is_table_file  # noqa: PLC0415  a URDF needs none of these
@@ -158,7 +174,7 @@ def _load_table(
     text = Text(urdf.encode(), name, name)
     robot = robot_of(text, **how, made=True, table=True)
     if checked_choice(how["verify"]):
-        plain = how["mimic"] is not False and how["root_joint"] is None
+        plain = _is_plain(robot)
         verifier = (robot if plain else robot_of(text)).verifier
         if isinstance(table, ProductOfExponentials):
             check_screws(verifier, table)
@@ -187,10 +203,16 @@ def _load_mjcf(
     listed = tuple(left_out(one, name) for one in read.listed)
     robot = robot_of(text, **how, listed=listed, made=True)
     if wanted:
-        plain = how["mimic"] is not False and how["root_joint"] is None
+        plain = _is_plain(robot)
         verifier = (robot if plain else robot_of(text, listed=listed, made=True)).verifier
         robot.verifier.reading = check_mjcf_source(verifier, read)
     return robot
+
+
+def _is_plain(robot: Robot) -> bool:
+    """Return whether a robot has the joints of its source: no root joint, no freed and no locked joints."""
+    origin = robot.origin
+    return origin.mimic is not False and origin.root_joint is None and not origin.lock
 
 
 def _bytes_of_mjcf(source: str | bytes | os.PathLike[str]) -> bytes:
@@ -217,7 +239,7 @@ def _load_model(source: Any, xacro_args: Mapping[str, object] | None, **how: Unp
     text = Text(write_urdf(read.tree).encode(), "<pinocchio.Model>", "<pinocchio.Model>")
     robot = robot_of(text, **how, made=True)
     if checked_choice(how["verify"]):
-        plain = how["root_joint"] is None
+        plain = _is_plain(robot)
         verifier = (robot if plain else robot_of(text, made=True)).verifier
         robot.verifier.reading = check_model_source(verifier, read, source)
     return robot
@@ -235,6 +257,8 @@ def robot_of(
     mimic: bool | None = None,
     root_joint: str | None = None,
     oracle: WitnessName = "pinocchio",
+    lock: str | Mapping[str, ArrayLike] = MappingProxyType({}),
+    joints: Sequence[str] | None = None,
     listed: tuple[Finding, ...] = (),
     made: bool = False,
     table: bool = False,
@@ -247,6 +271,8 @@ def robot_of(
         mimic: As in `load`.
         root_joint: As in `load`.
         oracle: As in `load`.
+        lock: As in `load`.
+        joints: As in `load`.
         listed: Findings about the original source, if the text was generated from another format.
         made: Whether the text was generated, so that no file contains it.
         table: Whether the original source is a table.
@@ -273,7 +299,7 @@ def robot_of(
         tree = with_tilts(tree, tilted)
     if text.entry is not None and text.entry.poses:
         tree = with_poses(tree, text.entry.poses)
-    return Robot(
+    robot = Robot(
         tree,
         text.data.decode("utf-8-sig"),
         origin=origin,
@@ -285,6 +311,7 @@ def robot_of(
         base_frame=text.entry.base if text.entry else None,
         tip_frame=text.entry.tip if text.entry else None,
     )
+    return robot.locked(lock, joints) if lock or joints is not None else robot
 
 
 def _unverifiable(findings: tuple[Finding, ...]) -> str | None:

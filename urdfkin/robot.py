@@ -6,10 +6,11 @@ default, a method compares its result with Pinocchio's before it returns.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from copy import copy
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -42,7 +43,7 @@ from urdfkin.model.configuration_like import Given, listed
 from urdfkin.model.frame_names import FrameName, LinkFrame
 from urdfkin.model.reference import Reference
 from urdfkin.model.summary import Joints, described
-from urdfkin.model.tree import FloatArray, KinematicTree
+from urdfkin.model.tree import FloatArray, KinematicTree, with_locks
 from urdfkin.system.lazy_import import hook
 from urdfkin.urdf.findings import Finding, Findings
 from urdfkin.urdf.sources import Origin, entry_of
@@ -638,6 +639,42 @@ class Robot(Displayable):
         [0.0, 0.0, 1.0, 0.0, 0.9, 0.0]
         """
         return ConventionRobot(self, self.convention(name, joints))
+
+    def locked(
+        self, lock: str | Mapping[str, ArrayLike] = MappingProxyType({}), joints: Sequence[str] | None = None
+    ) -> Robot:
+        """Return this robot with some joints fixed at a value; they have no numbers in q, v and a.
+
+        A mimic joint is locked together with its mimicked joint. All methods work on the result. Pinocchio
+        checks them with the reduced model (`buildReducedModel`) of the whole URDF.
+
+        Args:
+            lock: Value (rad or m) of each joint to lock: `{"finger": 0.04}` or `"finger=0.04, wrist=30deg"`.
+            joints: The joints that remain movable. All others are locked, at 0 unless `lock` has a value.
+                `lock` may then begin with a pose, such as "ready", for the other values.
+
+        Raises:
+            UnknownNameError: there is no such joint or pose.
+            InputError: a value is outside the limits; a mimic joint, or a joint without a single value
+                (planar, floating, fixed).
+
+        >>> import urdfkin
+        >>> panda = urdfkin.load("panda").locked({"panda_finger_joint1": 0.04})
+        >>> panda.nq, panda.jacobian("ready", "panda_hand_tcp").shape
+        (7, (6, 7))
+        >>> elbow = urdfkin.load("planar_two_link").locked(joints=["joint_2"])
+        >>> elbow.rate_names, elbow.joints["joint_1"].lock.value
+        (('joint_2',), 0.0)
+        """
+        if not isinstance(lock, str | Mapping):
+            raise InputError("lock must be a mapping from joints to values, or text", found=safe_repr(lock))
+        chosen = None if joints is None else as_names(joints, "joints")
+        held = configuration.locked_values(self.tree, lock, chosen)
+        tree = with_locks(self.tree, held)
+        found = copy(self)
+        found.tree, found.verifier = tree, self.verifier.locked(tree, tuple(held.items()))
+        found._tip_frame = self._tip_frame if self._has_one_tip else None
+        return found
 
     # -- computation --------------------------------------------------------------------------------
 

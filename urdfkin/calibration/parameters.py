@@ -179,7 +179,7 @@ class Model:
         return self._push(which, at, end=True)
 
     def origins(self, at: FloatArray) -> dict[str, FloatArray]:
-        """Return the new origins (4, 4) of the URDF's joints that moved, by name."""
+        """Return the new origins (4, 4) of the URDF's joints that moved, by name, without any lock."""
         found: dict[str, FloatArray] = {}
         if not isinstance(self.source, KinematicTree):
             return found
@@ -188,7 +188,8 @@ class Model:
             if (push != np.eye(4)).any():
                 joint = self.source.joints[self.source.joint_index(name)]
                 A = turned(joint)
-                found[name] = joint.T_parent_joint @ A @ push @ A.T
+                origin = joint.T_parent_joint @ A @ push @ A.T
+                found[name] = origin if joint.lock is None else origin @ inverse(joint.lock.motion)
         return found
 
     def table(self, at: FloatArray) -> DHTable | None:

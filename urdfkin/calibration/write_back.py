@@ -125,7 +125,8 @@ class Rewritten:
         mimic = self.robot.verifier.mimic
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the first load gave these warnings
-            return load(self.text, mimic=mimic, root_joint=self.robot.root_joint)
+            lock = dict(self.robot.origin.lock)
+            return load(self.text, mimic=mimic, root_joint=self.robot.root_joint, lock=lock)
 
     @cached_property
     def changes(self) -> Changes:
@@ -136,7 +137,7 @@ class Rewritten:
     def moved(self) -> dict[str, tuple[float, float]]:
         """The distance and angle (m, rad) by which each joint's origin moved."""
         tree = self.robot.tree
-        old = {name: tree.joints[tree.joint_index(name)].T_parent_joint for name in self.origins}
+        old = {name: tree.joints[tree.joint_index(name)].unlocked.T_parent_joint for name in self.origins}
         return {
             name: (
                 float(np.linalg.norm(T[:3, 3] - old[name][:3, 3])),

@@ -160,8 +160,18 @@ def _remember_xacro_args(context: click.Context, _: click.Parameter, words: Sequ
     context.meta.setdefault(_HOW, {})["xacro_args"] = arguments
 
 
+def _remember_lock(context: click.Context, _: click.Parameter, words: Sequence[str]) -> None:
+    if words:
+        context.meta.setdefault(_HOW, {})["lock"] = ", ".join(words)
+
+
+def _remember_joints(context: click.Context, _: click.Parameter, words: str | None) -> None:
+    if words is not None:
+        context.meta.setdefault(_HOW, {})["joints"] = [name.strip() for name in words.split(",")]
+
+
 def how_to_load() -> dict[str, Any]:
-    """Return the running command's options for `load`: `mimic`, `root_joint` and `xacro_args`."""
+    """Return the running command's options for `load`: its arguments from `mimic` to `joints`."""
     return dict(click.get_current_context().meta.get(_HOW, {}))
 
 
@@ -188,10 +198,29 @@ def root_joint_option(help_: str) -> Callable[[_F], _F]:
     return click.option("--root-joint", type=joints, expose_value=False, callback=_remember, help=help_)
 
 
+lock_options = together(
+    click.option(
+        "--lock",
+        multiple=True,
+        metavar="NAME=VALUE",
+        expose_value=False,
+        callback=_remember_lock,
+        help="Fix a joint at a value: it has no number in q and no column; repeatable. With --joints, the"
+        " first may be a pose, such as ready.",
+    ),
+    click.option(
+        "--joints",
+        metavar="NAMES",
+        expose_value=False,
+        callback=_remember_joints,
+        help="Joints that remain, separated by commas. All others are fixed at 0, or at the value of --lock.",
+    ),
+)
 robot_options = together(
     mimic_option("Couple mimic joints to the mimicked joints, as in the URDF (default)."),
     root_joint_option("Add a moving joint between the world and the root link."),
     xacro_option,
+    lock_options,
 )
 robot_argument = together(
     click.argument("robot", metavar="ROBOT", shell_complete=complete_robot), robot_options
@@ -385,7 +414,8 @@ def read_inputs(
         q_, v_, a_ = conversion.from_(q_, v_, a_)
     for line in robot.limit_violations(q_):
         say(f"warning: {line}", err=True)
-    return Inputs(robot, frame or robot.tip_frame, q_, v_, a_, conversion=conversion)
+    said = {"lock": dict(robot.origin.lock)} if robot.origin.lock else {}
+    return Inputs(robot, frame or robot.tip_frame, q_, v_, a_, said=said, conversion=conversion)
 
 
 def _values(

@@ -16,6 +16,7 @@ from urdfkin.cli.exit import stoppable
 from urdfkin.cli.options import (
     Whole,
     how_to_load,
+    lock_options,
     mimic_option,
     reject_unused_options,
     root_joint_option,
@@ -58,7 +59,7 @@ def judge_all(
         store: Folder of the campaign, which also stores the results of the study; None: no store.
         shard: Only the robots with their first chunk in that part. The report covers the same part.
         retry: Whether to repeat studies that failed before.
-        how: `mimic`, `root_joint` and `xacro_args`, as in `load`.
+        how: `mimic`, `root_joint`, `xacro_args`, `lock` and `joints`, as in `load`.
 
     Returns:
         The report with the results of the study.
@@ -176,6 +177,7 @@ def _with_quantities(command: _T) -> _T:
     help="Run each robot in its own process; a crash is reported as that robot's result.",
 )
 @xacro_option
+@lock_options
 @click.option(
     "--store",
     type=click.Path(path_type=Path),

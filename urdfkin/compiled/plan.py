@@ -7,7 +7,6 @@ constant offsets between moving joints. A plan contains only the joints that mov
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from enum import IntEnum
@@ -186,7 +185,7 @@ def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
         places_q=tuple(at + c for at, i in places for c in range(tree.joints[i].kind.nq)),
         parents=np.array(parents, dtype=np.int64),
         lengths=np.array(
-            [anchors[tree.joints[i].parent].length + _length(tree.joints[i]) for i in needed]
+            [anchors[tree.joints[i].parent].length + tree.joints[i].length for i in needed]
             + [end.length for end in ends]
         ),
         depth=np.array([depths[link] for link in links], dtype=np.int64),
@@ -229,14 +228,9 @@ def _anchors(tree: KinematicTree, step_of_joint: dict[int, int], wanted: Iterabl
         else:
             parent = anchors[joint.parent]
             anchors[i + 1] = _Anchor(
-                parent.step, parent.T @ joint.T_parent_joint, parent.length + _length(joint)
+                parent.step, parent.T @ joint.T_parent_joint, parent.length + joint.length
             )
     return anchors
-
-
-def _length(joint: Joint) -> float:
-    # A URDF may contain 1e-200 or 1e200, whose squares underflow or overflow; hypot avoids this.
-    return math.hypot(*joint.T_parent_joint[:3, 3].tolist())
 
 
 def turned(joint: Joint) -> FloatArray:

@@ -18,7 +18,6 @@ axes (Hayati), where the other numbers would need offsets of kilometres.
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
 from typing import Any
@@ -311,7 +310,7 @@ def _path_lengths(tree: KinematicTree) -> list[float]:
     """Return the path length from the root to each joint's origin: the sum of all offsets (metres)."""
     ways = [0.0]
     for joint in tree.joints:
-        ways.append(ways[joint.parent] + math.hypot(*joint.T_parent_joint[:3, 3]))
+        ways.append(ways[joint.parent] + joint.length)
     return ways[1:]
 
 

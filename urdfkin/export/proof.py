@@ -18,7 +18,7 @@ import numpy as np
 
 from urdfkin.compiled.plan import CompiledTree
 from urdfkin.export.function import Function
-from urdfkin.export.naming import quiet
+from urdfkin.export.naming import quiet, shown
 from urdfkin.kinematics.roundings import SMALLEST
 from urdfkin.model.recursion import Number
 from urdfkin.model.reference import Reference
@@ -61,12 +61,14 @@ class Proof:
         urdfkin: Version of urdfkin.
         certificate: The certificate of the printed expressions.
         vectors: The test vectors.
+        lock: Name and value of each locked joint.
     """
 
     sha256: str
     urdfkin: str
     certificate: Certificate
     vectors: tuple[Vector, ...]
+    lock: tuple[tuple[str, float], ...] = ()
 
     @property
     def lines(self) -> list[str]:
@@ -84,6 +86,7 @@ class Proof:
         return [
             *verdict,
             f"URDF sha256 {self.sha256}",
+            *(f"Joint {shown(name)} is locked at {value!r}" for name, value in self.lock),
             f"Written by urdfkin {self.urdfkin}; {len(self.vectors)} test vectors at {DIGITS} digits below",
         ]
 
@@ -114,6 +117,7 @@ def prove(
         urdfkin=own_version(),
         certificate=checker.certificate(),
         vectors=_vectors(verifier, plan_of, frame, reference, functions),
+        lock=verifier.origin.lock,
     )
 
 

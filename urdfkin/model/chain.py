@@ -257,7 +257,7 @@ def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
         _check_single_axis(tree, joint, base_name, tip)
         to_joint, from_joint = _poses_around(joint, backwards)
         A = A @ to_joint
-        length += 0.0 if backwards else _norm(joint)
+        length += 0.0 if backwards else joint.length
         count += 1
         if joint.kind.has_axis:
             joints.append(ChainJoint(joint.name, joint.kind, backwards, frozen(A), joint.limit, joint.mimic))
@@ -267,7 +267,7 @@ def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
             # of any other joint comes before the motion.
             A, length, count = np.eye(4), 0.0, int(backwards)
         A = A @ from_joint
-        length += _norm(joint) if backwards else 0.0
+        length += joint.length if backwards else 0.0
     ends = frozen(A), frozen([*lengths, length]), (*folded, count)
     return FrameChain(tree.name, base_name, tip, tuple(joints), *ends)
 
@@ -294,10 +294,6 @@ def _poses_around(joint: Joint, backwards: bool) -> tuple[FloatArray, FloatArray
     if backwards:
         return align, align.T @ inverse(joint.T_parent_joint)
     return joint.T_parent_joint @ align, align.T
-
-
-def _norm(joint: Joint) -> float:
-    return math.hypot(*joint.T_parent_joint[:3, 3])
 
 
 def _check_single_axis(tree: KinematicTree, joint: Joint, base: str, tip: str) -> None:

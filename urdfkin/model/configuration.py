@@ -12,7 +12,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import cast
 
 import numpy as np
@@ -21,8 +21,8 @@ from numpy.typing import ArrayLike
 from urdfkin.errors import InputError, NotFiniteError, Question
 from urdfkin.kinematics.inputs import floats
 from urdfkin.kinematics.rotation.quaternion import NORM_TOLERANCE, unit_quaternions
-from urdfkin.model.configuration_like import CoordinateLayout, Given, Hint, by_name
-from urdfkin.model.ranges import coordinate_ranges
+from urdfkin.model.configuration_like import CoordinateLayout, Given, Hint, by_name, listed
+from urdfkin.model.ranges import coordinate_ranges, narrowed_ranges
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, frozen
 
 #: Tolerance of `from_pinocchio` (rad or m) for the coordinate of a mimic joint.
@@ -105,6 +105,10 @@ def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
         )
         if joint.mimic
         else Hint("leave out this fixed joint", Question.FIXED_JOINTS)
+        if joint.lock is None
+        else Hint(
+            f"leave out this joint, which is locked at {joint.lock.value:.6g}", Question.FIXED_JOINTS
+        )
         for joint in tree.joints
         if not joint.nv
     }
@@ -164,6 +168,65 @@ def poses(tree: KinematicTree) -> dict[str, FloatArray]:
             q[tree.q_index[tree.joint_index(name)]] = value
         found[pose] = q
     return found
+
+
+def locked_values(
+    tree: KinematicTree, lock: str | Mapping[str, ArrayLike], joints: Sequence[str] | None = None
+) -> dict[str, float]:
+    """Return the value (rad or m) of each joint to lock, by name, in the order of the tree.
+
+    Args:
+        tree: The robot.
+        lock: A value for each joint to lock, as a mapping or text. With `joints`, a pose may come first.
+        joints: The joints that remain; all others are locked, at 0 unless `lock` has a value.
+
+    Raises:
+        UnknownNameError: there is no such joint or pose.
+        InputError: a joint has no single value, is a mimic joint, fixed or named twice; a value is not a
+            number or is outside the limits.
+    """
+    layout = places(tree, "q")
+    values, pose = layout.named(lock, "lock")
+    chosen = set(values)
+    if joints is not None:
+        layout.demand_names(joints, "joints")
+        if twice := sorted(chosen.intersection(joints)):
+            raise InputError("a joint to lock is also one of joints", where="lock", found=listed(twice))
+        chosen |= {joint.name for joint in tree.joints if joint.nq}.difference(joints)
+    elif pose is not None:
+        remedy = "write NAME=VALUE, or name the joints that remain movable in joints (--joints)"
+        raise InputError("a pose alone does not choose the joints to lock", where="lock", remedy=remedy)
+    for name, (at, size) in layout.spans.items():
+        if not chosen.isdisjoint([name, *layout.names[at : at + size]]):
+            kind = tree.joints[tree.joint_index(name)].kind.value
+            remedy = "leave it out" if joints is None else "add it to joints (--joints)"
+            raise InputError(f"a {kind} joint has no single value to lock", where=name, remedy=remedy)
+    q = layout.numbers(values, neutral(tree) if pose is None else pose, "lock")
+    if q.ndim > 1:
+        raise InputError("a locked joint needs one value", where="lock", found=f"shape {q.shape[:-1]}")
+    held = {name: float(x) for name, x in zip(layout.names, q, strict=True) if name in chosen}
+    for name, x in held.items():
+        if not math.isfinite(x):
+            raise NotFiniteError("a locked joint needs a finite value", where=f"lock, {name}", found=str(x))
+    _demand_within_limits(tree, held)
+    return held
+
+
+def _demand_within_limits(tree: KinematicTree, held: Mapping[str, float]) -> None:
+    """Check the limits of joints to lock, and of their mimic joints unless no value satisfies those."""
+    q = np.full(tree.nq, np.nan)  # no limit excludes NaN
+    for name, value in held.items():
+        q[tree.q_index[tree.joint_index(name)]] = value
+    impossible = {name for one in narrowed_ranges(tree) if one.kept is None for name in one.by}
+    for joint, words in _violations(tree, q):
+        if joint.name not in impossible:
+            name = joint.mimic.leader if joint.mimic else joint.name
+            raise InputError(
+                "a joint is locked outside its limits",
+                where=tree.name,
+                found=words,
+                remedy=f"give a value within them: lock={{{name!r}: VALUE}} (--lock {name}=VALUE)",
+            )
 
 
 def limits(tree: KinematicTree) -> FloatArray:
@@ -239,7 +302,11 @@ def _names(tree: KinematicTree, what: str) -> tuple[str, ...]:
 
 def limit_violations(tree: KinematicTree, q: FloatArray) -> list[str]:
     """Return one line for each joint, mimic joints too, that is outside its limits in a batch (..., nq)."""
-    lines = []
+    return [words for _, words in _violations(tree, q)]
+
+
+def _violations(tree: KinematicTree, q: FloatArray) -> Iterator[tuple[Joint, str]]:
+    """Yield each joint that is outside its limits, with the line of `limit_violations`."""
     for joint, values in zip(tree.joints, _own_values(tree, q), strict=True):
         if values is None or joint.limit is None or not values.size:
             continue
@@ -250,8 +317,7 @@ def limit_violations(tree: KinematicTree, q: FloatArray) -> list[str]:
         if outside.max() > 0.0:
             worst = float(values.flat[outside.argmax()])
             bounds = f"[{joint.limit.lower:.6g}, {joint.limit.upper:.6g}]"
-            lines.append(f"joint {joint.name}: {worst:.6g} is outside {bounds}{_degrees(joint, worst)}")
-    return lines
+            yield joint, f"joint {joint.name}: {worst:.6g} is outside {bounds}{_degrees(joint, worst)}"
 
 
 def _degrees(joint: Joint, value: float) -> str:

@@ -88,14 +88,30 @@ class CoordinateLayout:
 keeps: 'neutral, elbow=...'
         """
         where = where or self.what
-        if isinstance(value, Mapping):
-            return self._by_name(dict(value), where, None)
-        cells = _cells(value)
-        named = [_pair(cell) for cell in cells]
-        is_pose = len(cells) == 1 and _is_word(cells[0])
-        if not is_pose and all(name is None for name, _ in named):
+        if not isinstance(value, Mapping) and self._is_in_order(cells := _cells(value)):
             return self._in_order(cells, where)
-        pose = None
+        return self.numbers(*self.named(value, where), where)
+
+    def named(
+        self, value: str | Mapping[str, ArrayLike], where: str
+    ) -> tuple[dict[str, ArrayLike], FloatArray | None]:
+        """Return the values by name of a text or mapping, and the pose that the text begins with, or None.
+
+        Raises:
+            InputError: the text has numbers without names, or a name twice.
+            UnknownNameError: an unknown pose.
+
+        >>> CoordinateLayout("q", ("elbow",), ("rad",)).named("elbow=30deg", "q")
+        ({'elbow': '30deg'}, None)
+        """
+        if isinstance(value, Mapping):
+            return dict(value), None
+        cells, pose = _cells(value), None
+        if not cells:
+            return {}, None
+        if self._is_in_order(cells):
+            raise InputError("give each number with its name", where=where, found=repr(value.strip()[:60]))
+        named = [_pair(cell) for cell in cells]
         if named[0][0] is None:
             pose = self._pose(cells[0], where)
             named = named[1:]
@@ -107,7 +123,24 @@ keeps: 'neutral, elbow=...'
                     "give all numbers in order, or each number with its name", where=where, found=wrong
                 )
             values[name] = number
-        return self._by_name(values, where, pose)
+        return values, pose
+
+    @staticmethod
+    def _is_in_order(cells: Sequence[str]) -> bool:
+        """Return whether a text has numbers in order, without names and without a pose."""
+        is_pose = len(cells) == 1 and _is_word(cells[0])
+        return not is_pose and all(_pair(cell)[0] is None for cell in cells)
+
+    def demand_names(self, names: Sequence[str], where: str) -> None:
+        """Check that each name is a coordinate or a joint with several.
+
+        Raises:
+            UnknownNameError: there is no such coordinate.
+            InputError: the name is that of a fixed joint or a mimic joint, or not a text.
+        """
+        for name in names:
+            if name not in self.names and name not in self.spans:
+                raise self._not_a_coordinate(name, where)
 
     def _pose(self, word: str, where: str) -> FloatArray:
         poses = self.poses()
@@ -122,8 +155,11 @@ keeps: 'neutral, elbow=...'
         rows = zip(cells, self.names, self.units, strict=True)
         return np.array([self._number(text, f"{where}, {name}", unit) for text, name, unit in rows], float)
 
-    def _by_name(self, values: dict[str, ArrayLike], where: str, rest: FloatArray | None) -> FloatArray:
-        found: dict[int, FloatArray] = {}
+    def numbers(
+        self, values: Mapping[str, ArrayLike], rest: FloatArray | None, where: str | None = None
+    ) -> FloatArray:
+        """Return the numbers (..., numbers) of values by name; `rest` (numbers,) has the missing ones."""
+        where, found = where or self.what, dict[int, FloatArray]()
         index = {name: i for i, name in enumerate(self.names)}
         for name, value in values.items():
             if name in index:
@@ -151,19 +187,22 @@ keeps: 'neutral, elbow=...'
 
     def _of_a_joint(self, name: object, value: ArrayLike, where: str) -> dict[int, FloatArray]:
         """Return the numbers, by index, of a joint that has several; raises an error for any other name."""
-        kind = {"q": "coordinate", "v": "joint velocity"}.get(self.what, "joint acceleration")
-        if not isinstance(name, str):
-            raise InputError(f"the name of a {kind} must be text", where=where, found=safe_repr(name))
-        if (instead := self.otherwise().get(name)) is not None:
-            raise InputError(f"{name!r} is not a {kind}", where=where, **instead._asdict())
-        if name not in self.spans:
-            raise UnknownNameError(kind, name[:60], [*self.names, *self.spans], where=where)
+        if not isinstance(name, str) or name not in self.spans:
+            raise self._not_a_coordinate(name, where)
         at, size = self.spans[name]
         x = floats(value, f"{where}, {name}")
         if x.shape[-1:] != (size,):
             names, count = self.names[at : at + size], (x.shape or (1,))[-1]
             raise wrong_count(names, count, f"{where}, {name}", question=Question.FLOATING_BASES)
         return {at + k: x[..., k] for k in range(size)}
+
+    def _not_a_coordinate(self, name: object, where: str) -> InputError:
+        kind = {"q": "coordinate", "v": "joint velocity"}.get(self.what, "joint acceleration")
+        if not isinstance(name, str):
+            return InputError(f"the name of a {kind} must be text", where=where, found=safe_repr(name))
+        if (instead := self.otherwise().get(name)) is not None:
+            return InputError(f"{name!r} is not a {kind}", where=where, **instead._asdict())
+        return UnknownNameError(kind, name[:60], [*self.names, *self.spans], where=where)
 
     def _missing(self, missing: Sequence[str], values: Mapping[str, object], where: str) -> InputError:
         them, keeps = ("it", "it keeps") if len(missing) == 1 else ("them", "they keep")

@@ -88,7 +88,8 @@ def cells_of(tree: KinematicTree, i: int) -> tuple[str, ...]:
     """Return the cells of `COLUMNS` for joint `i`; for a fixed joint only its kind."""
     joint = tree.joints[i]
     if not joint.kind.nv:
-        return (joint.kind.value, *[""] * (len(COLUMNS) - 1))
+        words = joint.kind.value if joint.lock is None else f"locked at {joint.lock.value:.6g}"
+        return (words, *[""] * (len(COLUMNS) - 1))
     q, v = _place("q", tree.q_index[i], joint.kind.nq), _place("v", tree.v_index[i], joint.kind.nv)
     limit = joint.limit
     limits = ("", "", "") if limit is None else map(_bound, (limit.lower, limit.upper, limit.velocity))

@@ -19,6 +19,8 @@ from numpy.typing import ArrayLike
 from urdfkin.errors import InputError, Question, UnknownNameError
 from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.inputs import FloatArray, floats
+from urdfkin.kinematics.rotation.axis_angle import rotation_about
+from urdfkin.kinematics.rotation.euler import coordinate_rotation
 from urdfkin.model.frame_names import FrameName, JointFrame, LinkFrame
 
 __all__ = [
@@ -27,10 +29,12 @@ __all__ = [
     "JointKind",
     "KinematicTree",
     "Limit",
+    "Lock",
     "Mimic",
     "build_tree",
     "freed",
     "frozen",
+    "with_locks",
     "with_root_joint",
 ]
 
@@ -115,6 +119,7 @@ class Joint:
         mimic: Its mimic rule; None if it has its own coordinate.
         tilt: Angle (rad) between Pinocchio's axis and this one (URDF514), usually 0. No result uses it;
             differences from Pinocchio may be larger by this amount.
+        lock: The moving joint of the URDF, if this joint is that one, fixed at a value.
     """
 
     name: str
@@ -125,6 +130,7 @@ class Joint:
     limit: Limit | None = None
     mimic: Mimic | None = None
     tilt: float = 0.0
+    lock: Lock | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_parent_joint", frozen(self.T_parent_joint))
@@ -149,6 +155,61 @@ class Joint:
     def nv(self) -> int:
         """Number of its own joint velocities; 0 for a fixed joint or a mimic joint."""
         return 0 if self.mimic else self.kind.nv
+
+    @property
+    def unlocked(self) -> Joint:
+        """The joint as the URDF describes it, before a lock."""
+        return self.lock.joint if self.lock else self
+
+    @property
+    def length(self) -> float:
+        """Length (m) of the offset from its parent link, and of the displacement of a locked slide."""
+        # A URDF may contain 1e-200 or 1e200, whose squares underflow or overflow; hypot avoids this.
+        own = math.hypot(*self.unlocked.T_parent_joint[:3, 3].tolist())
+        return (
+            own + abs(self.lock.value) if self.lock and self.lock.joint.kind is JointKind.PRISMATIC else own
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lock:
+    """A joint of the URDF that is fixed at a value.
+
+    Attributes:
+        joint: The joint as the URDF describes it.
+        q: Its coordinate, rad or m; of a mimic joint the coordinate of its mimicked joint.
+    """
+
+    joint: Joint
+    q: float
+
+    def __reduce__(self) -> tuple[type[Lock], tuple[Any, ...]]:
+        return type(self), (self.joint, self.q)
+
+    @property
+    def value(self) -> float:
+        """The joint's own value, rad or m."""
+        rule = self.joint.mimic
+        return self.q if rule is None else rule.multiplier * self.q + rule.offset
+
+    @property
+    def motion(self) -> FloatArray:
+        """(4, 4) pose of the child link's frame in the joint frame."""
+        T, axis, value = np.eye(4), self.joint.axis, self.value
+        if not self.joint.kind.turns:
+            T[:3, 3] = value * axis
+        elif np.count_nonzero(axis) == 1:  # no rounding in the zeros and ones
+            k = int(np.flatnonzero(axis)[0])
+            T[:3, :3] = coordinate_rotation(k, np.array(axis[k] * value))
+        else:
+            T[:3, :3] = rotation_about(axis, value)
+        return T
+
+    def fixed(self) -> Joint:
+        """Return the joint as a fixed joint at its value."""
+        joint = self.joint
+        T = joint.T_parent_joint @ self.motion
+        return replace(joint, kind=JointKind.FIXED, T_parent_joint=T, limit=None, mimic=None, lock=self)
 
 
 @dataclass(frozen=True)
@@ -383,6 +444,21 @@ def with_poses(tree: KinematicTree, poses: Mapping[str, Mapping[str, float]]) ->
     own = {joint.name for joint in tree.joints if joint.nq == 1}
     kept = {pose: {name: x for name, x in of.items() if name in own} for pose, of in poses.items()}
     return replace(tree, poses=kept)
+
+
+def with_locks(tree: KinematicTree, values: Mapping[str, float]) -> KinematicTree:
+    """Return the tree with some joints fixed at a value, with their mimic joints.
+
+    Args:
+        tree: The robot.
+        values: Value (rad or m) of each joint to fix, by name; each has one coordinate of its own.
+    """
+    leaders = [joint.mimic.leader if joint.mimic else joint.name for joint in tree.joints]
+    joints = [
+        Lock(joint, values[leader]).fixed() if leader in values else joint
+        for joint, leader in zip(tree.joints, leaders, strict=True)
+    ]
+    return with_poses(KinematicTree(tree.name, tree.links, tuple(joints)), tree.poses)
 
 
 def freed(tree: KinematicTree) -> KinematicTree:

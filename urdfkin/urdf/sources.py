@@ -32,6 +32,7 @@ class Origin:
         table: Whether the robot comes from a Denavit-Hartenberg table. If so, the table's convention
             determines the frames between base and tip.
         sha256: The digest of the MJCF file behind the URDF; empty if the source is a URDF.
+        lock: Name and value (rad or m) of each locked joint, without its mimic joints.
 
     Raises:
         InputError: `mimic` is neither True, False nor None, or `root_joint` is not a string.
@@ -44,6 +45,7 @@ class Origin:
     oracle: Literal["pinocchio", "mujoco"] | None = None
     table: bool = False
     sha256: str = ""
+    lock: tuple[tuple[str, float], ...] = ()
 
     def __post_init__(self) -> None:
         if self.mimic is not None:
@@ -70,6 +72,7 @@ class Origin:
             words.append(f"--root-joint {shlex.quote(self.root_joint)}")
         if self.oracle is not None:
             words.append(f"--oracle {self.oracle}")
+        words += [f"--lock {shlex.quote(f'{name}={value!r}')}" for name, value in self.lock]
         return " ".join(words)
 
     @property
@@ -84,6 +87,16 @@ class Origin:
         return " ".join(filter(None, (shlex.quote(self.again), self.options)))
 
     @property
+    def lock_words(self) -> str:
+        """The locked joints in words; empty if there are none.
+
+        >>> Origin("panda", lock=(("finger", 0.04), ("wrist", 0.0))).lock_words
+        'finger locked at 0.04, wrist at 0'
+        """
+        first, *others = (f"{name}{{}} at {value:.6g}" for name, value in self.lock) if self.lock else [""]
+        return ", ".join([first.format(" locked"), *(other.format("") for other in others)])
+
+    @property
     def python(self) -> str:
         """The call of `load` in Python.
 
@@ -95,6 +108,7 @@ class Origin:
             "root_joint": self.root_joint,
             "xacro_args": dict(self.xacro_args) or None,
             "oracle": self.oracle,
+            "lock": dict(self.lock) or None,
         }
         arguments = [f"{name}={value!r}" for name, value in values.items() if value is not None]
         return f"urdfkin.load({', '.join([repr(self.again), *arguments])})"

@@ -12,7 +12,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
+
+from numpy.typing import ArrayLike
 
 from urdfkin.compiled.preload import are_on_disk
 from urdfkin.errors import InputError, UrdfkinError
@@ -49,6 +52,8 @@ def validate(
     mimic: bool | None = None,
     root_joint: str | None = None,
     xacro_args: Mapping[str, object] | None = None,
+    lock: str | Mapping[str, ArrayLike] = MappingProxyType({}),
+    joints: Sequence[str] | None = None,
     oracle: WitnessName = "pinocchio",
     isolate: bool = False,
     executor: Executor | Engine | None = None,
@@ -72,6 +77,8 @@ def validate(
         mimic: As in `load`.
         root_joint: As in `load`.
         xacro_args: As in `load`, for each .xacro file among the robots.
+        lock: As in `load`, for each robot.
+        joints: As in `load`, for each robot.
         oracle: "mujoco": also compare every frame with MuJoCo. If two of the three libraries
             agree, the report names the third one. This needs the extra `mujoco`.
         isolate: Run each robot in its own process, `jobs` processes at a time. If one crashes, its robot is
@@ -112,7 +119,7 @@ def validate(
     given = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
     started = datetime.datetime.now(datetime.UTC)
     pinocchio()  # once, before the work, so that a missing Pinocchio is an error at once
-    found, unread = subjects(given, mimic, root_joint, xacro_args)
+    found, unread = subjects(given, mimic, root_joint, xacro_args, lock, joints)
     if witness_of(oracle) is not PINOCCHIO:
         found = [replace(one, origin=replace(one.origin, oracle=oracle)) for one in found]
     cut = Cut(samples)

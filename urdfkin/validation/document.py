@@ -83,6 +83,9 @@ class Joint(TypedDict):
             "the whole range, or the joint has no mimic joints."
         ),
     ]
+    locked: NotRequired[
+        Annotated[float, says("Value, rad or m, of a joint that is locked; its kind is then fixed.")]
+    ]
 
 
 class Model(TypedDict):

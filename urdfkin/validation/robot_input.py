@@ -12,6 +12,9 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
+
+from numpy.typing import ArrayLike
 
 from urdfkin.dh.parse_table import is_table_file
 from urdfkin.dh.table import DHTable
@@ -53,7 +56,8 @@ class RobotInput:
     def of(cls, robot: Robot) -> RobotInput:
         """Return the input for a loaded robot."""
         if robot.source in catalogue():
-            return _word(robot.source, robot.origin.mimic, robot.origin.root_joint)
+            found = _word(robot.source, robot.origin.mimic, robot.origin.root_joint)
+            return replace(found, origin=replace(found.origin, lock=robot.origin.lock))
         listed = tuple(finding for finding in robot.findings if finding.code.startswith("MJCF"))
         return replace(_text(robot.urdf.encode(), robot.origin, robot.source), listed=listed)
 
@@ -94,6 +98,7 @@ class RobotInput:
                 mimic=self.origin.mimic,
                 root_joint=self.origin.root_joint,
                 oracle=self.origin.oracle or PINOCCHIO.name,
+                lock=dict(self.origin.lock),
                 listed=self.listed,
                 made=self.made,
             )
@@ -117,12 +122,14 @@ def subjects(
     mimic: bool | None = None,
     root_joint: str | None = None,
     xacro_args: Mapping[str, object] | None = None,
+    lock: str | Mapping[str, ArrayLike] = MappingProxyType({}),
+    joints: Sequence[str] | None = None,
 ) -> tuple[list[RobotInput], dict[int, Exception]]:
     """Return the robots as plain data, and the errors of those that cannot be read, by index."""
     found, errors = list[RobotInput](), dict[int, Exception]()
     for i, robot in enumerate(robots):
         try:
-            found.append(subject(robot, mimic, root_joint, xacro_args))
+            found.append(subject(robot, mimic, root_joint, xacro_args, lock, joints))
         except Exception as error:
             found.append(RobotInput(b"", Origin(_called(robot), mimic, root_joint)))
             errors[i] = error
@@ -134,8 +141,19 @@ def subject(
     mimic: bool | None = None,
     root_joint: str | None = None,
     xacro_args: Mapping[str, object] | None = None,
+    lock: str | Mapping[str, ArrayLike] = MappingProxyType({}),
+    joints: Sequence[str] | None = None,
 ) -> RobotInput:
     """Return one robot as plain data. Raise any error of reading it."""
+    found = _subject(robot, mimic, root_joint, xacro_args)
+    if not lock and joints is None:
+        return found
+    return replace(found, origin=found.read().locked(lock, joints).origin)
+
+
+def _subject(
+    robot: Given, mimic: bool | None, root_joint: str | None, xacro_args: Mapping[str, object] | None
+) -> RobotInput:
     if isinstance(robot, DHTable) or is_table_file(robot) or is_mjcf(robot):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)  # the findings are in its summary
@@ -150,7 +168,7 @@ def subject(
         return _word(source, mimic, root_joint)
     text = read_source(source)  # an open file, or standard input, is read once, here
     if is_mjcf(text.data):
-        return subject(text.data, mimic, root_joint)
+        return _subject(text.data, mimic, root_joint, None)
     return _text(text.data, Origin(text.source, mimic, root_joint), text.label)
 
 

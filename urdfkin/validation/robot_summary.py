@@ -76,6 +76,7 @@ def _joint(robot: Robot, i: int, narrowed: dict[str, NarrowedRange]) -> dict[str
         "limit": joint.limit,
         "mimic": joint.mimic,
         "kept": _remaining_range(narrowed.get(joint.name)),
+        **({} if joint.lock is None else {"locked": joint.lock.value}),
     }
 
 

@@ -22,6 +22,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, assert_never
 from xml.etree.ElementTree import Element, SubElement, tostring
 from xml.parsers.expat import ExpatError
@@ -35,7 +36,7 @@ from urdfkin.model.tree import FloatArray, KinematicTree, Mimic
 from urdfkin.urdf.mujoco import compiled, library
 from urdfkin.urdf.plain_xml import plain_xml
 from urdfkin.verify.pinocchio import demand_the_same, depth_of
-from urdfkin.verify.pinocchio_inputs import BaseNumbers, nearest_quaternion, rules_of_text
+from urdfkin.verify.pinocchio_inputs import BaseNumbers, locked_by_rules, nearest_quaternion, rules_of_text
 
 #: Parent of a root joint or of a moving base.
 WORLD = "universe"
@@ -65,7 +66,10 @@ class _Joint:
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """Indices of a moving joint in MuJoCo's and in urdfkin's vectors, with its mimic rule."""
+    """Indices of a moving joint in MuJoCo's and in urdfkin's vectors, with its mimic rule.
+
+    For the moving base, q and v are -1. For a locked joint, v is -1 and the offset is its value.
+    """
 
     kind: str
     their_q: int
@@ -85,6 +89,8 @@ class MujocoOracle:
         mimic: True: couple mimic joints. False: each moves freely.
         moving_base: Connect the root to the world by a floating joint, which receives the base's motion.
         root_joint: "floating" or "planar" if the tree has such a root joint.
+        lock: Value (rad or m) of each locked joint. MuJoCo's model keeps these joints; they have no numbers
+            in q, v and a.
 
     Raises:
         OracleError: MuJoCo does not accept the text, or the text has a feature that MuJoCo lacks.
@@ -98,6 +104,7 @@ class MujocoOracle:
         mimic: bool = True,
         moving_base: bool = False,
         root_joint: str | None = None,
+        lock: Mapping[str, float] = MappingProxyType({}),
     ) -> None:
         self._mujoco, self._name, self._moving_base = library(), tree.name, moving_base
         if (depth := depth_of(tree)) > _DEEPEST:
@@ -113,11 +120,13 @@ class MujocoOracle:
             rules = rules_of_text(text, set(moving)) if mimic else {}
         except (ValueError, KeyError, ExpatError) as error:
             raise OracleError("the oracle cannot read the text", where=tree.name, found=str(error)) from error
+        held = locked_by_rules(lock, rules)
+        moving = [name for name in moving if name not in held]
         self._children = {joint.name: joint.child for joint in joints}
         carrier = [_Joint("", "floating", "", self._links[0])] if moving_base else []
         self._bodies = {link: f"l{i}" for i, link in enumerate([*([""] if carrier else []), *self._links])}
         self._model = self._compiled([*carrier, *joints])
-        self._places = list(self._laid_out([*carrier, *joints], rules))
+        self._places = list(self._laid_out([*carrier, *joints], rules, held))
         self.nq, self.nv = tree.nq, tree.nv
         demand_the_same("MuJoCo", tree, moving, [name for name in moving if name not in rules])
         self._moving = [JointFrame.of(name) for name in moving]
@@ -169,12 +178,14 @@ class MujocoOracle:
             SubElement(element, "limit", lower="-1", upper="1")
         return element
 
-    def _laid_out(self, joints: Sequence[_Joint], rules: Mapping[str, Mimic]) -> Iterator[_Place]:
+    def _laid_out(
+        self, joints: Sequence[_Joint], rules: Mapping[str, Mimic], held: Mapping[str, float]
+    ) -> Iterator[_Place]:
         """Yield the indices of each moving joint in urdfkin's layout and in MuJoCo's."""
         leaders, q, v = dict[str, tuple[int, int]](), 0, 0
         for joint in joints:
             sizes = _SIZES[joint.kind]
-            if joint.name and joint.name not in rules:
+            if joint.name and joint.name not in rules and joint.name not in held:
                 leaders[joint.name] = q, v
                 q, v = q + sizes[0], v + sizes[1]
         for i, joint in enumerate(joints):
@@ -182,6 +193,10 @@ class MujocoOracle:
                 continue
             first = _PARTS.get(joint.kind, ("",))[0]
             own = self._model.joint(f"j{i} {first}" if first else f"j{i}")
+            if joint.name in held:
+                their = int(own.qposadr[0]), int(own.dofadr[0])
+                yield _Place(joint.kind, *their, 0, -1, 0.0, held[joint.name])
+                continue
             rule = rules.get(joint.name, Mimic(joint.name, 1.0, 0.0))
             if joint.name and rule.leader not in leaders:
                 raise OracleError(
@@ -416,6 +431,8 @@ class MujocoOracle:
                 qpos[:, at : at + 3], qpos[:, at + 3 : at + 7] = own[:, :3], _scalar_first(unit)
             elif place.kind == "planar":
                 qpos[:, at : at + 3] = own[:, :3]
+            elif place.v < 0:
+                qpos[:, at] = place.offset
             else:
                 qpos[:, at] = place.multiplier * own[:, 0] + place.offset
         if v is None:

@@ -28,8 +28,8 @@ class Witness:
         title: Its name in sentences.
         package: Name of its Python package.
         version: Function that returns the installed version without importing the library.
-        oracle: Function (text, tree, mimic=, moving_base=, root_joint=) that returns the oracle's model of a
-            robot.
+        oracle: Function (text, tree, mimic=, moving_base=, root_joint=, lock=) that returns the oracle's
+            model of a robot.
         size: Function that converts magnitudes to those of the bound for this oracle
             (`urdfkin.verify.bounds`).
     """

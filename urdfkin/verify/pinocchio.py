@@ -13,7 +13,8 @@ index "full" marks Pinocchio's vectors, in which mimic joints have numbers of th
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 from xml.parsers.expat import ExpatError
 
@@ -30,6 +31,7 @@ from urdfkin.verify.pinocchio_inputs import (
     free_flyer,
     free_flyer_rates,
     free_flyer_second_rates,
+    locked_by_rules,
     rules_of_text,
 )
 from urdfkin.verify.pinocchio_module import pinocchio, version
@@ -51,7 +53,15 @@ _NAMED = 5
 _BASE = "base"
 
 
-def build_model(text: str, tree: KinematicTree, root_joint: str | None = None, *, mimic: bool = False) -> Any:
+def build_model(
+    text: str,
+    tree: KinematicTree,
+    root_joint: str | None = None,
+    *,
+    mimic: bool = False,
+    lock: Mapping[str, float] = MappingProxyType({}),
+    coupled: bool = True,
+) -> Any:
     """Return Pinocchio's model of a URDF text.
 
     Robots that would exhaust memory or stack, and so crash the process, are rejected or get a larger stack.
@@ -61,6 +71,9 @@ def build_model(text: str, tree: KinematicTree, root_joint: str | None = None, *
         tree: urdfkin's tree of the text, which gives the size of the robot.
         root_joint: "floating" or "planar" to connect the root to the world by such a joint.
         mimic: True: the model couples its mimic joints.
+        lock: Value (rad or m) of each locked joint. `buildReducedModel` removes these joints from the model
+            of the whole text.
+        coupled: Whether a locked joint locks its mimic joints too.
 
     Raises:
         OracleError: Pinocchio does not accept the text, or the robot is too large.
@@ -75,8 +88,38 @@ def build_model(text: str, tree: KinematicTree, root_joint: str | None = None, *
         )
     depth = depth_of(tree)
     if depth < _SHALLOW:
-        return _parse(text, tree, root_joint, mimic)
-    return with_stack(depth * _STACK_FOR_A_LINK, lambda: _parse(text, tree, root_joint, mimic))
+        model = _parse(text, tree, root_joint, mimic)
+    else:
+        model = with_stack(depth * _STACK_FOR_A_LINK, lambda: _parse(text, tree, root_joint, mimic))
+    return _reduced(model, text, lock, coupled=coupled) if lock else model
+
+
+def _reduced(model: Any, text: str, lock: Mapping[str, float], *, coupled: bool) -> Any:
+    """Return a model without the locked joints, by `buildReducedModel`."""
+    pin, q = pinocchio(), pinocchio().neutral(model)
+    rules = mimic_rules(text, list(model.names)[1:], str(model.name)) if coupled else {}
+    held = locked_by_rules(lock, rules)
+    ids = [int(model.getJointId(name)) for name in held]
+    for i, (name, value) in zip(ids, held.items(), strict=True):
+        if i >= model.njoints:
+            raise OracleError("Pinocchio has no such joint to lock", where=str(model.name), found=repr(name))
+        at, numbers = model.joints[i].idx_q, model.joints[i].nq  # 0 for a mimic joint of a coupled model
+        q[at : at + numbers] = (value,) if numbers == 1 else (np.cos(value), np.sin(value))[:numbers]
+    return pin.buildReducedModel(model, ids, q)
+
+
+def mimic_rules(text: str, joints: Sequence[str], name: str) -> dict[str, Mimic]:
+    """Return the mimic rules of the text, read independently of urdfkin's reader.
+
+    Raises:
+        OracleError: a rule cannot be read.
+    """
+    try:
+        return rules_of_text(text, set(joints))
+    except (ValueError, ExpatError) as error:
+        raise OracleError(
+            "the oracle's reader cannot read the mimic rules", where=name, found=str(error)
+        ) from error
 
 
 def _parse(text: str, tree: KinematicTree, root_joint: str | None, mimic: bool) -> Any:
@@ -110,6 +153,7 @@ class Oracle:
         mimic: True: couple mimic joints. False: each moves freely.
         moving_base: Build the model on a free-flyer, which receives the base's motion.
         root_joint: "floating" or "planar" if the tree has such a root joint, which the text does not contain.
+        lock: Value (rad or m) of each locked joint; the tree has it as a fixed joint.
 
     Raises:
         OracleError: Pinocchio does not accept the text, or reads other joints from it.
@@ -124,29 +168,21 @@ class Oracle:
         mimic: bool = True,
         moving_base: bool = False,
         root_joint: str | None = None,
+        lock: Mapping[str, float] = MappingProxyType({}),
     ) -> None:
         self._pin = pin = pinocchio()
         self._tree = tree
         self._moving_base = moving_base
-        self._model = build_model(text, tree, root_joint)
+        self._model = build_model(text, tree, root_joint, lock=lock, coupled=mimic)
         names = list(self._model.names)[1:]
         self._frames = Frames(self._model, pin, stands_on_world=root_joint is not None)
         joints, self._index = list(range(1, len(names) + 1)), list(range(self._model.nframes))
         if moving_base:
             joints, self._index = self._put_on_free_flyer(joints)
-        rules = self._rules(text, names) if mimic else {}
+        rules = mimic_rules(text, names, tree.name) if mimic else {}
         self._layout = Layout(self._model, joints, names, rules)
         demand_the_same("Pinocchio", tree, names, self._layout.coordinates)
         self._local = threading.local()
-
-    def _rules(self, text: str, joints: Sequence[str]) -> dict[str, Mimic]:
-        """Return the mimic rules of the text, read independently of urdfkin's reader."""
-        try:
-            return rules_of_text(text, set(joints))
-        except (ValueError, ExpatError) as error:
-            raise OracleError(
-                "the oracle's reader cannot read the mimic rules", where=self._tree.name, found=str(error)
-            ) from error
 
     def _put_on_free_flyer(self, joints: Sequence[int]) -> tuple[list[int], list[int]]:
         """Put the model on a free-flyer for the base's motion; a root joint of the robot remains.

@@ -83,6 +83,20 @@ def _resolved(joint: str, rules: dict[str, Mimic], known: dict[str, Mimic]) -> M
     return known[joint]
 
 
+def locked_by_rules(lock: Mapping[str, float], rules: Mapping[str, Mimic]) -> dict[str, float]:
+    """Return the value of each locked joint, with those of the mimic joints that a locked joint moves.
+
+    >>> locked_by_rules({"a": 2.0}, {"b": Mimic("a", 0.5, 0.25), "c": Mimic("d", 1.0, 0.0)})
+    {'a': 2.0, 'b': 1.25}
+    """
+    moved = {
+        name: rule.multiplier * lock[rule.leader] + rule.offset
+        for name, rule in rules.items()
+        if rule.leader in lock
+    }
+    return {**lock, **moved}
+
+
 #: Pinocchio's (nq, nv) of a joint -> number of urdfkin's coordinates of this joint.
 _CONTINUOUS, _PLANAR, _FLOATING = (2, 1), (4, 3), (7, 6)
 _COORDINATES = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}

@@ -277,7 +277,7 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
             joint = tree.joints[i]
             joints += 1
             tilt += joint.tilt
-            reach += math.hypot(*joint.T_parent_joint[:3, 3])  # hypot, because squares may underflow
+            reach += joint.length
             factor, offset, leader = 1.0, 0.0, joint.name
             if (rule := joint.mimic) is not None:
                 factor, offset, leader = abs(rule.multiplier), abs(rule.offset), rule.leader

@@ -103,7 +103,12 @@ class Verifier:
         key = by.name, base is not None
         if key not in self._oracles:
             self._oracles[key] = by.oracle(
-                self.text, self.tree, mimic=self.mimic, moving_base=key[1], root_joint=self.origin.root_joint
+                self.text,
+                self.tree,
+                mimic=self.mimic,
+                moving_base=key[1],
+                root_joint=self.origin.root_joint,
+                lock=dict(self.origin.lock),
             )
         return self._oracles[key]
 
@@ -115,7 +120,35 @@ class Verifier:
         """
         if self.unverifiable is not None:
             raise OracleError(self.unverifiable, where=self.tree.name)
-        return build_model(self.text, self.tree, self.origin.root_joint, mimic=mimic)
+        return build_model(
+            self.text,
+            self.tree,
+            self.origin.root_joint,
+            mimic=mimic,
+            lock=dict(self.origin.lock),
+            coupled=self.mimic,
+        )
+
+    def locked(self, tree: KinematicTree, lock: tuple[tuple[str, float], ...]) -> Verifier:
+        """Return the verifier of the robot with locked joints: the same text, and Pinocchio's reduced model.
+
+        Args:
+            tree: The tree with the locked joints.
+            lock: Name and value of each newly locked joint.
+        """
+        # Pinocchio may refuse a robot with many joints, and accept it with fewer.
+        known = self.unverifiable if self.unverifiable not in self._refusals.values() else None
+        found = Verifier(
+            self.text,
+            tree,
+            replace(self.origin, lock=(*self.origin.lock, *lock)),
+            policy=self.policy,
+            mimic=self.mimic,
+            unverifiable=known,
+            oracle=self.witness.name,
+        )
+        found.reading = self.reading
+        return found
 
     def cannot(self, base: BaseMotion | None = None, by: Witness = PINOCCHIO) -> str | None:
         """Return the reason why an oracle cannot check this robot; None if it can."""
@@ -147,7 +180,7 @@ class Verifier:
         """Return the record of all checks so far: the oracle, the agreement, and the unchecked results."""
         return replace(
             self.ledger.certificate(self.tree.name, self.witness.words),
-            reading=self.reading,
+            reading="; ".join(filter(None, (self.reading, self.origin.lock_words))),
             source=self.origin.source,
             sha256=self.sha256,
             urdfkin=own_version(),

@@ -229,7 +229,7 @@ class Mechanism:
         lengths, depths = [0.0], [0]
         for i, joint in enumerate(tree.joints):
             homes.append(homes[joint.parent] @ joint.T_parent_joint)
-            lengths.append(lengths[joint.parent] + math.hypot(*joint.T_parent_joint[:3, 3].tolist()))
+            lengths.append(lengths[joint.parent] + joint.length)
             depths.append(depths[joint.parent] + 1)
             if joint.kind.nv or i in parting:
                 body.append(len(bodies))

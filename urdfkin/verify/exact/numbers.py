@@ -21,7 +21,7 @@ from flint import arb, ctx
 from urdfkin.errors import InputError
 from urdfkin.kinematics import equations as eq
 from urdfkin.model.recursion import IDENTITY, ZERO, Matrix, Number, Vector
-from urdfkin.model.tree import Joint, JointKind, KinematicTree
+from urdfkin.model.tree import Joint, JointKind, KinematicTree, Lock
 from urdfkin.system.locks import lock_over_forks
 from urdfkin.urdf.plain_xml import plain_xml
 
@@ -184,12 +184,24 @@ class _Text:
         self.quaternions = tuple(map(int, root.get("version", "1.0").split("."))) >= _WITH_QUATERNIONS
 
     def joint_of(self, joint: Joint, robot: str) -> ExactJoint:
+        if joint.lock is not None:
+            return self.locked(self.joint_of(joint.lock.joint, robot), joint.lock)
         element = self.elements.get(joint.name)
         if element is not None:
             return self.joint(element, has_axis=joint.kind.has_axis, is_mimic=joint.mimic is not None)
         if joint.kind in (JointKind.FLOATING, JointKind.PLANAR):
             return ExactJoint(IDENTITY, ZERO, IDENTITY[0], 1, 0)
         raise InputError("a joint is not in the URDF text", where=robot, found=joint.name)
+
+    def locked(self, free: ExactJoint, lock: Lock) -> ExactJoint:
+        """Return a joint that is fixed at the exact value of a double."""
+        R, p = free.R, free.p
+        value = free.multiplier * exact(lock.q) + free.offset
+        if lock.joint.kind.turns:
+            R = eq.product(R, about(free.axis, value))
+        else:
+            p = eq.plus(p, eq.rotate(R, eq.times(value, free.axis)))
+        return ExactJoint(R, p, free.axis, 1, 0)
 
     def joint(self, element: Element, *, has_axis: bool, is_mimic: bool) -> ExactJoint:
         axis = self.vector(element.find("axis"), "xyz", "1 0 0")
