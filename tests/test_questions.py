@@ -101,6 +101,10 @@ ASKED: dict[Question, list[Callable[[], str]]] = {
     Question.FLOATING_BASES: [
         _raised(lambda: urdfkin.load(WHEEL, root_joint="floating").placement({"root_joint": np.zeros(6)}))
     ],
+    Question.LOCKED_JOINTS: [
+        _raised(lambda: urdfkin.load("panda").locked("ready")),
+        _raised(lambda: _ur5().locked({"elbow_joint": 1.0}).placement({"elbow_joint": 1.0})),
+    ],
     Question.SINGULARITY: [_typed("singular-values", "--help")],
 }
 

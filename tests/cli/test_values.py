@@ -353,3 +353,75 @@ def test_names_are_never_folded_nothing_wraps_and_no_line_ends_in_blanks_in_a_pi
     if not columns and "info" in words:
         assert sum("nq 1" in line and f"{LONG}_robot" in line for line in named) == 1
         assert sum("default base" in line and f"{LONG}_tool" in line for line in named) == 1
+
+
+# -- locked joints -----------------------------------------------------------------------------------
+
+
+def test_a_locked_joint_has_no_number_in_q_and_no_column() -> None:
+    done = urdfkin(
+        "jacobian", "panda", "--lock", "panda_finger_joint1=40mm", "--q", "ready", "--format", "json"
+    )
+    robot = library.load("panda", lock={"panda_finger_joint1": 0.04})
+    assert done.code == 0, done.err
+    assert done.data["result"] == [robot.jacobian("ready").tolist()]
+    assert done.data["rates"] == list(robot.rate_names)
+    assert done.data["lock"] == {"panda_finger_joint1": 0.04}
+
+
+def test_all_but_the_named_joints_are_locked_at_a_pose_and_single_values() -> None:
+    words = ("--joints", "panda_joint1, panda_joint2", "--lock", "ready", "--lock", "panda_joint7=30deg")
+    found = urdfkin("placement", "panda", *words, "--q", "0.1,0.2", "--format", "json").data
+    robot = library.load("panda").locked("ready, panda_joint7=30deg", joints=["panda_joint1", "panda_joint2"])
+    assert found["result"] == [robot.placement([0.1, 0.2]).tolist()]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("info", "panda"),
+        ("dh", "panda"),
+        ("screws", "panda"),
+        ("chain", "panda"),
+        ("structure", "panda"),
+        ("order", "panda"),
+        ("hessian", "panda"),
+        ("singular-values", "panda", "--q", "ready"),
+        ("imu", "panda"),
+        ("analytical-jacobian", "panda", "--angles", "quaternion"),
+        ("export", "panda", "--to", "numpy", "--quantity", "placement"),
+        ("calibrate", "panda"),
+        ("validate", "panda", "--samples", "2"),
+    ],
+)
+def test_every_command_with_one_robot_can_lock_joints(words: tuple[str, ...]) -> None:
+    done = urdfkin(*words, "--lock", "panda_finger_joint1=0.04", "--joints", "panda_joint4,panda_joint5")
+    assert done.code == 0, done.err
+    assert "panda_joint3" not in done.text or "locked" in done.text
+
+
+def test_a_replay_of_a_locked_robot_locks_the_same_joints() -> None:
+    robot = library.load("panda").locked({"panda_joint4": -1.0 / 3.0})
+    words = robot.origin.words.split()
+    assert words == ["panda", "--lock", f"panda_joint4={-1.0 / 3.0!r}"]
+    found = urdfkin("placement", *words, "--q", "ready", "--format", "json").data
+    assert found["result"] == [robot.placement("ready").tolist()]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--lock", "elbow=1"), "unknown coordinate 'elbow'"),
+        (("--lock", "panda_joint1=200deg"), "3.49066 is outside [-2.8973, 2.8973]"),
+        (("--lock", "panda_joint1=90"), "degrees? write 90deg"),
+        (("--lock", "panda_finger_joint2=0.01"), "it mimics panda_finger_joint1"),
+        (("--lock", "0.4"), "give each number with its name"),
+        (("--joints", "elbow"), "unknown coordinate 'elbow'"),
+        (("--joints", "panda_joint1"), "--lock panda_joint4=VALUE"),
+    ],
+)
+def test_a_wrong_lock_is_one_clear_error(words: tuple[str, ...], message: str) -> None:
+    done = urdfkin("info", "panda", *words)
+    assert done.code == 2
+    assert message in done.err
+    assert done.err.count("\n") == 1

@@ -82,6 +82,7 @@ class Question(Enum):
     XACRO = "xacro-without-ros"
     GRAVITY = "gravity-in-an-acceleration"
     FLOATING_BASES = "floating-bases"
+    LOCKED_JOINTS = "locked-joints"
     SINGULARITY = "singularity"
 
     def __str__(self) -> str:

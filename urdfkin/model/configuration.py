@@ -106,9 +106,7 @@ def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
         if joint.mimic
         else Hint("leave out this fixed joint", Question.FIXED_JOINTS)
         if joint.lock is None
-        else Hint(
-            f"leave out this joint, which is locked at {joint.lock.value:.6g}", Question.FIXED_JOINTS
-        )
+        else Hint(f"leave out this joint, locked at {joint.lock.value:.6g}", Question.LOCKED_JOINTS)
         for joint in tree.joints
         if not joint.nv
     }
@@ -195,13 +193,20 @@ def locked_values(
         chosen |= {joint.name for joint in tree.joints if joint.nq}.difference(joints)
     elif pose is not None:
         remedy = "write NAME=VALUE, or name the joints that remain movable in joints (--joints)"
-        raise InputError("a pose alone does not choose the joints to lock", where="lock", remedy=remedy)
+        raise InputError(
+            "a pose alone does not choose the joints to lock",
+            where="lock",
+            remedy=remedy,
+            question=Question.LOCKED_JOINTS,
+        )
     for name, (at, size) in layout.spans.items():
         if not chosen.isdisjoint([name, *layout.names[at : at + size]]):
             kind = tree.joints[tree.joint_index(name)].kind.value
             remedy = "leave it out" if joints is None else "add it to joints (--joints)"
-            raise InputError(f"a {kind} joint has no single value to lock", where=name, remedy=remedy)
-    q = layout.numbers(values, neutral(tree) if pose is None else pose, "lock")
+            claim, question = f"a {kind} joint has no single value to lock", Question.LOCKED_JOINTS
+            raise InputError(claim, where=name, remedy=remedy, question=question)
+    rest = zip(layout.names, (neutral(tree) if pose is None else pose).tolist(), strict=True)
+    q = layout.read({**dict(rest), **values}, "lock")
     if q.ndim > 1:
         raise InputError("a locked joint needs one value", where="lock", found=f"shape {q.shape[:-1]}")
     held = {name: float(x) for name, x in zip(layout.names, q, strict=True) if name in chosen}

@@ -90,7 +90,8 @@ keeps: 'neutral, elbow=...'
         where = where or self.what
         if not isinstance(value, Mapping) and self._is_in_order(cells := _cells(value)):
             return self._in_order(cells, where)
-        return self.numbers(*self.named(value, where), where)
+        values, pose = self.named(value, where)
+        return self._by_name(values, where, pose)
 
     def named(
         self, value: str | Mapping[str, ArrayLike], where: str
@@ -155,11 +156,8 @@ keeps: 'neutral, elbow=...'
         rows = zip(cells, self.names, self.units, strict=True)
         return np.array([self._number(text, f"{where}, {name}", unit) for text, name, unit in rows], float)
 
-    def numbers(
-        self, values: Mapping[str, ArrayLike], rest: FloatArray | None, where: str | None = None
-    ) -> FloatArray:
-        """Return the numbers (..., numbers) of values by name; `rest` (numbers,) has the missing ones."""
-        where, found = where or self.what, dict[int, FloatArray]()
+    def _by_name(self, values: dict[str, ArrayLike], where: str, rest: FloatArray | None) -> FloatArray:
+        found: dict[int, FloatArray] = {}
         index = {name: i for i, name in enumerate(self.names)}
         for name, value in values.items():
             if name in index:
@@ -196,7 +194,8 @@ keeps: 'neutral, elbow=...'
             raise wrong_count(names, count, f"{where}, {name}", question=Question.FLOATING_BASES)
         return {at + k: x[..., k] for k in range(size)}
 
-    def _not_a_coordinate(self, name: object, where: str) -> InputError:
+    def _not_a_coordinate(self, name: object, where: str) -> InputError | UnknownNameError:
+        """Return the error for a name that has no number."""
         kind = {"q": "coordinate", "v": "joint velocity"}.get(self.what, "joint acceleration")
         if not isinstance(name, str):
             return InputError(f"the name of a {kind} must be text", where=where, found=safe_repr(name))

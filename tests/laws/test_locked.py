@@ -1,0 +1,401 @@
+"""A locked robot is the whole robot at the locked values, without the locked columns."""
+
+import copy
+import math
+import pickle
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import urdfkin
+from tests.laws.subjects import robot_of, state
+from tests.strategies import trees
+from urdfkin.compiled.plan import CompiledTree
+from urdfkin.kinematics.rotation import rotation_from_rpy
+from urdfkin.kinematics.roundings import EPS
+from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray
+from urdfkin.robot import Robot
+from urdfkin.urdf.writer import to_urdf
+from urdfkin.verify.bounds import magnitudes
+from urdfkin.verify.certificate import VerificationError
+from urdfkin.verify.oracles import MUJOCO, PINOCCHIO, Witness
+from urdfkin.verify.pinocchio import OracleError
+from urdfkin.verify.quantities import QUANTITIES, walked
+
+#: Robots, and the joints to lock; None: every second joint. There are mimic joints, slides, continuous
+#: joints, oblique axes, and planar and floating joints, which remain.
+LOCKS = {
+    "panda": ("panda_finger_joint1", "panda_joint4"),
+    "a1": ("FL_hip_joint", "RR_calf_joint"),
+    "tree_3": None,
+    "tree_8": None,
+    "floating_root": None,
+    "planar_and_floating_in_the_middle": None,
+    "mimic_hand_40_sliding": None,
+}
+
+
+def lockable(robot: Robot) -> list[str]:
+    return [joint.name for joint in robot.tree.joints if joint.nq == 1]
+
+
+def values_at(robot: Robot, q: FloatArray, names: list[str]) -> dict[str, float]:
+    tree = robot.tree
+    return {name: float(q[tree.q_index[tree.joint_index(name)]]) for name in names}
+
+
+def held(robot: Robot, name: str) -> float:
+    lock = robot.joints[name].lock
+    assert lock is not None
+    return lock.value
+
+
+def kept(robot: Robot, names: list[str]) -> tuple[list[int], list[int]]:
+    """Return the indices in q and in v of the joints that are not locked."""
+    tree = robot.tree
+    free = [(i, j) for i, j in enumerate(tree.joints) if j.nv and j.name not in names]
+    q = [tree.q_index[i] + c for i, j in free for c in range(j.nq)]
+    return q, [tree.v_index[i] + c for i, j in free for c in range(j.nv)]
+
+
+def bound(
+    plan: CompiledTree, name: str, reference: Reference | None, x: tuple[FloatArray, ...]
+) -> FloatArray:
+    row, (q, v, a) = QUANTITIES[name], x
+    found = row.bound(plan, magnitudes(plan, q, v, a, STILL_STATE), reference)
+    return np.asarray(EPS * found.k * found.scale)
+
+
+def demand_the_columns(robot: Robot, names: list[str], q: FloatArray, rng: np.random.Generator) -> Robot:
+    """Compare every quantity of all links with the whole robot's; return the locked robot."""
+    locked = robot.locked(values_at(robot, q, names))
+    of_q, of_v = kept(robot, names)
+    v, a = np.zeros((2, 1, robot.nv))
+    v[:, of_v], a[:, of_v] = rng.standard_normal((2, 1, len(of_v)))
+    whole, part = (q[None], v, a), (q[None, of_q], v[:, of_v], a[:, of_v])
+    frames = robot.link_frames
+    plan = robot.plan([robot.tree.frame_link(frame) for frame in frames])
+    for row in walked():
+        for reference in row.references:
+            inputs = [x[: len(row.inputs)] for x in (whole, part)]
+            named = reference or Reference.LOCAL_WORLD_ALIGNED
+            full = robot.compute(row.name, inputs[0], frames, named)
+            ours = locked.compute(row.name, inputs[1], frames, named)
+            most = np.broadcast_to(bound(plan, row.name, reference, whole), full.shape)
+            for axis in range(full.ndim)[3:] if row.columns else ():
+                full, most = full.take(of_v, axis), most.take(of_v, axis)
+            assert ours.shape == full.shape, row.name
+            assert (np.abs(ours - full) <= most).all(), (row.name, reference)
+    return locked
+
+
+@pytest.mark.parametrize("name", LOCKS)
+def test_results_of_a_locked_robot_are_the_columns_of_the_whole_robot(name: str) -> None:
+    robot, rng = robot_of(name), np.random.default_rng(1)
+    names = list(LOCKS[name] or lockable(robot)[::2])
+    for q in robot.sample(3, seed=2):
+        demand_the_columns(robot, names, q, rng)
+
+
+@pytest.mark.parametrize("name", LOCKS)
+@pytest.mark.parametrize("oracle", ["pinocchio", "mujoco"])
+def test_both_oracles_agree_with_a_locked_robot(name: str, oracle: str) -> None:
+    robot = robot_of(name)
+    names = list(LOCKS[name] or lockable(robot)[::2])
+    locked = robot.locked(values_at(robot, robot.sample(1)[0], names))
+    locked.verifier.witness = {"pinocchio": PINOCCHIO, "mujoco": MUJOCO}[oracle]
+    q, v, a = state(locked, 4, 3)
+    for reference in Reference:
+        locked.acceleration(q, v, a, locked.link_frames, reference, verify=True)
+        locked.jacobian_rate(q, v, locked.link_frames, reference, verify=True)
+    assert locked.certificate().verified
+    assert all(line.share > 0.0 or not locked.nv for line in locked.certificate().lines)
+
+
+@pytest.mark.parametrize("name", ["panda", "a1"])
+def test_a_locked_robot_on_a_moving_base_agrees_with_pinocchio(name: str) -> None:
+    locked = robot_of(name).locked(joints=lockable(robot_of(name))[:2], lock="ready")
+    T = np.eye(4)
+    T[:3, 3] = 1.0, 2.0, 3.0
+    base = urdfkin.BaseMotion(T, np.array([1.0, 0, 0, 0, 0, 2.0]), np.array([0, 1.0, 0, 3.0, 0, 0]))
+    q, v, a = state(locked, 2, 4)
+    locked.acceleration(q, v, a, locked.link_frames, base=base, verify=True)
+    assert locked.certificate().verified
+
+
+@pytest.mark.slow
+@settings(max_examples=60, deadline=None)
+@given(st.data())
+def test_any_tree_with_any_joints_locked_is_the_whole_tree_at_these_values(data: st.DataObject) -> None:
+    text = to_urdf(data.draw(trees(max_joints=6)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        robot = urdfkin.load(text, verify=False)
+    names = [name for name in lockable(robot) if data.draw(st.booleans())]
+    q = robot.sample(1, seed=data.draw(st.integers(0, 99)))[0]
+    locked = demand_the_columns(robot, names, q, np.random.default_rng(5))
+    if robot.verifier.unverifiable is None:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", urdfkin.NotVerifiedWarning)
+            locked.placement(locked.sample(2), locked.link_frames, verify=True)
+            locked.jacobian(locked.sample(2), locked.link_frames, verify=True)
+
+
+def test_a_slide_that_is_locked_back_to_its_parent_keeps_its_rounding_in_the_bound() -> None:
+    text = """<robot name="r"><link name="a"/><link name="b"/><joint name="s" type="prismatic">
+    <parent link="a"/><child link="b"/><origin xyz="0.1 0.7 -0.3" rpy="0.4 -1.1 2.2"/><axis xyz="AXIS"/>
+    <limit lower="-9" upper="9" effort="1" velocity="1"/></joint></robot>"""
+    p = np.array([0.1, 0.7, -0.3])
+    length = math.hypot(*p)
+    axis = rotation_from_rpy([0.4, -1.1, 2.2]).T @ p
+    axis /= math.hypot(*axis)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)  # the axis is a unit vector to rounding only
+        whole = urdfkin.load(text.replace("AXIS", " ".join(map(repr, axis.tolist()))))
+    for value in (-length, np.nextafter(-length, 0.0), 7.3):
+        locked = whole.locked({"s": float(value)})
+        locked.placement([], "b")
+        assert locked.certificate().verified
+    locked = whole.locked({"s": -length})
+    assert locked.joints["s"].length == pytest.approx(2.0 * length)
+    assert np.abs(locked.joints["s"].T_parent_joint[:3, 3]).max() < 1e-15
+
+
+# -- independence ------------------------------------------------------------------------------------
+
+
+def test_pinocchio_reads_the_whole_text_and_reduces_its_model() -> None:
+    whole = robot_of("panda")
+    locked = whole.locked({"panda_finger_joint1": 0.04})
+    assert locked.urdf == whole.urdf
+    model = locked.pinocchio_model()
+    assert model.nq == 7
+    assert "panda_finger_joint2" not in list(model.names)
+    assert locked.pinocchio_model(mimic=True).nq == 7
+    assert locked.to_pinocchio(np.arange(7.0)).tolist() == list(range(7))
+
+
+@pytest.mark.parametrize("oracle", [PINOCCHIO, MUJOCO])
+@pytest.mark.parametrize("slip", ["value", "mimic", "sense", "free"])
+def test_the_oracle_finds_a_wrongly_locked_tree(slip: str, oracle: Witness) -> None:
+    robot = robot_of("panda").locked({"panda_finger_joint1": 0.03, "panda_joint7": 0.5})
+    robot.verifier.witness = oracle
+    other = {
+        "value": {"panda_finger_joint1": 0.03, "panda_joint7": 0.5000001},
+        "mimic": {"panda_finger_joint1": 0.0300001, "panda_joint7": 0.5},
+        "sense": {"panda_finger_joint1": 0.03, "panda_joint7": -0.5},
+        "free": {"panda_finger_joint1": 0.03},
+    }[slip]
+    robot.tree = robot.verifier.tree = robot_of("panda").locked(other).tree
+    if slip == "free":
+        with pytest.raises(OracleError, match="finds other joints"):
+            robot.verifier.oracle(None, oracle)
+        return
+    with pytest.raises(VerificationError, match=r"--lock panda_joint7=0\.5 --lock panda_finger_joint1=0\.03"):
+        robot.placement(robot.neutral(), ["panda_rightfinger", "panda_hand_tcp"], verify=True)
+
+
+def test_a_mimic_joint_that_stays_at_zero_is_found() -> None:
+    whole = robot_of("panda")
+    robot = whole.locked({"panda_finger_joint1": 0.03})
+    joints = list(robot.tree.joints)
+    i = robot.tree.joint_index("panda_finger_joint2")
+    joints[i] = whole.locked({"panda_finger_joint1": 0.0}).tree.joints[i]
+    robot.tree = robot.verifier.tree = type(robot.tree)(robot.name, robot.tree.links, tuple(joints))
+    with pytest.raises(VerificationError):
+        robot.placement(robot.neutral(), "panda_rightfinger", verify=True)
+
+
+def test_with_free_mimic_joints_a_lock_holds_only_the_named_joint() -> None:
+    locked = urdfkin.load("panda", mimic=False, lock={"panda_finger_joint1": 0.04})
+    assert locked.joint_names[-1] == "panda_finger_joint2"
+    locked.placement(locked.sample(3), locked.link_frames)
+    assert locked.certificate().verified
+
+
+# -- other forms of the same robot -------------------------------------------------------------------
+
+
+def test_all_ways_to_lock_give_the_same_robot() -> None:
+    panda = urdfkin.load("panda")
+    arm = [f"panda_joint{i}" for i in range(1, 8)]
+    ways = [
+        panda.locked({"panda_finger_joint1": 0.04}),
+        panda.locked("panda_finger_joint1=40mm"),
+        panda.locked({"panda_finger_joint1": 0.04}, joints=arm),
+        urdfkin.load("panda", lock={"panda_finger_joint1": "40mm"}),
+        urdfkin.load("panda", lock={"panda_finger_joint1": 0.04}, joints=arm),
+        pickle.loads(pickle.dumps(panda.locked({"panda_finger_joint1": 0.04}))),
+        copy.copy(panda.locked({"panda_finger_joint1": 0.04})),
+        panda.locked({"panda_joint7": 0.5}).locked({"panda_finger_joint1": 0.04}),
+    ]
+    q = ways[0].poses["ready"]
+    T = ways[0].placement(q, "panda_leftfinger")
+    for way in ways[:-1]:
+        assert way.origin.lock == (("panda_finger_joint1", 0.04),)
+        assert way.placement(q, "panda_leftfinger").tobytes() == T.tobytes()
+        assert way.jacobian(q, "panda_hand_tcp").shape == (6, 7)
+    assert ways[-1].origin.lock == (("panda_joint7", 0.5), ("panda_finger_joint1", 0.04))
+    assert ways[-1].nq == 6
+    assert panda.nq == 8
+
+
+def test_the_rest_of_the_joints_are_locked_at_zero_or_at_a_pose() -> None:
+    panda = urdfkin.load("panda")
+    ready = panda.locked("ready, panda_joint7=30deg", joints=["panda_joint2", "panda_joint1"])
+    assert ready.joint_names == ("panda_joint1", "panda_joint2")
+    assert held(ready, "panda_joint7") == math.radians(30)
+    assert held(ready, "panda_joint4") == panda.poses["ready"][3]
+    arm = urdfkin.load("planar_two_link").locked(joints=["joint_1"])
+    assert held(arm, "joint_2") == 0.0
+    assert arm.placement([0.0], "tip")[:3, 3].tolist() == [0.9, 0.0, 0.0]
+    assert urdfkin.load("planar_two_link").locked(joints=[]).nq == 0
+
+
+def test_a_locked_robot_is_the_same_as_its_text_with_fixed_joints() -> None:
+    whole = urdfkin.load("ur5")
+    locked = whole.locked({"wrist_1_joint": 0.5, "shoulder_pan_joint": -1.0})
+    assert urdfkin.same(locked, urdfkin.load(to_urdf(locked.tree)))
+    assert not urdfkin.same(locked, whole.locked({"wrist_1_joint": 0.6, "shoulder_pan_joint": -1.0}))
+
+
+def test_every_other_result_works_on_a_locked_robot() -> None:
+    panda = urdfkin.load("panda").locked({"panda_finger_joint1": 0.04, "panda_joint3": 0.3})
+    frame, q = "panda_hand_tcp", panda.poses["ready"]
+    T = panda.placement(q, frame)
+    table = panda.dh(frame)
+    assert np.abs(table.placement(panda.select(table, q)) - T).max() < 1e-14
+    screws = panda.screws(frame)
+    assert np.abs(screws.placement(q) - T).max() < 1e-14
+    assert panda.tree_parameters().rows
+    assert np.array_equal(panda.prepare(frame).placement(q), T)
+    scope: dict[str, Any] = {}
+    code = panda.export("numpy", frame, ["placement"])
+    assert "Joint panda_finger_joint1 is locked at 0.04" in code
+    exec(code, scope)
+    assert np.abs(scope["placement"](q) - T).max() < 1e-14
+    mujoco = panda.with_convention("mujoco")
+    assert mujoco.jacobian(mujoco.neutral(), frame).shape[1] >= panda.nv
+    report = urdfkin.validate([panda], samples=3)
+    assert report.passed
+    assert "--lock panda_joint3=0.3 --lock panda_finger_joint1=0.04" in str(report.as_dict()["command"])
+    assert panda.view(q) is not None
+    one = np.ones(panda.nv)
+    assert (panda.enclose(q, one, one, frame).jacobian.error(panda.jacobian(q, frame)) < 1e-14).all()
+    assert panda.certificate().reading == "panda_joint3 locked at 0.3, panda_finger_joint1 at 0.04"
+
+
+@pytest.mark.parametrize("source", ["mjcf", "table", "model"])
+def test_a_robot_from_another_format_can_be_locked(source: str) -> None:
+    import pinocchio as pin  # noqa: PLC0415
+
+    mjcf = """<mujoco><worldbody><body name="b"><joint name="one" axis="0 0 1"/><geom size="1"/>
+    <body name="c" pos="1 0 0"><joint name="two" axis="0 1 0" ref="0.5"/><geom size="1"/></body></body>
+    </worldbody></mujoco>"""
+    what = {
+        "mjcf": mjcf,
+        "table": urdfkin.load("planar_two_link").dh(),
+        "model": pin.buildModelFromXML(urdfkin.load("planar_two_link").urdf),
+    }[source]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        whole = urdfkin.load(what)
+        first = whole.joint_names[0]
+        locked = urdfkin.load(what, lock={first: 0.25})
+    tip = whole.tip_frame
+    T = whole.placement([0.25, 1.0], tip)
+    assert np.abs(locked.placement([1.0], tip) - T).max() < 1e-15
+    assert locked.certificate().verified
+    assert locked.verifier.reading == whole.verifier.reading
+
+
+def test_calibration_of_a_locked_robot_writes_the_origins_of_the_whole_text() -> None:
+    whole = urdfkin.load("panda")
+    true = urdfkin.load(whole.urdf.replace('xyz="0 0 0.107"', 'xyz="0 0.001 0.107"'))
+    lock = {"panda_joint7": 0.6, "panda_finger_joint1": 0.02}
+    locked, q = whole.locked(lock), whole.locked(lock).sample(40)
+    T = true.locked(lock).placement(q, "panda_leftfinger")
+    found = urdfkin.calibrate(locked, q, T, tip="panda_leftfinger", every=True)
+    written = urdfkin.load(found.written.text)
+    full = np.insert(np.concatenate((q, np.full((40, 1), 0.02)), axis=1), 6, 0.6, axis=1)
+    assert np.abs(written.placement(full, "panda_leftfinger") - T).max() < 1e-9
+
+
+# -- errors ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("lock", "words"),
+    [
+        ({"elbow": 1.0}, "unknown coordinate 'elbow'"),
+        ({"panda_finger_joint2": 0.01}, "it mimics panda_finger_joint1: give that value"),
+        ({"panda_joint8": 0.0}, "it is fixed"),
+        ({"panda_finger_joint1": 4.0}, "4 is outside [0, 0.04]"),
+        ({"panda_joint1": 90}, "degrees? write 90deg"),
+        ({"panda_joint1": [1.0, 2.0]}, "needs one value"),
+        ({"panda_joint1": math.nan}, "finite value"),
+        ({"panda_joint1": "soon"}, "not a finite number"),
+        ("1, 2", "give each number with its name"),
+        ("ready", "a pose alone does not choose the joints to lock"),
+        (7, "lock must be a mapping"),
+        ({3: 4}, "must be text"),
+    ],
+)
+def test_a_lock_that_makes_no_sense_is_one_clear_error(lock: Any, words: str) -> None:
+    with pytest.raises(urdfkin.UrdfkinError) as found:
+        urdfkin.load("panda", lock=lock)
+    assert words in str(found.value)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"joints": ["elbow"]}, "unknown coordinate 'elbow'"),
+        ({"joints": "panda_joint1"}, "must be a list of names"),
+        ({"joints": ["panda_joint1"]}, "give a value within them: lock={'panda_joint4': VALUE}"),
+        ({"joints": ["panda_joint1"], "lock": {"panda_joint1": 0.0}}, "is also one of joints"),
+        ({"joints": ["panda_finger_joint2"]}, "it mimics panda_finger_joint1"),
+    ],
+)
+def test_joints_that_make_no_sense_are_one_clear_error(options: dict[str, Any], words: str) -> None:
+    with pytest.raises(urdfkin.UrdfkinError) as found:
+        urdfkin.load("panda").locked(**options)
+    assert words in str(found.value)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"joints": ["FL_hip_joint"]}, {"lock": {"root_joint": [0.0] * 7}}, {"lock": {"root_joint.x": 1.0}}],
+)
+def test_a_floating_joint_is_not_locked(options: dict[str, Any]) -> None:
+    with pytest.raises(urdfkin.InputError, match="a floating joint has no single value to lock"):
+        urdfkin.load("a1", root_joint="floating").locked(**options)
+
+
+def test_a_locked_joint_is_named_in_the_errors_about_q() -> None:
+    locked = urdfkin.load("planar_two_link").locked({"joint_1": 0.5})
+    with pytest.raises(urdfkin.InputError, match=r"locked at 0\.5: leave it out"):
+        locked.placement({"joint_1": 0.5, "joint_2": 0.0})
+    with pytest.raises(urdfkin.InputError, match=r"locked at 0\.5"):
+        locked.locked({"joint_1": 0.4})
+
+
+def test_a_mimic_joint_outside_its_limits_is_refused_unless_no_value_satisfies_it() -> None:
+    text = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
+    <joint name="x" type="revolute"><parent link="a"/><child link="b"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+    <joint name="y" type="revolute"><parent link="b"/><child link="c"/><mimic joint="x" multiplier="2"/>
+    <limit lower="LOW" upper="9" effort="1" velocity="1"/></joint></robot>"""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        good, impossible = (urdfkin.load(text.replace("LOW", low)) for low in ("0", "3"))
+    assert good.locked({"x": 0.5}).nq == 0
+    with pytest.raises(urdfkin.InputError, match="joint y: -1 is outside"):
+        good.locked({"x": -0.5})
+    assert impossible.locked({"x": 0.5}).nq == 0
