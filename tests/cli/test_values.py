@@ -388,7 +388,7 @@ def test_all_but_the_named_joints_are_locked_at_a_pose_and_single_values() -> No
         ("hessian", "panda"),
         ("singular-values", "panda", "--q", "ready"),
         ("imu", "panda"),
-        ("analytical-jacobian", "panda", "--angles", "quaternion"),
+        ("analytical-jacobian", "panda", "--representation", "rpy", "--q", "-0.5,0.3"),
         ("export", "panda", "--to", "numpy", "--quantity", "placement"),
         ("calibrate", "panda"),
         ("validate", "panda", "--samples", "2"),

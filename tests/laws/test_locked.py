@@ -84,7 +84,7 @@ def demand_the_columns(robot: Robot, names: list[str], q: FloatArray, rng: np.ra
     for row in walked():
         for reference in row.references:
             inputs = [x[: len(row.inputs)] for x in (whole, part)]
-            named = reference or Reference.LOCAL_WORLD_ALIGNED
+            named = Reference.LOCAL_WORLD_ALIGNED if reference is None else reference
             full = robot.compute(row.name, inputs[0], frames, named)
             ours = locked.compute(row.name, inputs[1], frames, named)
             most = np.broadcast_to(bound(plan, row.name, reference, whole), full.shape)
