@@ -58,6 +58,12 @@ def _wheel() -> urdfkin.Robot:
     return urdfkin.load(WHEEL)
 
 
+def _warned(act: Callable[[], object]) -> str:
+    with pytest.warns(urdfkin.DegreesWarning) as caught:
+        act()
+    return str(caught[0].message)
+
+
 #: What leads to each question: a message or a page.
 ASKED: dict[Question, list[Callable[[], str]]] = {
     Question.REFERENCE_FRAMES: [
@@ -105,6 +111,7 @@ ASKED: dict[Question, list[Callable[[], str]]] = {
         _raised(lambda: urdfkin.load("panda").locked("ready")),
         _raised(lambda: _ur5().locked({"elbow_joint": 1.0}).placement({"elbow_joint": 1.0})),
     ],
+    Question.DEGREES: [lambda: _warned(lambda: _ur5().integrate(np.full(6, 40.0), np.zeros(6)))],
     Question.SINGULARITY: [_typed("singular-values", "--help")],
 }
 

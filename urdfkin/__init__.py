@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from urdfkin.comparison.diff import diff
     from urdfkin.comparison.verdict import same
     from urdfkin.dh import DHRow, DHTable, read_table, table_from_rows
-    from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
+    from urdfkin.errors import DegreesWarning, InputError, SourceError, UnknownNameError, UrdfkinError
     from urdfkin.lint import Finding, UrdfError, UrdfWarning, check
     from urdfkin.loading import load
     from urdfkin.model.base_motion import BaseMotion
@@ -39,6 +39,7 @@ _HOMES = {
     "Certificate": "urdfkin.verify.certificate",
     "DHRow": "urdfkin.dh",
     "DHTable": "urdfkin.dh",
+    "DegreesWarning": "urdfkin.errors",
     "Finding": "urdfkin.lint",
     "FrameChain": "urdfkin.model.chain",
     "InputError": "urdfkin.errors",
@@ -76,6 +77,7 @@ __all__ = [
     "Certificate",
     "DHRow",
     "DHTable",
+    "DegreesWarning",
     "Finding",
     "FrameChain",
     "InputError",

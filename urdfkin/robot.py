@@ -485,7 +485,8 @@ class Robot(Displayable):
         >>> urdfkin.load("planar_two_link").limit_violations([[4.0, 0.0], [0.0, 0.0]])
         ['joint joint_1: 4 is outside [-3, 3]']
         """
-        return configuration.limit_violations(self.tree, configuration.checked(self.tree, q, "q"))
+        found = configuration.checked(self.tree, q, "q", look=False)  # the lines themselves ask about degrees
+        return configuration.limit_violations(self.tree, found)
 
     def integrate(self, q: Given, v: Given) -> FloatArray:
         """Return the configuration (..., nq) one second after `q` at constant joint velocities `v`.

@@ -236,6 +236,7 @@ def calibrate(
         complete: Used without poses: whether you will measure full poses, not positions alone.
         radians: Whether joint angles above one turn are radians, although they look like degrees.
         force: Whether to return a fit even if it is not plausible; the objections are then in `plausibility`.
+            Joint values that look like degrees are refused in any case, unless `radians` is True.
         every: Whether to write all fitted parameters, including those with a change of less than two standard
             deviations.
 
@@ -265,7 +266,10 @@ def calibrate(
         radians=as_bool(radians, "radians"),
         every=as_bool(every, "every"),
     )
-    if found.plausibility.objections and not as_bool(force, "force"):
+    force = as_bool(force, "force")
+    if found.plausibility.is_in_degrees:
+        raise ImplausibleError(found, "if these values are radians, pass radians=True")
+    if found.plausibility.objections and not force:
         raise ImplausibleError(found, "to return this fit anyway, pass force=True")
     return found
 
@@ -354,7 +358,7 @@ def _check_measured(
     if isinstance(model.source, DHTable):
         path_q = model.coupling.checked(q, "q")
     else:
-        path_q = model.coupling.select(robot.tree, np.atleast_2d(checked(robot.tree, q, "q")))
+        path_q = model.coupling.select(robot.tree, np.atleast_2d(checked(robot.tree, q, "q", look=False)))
     values = model.coupling.values(path_q)
     if len(values) != len(T) or values.ndim != 2:
         raise InputError(

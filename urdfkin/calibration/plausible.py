@@ -28,7 +28,7 @@ from urdfkin.calibration.fit import (
 )
 from urdfkin.calibration.parameters import Model, Parameter
 from urdfkin.comparison.result import angle, length
-from urdfkin.model.tree import FloatArray, JointKind, KinematicTree
+from urdfkin.model.tree import LARGEST_ANGLE, FloatArray, JointKind, KinematicTree, far_outside
 
 #: Limits of the rms position error as shares of the reach. Above the first, a fit is refused. The second and
 #: third limits apply together with `_UNEXPLAINED` and `_HARDLY_BELOW`. Above the last, corrections of
@@ -43,12 +43,6 @@ _HARDLY_BELOW = 0.7
 #: Limits of the rms orientation error, radians. Above the first, a fit is refused. Above the second,
 #: corrections of mistakes are tried.
 _MISTURNED, _SUSPECT_TURN = 0.2, 0.005
-#: Largest plausible joint angle, radians. It is more than one turn, because some industrial wrists turn 400
-#: degrees.
-_TURN = 2.5 * math.pi
-#: Smallest excess over a joint's limits that counts, in radians or metres, and as a share of the joint's
-#: range.
-_OUTSIDE, _OF_RANGE = 0.5, 0.25
 #: Largest plausible tilt of a joint's axis, radians, and largest plausible gain.
 _TILTED, _GAINED = 0.5, 0.5
 #: Two configurations count as one if their joint values (rad, m) differ by less than this number.
@@ -73,10 +67,12 @@ class Plausibility:
     Attributes:
         objections: Reasons why the fit is refused; empty for a plausible one.
         reason: The likeliest mistake and its remedy; None where no correction makes the fit plausible.
+        is_in_degrees: Whether joint angles look like degrees. Then only `radians` gives the fit.
     """
 
     objections: tuple[str, ...] = ()
     reason: str | None = None
+    is_in_degrees: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,28 +104,31 @@ def judge(model: Model, ended: Ended, *, radians: bool) -> Plausibility:
     """
     few = _too_few(ended)
     misfits = [*_misfits(model, ended), *_extreme_parameters(model, ended)]
-    ranges = [*_out_of_range(model, ended.q, radians=radians, misfit=bool(misfits or few))]
+    turned, outside = _out_of_range(model, ended.q)
+    in_degrees = bool(turned) and not radians
+    beyond = f"joint values of more than one turn look like degrees: joint {_list(turned)}"
+    ranges = [beyond] if in_degrees else []
+    if outside and (misfits or few):
+        ranges.append(f"joint values are far outside the limits: joint {_list(outside)}")
     objections = [*ranges, *misfits, *few]
     reach, fitted = _reach(model, ended), ended.fitted
     metres, turn = fitted.rms()
     zeros = _turned_zeros(model, ended)
     is_suspect = metres > _SUSPECT * reach or (turn or 0.0) > _SUSPECT_TURN
     if few or not (objections or is_suspect or zeros):
-        return Plausibility(tuple(objections))
+        return Plausibility(tuple(objections), is_in_degrees=in_degrees)
     limit = (_NOT_WORSE if objections or zeros else _BETTER) * _left(ended, reach)
     better = _likeliest(model, ended, limit, reach)
     if better is None:
-        return Plausibility(tuple(objections))
+        return Plausibility(tuple(objections), is_in_degrees=in_degrees)
     if not objections:
-        turned = f"a joint zero changed by half a turn, joint {_list(zeros)}; " if zeros else ""
+        half = f"a joint zero changed by half a turn, joint {_list(zeros)}; " if zeros else ""
         objections = [
-            f"{turned}an rms error of {_rms(fitted)}, but only {_rms(better.ended.fitted)} with a"
+            f"{half}an rms error of {_rms(fitted)}, but only {_rms(better.ended.fitted)} with a"
             " correction of the data"
         ]
-    return Plausibility(
-        tuple(objections),
-        f"{better.correction.reason} (after this correction the rms error is {_rms(better.ended.fitted)})",
-    )
+    corrected = f"after this correction the rms error is {_rms(better.ended.fitted)}"
+    return Plausibility(tuple(objections), f"{better.correction.reason} ({corrected})", in_degrees)
 
 
 # -- objections --------------------------------------------------------------------------------------
@@ -219,23 +218,23 @@ def _changes(model: Model, ended: Ended) -> Iterator[tuple[Parameter, float, flo
             yield parameter, moved, abs(moved) - _UNCERTAIN * deviation
 
 
-def _out_of_range(model: Model, q: FloatArray, *, radians: bool, misfit: bool) -> Iterator[str]:
-    """Yield objections to joint values that look like degrees or millimetres."""
+def _out_of_range(model: Model, q: FloatArray) -> tuple[list[str], list[str]]:
+    """Return the joints with values that look like degrees, and the others with values far outside limits.
+
+    A joint of which `configuration.warn_of_degrees` warns is among the first.
+    """
     largest = dict(zip(model.coupling.names, np.abs(q).max(axis=0, initial=0.0).tolist(), strict=True))
     turned, outside = dict[str, str](), dict[str, str]()
     for name, is_turning, lower, upper in _coordinates(model):
         column = q[:, model.coupling.names.index(name)]
-        over = max(float(column.max()) - upper, lower - float(column.min()))
-        far = over > max(_OUTSIDE, _OF_RANGE * (upper - lower) if math.isfinite(upper - lower) else 0.0)
+        ends = far_outside(lower, upper)
+        far = float(column.min()) < ends[0] or float(column.max()) > ends[1]
         is_limited = math.isfinite(lower) and math.isfinite(upper)
-        if is_turning and largest[name] > _TURN and (far or not is_limited):
+        if is_turning and largest[name] > LARGEST_ANGLE and (far or not is_limited):
             turned[name] = f"{name!r} ({largest[name]:.4g})"
         elif far:
             outside[name] = f"{name!r} ({largest[name]:.4g}, limits {lower:.4g} to {upper:.4g})"
-    if turned and not radians:
-        yield f"joint values of more than one turn look like degrees: joint {_list(turned.values())}"
-    if outside and misfit:
-        yield f"joint values are far outside the limits: joint {_list(outside.values())}"
+    return list(turned.values()), list(outside.values())
 
 
 def _coordinates(model: Model) -> Iterator[tuple[str, bool, float, float]]:

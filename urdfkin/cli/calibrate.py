@@ -108,7 +108,8 @@ def command(
     and --ur, the command lists which parameters are identifiable in principle.
 
     A calibration that is not plausible is refused with the likeliest reason: joint angles in degrees, rows of
-    q shifted against the poses, or the sign of a joint. Then nothing is written without --force.
+    q shifted against the poses, or the sign of a joint. Then nothing is written without --force; values that
+    look like degrees also need --radians.
 
     Exit 0: verified. 1: Pinocchio disagrees. 2: bad input. 3: not checked, or refused.
     """
@@ -142,8 +143,9 @@ def command(
     if written is None or (found is not None and found.fitted is None):
         answer()
     if found is not None and found.plausibility.objections:
-        say(f"urdfkin: {'warning' if context.params['force'] else 'error'}: {_refusal(found)}", err=True)
-        if not context.params["force"]:
+        refused = found.plausibility.is_in_degrees or not context.params["force"]
+        say(f"urdfkin: {'error' if refused else 'warning'}: {_refusal(found)}", err=True)
+        if refused:
             answer(code=3)
     if written.origins:
         parts.append(moved_table(written))
@@ -161,6 +163,8 @@ def command(
 def _refusal(found: Calibration) -> ImplausibleError:
     from urdfkin.calibration.calibrate import ImplausibleError  # noqa: PLC0415
 
+    if found.plausibility.is_in_degrees:
+        return ImplausibleError(found, "if these values are radians, add --radians")
     return ImplausibleError(found, "to write this calibration anyway, add --force")
 
 
@@ -180,7 +184,7 @@ def _reject_unused(context: click.Context, given: list[str]) -> None:
 
 def _run(context: click.Context, robot: Robot) -> Calibration:
     """Run the calibration that the command's options request."""
-    from urdfkin.calibration.calibrate import calibrate, read_poses  # noqa: PLC0415
+    from urdfkin.calibration.calibrate import fitted_model, read_poses  # noqa: PLC0415
     from urdfkin.dh.parse_table import is_table_file, read_table_or_screws  # noqa: PLC0415
     from urdfkin.dh.table import DHTable  # noqa: PLC0415
 
@@ -198,7 +202,7 @@ def _run(context: click.Context, robot: Robot) -> Calibration:
     )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the table is loaded again here; do not repeat its warnings
-        return calibrate(
+        return fitted_model(
             source,
             q,
             T,
@@ -210,7 +214,6 @@ def _run(context: click.Context, robot: Robot) -> Calibration:
             complete=not options["positions"],
             radians=options["radians"],
             every=options["every"],
-            force=True,
         )
 
 

@@ -21,7 +21,7 @@ from typing import Any, TextIO
 
 import click
 
-from urdfkin.errors import SourceError
+from urdfkin.errors import DegreesWarning, SourceError
 from urdfkin.errors.escape import COMMAND_ANYWHERE, COMMANDS, escape, printable
 
 #: Exit code when the reader of a pipe has exited: 128 + SIGPIPE, as in shells.
@@ -34,6 +34,8 @@ def prepare() -> None:
     sys.stdout = _with_errors(sys.stdout, 1)
     sys.stderr = _with_errors(sys.stderr, 2)
     warnings.showwarning = _warn
+    # Commands print a line about limits and degrees themselves.
+    warnings.filterwarnings("ignore", category=DegreesWarning)
 
 
 def finish() -> None:

@@ -17,6 +17,7 @@ from urdfkin.compiled import preload
 from urdfkin.compiled.kept import compiling
 from urdfkin.compiled.kernel_args import KernelArgs
 from urdfkin.compiled.plan import CompiledTree
+from urdfkin.model.configuration import warn_of_degrees
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -164,6 +165,7 @@ class PreparedFrame:
 
         if not arrays_are_known():
             return None
+        warn_of_degrees(self._robot.tree, q)  # of the first configuration only: later calls cost nothing more
         compute, task = single(quantity, self._plan, self.reference)
         self._robot.verifier.ledger.account(quantity).counters.append((task, KernelArgs.COUNT))
         setattr(self, f"_{quantity}", compute)

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import difflib
 import heapq
+import sys
+import warnings
 from collections.abc import Callable, Iterable
 from enum import Enum
 from typing import Any, Self, TypeVar
@@ -83,10 +85,28 @@ class Question(Enum):
     GRAVITY = "gravity-in-an-acceleration"
     FLOATING_BASES = "floating-bases"
     LOCKED_JOINTS = "locked-joints"
+    DEGREES = "degrees"
     SINGULARITY = "singularity"
 
     def __str__(self) -> str:
         return f"see `urdfkin explain {self.value}`"
+
+
+class DegreesWarning(UserWarning):
+    """Values of q look like degrees; urdfkin takes radians.
+
+    >>> import urdfkin
+    >>> issubclass(urdfkin.DegreesWarning, UserWarning)
+    True
+    """
+
+
+def warn_caller(message: str, category: type[Warning]) -> None:
+    """Issue a warning at the line that called the package."""
+    level, frame = 1, sys._getframe()
+    while frame.f_back is not None and frame.f_globals["__name__"].startswith("urdfkin."):
+        level, frame = level + 1, frame.f_back
+    warnings.warn(message, category, stacklevel=level)
 
 
 _E = TypeVar("_E", bound="UrdfkinError")

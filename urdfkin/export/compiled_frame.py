@@ -33,6 +33,7 @@ from urdfkin.compiled.program import LANES
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.export.c import Layout, advance, framed, spare, unit
 from urdfkin.export.code import Code, bare
+from urdfkin.model.configuration import warn_of_degrees
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -322,6 +323,7 @@ class CompiledFrame:
         row = QUANTITIES[name]
         if (core := self._machine_code(row)) is None:
             return None
+        warn_of_degrees(self._tree, q)  # of the first configuration only: later calls cost nothing more
         compute, task = called(core, len(row.inputs), row.own_shape(self._plan.nv), self._plan)
         self._robot.verifier.ledger.account(name).counters.append((task, KernelArgs.COUNT))
         setattr(self, f"_{row.method}", compute)

@@ -18,12 +18,21 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.errors import InputError, NotFiniteError, Question
+from urdfkin.errors import DegreesWarning, InputError, NotFiniteError, Question, warn_caller
 from urdfkin.kinematics.inputs import floats
 from urdfkin.kinematics.rotation.quaternion import NORM_TOLERANCE, unit_quaternions
 from urdfkin.model.configuration_like import CoordinateLayout, Given, Hint, by_name, listed
 from urdfkin.model.ranges import coordinate_ranges, narrowed_ranges
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, frozen
+from urdfkin.model.tree import (
+    LARGEST_ANGLE,
+    FloatArray,
+    Joint,
+    JointKind,
+    KinematicTree,
+    far_outside,
+    frozen,
+    is_bounded,
+)
 
 #: Tolerance of `from_pinocchio` (rad or m) for the coordinate of a mimic joint.
 _MIMIC_TOLERANCE = 1e-9
@@ -284,15 +293,22 @@ def numbers(tree: KinematicTree, value: Given, what: str) -> FloatArray:
     return array
 
 
-def shaped(tree: KinematicTree, value: Given, what: str) -> FloatArray:
-    """Return the same as `numbers`, with unit quaternions; raises InputError."""
+def shaped(tree: KinematicTree, value: Given, what: str, *, look: bool = True) -> FloatArray:
+    """Return the same as `numbers`, with unit quaternions; raises InputError.
+
+    With `look`, values of q that look like degrees cause a `DegreesWarning`.
+    """
     array = numbers(tree, value, what)
-    return with_unit_quaternions(tree, array) if what == "q" else array
+    if what != "q":
+        return array
+    if look:
+        warn_of_degrees(tree, array)
+    return with_unit_quaternions(tree, array)
 
 
-def checked(tree: KinematicTree, value: Given, what: str) -> FloatArray:
+def checked(tree: KinematicTree, value: Given, what: str, *, look: bool = True) -> FloatArray:
     """Return the same as `shaped`; raises NotFiniteError as well if a number is not finite."""
-    array = shaped(tree, value, what)
+    array = shaped(tree, value, what, look=look)
     if not np.isfinite(array).all():
         where = np.argwhere(~np.isfinite(array))[0]
         raise NotFiniteError(
@@ -328,14 +344,48 @@ def _violations(tree: KinematicTree, q: FloatArray) -> Iterator[tuple[Joint, str
 def _degrees(joint: Joint, value: float) -> str:
     """Return the hint "degrees?" if the value looks like degrees, else "".
 
-    A value looks like degrees if it exceeds one turn in radians, has at most six digits, and is within the
-    limits when it is read as degrees.
+    A value looks like degrees if it is far outside the limits of a revolute joint, beyond `LARGEST_ANGLE`,
+    and within the limits when it is read as degrees.
     """
-    typed = f"{value:.6g}"
-    if not (joint.kind.turns and joint.limit and abs(value) > math.tau and float(typed) == value):
+    if not (joint.kind.turns and is_bounded(joint.limit) and abs(value) > LARGEST_ANGLE):
         return ""
-    allowed = joint.limit.lower <= math.radians(value) <= joint.limit.upper
-    return f"; degrees? write {typed}deg" if allowed else ""
+    lower, upper = far_outside(joint.limit.lower, joint.limit.upper)
+    if lower <= value <= upper or not joint.limit.lower <= math.radians(value) <= joint.limit.upper:
+        return ""
+    return f"; degrees? write {value:.6g}deg"
+
+
+#: Number of configurations of a batch in which `warn_of_degrees` looks. A batch has one unit, so some of its
+#: configurations are enough.
+_LOOKED_AT = 64
+#: Up to this number of values, Python's `max` is faster than NumPy's.
+_FEW = 64
+
+
+def degrees_lines(tree: KinematicTree, q: FloatArray) -> list[str]:
+    """Return the lines of `limit_violations` for values that look like degrees, in at most 64 of the rows.
+
+    Args:
+        tree: The robot.
+        q: (..., nq) rad, m.
+    """
+    if tree.least_implausible == math.inf or not q.size:
+        return []
+    if q.size > _LOOKED_AT * tree.nq:
+        most = max(1, int(_LOOKED_AT ** (1.0 / (q.ndim - 1))))
+        q = q[tuple(slice(None, None, -(-size // most)) for size in q.shape[:-1])]
+    largest = max(map(abs, q.ravel().tolist())) if q.size <= _FEW else max(q.max(), -q.min())
+    if not largest > tree.least_implausible:
+        return []
+    return [words for joint, words in _violations(tree, q) if not joint.mimic and "; degrees? " in words]
+
+
+def warn_of_degrees(tree: KinematicTree, q: FloatArray) -> None:
+    """Issue a `DegreesWarning` at the caller's line if values of q (..., nq) look like degrees."""
+    if lines := degrees_lines(tree, q):
+        more = f" ({len(lines) - 1} more joints likewise)" if len(lines) > 1 else ""
+        advice = "q is in radians; numpy.radians converts degrees"
+        warn_caller(f"{tree.name}: {lines[0]}{more}: {advice}; {Question.DEGREES}", DegreesWarning)
 
 
 def _own_values(tree: KinematicTree, q: FloatArray) -> Iterator[FloatArray | None]:

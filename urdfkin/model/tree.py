@@ -82,6 +82,24 @@ class Limit:
     effort: float
 
 
+#: Largest plausible joint angle, radians. It is more than one turn, because some industrial wrists turn 400
+#: degrees.
+LARGEST_ANGLE = 2.5 * math.pi
+#: Smallest excess over a joint's limits that is far outside, in radians or metres, and as a share of the
+#: joint's range.
+_OUTSIDE, _OF_RANGE = 0.5, 0.25
+
+
+def far_outside(lower: float, upper: float) -> tuple[float, float]:
+    """Return the ends beyond which a value is far outside the limits.
+
+    >>> far_outside(-2.0, 2.0), far_outside(-float("inf"), 2.0)
+    ((-3.0, 3.0), (-inf, 2.0))
+    """
+    far = max(_OUTSIDE, _OF_RANGE * (upper - lower)) if math.isfinite(upper - lower) else 0.0
+    return lower - far, upper + far
+
+
 def is_bounded(limit: Limit | None) -> TypeGuard[Limit]:
     """Return whether there is a limit with finite `lower` and `upper`."""
     return limit is not None and math.isfinite(limit.lower) and math.isfinite(limit.upper)
@@ -292,6 +310,21 @@ class KinematicTree:
             self.joint_index(joint.mimic.leader) if joint.mimic else i for i, joint in enumerate(self.joints)
         )
         return tuple(int(own[i]) for i in leaders)
+
+    @cached_property
+    def plausible_angles(self) -> FloatArray:
+        """(2, nq) ends beyond which a value cannot be an angle in radians; infinite for other coordinates."""
+        ends = np.tile([[-np.inf], [np.inf]], self.nq)
+        for joint, at in zip(self.joints, self.q_index, strict=True):
+            if joint.nq == 1 and joint.kind.turns and is_bounded(joint.limit):
+                lower, upper = far_outside(joint.limit.lower, joint.limit.upper)
+                ends[:, at] = min(lower, -LARGEST_ANGLE), max(upper, LARGEST_ANGLE)
+        return frozen(ends)
+
+    @cached_property
+    def least_implausible(self) -> float:
+        """Smallest size of the numbers of `plausible_angles`; infinite without such a number."""
+        return float(np.abs(self.plausible_angles).min(initial=np.inf))
 
     # -- names ---------------------------------------------------------------------------------------
 

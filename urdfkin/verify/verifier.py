@@ -6,15 +6,13 @@ returns.
 
 from __future__ import annotations
 
-import sys
-import warnings
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from urdfkin.compiled.plan import IntArray
-from urdfkin.errors import RangeError
+from urdfkin.errors import RangeError, warn_caller
 from urdfkin.kinematics.roundings import EPS, NOT_ZERO, of_joints
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.tree import FloatArray, KinematicTree
@@ -370,8 +368,4 @@ def theirs_of(quantity: Quantity, oracle: Oracle, asked: QueryBatch) -> FloatArr
 
 
 def _warn(reason: str) -> None:
-    """Issue a warning at the line that called the package."""
-    level, frame = 1, sys._getframe()
-    while frame.f_back is not None and frame.f_globals["__name__"].startswith("urdfkin."):
-        level, frame = level + 1, frame.f_back
-    warnings.warn(f"not verified: {reason}", NotVerifiedWarning, stacklevel=level)
+    warn_caller(f"not verified: {reason}", NotVerifiedWarning)

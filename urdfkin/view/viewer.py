@@ -18,7 +18,7 @@ import numpy as np
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import UrdfkinError
 from urdfkin.errors.escape import markdown_text, printable
-from urdfkin.model.configuration import checked
+from urdfkin.model.configuration import checked, degrees_lines
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, Joint
@@ -477,11 +477,11 @@ class Viewer:
             return
         with self._lock:
             try:
-                self.q = checked(self.robot.tree, self.words_of_q.value, "q").copy()
+                self.q = checked(self.robot.tree, self.words_of_q.value, "q", look=False).copy()
             except UrdfkinError as error:
                 self.wrong.content = markdown_text(str(error))
                 return
-            self.wrong.content = ""
+            self.wrong.content = markdown_text("; ".join(degrees_lines(self.robot.tree, self.q)))
             self.sliders.show(self.q)
             self.update()
 
