@@ -165,8 +165,11 @@ class PreparedFrame:
 
         if not arrays_are_known():
             return None
-        warn_of_degrees(self._robot.tree, q)  # of the first configuration only: later calls cost nothing more
         compute, task = single(quantity, self._plan, self.reference)
         self._robot.verifier.ledger.account(quantity).counters.append((task, KernelArgs.COUNT))
         setattr(self, f"_{quantity}", compute)
-        return compute(q, *others)
+        if (found := compute(q, *others)) is not None:
+            warn_of_degrees(
+                self._robot.tree, q
+            )  # the first configuration only: later calls cost nothing more
+        return found

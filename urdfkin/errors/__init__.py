@@ -104,7 +104,7 @@ class DegreesWarning(UserWarning):
 def warn_caller(message: str, category: type[Warning]) -> None:
     """Issue a warning at the line that called the package."""
     level, frame = 1, sys._getframe()
-    while frame.f_back is not None and frame.f_globals["__name__"].startswith("urdfkin."):
+    while frame.f_back is not None and str(frame.f_globals.get("__name__")).startswith("urdfkin."):
         level, frame = level + 1, frame.f_back
     warnings.warn(message, category, stacklevel=level)
 

@@ -323,11 +323,12 @@ class CompiledFrame:
         row = QUANTITIES[name]
         if (core := self._machine_code(row)) is None:
             return None
-        warn_of_degrees(self._tree, q)  # of the first configuration only: later calls cost nothing more
         compute, task = called(core, len(row.inputs), row.own_shape(self._plan.nv), self._plan)
         self._robot.verifier.ledger.account(name).counters.append((task, KernelArgs.COUNT))
         setattr(self, f"_{row.method}", compute)
-        return compute(q, *others)
+        if (found := compute(q, *others)) is not None:
+            warn_of_degrees(self._tree, q)  # the first configuration only: later calls cost nothing more
+        return found
 
     def _machine_code(self, row: Quantity) -> Any:
         """Return the function `task`, compiled and checked once; None without a compiler."""

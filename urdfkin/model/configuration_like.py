@@ -140,7 +140,7 @@ keeps: 'neutral, elbow=...'
             InputError: the name is that of a fixed joint or a mimic joint, or not a text.
         """
         for name in names:
-            if name not in self.names and name not in self.spans:
+            if not isinstance(name, str) or (name not in self.names and name not in self.spans):
                 raise self._not_a_coordinate(name, where)
 
     def _pose(self, word: str, where: str) -> FloatArray:
