@@ -94,14 +94,14 @@ def test_all_configurations_of_a_batch_in_degrees_need_only_some_looks(ur5: Robo
     looked = list[int]()
 
     class Counted(np.ndarray):
-        def max(self, *args: Any, **options: Any) -> Any:
+        def ravel(self, *args: Any, **options: Any) -> Any:
             looked.append(self.size)
-            return np.asarray(self).max(*args, **options)
+            return np.asarray(self).ravel(*args, **options)
 
     q = np.degrees(ur5.sample(100_000)).reshape(100, 1000, 6)
     assert degrees_lines(ur5.tree, q.view(Counted))
     assert looked
-    assert looked[0] <= 64 * 6
+    assert looked[0] <= 16 * 6
 
 
 def test_a_batch_in_radians_is_not_copied_and_hardly_read(ur5: Robot) -> None:
