@@ -335,7 +335,7 @@ def test_calibration_of_a_locked_robot_writes_the_origins_of_the_whole_text() ->
     [
         ({"elbow": 1.0}, "unknown coordinate 'elbow'"),
         ({"panda_finger_joint2": 0.01}, "it mimics panda_finger_joint1: give that value"),
-        ({"panda_joint8": 0.0}, "it is fixed"),
+        ({"panda_joint8": 0.0}, "leave out this fixed joint"),
         ({"panda_finger_joint1": 4.0}, "4 is outside [0, 0.04]"),
         ({"panda_joint1": 90}, "degrees? write 90deg"),
         ({"panda_joint1": [1.0, 2.0]}, "needs one value"),
@@ -380,7 +380,7 @@ def test_a_floating_joint_is_not_locked(options: dict[str, Any]) -> None:
 
 def test_a_locked_joint_is_named_in_the_errors_about_q() -> None:
     locked = urdfkin.load("planar_two_link").locked({"joint_1": 0.5})
-    with pytest.raises(urdfkin.InputError, match=r"locked at 0\.5: leave it out"):
+    with pytest.raises(urdfkin.InputError, match=r"leave out this joint, locked at 0\.5"):
         locked.placement({"joint_1": 0.5, "joint_2": 0.0})
     with pytest.raises(urdfkin.InputError, match=r"locked at 0\.5"):
         locked.locked({"joint_1": 0.4})
