@@ -311,7 +311,8 @@ def robot_of(
         base_frame=text.entry.base if text.entry else None,
         tip_frame=text.entry.tip if text.entry else None,
     )
-    return robot.locked(lock, joints) if lock or joints is not None else robot
+    is_plain = isinstance(lock, str | Mapping) and not lock and joints is None
+    return robot if is_plain else robot.locked(lock, joints)
 
 
 def _unverifiable(findings: tuple[Finding, ...]) -> str | None:

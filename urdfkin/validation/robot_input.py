@@ -146,7 +146,7 @@ def subject(
 ) -> RobotInput:
     """Return one robot as plain data. Raise any error of reading it."""
     found = _subject(robot, mimic, root_joint, xacro_args)
-    if not lock and joints is None:
+    if isinstance(lock, str | Mapping) and not lock and joints is None:
         return found
     return replace(found, origin=found.read().locked(lock, joints).origin)
 
