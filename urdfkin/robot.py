@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike
 from urdfkin.compiled.batch import in_parts
 from urdfkin.compiled.plan import CompiledTree, compile_tree
 from urdfkin.compiled.prepared import PreparedFrame
-from urdfkin.conventions import Convention, ConventionRobot, Conversion, find_convention
 from urdfkin.errors import InputError, RangeError, RepresentationSingularityError
 from urdfkin.errors.display import Displayable, TextDocument
 from urdfkin.errors.escape import log_line
@@ -67,6 +66,7 @@ from urdfkin.verify.verifier import Verifier
 
 if TYPE_CHECKING:
     from urdfkin.compiled.breakdown import AccelerationBreakdown
+    from urdfkin.conventions import Convention, ConventionRobot, Conversion
     from urdfkin.dh.screws import ProductOfExponentials
     from urdfkin.dh.table import DHTable
     from urdfkin.dh.tree_parameters import TreeParameters
@@ -623,6 +623,8 @@ class Robot(Displayable):
         >>> isaaclab.to(a1.neutral()).shape
         (12,)
         """
+        from urdfkin.conventions import Conversion, find_convention  # noqa: PLC0415  nothing is paid without one
+
         return Conversion(self.tree, self.urdf, find_convention(name), joints)
 
     def with_convention(
@@ -637,6 +639,8 @@ class Robot(Displayable):
         >>> arm.velocity([0.0, 0.0], [1.0, 0.0], "tip").tolist()  # angular first
         [0.0, 0.0, 1.0, 0.0, 0.9, 0.0]
         """
+        from urdfkin.conventions import ConventionRobot  # noqa: PLC0415
+
         return ConventionRobot(self, self.convention(name, joints))
 
     # -- computation --------------------------------------------------------------------------------
