@@ -64,6 +64,7 @@ def test_the_list_of_names_is_that_of_the_data_and_each_has_evidence() -> None:
     own = {"urdfkin", "urdf", "alphabetical"}  # nothing to run: the file itself, and Python's sort
     measured = {name for name in BUILT_IN if find_convention(name).evidence == "measured"}
     assert measured == own | set(LIBRARIES)
+    assert {name for name in BUILT_IN if find_convention(name).measured} == set(LIBRARIES)
 
 
 @pytest.mark.parametrize("convention", [*map(find_convention, FLOATING), *ODD], ids=lambda c: c.name)

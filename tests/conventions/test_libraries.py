@@ -2,7 +2,8 @@
 
 The differences are within the bound that `tests/conventions/libraries.py` derives. MuJoCo and Pinocchio run
 everywhere. The others run where they are installed:
-`pip install drake idyntree roboticstoolbox-python newton[importers] urdf-usd-converter`.
+`pip install drake idyntree roboticstoolbox-python newton[importers] urdf-usd-converter`;
+then `pip uninstall usd-core` and `pip install --force-reinstall usd-exchange`, which has the same modules.
 """
 
 from __future__ import annotations
