@@ -84,10 +84,16 @@ def test_a_wrong_convention_is_one_line(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ('joints = ["joint_1"]', "a joint has no column: found joint_2"),
+        ('joints = ["joint_1"]', "the order of joints lacks a joint: found joint_2"),
         ('joints = ["joint_1", "joint_2", "elbow"]', "unknown joint 'elbow'"),
-        ('[joint.joint_1]\nname = "joint_2"', "two columns have the same name: found 'joint_2'"),
-        ('joints = ["joint_2", "joint_2"]', "two columns have the same name: found 'joint_2'"),
+        (
+            '[joint.joint_1]\nname = "joint_2"',
+            "two joints have the same name in the convention: found 'joint_2'",
+        ),
+        (
+            'joints = ["joint_2", "joint_2"]',
+            "two joints have the same name in the convention: found 'joint_2'",
+        ),
     ],
 )
 def test_a_file_without_a_joint_or_with_two_columns_of_one_name_is_one_error(

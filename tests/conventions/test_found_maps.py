@@ -154,7 +154,7 @@ def test_a_coordinate_of_one_model_only_is_an_error_that_names_its_joint() -> No
     shorter = urdfkin.load(b.urdf.replace('name="b" type="revolute"', 'name="b" type="fixed"'), verify=False)
     with pytest.raises(InputError, match=r"a joint of B has no joint of A.*found b"):
         urdfkin.same(shorter, b, bounds=False).convention()
-    with pytest.raises(InputError, match=r"a joint has no column.*found b"):
+    with pytest.raises(InputError, match=r"the order of joints lacks a joint.*found b"):
         urdfkin.same(a, shorter, bounds=False).convention()
 
 
