@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from urdfkin.model.base_motion import BaseMotion
     from urdfkin.model.chain import FrameChain
     from urdfkin.model.reference import Reference
+    from urdfkin.motion.frame_motion import frame_motion
+    from urdfkin.motion.trajectory import read_trajectory
     from urdfkin.robot import Robot
     from urdfkin.urdf.catalogue import robots
     from urdfkin.validation.campaign import validate
@@ -55,8 +57,10 @@ _HOMES = {
     "calibrate": "urdfkin.calibration.calibrate",
     "check": "urdfkin.lint",
     "diff": "urdfkin.comparison.diff",
+    "frame_motion": "urdfkin.motion.frame_motion",
     "load": "urdfkin.loading",
     "read_table": "urdfkin.dh",
+    "read_trajectory": "urdfkin.motion.trajectory",
     "robots": "urdfkin.urdf.catalogue",
     "same": "urdfkin.comparison.verdict",
     "table_from_rows": "urdfkin.dh",
@@ -92,8 +96,10 @@ __all__ = [
     "calibrate",
     "check",
     "diff",
+    "frame_motion",
     "load",
     "read_table",
+    "read_trajectory",
     "robots",
     "same",
     "table_from_rows",

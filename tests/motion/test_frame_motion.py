@@ -17,7 +17,7 @@ N = 7
 def motion(robot: Robot, reference: str = "local_world_aligned") -> FrameMotion:
     rng = np.random.default_rng(0)
     v, a = rng.standard_normal((2, N, robot.nv))
-    return frame_motion(robot, robot.sample(N, 0), v, a, robot.tip_frame, reference)
+    return frame_motion(robot, (robot.sample(N, 0), v, a), robot.tip_frame, reference)
 
 
 @pytest.mark.parametrize("reference", ["local", "world", "local_world_aligned"])
@@ -26,7 +26,7 @@ def test_it_is_what_the_robots_methods_give_and_pinocchio_confirms(reference: st
     rng = np.random.default_rng(0)
     v, a = rng.standard_normal((2, N, robot.nv))
     q, tip = robot.sample(N, 0), robot.tip_frame
-    x = frame_motion(robot, q, v, a, tip, reference)
+    x = frame_motion(robot, (q, v, a), tip, reference)
     np.testing.assert_array_equal(x.placement, robot.placement(q, tip))
     np.testing.assert_array_equal(x.velocity, robot.velocity(q, v, tip, reference))
     np.testing.assert_array_equal(x.acceleration, robot.acceleration(q, v, a, tip, reference))
@@ -61,7 +61,7 @@ def test_a_frame_that_nothing_moves_has_no_manipulability() -> None:
     robot = urdfkin.load("ur5")
     q = robot.sample(N, 0)
     still = np.zeros_like(q)
-    assert not frame_motion(robot, q, still, still, "base_link").manipulability().any()
+    assert not frame_motion(robot, (q, still, still), "base_link").manipulability().any()
 
 
 @pytest.mark.parametrize("reference", ["local", "world", "local_world_aligned"])
@@ -71,10 +71,10 @@ def test_one_configuration_alone_and_in_a_batch_have_the_same_manipulability(
 ) -> None:
     robot = urdfkin.load(SLIDE)
     q, still = np.array([[0.3, 0.0], [0.3, 1.0]]), np.zeros((2, 2))
-    both = frame_motion(robot, q, still, still, "c", reference).manipulability(rows)
+    both = frame_motion(robot, (q, still, still), "c", reference).manipulability(rows)
     for k in range(2):
         one = slice(k, k + 1)
-        alone = frame_motion(robot, q[one], still[one], still[one], "c", reference).manipulability(rows)
+        alone = frame_motion(robot, (q[one], still[one], still[one]), "c", reference).manipulability(rows)
         assert alone.tolist() == both[one].tolist()
 
 
@@ -82,6 +82,6 @@ def test_one_configuration_alone_and_in_a_batch_have_the_same_manipulability(
 def test_manipulability_is_the_robots_own(rows: str) -> None:
     robot, part = urdfkin.load(SLIDE), {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
     q, still = np.array([[0.3, 0.0], [0.3, 1.0]]), np.zeros((2, 2))
-    found = frame_motion(robot, q, still, still, "c").manipulability(part[rows])
+    found = frame_motion(robot, (q, still, still), "c").manipulability(part[rows])
     expected = robot.singular_values(q, "c", rows).manipulability.value
     np.testing.assert_allclose(found, expected, rtol=1e-14)

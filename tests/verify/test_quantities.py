@@ -149,7 +149,7 @@ def test_a_new_row_is_a_command_with_help_and_every_form() -> None:
 def test_a_new_row_is_checked_along_a_trajectory() -> None:
     robot = urdfkin.load("ur5")
     q = robot.sample(3)
-    x = frame_motion(robot, q, q, q, "tool0")
+    x = frame_motion(robot, (q, q, q), "tool0")
     assert x.agrees
     assert x.checks["angular velocity"].share.shape == (3,)
 

@@ -164,7 +164,9 @@ def find_convention(name: str | Path | Convention) -> Convention:
     path = Path(name)
     if path.suffix == ".toml" or exists(path):
         return read_convention(read_text(path), shortened(path), path.stem)
-    raise UnknownNameError("convention", str(name), BUILT_IN)
+    error = UnknownNameError("convention", str(name), BUILT_IN)
+    error.remedy = f"{error.remedy} `urdfkin order ROBOT` lists all; a file's name ends with .toml"
+    raise error
 
 
 def read_convention(text: str, where: str, name: str) -> Convention:

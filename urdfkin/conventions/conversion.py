@@ -651,8 +651,23 @@ class Conversion:
         Raises:
             InputError: a column of J belongs to several joints of the tool, because one mimics the other.
         """
+        return self.columns(q, self.six(J, -2))
+
+    def columns(self, q: Given, J: ArrayLike) -> FloatArray:
+        """Convert the columns of a matrix (..., rows, nv) with any rows: J M^-1.
+
+        Its rows are derivatives of numbers that the convention does not change, such as Euler angles.
+
+        Raises:
+            InputError: a column of J belongs to several joints of the tool, because one mimics the other.
+
+        >>> import urdfkin
+        >>> a1 = urdfkin.load("a1", verify=False)
+        >>> a1.convention("mujoco").columns(a1.neutral(), [range(12)])[0, :4].tolist()
+        [3.0, 4.0, 5.0, 0.0]
+        """
         self._demand_own_columns()
-        array = self.six(J, -2)
+        array = np.asarray(J, dtype=np.float64)
         if self._plain_v:
             return array if self._same_v else array[..., self._v_at]
         return array @ _for_frames(self.inverse_matrix(q), array.ndim)
