@@ -3,7 +3,8 @@
 A line is parameterised by s = 10 u^3 - 15 u^4 + 6 u^5 with u = t / duration. It starts and ends at rest, and
 its acceleration is continuous. If a file has no joint velocities, they are computed by central differences of
 the configurations, after the angles are unwrapped. The error of these differences falls with the square of
-the time step. Differences with half of the samples have four times the error, which gives an estimate of it.
+the time step; that of joint accelerations from configurations falls with the time step at both ends. The
+differences with half of the samples give an estimate of it.
 
 A log often wraps the angle of a wheel to [-pi, pi] or [0, 2 pi]. The jump from one end of this range to the
 other is not a motion. Its difference quotient, however, would be a huge joint velocity. The angle of a planar
@@ -19,8 +20,10 @@ import math
 import re
 import zipfile
 import zlib
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -187,8 +190,8 @@ class Trajectory:
             return self.rates
         v, a = self.errors
         return (
-            f"{self.rates}, of second order: largest errors about {v:.1e} (v) and {a:.1e} (a), in rad or m"
-            " per s and s^2, estimated with half of the samples"
+            f"{self.rates}; largest errors about {v:.1e} (v) and {a:.1e} (a), in rad or m per s and s^2,"
+            " estimated with half of the samples"
         )
 
 
@@ -324,7 +327,9 @@ def with_rates(tree: KinematicTree, x: Samples) -> Trajectory:
     if n >= 2 * _FEWEST - 1:
         half = slice(None, None, 2)
         coarse = _differences(tree, found.q[half], t[half], None if x.v is None else x.v[half])
-        errors = _error(v[half], coarse[0]), _error(a[half], coarse[1])
+        # With half of the samples, an error of second order is four times as large, one of first order twice.
+        order = 1 if x.v is None else 2
+        errors = _error(v[half], coarse[0], 2), _error(a[half], coarse[1], order)
     words = "by central differences" if x.v is None else "v as given, a by central differences of v"
     if found.joints:
         words += f", after unwrapping {', '.join(found.joints)}"
@@ -340,9 +345,9 @@ def _differences(
     return v, _gradient(v, t)
 
 
-def _error(fine: FloatArray, coarse: FloatArray) -> float:
-    """Estimate the largest error of second-order differences; with half of the samples it is four times."""
-    return float(np.abs(fine - coarse).max(initial=0.0)) / 3.0
+def _error(fine: FloatArray, coarse: FloatArray, order: int) -> float:
+    """Estimate the largest error of differences of some order from those with half of the samples."""
+    return float(np.abs(fine - coarse).max(initial=0.0)) / (2.0**order - 1.0)
 
 
 def _time_notes(t: FloatArray, *, given: bool) -> Iterator[str]:
@@ -467,23 +472,25 @@ def read_columns(
     >>> read_columns("a_deg\n90\n", "x.csv", "q", ["a"], units={"a": "rad"})["a"].tolist()
     [1.5707963267948966]
     """
-    rows = list(_rows(text, where))
+    rows = _rows(text, where)
     names, written = list(required), list[str]()
-    if rows and (named or _is_header(rows[0][1], names)):
-        line, cells = rows.pop(0)
+    first = next(rows, None)
+    if first is not None and (named or _is_header(first[1], names)):
+        line, cells = first
         headings = [_heading(cell, f"{where}:{line}", units or {}) for cell in cells]
         names, written = [name for name, _ in headings], [unit for _, unit in headings]
         if named and not {*names} & {*required, *optional} and all(parse_float(x) is not None for x in cells):
             raise InputError(
                 f"no header: the first line must name the columns of {what}",
                 where=f"{where}:{line}",
-                found=f"numbers: {listed(cells)}",
+                found=f"only numbers: {', '.join(cells[:3])}{', ...' if len(cells) > 3 else ''}",
                 remedy=f"write a line with names above it: {listed([*optional[:1], *required])}",
             )
-        _check_columns(names, f"{where}:{line}", what, required, optional)
-    table = np.empty((len(rows), len(names)))
-    for k, (line, cells) in enumerate(rows):
-        table[k] = numbers(cells, f"{where}:{line}", names)
+        _check_columns(names, cells, f"{where}:{line}", what, required, optional)
+    elif first is not None:
+        rows = chain([first], rows)
+    values = chain.from_iterable(numbers(cells, f"{where}:{line}", names) for line, cells in rows)
+    table = np.fromiter(values, np.float64).reshape(-1, max(1, len(names)))
     found = {name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(names)}
     return found | {
         name: _in_si(found[name], unit) for name, unit in zip(names, written, strict=False) if unit
@@ -597,13 +604,19 @@ def _is_header(cells: Sequence[str], names: Sequence[str]) -> bool:
 
 
 def _check_columns(
-    names: Sequence[str], where: str, what: str, required: Sequence[str], optional: Sequence[str]
+    names: Sequence[str],
+    headings: Sequence[str],
+    where: str,
+    what: str,
+    required: Sequence[str],
+    optional: Sequence[str],
 ) -> None:
-    known = {*required, *optional}
+    """Raise InputError if a column is unknown, missing or duplicate; `headings` are the names as written."""
+    known, given = {*required, *optional}, Counter(names)
     wrong = {
         "unknown": [name for name in names if name not in known],
-        "missing": [name for name in required if name not in names],
-        "duplicate": sorted({name for name in names if names.count(name) > 1}),
+        "missing": [name for name in required if name not in given],
+        "duplicate": sorted({h for name, h in zip(names, headings, strict=True) if given[name] > 1}),
     }
     if any(wrong.values()):
         also = f", and optionally {listed(optional)}" if optional else ""
