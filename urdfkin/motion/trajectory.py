@@ -306,7 +306,8 @@ def read_samples(robot: Robot, path: Path, conversion: Conversion | None = None)
     if not len(q):
         raise InputError("no samples", where=str(path), remedy="write one line for each sample")
     base = BaseMotion(*(data[name] for name in _BASE)) if _BASE[0] in data else None
-    return Samples(str(path), frozen(q), *(x if x is None else frozen(x) for x in (t, v, a)), base)
+    t, v, a = (x if x is None else frozen(x) for x in (t, v, a))
+    return Samples(str(path), frozen(q), t, v, a, base)
 
 
 def with_rates(tree: KinematicTree, x: Samples) -> Trajectory:
