@@ -504,8 +504,11 @@ _PER_SECOND = {
     **dict.fromkeys(("s", "sec", "second", "seconds"), 1.0),
     "ms": 1e3, "us": 1e6, "µs": 1e6, "ns": 1e9,
 }  # fmt: skip
-#: A unit at the end of a heading: `elbow_deg`, `elbow_deg_s`, `elbow_rad_per_s2`.
-_SUFFIX = re.compile(r"(.+)_(deg|rad|mm|m|s|ms|us|ns)(?:_(?:per_)?(s2?))?", re.DOTALL)
+#: A unit at the end of a heading: `v:elbow_deg_s`, `a:elbow_rad_per_s2`; `elbow_deg`.
+_SUFFIXES = (
+    re.compile(r"(.+)_(deg|rad|mm|m)_(?:per_)?(s2?)", re.DOTALL),
+    re.compile(r"(.+)_(deg|rad|mm|m|s|ms|us|ns)", re.DOTALL),
+)
 
 
 def _heading(cell: str, where: str, units: Mapping[str, str]) -> tuple[str, str]:
@@ -517,14 +520,15 @@ def _heading(cell: str, where: str, units: Mapping[str, str]) -> tuple[str, str]
     """
     if (name := _column_name(cell, units)) in units:
         return name, ""
-    unit = ""
+    found = list[tuple[str, str]]()
     if cell.endswith(("]", ")")):
-        at = cell.rfind("[" if cell.endswith("]") else "(")
-        name, unit = cell[: max(at, 0)].rstrip(), cell[at + 1 : -1]
-    elif match := _SUFFIX.fullmatch(cell):
-        name, unit = match[1], "/".join(filter(None, match.groups()[1:]))
-    if (name := _column_name(name, units)) in units:
-        return name, _unit(unit, f"{where}, {cell}", units[name])
+        at = max(cell.rfind("[" if cell.endswith("]") else "("), 0)
+        found.append((cell[:at].rstrip(), cell[at + 1 : -1]))
+    matches = (suffix.fullmatch(cell) for suffix in _SUFFIXES)
+    found += [(match[1], "/".join(match.groups()[1:])) for match in matches if match]
+    for heading, unit in found:
+        if (name := _column_name(heading, units)) in units:
+            return name, _unit(unit, f"{where}, {cell}", units[name])
     return cell, ""
 
 
