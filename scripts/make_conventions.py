@@ -144,9 +144,10 @@ print(qpos.shape, qvel.shape, J.shape)
 (19,) (18,) (6, 18)
 ```
 
-Every command that takes joint values has `--convention NAME`. --q, --v, --a, --trajectory and the result are the
-tool's numbers. Three results stay in urdfkin's convention: `imu` prints the accelerometer first, singular values
-are for joint velocities in rad/s and m/s, and the panels of `plot` and the sliders of `view` have the URDF's names.
+Every command that takes joint values has `--convention NAME`. --q, --v, --a, --trajectory and the result are
+the tool's numbers. Three results stay in urdfkin's convention: `imu` prints the accelerometer first, singular
+values are for joint velocities in rad/s and m/s, and the panels of `plot` and the sliders of `view` have the
+URDF's names.
 
 """
 #: The tools of each table: libraries of kinematics, and simulators and formats.

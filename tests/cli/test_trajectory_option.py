@@ -240,8 +240,9 @@ def test_a_base_of_the_options_or_of_the_file_moves_the_robot(
     np.testing.assert_allclose(np.array(shifted)[:, :3, 3] - fixed[:, :3, 3], [[1, 2, 3]] * N, atol=1e-15)
     T = np.tile(np.eye(4), (N, 1, 1))
     T[:, 0, 3] = 1.0
-    still = {f"base_{name}": np.zeros((N, 6)) for name in ("velocity", "acceleration")}
-    np.savez(tmp_path / "log.npz", **motion, base_placement=T, **still)
+    arrays: dict[str, Any] = {**motion, "base_placement": T}
+    arrays |= {f"base_{name}": np.zeros((N, 6)) for name in ("velocity", "acceleration")}
+    np.savez(tmp_path / "log.npz", **arrays)
     found = np.array(run(*words, "--trajectory", str(tmp_path / "log.npz")).data["result"])
     np.testing.assert_allclose(found[:, 0, 3] - fixed[:, 0, 3], 1.0, atol=1e-15)
     both = run(*words, "--trajectory", str(tmp_path / "log.npz"), "--base-placement", "0,0,0,0,0,0")

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 
 import urdfkin
+from tests.laws.test_imu import moving_base
 from tests.verify.test_singular_values import SLIDE
 from urdfkin.motion.frame_motion import FrameMotion, frame_motion
 from urdfkin.robot import Robot
@@ -85,3 +89,25 @@ def test_manipulability_is_the_robots_own(rows: str) -> None:
     found = frame_motion(robot, (q, still, still), "c").manipulability(part[rows])
     expected = robot.singular_values(q, "c", rows).manipulability.value
     np.testing.assert_allclose(found, expected, rtol=1e-14)
+
+
+def test_a_moving_base_of_a_trajectory_moves_the_frame_and_is_checked(tmp_path: Path) -> None:
+    robot, base, rng = urdfkin.load("ur5"), moving_base(5, 3), np.random.default_rng(2)
+    q, (v, a) = robot.sample(5, 1), rng.standard_normal((2, 5, 6))
+    fields: dict[str, Any] = {
+        f"base_{name}": getattr(base, name) for name in ("placement", "velocity", "acceleration")
+    }
+    np.savez(tmp_path / "log.npz", t=np.arange(5.0), q=q, v=v, a=a, **fields)
+    x = urdfkin.frame_motion(robot, urdfkin.read_trajectory(robot, tmp_path / "log.npz"), "tool0")
+    np.testing.assert_array_equal(x.placement, robot.placement(q, "tool0", base=base))
+    np.testing.assert_array_equal(x.velocity, robot.velocity(q, v, "tool0", base=base))
+    np.testing.assert_array_equal(x.acceleration, robot.acceleration(q, v, a, "tool0", base=base))
+    np.testing.assert_allclose(x.parts.total, x.acceleration, atol=1e-12)
+    assert x.agrees
+    assert repr(x) == "<FrameMotion of tool0: 5 samples, verified by Pinocchio>"
+
+
+def test_a_motion_of_two_arrays_is_refused() -> None:
+    robot = urdfkin.load("ur5")
+    with pytest.raises(urdfkin.InputError, match="a trajectory, or q, v and a: found 2 arrays"):
+        urdfkin.frame_motion(robot, (np.zeros((1, 6)), np.zeros((1, 6))), "tool0")

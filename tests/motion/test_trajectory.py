@@ -192,6 +192,11 @@ def test_a_heading_may_end_with_a_unit(heading: str, value: float) -> None:
     assert found.tolist() == [value]
 
 
+def test_a_joint_may_have_the_name_of_a_time() -> None:
+    found = read_columns("t,time\n1,2\n", "x.csv", "q", ["time"], ["t"], units={"t": "s", "time": "rad"})
+    assert {name: x.tolist() for name, x in found.items()} == {"t": [1.0], "time": [2.0]}
+
+
 @pytest.mark.parametrize(
     ("heading", "remedy"),
     [
@@ -211,7 +216,8 @@ def test_a_unit_that_does_not_fit_is_refused_with_those_that_do(heading: str, re
 
 def test_a_table_in_a_convention_is_that_motion(tmp_path: Path) -> None:
     robot = urdfkin.load("a1", root_joint="floating", verify=False)
-    x = line(robot, *robot.sample(2, seed=8), 2.0, 31)
+    start, end = robot.sample(2, seed=8)
+    x = line(robot, start, end, 2.0, 31)
     mujoco = robot.convention("mujoco")
     columns = {"time": x.t}
     for prefix, names, values in zip(

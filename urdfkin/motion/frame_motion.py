@@ -170,7 +170,7 @@ def frame_motion(
     call = Call(robot.tree, robot.plan, as_str(frame, "frame"), reference, base, given)
     inputs, reference, state = (call.q, *call.rates), call.reference, call.state
     ours = {row: call.compute(row.ours, call.plan, inputs, reference, base=state) for row in validated()}
-    reason = robot.verifier.cannot()
+    reason = robot.verifier.cannot(call.base)
     placement, velocity, acceleration, jacobian = (
         ours[row][:, 0] for row in (PLACEMENT, VELOCITY, ACCELERATION, JACOBIAN)
     )
@@ -189,7 +189,7 @@ def frame_motion(
 
 
 def _check(row: Quantity, robot: Robot, call: Call, ours: FloatArray) -> Check:
-    theirs, bound = held_against(row, robot.verifier.oracle(), call.part(slice(0, call.n)), ours)
+    theirs, bound = held_against(row, robot.verifier.oracle(call.base), call.part(slice(0, call.n)), ours)
     units = worst_of_each(ours, theirs, bound.scale, 2)
     k = np.broadcast_to(result_k(bound, units.shape), units.shape)
     return Check(units[:, 0], (units / k)[:, 0], k[:, 0])
