@@ -283,7 +283,7 @@ def trajectory_option(help_: str) -> Callable[[_F], _F]:
         "--trajectory",
         type=click.Path(path_type=Path),
         metavar="FILE",
-        help=f"{help_}: {files}.",
+        help=f"{help_} File: {files}.",
     )
 
 

@@ -42,7 +42,7 @@ EXAMPLE = "urdfkin plot ur5 --to 1,-1,1.2,0.3,0.5,0 --duration 2 --output ur5.sv
 @robot_argument
 @frame_option
 @reference_option
-@trajectory_option("Samples to plot")
+@trajectory_option("Samples to plot.")
 @convention_of_input_option
 @click.option(
     "--from",

@@ -40,7 +40,7 @@ EXAMPLE = "urdfkin view panda --q 0,-0.8,0,-2.4,0,1.6,0.8,0.04"
 @click.option(
     "--browser/--no-browser", default=None, help="Open the browser.  [default: if there is a screen]"
 )
-@trajectory_option("Samples to play")
+@trajectory_option("Samples to play.")
 @convention_of_input_option
 @click.option("--port", type=Whole(1, 65535), default=8080, show_default=True, help="Port to listen on.")
 def command(
