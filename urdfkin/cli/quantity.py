@@ -8,6 +8,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -158,28 +159,6 @@ _breakdown = click.option(
 )
 
 
-def _converted(
-    x: Inputs,
-    conversion: Conversion,
-    quantity: Quantity,
-    result: FloatArray,
-    reference: str = "local_world_aligned",
-) -> FloatArray:
-    """Return a result with the rows and columns of a convention."""
-    if quantity is IMU:
-        return result  # the reading of two instruments, in the same order in every tool
-    if quantity.axes == 1:
-        return conversion.six(result)
-    if quantity is ANALYTICAL_JACOBIAN:
-        return conversion.columns(x.q, result)
-    if quantity.name == "jacobian":
-        return conversion.jacobian(x.q, result)
-    J = x.robot.jacobian(x.q, x.frame, reference, base=x.base)
-    if quantity.name == "hessian":
-        return conversion.hessian(x.q, J, result)
-    return conversion.jacobian_rate(x.q, x.v, J, result)
-
-
 def command_of(quantity: Quantity) -> click.Command:
     """Make the command that computes a quantity."""
     has_breakdown = ACCELERATION_BREAKDOWN.command == f"{quantity.command} --breakdown"
@@ -198,7 +177,8 @@ def command_of(quantity: Quantity) -> click.Command:
             inputs = [getattr(x, letter) for letter in quantity.inputs]
             result = x.robot.compute(quantity.name, inputs, x.frame, reference, base=x.base)
             if x.conversion is not None:
-                result = _converted(x, x.conversion, quantity, result, reference)
+                J = partial(x.robot.jacobian, x.q, x.frame, reference, base=x.base)
+                result = x.conversion.result(quantity.name, (x.q, x.v), result, J)
         return _answer(x, quantity, result, reference if quantity.referred else None)
 
     summary = f"{quantity.summary[0].upper()}{quantity.summary[1:]} (eq. {', '.join(quantity.equations)})."
@@ -488,7 +468,7 @@ def analytical_jacobian_command(representation: str, nearest: float | None, **_:
     with compiling():
         J = x.robot.analytical_jacobian(x.q, x.frame, representation, nearest=nearest, base=x.base)
     if x.conversion is not None:
-        J = _converted(x, x.conversion, ANALYTICAL_JACOBIAN, J)
+        J = x.conversion.columns(x.q, J)
     row = replace(ANALYTICAL_JACOBIAN, labels=("x", "y", "z", *labels(representation)))
     return _answer(x.saying(representation=representation), row, J)
 
