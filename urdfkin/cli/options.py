@@ -293,13 +293,27 @@ def conversion_of(robot: Robot, name: str | None) -> Conversion | None:
 
 
 def read_motion(robot: Robot, path: Path, convention: str | None) -> Trajectory:
-    """Read a trajectory with joint velocities and accelerations; write its notes to stderr."""
+    """Read a trajectory with joint velocities and accelerations, and write its notes to stderr."""
     from urdfkin.motion.trajectory import read_trajectory  # noqa: PLC0415  keeps --help fast
 
     motion = read_trajectory(robot, path, convention=convention)
-    for note in (*motion.notes, *robot.limit_violations(motion.q)):
-        say(f"warning: {note}", err=True)
+    tell_notes(motion)
+    tell_limits(robot, motion.q)
     return motion
+
+
+def tell_notes(motion: Trajectory) -> None:
+    """Write the notes of a trajectory to stderr, and the origin of v and a if they are computed."""
+    for note in motion.notes:
+        say(f"warning: {note}", err=True)
+    if motion.rates != "as given":
+        say(f"rates {motion.derivation()}", err=True)
+
+
+def tell_limits(robot: Robot, q: FloatArray) -> None:
+    """Write a warning to stderr for each joint outside its limits."""
+    for line in robot.limit_violations(q):
+        say(f"warning: {line}", err=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -419,8 +433,7 @@ def read_inputs(
     q_, v_, a_ = (np.ascontiguousarray(np.broadcast_to(part, (n, part.shape[1]))) for part in rows)
     if conversion is not None:
         q_, v_, a_ = conversion.from_(q_, v_, a_)
-    for line in robot.limit_violations(q_):
-        say(f"warning: {line}", err=True)
+    tell_limits(robot, q_)
     return Inputs(robot, frame or robot.tip_frame, q_, v_, a_, conversion=conversion)
 
 

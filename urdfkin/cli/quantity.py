@@ -32,6 +32,8 @@ from urdfkin.cli.options import (
     reject_unused_options,
     robot_argument,
     seed_option,
+    tell_limits,
+    tell_notes,
     together,
     trajectory_option,
     v_option,
@@ -39,7 +41,6 @@ from urdfkin.cli.options import (
     with_base,
 )
 from urdfkin.cli.output import TEXTS, Answer, answering, check_line, compiling, exit_code, finite
-from urdfkin.cli.streams import say
 from urdfkin.errors.display import NOISE, Table, TextDocument, six_digits
 from urdfkin.errors.escape import csv_cell
 from urdfkin.verify.quantities import (
@@ -114,11 +115,8 @@ def _along(
         motion = with_rates(robot.tree, x)
         q, t, rates = motion.q, motion.t, {letter: getattr(motion, letter) for letter in letters[1:]}
         said["derivatives"] = motion.rates
-        for note in motion.notes:
-            say(f"warning: {note}", err=True)
-        say(f"rates {motion.derivation()}", err=True)
-    for line in robot.limit_violations(q):
-        say(f"warning: {line}", err=True)
+        tell_notes(motion)
+    tell_limits(robot, q)
     v, a = (rates.get(letter, np.zeros((len(q), robot.nv))) for letter in "va")
     frame = frame or robot.tip_frame
     return Inputs(robot, frame, q, v, a, t, x.base, said, conversion, along=True)
