@@ -20,7 +20,8 @@ from urdfkin.model.reference import Reference
 from urdfkin.robot import Robot
 from urdfkin.verify import sampling, verifier
 from urdfkin.verify.certificate import Comparison
-from urdfkin.verify.pinocchio import Oracle
+from urdfkin.verify.oracle import QueryBatch
+from urdfkin.verify.pinocchio import PinocchioOracle
 
 
 @pytest.fixture
@@ -385,7 +386,6 @@ def test_the_oracle_reads_names_and_layout_from_the_tree_and_nothing_else(panda:
     for joint in other.tree.joints:
         object.__setattr__(joint, "T_parent_joint", np.eye(4))
         object.__setattr__(joint, "axis", np.array([1.0, 0.0, 0.0]))
-    q = panda.sample(3, 2)
-    frames = ["panda_hand", "panda_rightfinger"]
-    one, two = (Oracle(panda.urdf, robot.tree).placements(q, frames) for robot in (panda, other))
+    x = QueryBatch(["panda_hand", "panda_rightfinger"], (panda.sample(3, 2),))
+    one, two = (PinocchioOracle(panda.urdf, robot.tree).placements(x) for robot in (panda, other))
     assert (one == two).all()

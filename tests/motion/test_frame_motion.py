@@ -13,7 +13,7 @@ from tests.laws.test_imu import moving_base
 from tests.verify.test_singular_values import SLIDE
 from urdfkin.motion.frame_motion import FrameMotion, frame_motion
 from urdfkin.robot import Robot
-from urdfkin.verify.pinocchio import Oracle
+from urdfkin.verify.pinocchio import PinocchioOracle
 
 N = 7
 
@@ -43,8 +43,8 @@ def test_it_is_what_the_robots_methods_give_and_pinocchio_confirms(reference: st
 
 def test_a_disagreement_is_shown_and_not_raised(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = urdfkin.load("panda")
-    right = Oracle.velocities
-    monkeypatch.setattr(Oracle, "velocities", lambda *args: right(*args) * (1.0 + 1e-10))
+    right = PinocchioOracle.velocities
+    monkeypatch.setattr(PinocchioOracle, "velocities", lambda *args: right(*args) * (1.0 + 1e-10))
     x = motion(robot)
     assert not x.agrees
     assert (x.checks["velocity"].share > 1.0).all()
