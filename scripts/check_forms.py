@@ -28,6 +28,7 @@ import urdfkin
 from scripts.forms.running import RUN, Job, Missing, elsewhere, too_wide
 from urdfkin.dh import FORMATS, DHTable, export
 from urdfkin.errors import InputError
+from urdfkin.export import LANGUAGES
 from urdfkin.kinematics.roundings import EPS, of_rows
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
@@ -81,7 +82,9 @@ def subject(robot: Robot, name: str, table: DHTable) -> Subject:
 
 
 def fits(form: str, table: DHTable) -> bool:
-    """Return whether the format can represent the table."""
+    """Return whether the format can represent the table; code of `urdfkin export` can."""
+    if form in LANGUAGES:
+        return True
     try:
         export(table, form)
     except InputError:

@@ -70,6 +70,10 @@ _HOMES = {
 
 # Methods of earlier packages call these functions of later packages. They cannot import them.
 register_hook("a table in a form", lazy_import("urdfkin.dh.export:export"))
+register_hook("code of a robot", lazy_import("urdfkin.export.forms:code_of_robot"))
+register_hook("code of a chain", lazy_import("urdfkin.export.forms:code_of_chain"))
+register_hook("a robot of a source", lazy_import("urdfkin.loading:load"))
+register_hook("code in a language", lazy_import("urdfkin.export:write"))
 register_hook("a report as a page", lazy_import("urdfkin.report.html:as_html"))
 register_hook("a report as a comment", lazy_import("urdfkin.report.markdown:as_markdown"))
 register_hook("a comparison as a document", lazy_import("urdfkin.report.same:as_document"))

@@ -1250,6 +1250,7 @@ class Robot(Displayable):
         quantities: Sequence[str] = EXPORTED,
         reference: Reference | str = _ALIGNED,
         *,
+        form: str = "tree",
         name: str | None = None,
         verify: bool | None = None,
     ) -> str:
@@ -1263,12 +1264,15 @@ class Robot(Displayable):
             frame: Name of a link or joint; None: `tip_frame`.
             quantities: Any of "placement", "velocity", "jacobian", "jacobian_rate", "acceleration".
             reference: Reference frame of velocities, accelerations and Jacobians.
+            form: "tree": the steps are the URDF's joints. "dh": the rows of the table from `base_frame` to
+                the frame. "screws": the screws of this path. Results of "dh" and "screws" are in the axes of
+                `base_frame`.
             name: Prefix of the function names; None: made of the names of the robot and the frame.
             verify: True: check the code with Pinocchio. None: as chosen in `load`. The first line of
                 unchecked code states UNVERIFIED.
 
         Raises:
-            UnknownNameError: the language, frame, quantity or reference does not exist.
+            UnknownNameError: the language, frame, quantity, reference or form does not exist.
             InputError: no quantity is given, or one that cannot be exported.
             VerificationError: Pinocchio's result differs by more than the bound.
 
@@ -1279,13 +1283,10 @@ class Robot(Displayable):
         >>> scope["jacobian"]([0.0, 0.0])[:2].tolist()
         [[-0.0, -0.0], [0.9, 0.4]]
         """
-        from urdfkin.export import write  # noqa: PLC0415
-        from urdfkin.export.code import code_of  # noqa: PLC0415  loads python-flint
-
-        frame = as_choice(frame, self.tip_frame, "frame")
+        frame, form = as_choice(frame, self.tip_frame, "frame"), as_str(form, "form")
         name = None if name is None else as_str(name, "name")
-        code = code_of(self.verifier, self.plan, frame, quantities, reference, name=name, verify=verify)
-        return write(code, as_str(to, "to"))
+        code = hook("code of a robot")(self, frame, quantities, reference, form, name=name, verify=verify)
+        return str(hook("code in a language")(code, as_str(to, "to")))
 
     # -- chains and Denavit-Hartenberg tables ---------------------------------------------------------
 
