@@ -6,14 +6,13 @@ Learn: a motion from rest to rest, one call for the whole motion of a frame, and
 import numpy as np
 
 import urdfkin
-from urdfkin.motion.frame_motion import frame_motion
 from urdfkin.motion.trajectory import line
 
 robot = urdfkin.load("ur5")
 start = np.array([0.0, -1.5, 1.2, -1.0, -1.5, 0.0])
 end = np.array([1.5, -0.8, 0.6, -1.2, -1.0, 0.5])
 motion = line(robot, start, end, duration=2.0, samples=101)
-tool = frame_motion(robot, motion.q, motion.v, motion.a, "tool0")
+tool = urdfkin.frame_motion(robot, motion, "tool0")
 
 speed = np.linalg.norm(tool.velocity[:, :3], axis=1)
 magnitude = np.linalg.norm(tool.acceleration[:, :3], axis=1)

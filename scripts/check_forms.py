@@ -28,10 +28,12 @@ import urdfkin
 from scripts.forms.running import RUN, Job, Missing, elsewhere, too_wide
 from urdfkin.dh import FORMATS, DHTable, export
 from urdfkin.errors import InputError
+from urdfkin.export import LANGUAGES
 from urdfkin.kinematics.roundings import EPS, of_rows
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import examples
+from urdfkin.verify.oracle import QueryBatch
 from urdfkin.verify.sampling import sample
 
 #: Number of configurations of each table.
@@ -75,12 +77,14 @@ def subject(robot: Robot, name: str, table: DHTable) -> Subject:
     """Return one table of a robot with its configurations."""
     q = sample(robot.tree, SAMPLES, np.random.default_rng(0))
     ends = [table.base_frame, table.tip_frame]
-    base, tip = np.moveaxis(robot.verifier.oracle().placements(q, ends), 1, 0)
+    base, tip = np.moveaxis(robot.verifier.oracle().placements(QueryBatch(ends, (q,))), 1, 0)
     return Subject(name, Job(table, table.coupling.select(robot.tree, q)), np.linalg.inv(base) @ tip)
 
 
 def fits(form: str, table: DHTable) -> bool:
-    """Return whether the format can represent the table."""
+    """Return whether the format can represent the table; code of `urdfkin export` can."""
+    if form in LANGUAGES:
+        return True
     try:
         export(table, form)
     except InputError:

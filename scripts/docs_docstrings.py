@@ -1,15 +1,19 @@
 """An extension of mkdocs that shows doctests in docstrings as blocks of code; mkdocs.yml refers to it.
 
-The heading `Example:` is removed, because the site would draw a box around such a section.
+The docstrings of `Robot` are those that `help` shows, with the arguments that its methods share. The heading
+`Example:` is removed, because the site would draw a box around such a section.
 """
 
 from __future__ import annotations
 
+import inspect
 import re
 import textwrap
 from typing import Any
 
 import griffe
+
+from urdfkin.robot import Robot
 
 #: A section `Example:` and its indented lines.
 _EXAMPLE = re.compile(r"^( *)Examples?:\n((?:\1 +\S.*\n?|\n)+)", re.MULTILINE)
@@ -22,6 +26,8 @@ class Doctests(griffe.Extension):
 
     def on_object(self, *, obj: griffe.Object, **_: Any) -> None:
         """Change an object's docstring before it is parsed."""
+        if obj.docstring is not None and obj.path.startswith("urdfkin.robot.Robot."):
+            obj.docstring.value = inspect.getdoc(getattr(Robot, obj.name)) or ""
         if obj.docstring is not None:
             obj.docstring.value = fenced(obj.docstring.value)
 

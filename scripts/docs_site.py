@@ -45,6 +45,12 @@ LIBRARY: dict[str, tuple[str, str, str]] = {
         "placement relative_placement velocity jacobian jacobian_rate hessian acceleration "
         "acceleration_breakdown analytical_jacobian imu compute enclose Reference BaseMotion",
     ),
+    "api/trajectories.md": (
+        "Trajectories",
+        "Samples of a log, and the motion of a frame along them, compared with Pinocchio.",
+        "read_trajectory frame_motion urdfkin.motion.trajectory.Trajectory "
+        "urdfkin.motion.frame_motion.FrameMotion",
+    ),
     "api/singularities.md": (
         "Singular values",
         "Singular values within guaranteed bounds, manipulability, and the reason for a singularity.",

@@ -3,16 +3,22 @@
 For each row, the script compares a library's result with several candidate definitions, on a random robot and
 motion, and writes the one that matches. A test checks that the page is current.
 
+The tables of other tools come from urdfkin/conventions/conventions.toml. With --measure, the script first
+runs each installed library on all robots of the catalogue, in its convention, and writes the results there.
+
     python scripts/make_conventions.py
+    python scripts/make_conventions.py --measure
 """
 
 from __future__ import annotations
 
 import re
 import sys
+import tempfile
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +27,13 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 
 import urdfkin
-from urdfkin.conventions import BUILT_IN, find_convention
+from urdfkin.conventions import Convention, find_convention
+from urdfkin.conventions.convention import _built_in, spelled
 from urdfkin.model.tree import FloatArray
+from urdfkin.urdf.catalogue import catalogue
 
 PAGE = Path(__file__).parents[1] / "docs" / "conventions.md"
+DATA = Path(__file__).parents[1] / "urdfkin" / "conventions" / "conventions.toml"
 
 _LIMIT = '<limit lower="-2" upper="2" effort="1" velocity="1"/>'
 _BODY = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
@@ -135,21 +144,50 @@ print(qpos.shape, qvel.shape, J.shape)
 (19,) (18,) (6, 18)
 ```
 
-`placement`, `velocity`, `jacobian`, `jacobian-rate`, `hessian` and `acceleration` have `--convention NAME`:
---q, --v, --a and the result are the tool's numbers.
+Every command that takes joint values has `--convention NAME`. --q, --v, --a, --trajectory and the result are
+the tool's numbers. Three results stay in urdfkin's convention: `imu` prints the accelerometer first, singular
+values are for joint velocities in rad/s and m/s, and the panels of `plot` and the sliders of `view` have the
+URDF's names.
 
 """
-_TOOL_HEADS = (
-    "order of joints", "q of a continuous joint", "mimic joint", "q of a free body", "v of a free body",
-    "six-vector", "evidence",
-)  # fmt: skip
+#: The tools of each table: libraries of kinematics, and simulators and formats.
+_TABLES = (
+    ("urdfkin", "pinocchio", "mujoco", "drake", "idyntree", "rtb", "kdl"),
+    ("isaaclab", "isaaclab3", "isaacgym", "newton", "newton-usd", "usd", "ros"),
+)
+#: The distribution of each library that tests/conventions/libraries.py runs.
+_DISTRIBUTIONS = {
+    "pinocchio": "pin",
+    "mujoco": "mujoco",
+    "drake": "drake",
+    "idyntree": "idyntree",
+    "rtb": "roboticstoolbox-python",
+    "newton": "newton",
+    "newton-usd": "newton",
+    "usd": "usd-exchange",
+}
 _OWN = """
-*Measured*: a test runs the library on 20 robots, with its own forward kinematics, Jacobian and base velocity,
-and compares them with ours after the conversion (`tests/conventions/test_libraries.py`). The difference is at
-most 2e-12; for Newton, which computes in single precision, 2e-5. A root joint comes first. The orders
-of Isaac Lab and Isaac Gym are compared with published lists (`tests/conventions/test_published_orders.py`).
-`isaaclab` and `usd` assume that the importer merges fixed joints. Without that option, a fixed joint counts
-as a level: use `order = "breadth first, with fixed joints"` in a file.
+`urdf` (the joints in the order of the file) and `alphabetical` (sorted by name) are urdfkin's convention with
+another order and a coordinate for each mimic joint. A root joint comes first.
+
+*Measured*: `scripts/make_conventions.py --measure` ran the library on the catalogue, with its own forward
+kinematics, Jacobian and base velocity, and compared them with ours after the conversion. The bound is derived
+(`tests/conventions/libraries.py`); Newton and USD compute in single precision. A test does the same on 20
+robots wherever the library is installed (`tests/conventions/test_libraries.py`). OpenUSD has no forward
+kinematics; the test computes it from the frames of the joint prims. The other robots were not compared for
+these reasons:
+
+- Drake and urdf-usd-converter refuse `alex_psyonic_hands`: mimic joints name a leader that the file lacks.
+- Robotics Toolbox fails for `hector` and `iris_simple`, which have no moving joint. It turns an axis that is
+  not parallel to x, y or z, as in both iCubs and two Romeos, so that only their joints' order agrees.
+
+*Sources*: no library runs here. A test compares the convention with what the sources state
+(`tests/conventions/test_statements.py`), and the orders of Isaac Lab and Isaac Gym with published lists
+(`tests/conventions/test_published_orders.py`). The file of the convention,
+`urdfkin/conventions/conventions.toml`, says what each source is for, and what is in doubt.
+
+`isaaclab` and `isaaclab3` assume that the importer merges fixed joints. Without that option, a fixed joint
+counts as a level: use `order = "breadth first, with fixed joints"` in a file.
 
 ## Your own convention
 
@@ -170,7 +208,20 @@ unit = 4096                  # steps of one turn
 zero = 2048                  # the motor's value where the joint is at 0
 ```
 
-The other keys are those of `urdfkin/conventions/conventions.toml`, such as `quaternion = "wxyz"`.
+The other keys are those of `urdfkin/conventions/conventions.toml`, such as `quaternion = "wxyz"`, or
+`names = "usd"`, `"identifier"` and `"isaacsim"` for three spellings of names in USD.
+
+`urdfkin same A B --write-map FILE` writes such a file for A, with the joint names, order, senses and zeros of
+B:
+
+```console
+$ urdfkin same ur5 ur5_limited --boxes 0 --write-map map.toml
+...
+$ urdfkin placement ur5 --convention map.toml --q 0,-90deg,90deg,0,0,0
+...
+```
+
+In Python, `urdfkin.same(a, b).convention()` returns it.
 """
 
 Readings = Mapping[str, FloatArray]
@@ -507,31 +558,87 @@ def _free() -> list[Row]:
 
 
 def _tools() -> str:
-    """Return the table of the built-in conventions."""
-    lines = []
-    for name in BUILT_IN:
-        how = find_convention(name)
-        order = "no known rule" if how.order == "given" else how.order.replace("file", "place in the file")
-        order = {"name": "by name", "place in the file": "that of the file"}.get(order, order)
-        parts = ["x, y, z", f"q{', q'.join(how.quaternion)}"]
-        q = ", then ".join(parts if how.base_q == "position first" else parts[::-1])
-        axes = {"body": "its own axes", "parent": "world axes"}
-        v = [f"linear in {axes[how.linear]}", f"angular in {axes[how.angular]}"]
-        v = v if how.base_v == "linear first" else v[::-1]
-        point = ", at the centre of mass" if how.point != "origin" else ""
-        six = "[linear; angular]" if how.six == "linear first" else "[angular; linear]"
-        evidence = how.evidence + "".join(
-            f" [{k}]({_address(source)})" for k, source in enumerate(how.sources, 1)
-        )
-        free = name not in ("rtb", "kdl")
-        cells = [
-            f"{how.title} (`{name}`)", order, "the angle" if how.continuous == 1 else "its cosine and sine",
-            "own coordinate" if how.mimic == "own" else "none", q if free else "not available",
-            f"{', '.join(v)}{point}" if free else "not available", six, evidence,
-        ]  # fmt: skip
-        lines.append(f"| {' | '.join(cells)} |\n")
-    heads = f"| | {' | '.join(_TOOL_HEADS)} |\n{'|---' * (1 + len(_TOOL_HEADS))}|\n"
-    return f"{_TOOLS}{heads}{''.join(lines)}{_OWN}"
+    """Return the tables of the built-in conventions."""
+    return _TOOLS + "\n".join(map(_table, _TABLES)) + _OWN
+
+
+def _table(names: tuple[str, ...]) -> str:
+    """Return a table with a column for each convention."""
+    columns = [_cells(find_convention(name)) for name in names]
+    heads = f"| | {' | '.join(f'{find_convention(x).title} (`{x}`)' for x in names)} |\n{'|---' * 8}|\n"
+    lines = [f"| {what} | {' | '.join(column[what] for column in columns)} |\n" for what in columns[0]]
+    return heads + "".join(lines)
+
+
+def _cells(how: Convention) -> dict[str, str]:
+    """Return the cell of each row for a convention."""
+    order = "no known rule" if how.order == "given" else how.order.replace("file", "place in the file")
+    order = {"name": "by name", "place in the file": "that of the file"}.get(order, order)
+    parts = ["x, y, z", f"q{', q'.join(how.quaternion)}"]
+    q = ", then ".join(parts if how.base_q == "position first" else parts[::-1])
+    axes = {"body": "its own axes", "parent": "world axes"}
+    v = [f"linear in {axes[how.linear]}", f"angular in {axes[how.angular]}"]
+    v = v if how.base_v == "linear first" else v[::-1]
+    free = how.name not in ("rtb", "kdl")
+    links = "".join(f" [{k}]({_address(source)})" for k, source in enumerate(how.sources, 1))
+    return {
+        "order of joints": order,
+        "names of joints": {"urdf": "those of the URDF", "usd": "USD, `1` is `tn__1_`"}.get(
+            how.names, f"identifiers, `1` is `{spelled('1', how.names)}`"
+        ),
+        "q of a continuous joint": "the angle" if how.continuous == 1 else "its cosine and sine",
+        "unit of angles": how.angle,
+        "mimic joint": "own coordinate" if how.mimic == "own" else "none",
+        "q of a free body": q if free else "not available",
+        "v of a free body": f"{', '.join(v)}{', at the centre of mass' * (how.point != 'origin')}"
+        if free
+        else "not available",
+        "six-vector": "[linear; angular]" if how.six == "linear first" else "[angular; linear]",
+        "evidence": (f"measured: {how.measured}" if how.measured else how.evidence) + links,
+    }
+
+
+def measure() -> None:
+    """Run the installed libraries on the catalogue, and write the results to conventions.toml."""
+    from tests.conventions.libraries import LIBRARIES  # noqa: PLC0415  needs pytest
+
+    for name, library in LIBRARIES.items():
+        try:
+            version = metadata.version(_DISTRIBUTIONS[name])
+        except metadata.PackageNotFoundError:
+            continue
+        line = f'measured = "{_DISTRIBUTIONS[name]} {version}, {_measured(name, library)}"\n'
+        head, mark, rest = DATA.read_text("utf-8").partition(f"[{name}]\n")
+        own, blank, others = rest.partition("\n\n")
+        kept = [row for row in own.split("\n") if not row.startswith("measured = ")]
+        at = kept.index('evidence = "measured"') + 1
+        kept.insert(at, line.rstrip())
+        DATA.write_text(head + mark + "\n".join(kept) + blank + others, "utf-8")
+
+
+def _measured(name: str, make: Callable[[Any, Path], Any]) -> str:
+    """Return on how many robots a library agrees, and the largest difference."""
+    from tests.conventions.test_libraries import _conversion, _differences, _loaded  # noqa: PLC0415
+
+    agree, worst, share, robots = 0, 0.0, 0.0, sorted(catalogue())
+    for name_of_robot in robots:
+        robot = _loaded(name_of_robot, name)
+        with tempfile.TemporaryDirectory() as folder:
+            try:
+                library = make(robot, Path(folder))
+                conversion = _conversion(robot, name, library)
+                pairs = list(_differences(robot, library, conversion))
+            except Exception as error:
+                print(f"{name}: {name_of_robot}: {type(error).__name__}: {str(error)[:200]}")
+                continue
+        bad = any((found > bound).any() for found, bound in pairs)
+        if bad or list(conversion.joint_names) != library.names:
+            print(f"{name}: {name_of_robot}: different")
+            continue
+        agree += 1
+        worst = max(worst, *(float(found.max(initial=0.0)) for found, _ in pairs))
+        share = max(share, *(float((x[bound > 0] / bound[bound > 0]).max(initial=0.0)) for x, bound in pairs))
+    return f"{agree} of {len(robots)} robots, at most {worst:.0e} off, {100 * share:.2g} % of the bound"
 
 
 def _address(source: str) -> str:
@@ -549,4 +656,7 @@ def page() -> str:
 
 
 if __name__ == "__main__":
+    if "--measure" in sys.argv[1:]:
+        measure()
+        _built_in.cache_clear()
     PAGE.write_text(page(), "utf-8")

@@ -34,7 +34,7 @@ METHODS: dict[str, tuple[int, Compute]] = {
     "accelerations": (3, lambda r, q, v, a, **o: r.acceleration(q, v, a, [FRAME], **o)),
     "analytical_jacobian": (1, lambda r, q, **o: r.analytical_jacobian(q, FRAME, "quaternion", **o)),
     "acceleration_breakdown": (3, lambda r, q, v, a, **o: r.acceleration_breakdown(q, v, a, FRAME, **o)),
-    "frame_motion": (3, lambda r, q, v, a, **o: frame_motion(r, q, v, a, FRAME)),
+    "frame_motion": (3, lambda r, q, v, a, **o: frame_motion(r, (q, v, a), FRAME)),
 }
 BAD = (np.nan, np.inf, -np.inf)
 

@@ -1,7 +1,9 @@
 """A robot hands out what was checked, refuses clearly, and says how to compute it again."""
 
+import inspect
 import io
 import pickle
+import re
 import shlex
 import warnings
 from pathlib import Path
@@ -17,10 +19,12 @@ from urdfkin.kinematics import roundings
 from urdfkin.kinematics.rotation import exp_rotation
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.reference import Reference
-from urdfkin.robot import Robot
+from urdfkin.robot import _INSIDE, Robot
 from urdfkin.verify import sampling, verifier
 from urdfkin.verify.certificate import Comparison
-from urdfkin.verify.pinocchio import Oracle
+from urdfkin.verify.oracle import QueryBatch
+from urdfkin.verify.pinocchio import PinocchioOracle
+from urdfkin.verify.quantities import QUANTITIES, Quantity
 
 
 @pytest.fixture
@@ -385,7 +389,27 @@ def test_the_oracle_reads_names_and_layout_from_the_tree_and_nothing_else(panda:
     for joint in other.tree.joints:
         object.__setattr__(joint, "T_parent_joint", np.eye(4))
         object.__setattr__(joint, "axis", np.array([1.0, 0.0, 0.0]))
-    q = panda.sample(3, 2)
-    frames = ["panda_hand", "panda_rightfinger"]
-    one, two = (Oracle(panda.urdf, robot.tree).placements(q, frames) for robot in (panda, other))
+    x = QueryBatch(["panda_hand", "panda_rightfinger"], (panda.sample(3, 2),))
+    one, two = (PinocchioOracle(panda.urdf, robot.tree).placements(x) for robot in (panda, other))
     assert (one == two).all()
+
+
+@pytest.mark.parametrize("name", sorted({name for name in vars(Robot) if name[0] != "_"} - _INSIDE))
+def test_the_help_of_a_method_describes_each_argument_in_the_order_of_its_signature(name: str) -> None:
+    text, method = inspect.getdoc(vars(Robot)[name]) or "", vars(Robot)[name]
+    section = text.partition("Args:\n")[2].partition("\n\n")[0]
+    arguments = list(inspect.signature(method).parameters)[1:] if inspect.isfunction(method) else []
+    if name not in {"limit_violations", "with_convention"}:  # their first lines describe the arguments
+        assert re.findall(r"^    (\w+): [^ ]", section, re.MULTILINE) == arguments
+
+
+@pytest.mark.parametrize("row", QUANTITIES.values(), ids=lambda row: row.name)
+def test_the_help_of_a_quantity_has_its_equations_and_what_its_method_raises(row: Quantity) -> None:
+    if (method := getattr(Robot, row.method, None)) is None or row.method == "screws":
+        return
+    text = inspect.getdoc(method) or ""
+    assert all(number in text for number in row.equations)
+    raised = text.partition("Raises:\n")[2].partition("\n\n")[0]
+    for error in ("InputError", "UnknownNameError", "VerificationError"):
+        assert f"    {error}: " in raised
+    assert text.index("Args:") < text.index("Returns:") < text.index("Raises:") < text.index(">>> ")

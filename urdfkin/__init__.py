@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from urdfkin.model.base_motion import BaseMotion
     from urdfkin.model.chain import FrameChain
     from urdfkin.model.reference import Reference
+    from urdfkin.motion.frame_motion import frame_motion
+    from urdfkin.motion.trajectory import read_trajectory
     from urdfkin.robot import Robot
     from urdfkin.urdf.catalogue import robots
     from urdfkin.validation.campaign import validate
@@ -56,8 +58,10 @@ _HOMES = {
     "calibrate": "urdfkin.calibration.calibrate",
     "check": "urdfkin.lint",
     "diff": "urdfkin.comparison.diff",
+    "frame_motion": "urdfkin.motion.frame_motion",
     "load": "urdfkin.loading",
     "read_table": "urdfkin.dh",
+    "read_trajectory": "urdfkin.motion.trajectory",
     "robots": "urdfkin.urdf.catalogue",
     "same": "urdfkin.comparison.verdict",
     "table_from_rows": "urdfkin.dh",
@@ -67,6 +71,10 @@ _HOMES = {
 
 # Methods of earlier packages call these functions of later packages. They cannot import them.
 register_hook("a table in a form", lazy_import("urdfkin.dh.export:export"))
+register_hook("code of a robot", lazy_import("urdfkin.export.forms:code_of_robot"))
+register_hook("code of a chain", lazy_import("urdfkin.export.forms:code_of_chain"))
+register_hook("a robot of a source", lazy_import("urdfkin.loading:load"))
+register_hook("code in a language", lazy_import("urdfkin.export:write"))
 register_hook("a report as a page", lazy_import("urdfkin.report.html:as_html"))
 register_hook("a report as a comment", lazy_import("urdfkin.report.markdown:as_markdown"))
 register_hook("a comparison as a document", lazy_import("urdfkin.report.same:as_document"))
@@ -94,8 +102,10 @@ __all__ = [
     "calibrate",
     "check",
     "diff",
+    "frame_motion",
     "load",
     "read_table",
+    "read_trajectory",
     "robots",
     "same",
     "table_from_rows",

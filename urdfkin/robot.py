@@ -6,11 +6,14 @@ default, a method compares its result with Pinocchio's before it returns.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping, Sequence
 from copy import copy
 from functools import partial
+from inspect import cleandoc
 from pathlib import Path
-from types import MappingProxyType
+from textwrap import fill
+from types import FunctionType, MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +22,6 @@ from numpy.typing import ArrayLike
 from urdfkin.compiled.batch import in_parts
 from urdfkin.compiled.plan import CompiledTree, compile_tree
 from urdfkin.compiled.prepared import PreparedFrame
-from urdfkin.conventions import Convention, ConventionRobot, Conversion, find_convention
 from urdfkin.errors import InputError, RangeError, RepresentationSingularityError
 from urdfkin.errors.display import Displayable, TextDocument
 from urdfkin.errors.escape import log_line
@@ -68,6 +70,7 @@ from urdfkin.verify.verifier import Verifier
 
 if TYPE_CHECKING:
     from urdfkin.compiled.breakdown import AccelerationBreakdown
+    from urdfkin.conventions import Convention, ConventionRobot, Conversion
     from urdfkin.dh.screws import ProductOfExponentials
     from urdfkin.dh.table import DHTable
     from urdfkin.dh.tree_parameters import TreeParameters
@@ -101,6 +104,29 @@ class Robot(Displayable):
     - a pose of `poses`, with or without changes: `"ready"`, `"ready, elbow=0.5"`
 
     A missing name is an error.
+
+    Methods that compute share these arguments:
+
+    - `q`: (..., nq) rad, m.
+    - `v`: (..., nv) rad/s, m/s; of planar and floating joints in the axes of the moving frame.
+    - `a`: (..., nv) rad/s^2, m/s^2; in the same axes as `v`.
+    - `frame`: Name of a link or joint; None: the robot's only tip. A list of names, such as `link_frames`, is
+      computed in one pass and adds an axis after the batch axes.
+    - `reference`: LOCAL_WORLD_ALIGNED: at the frame's origin, in world axes. LOCAL: at the frame's origin, in
+      the frame's axes. WORLD: at the body point that coincides with the world origin, in world axes.
+    - `base`: Motion of the root link; None: fixed at the world origin.
+    - `out`: Output array, C-contiguous float64 of the result's shape. Its contents are undefined after an
+      error.
+    - `verify`: True: check this call with Pinocchio. "sample": check 100 of its configurations. None: as
+      chosen in `load`.
+    - `threads`: Number of threads for a batch. None: all processors from 4,096 configurations on. The result
+      does not depend on it.
+
+    They share these errors:
+
+    - `InputError`: a wrong length, a number that is not finite, or batch shapes that do not broadcast.
+    - `UnknownNameError`: the frame, reference or joint does not exist.
+    - `VerificationError`: Pinocchio's result differs by more than the bound.
 
     Attributes:
         tree: Links and joints.
@@ -625,6 +651,8 @@ class Robot(Displayable):
         >>> isaaclab.to(a1.neutral()).shape
         (12,)
         """
+        from urdfkin.conventions import Conversion, find_convention  # noqa: PLC0415  nothing is paid without one
+
         return Conversion(self.tree, self.urdf, find_convention(name), joints)
 
     def with_convention(
@@ -639,6 +667,8 @@ class Robot(Displayable):
         >>> arm.velocity([0.0, 0.0], [1.0, 0.0], "tip").tolist()  # angular first
         [0.0, 0.0, 1.0, 0.0, 0.9, 0.0]
         """
+        from urdfkin.conventions import ConventionRobot  # noqa: PLC0415
+
         return ConventionRobot(self, self.convention(name, joints))
 
     def locked(
@@ -696,19 +726,11 @@ class Robot(Displayable):
         Args:
             name: "placement", "velocity", "jacobian", "jacobian rate", "hessian" or "acceleration".
             inputs: The inputs of the method of that name, in order: (q,), (q, v) or (q, v, a).
-            frame: Name of a link or joint, or a list of names; None: the robot's only tip.
-            reference: Reference frame of the result; a placement has none.
-            base: Motion of the root link; None: fixed at the world origin.
-            out: Output array, C-contiguous float64 of the result's shape.
-            verify: True: check this call with Pinocchio. "sample": check 100 of its configurations. None:
-                as chosen in `load`.
-            threads: Number of threads for a batch. None: all processors from 4,096 configurations on.
 
         Raises:
             UnknownNameError: the quantity or the frame does not exist.
             InputError: a wrong length, a number that is not finite, batch shapes that do not broadcast,
                 the wrong number of inputs, or a quantity that only its own method computes.
-            VerificationError: Pinocchio's result differs by more than the bound.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -732,27 +754,7 @@ class Robot(Displayable):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """Return the placement of a frame, the homogeneous matrix T_world_frame (eq. 7.77).
-
-        Args:
-            q: (..., nq) rad, m.
-            frame: Name of a link or joint, or a list of names that one pass computes together, such as
-                `link_frames`. None: the robot's only tip.
-            base: Motion of the root link; None: fixed at the world origin.
-            out: Output array, C-contiguous float64 of the result's shape. Its contents are undefined after
-                an error.
-            verify: True: check this call with Pinocchio. "sample": check 100 of its configurations. None:
-                as chosen in `load`.
-            threads: Number of threads for a batch. None: all processors from 4,096 configurations on. The
-                result does not depend on it.
-
-        Returns:
-            (..., 4, 4), or (..., frames, 4, 4) for a list of frames; positions in m.
-
-        Raises:
-            InputError: a wrong length, a number that is not finite, or batch shapes that do not broadcast.
-            UnknownNameError: the frame does not exist.
-            VerificationError: Pinocchio's result differs by more than the bound.
+        """Return the placement of a frame, the homogeneous matrix T_world_frame; positions in m.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -786,17 +788,8 @@ class Robot(Displayable):
         placements for the check. The result does not depend on the motion of the base.
 
         Args:
-            q: (..., nq) rad, m.
-            frame: As in `placement`.
+            frame: Name of a link or joint, or a list of names.
             relative_to: Name of the other link or joint.
-            out: As in `placement`.
-            verify: As in `placement`.
-            threads: As in `placement`.
-
-        Raises:
-            InputError: as in `placement`.
-            UnknownNameError: the frame does not exist.
-            VerificationError: Pinocchio's result differs by more than the bound.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -828,26 +821,7 @@ class Robot(Displayable):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """Return the velocity of a frame (..., 6), [linear; angular] in m/s, rad/s (eq. 7.127, 7.128).
-
-        Args:
-            q: (..., nq) rad, m.
-            v: (..., nv) rad/s, m/s; of planar and floating joints in the axes of the moving frame.
-            frame: Name of a link or joint, or a list of names, which adds an axis after the batch axes. None:
-                the robot's only tip.
-            reference: LOCAL_WORLD_ALIGNED: at the frame's origin, in world axes. LOCAL: at the frame's
-                origin, in the frame's axes. WORLD: at the body point that coincides with the world origin, in
-                world axes.
-            base: Motion of the root link; None: fixed at the world origin.
-            out: Output array, C-contiguous float64 of the result's shape.
-            verify: True: check this call with Pinocchio. "sample": check 100 of its configurations. None:
-                as chosen in `load`.
-            threads: Number of threads for a batch. None: all processors from 4,096 configurations on.
-
-        Raises:
-            InputError: a wrong length, a number that is not finite, or batch shapes that do not broadcast.
-            UnknownNameError: the frame, reference or joint does not exist.
-            VerificationError: Pinocchio's result differs by more than the bound.
+        """Return the velocity of a frame (..., 6), [linear; angular].
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -873,28 +847,10 @@ class Robot(Displayable):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """Return the velocity Jacobian J of a frame (..., 6, nv), with velocity = J v (eq. 7.85).
+        """Return the velocity Jacobian J of a frame (..., 6, nv), with velocity = J v.
 
         Column i is the frame's velocity [linear; angular] when the joint velocity `rate_names[i]` is 1 and
         all others are 0. Units: m/s and rad/s per rad/s or m/s.
-
-        Args:
-            q: (..., nq) rad, m.
-            frame: Name of a link or joint, or a list of names, which adds an axis after the batch axes. None:
-                the robot's only tip.
-            reference: LOCAL_WORLD_ALIGNED: at the frame's origin, in world axes. LOCAL: at the frame's
-                origin, in the frame's axes. WORLD: at the body point that coincides with the world origin, in
-                world axes.
-            base: Motion of the root link; None: fixed at the world origin.
-            out: Output array, C-contiguous float64 of the result's shape.
-            verify: True: check this call with Pinocchio. "sample": check 100 of its configurations. None:
-                as chosen in `load`.
-            threads: Number of threads for a batch. None: all processors from 4,096 configurations on.
-
-        Raises:
-            InputError: a wrong length, a number that is not finite, or batch shapes that do not broadcast.
-            UnknownNameError: the frame, reference or joint does not exist.
-            VerificationError: Pinocchio's result differs by more than the bound.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -922,31 +878,12 @@ class Robot(Displayable):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """Return J-dot (..., 6, nv), the time derivative of `jacobian` along the motion (eq. 7.126).
+        """Return J-dot (..., 6, nv), the time derivative of `jacobian` along the motion.
 
         In LOCAL_WORLD_ALIGNED, J a + J-dot v equals the result of `acceleration`, the classical one. In LOCAL
         and WORLD, J a + J-dot v is the *spatial* acceleration, because the axes or the point move. The linear
         part of the spatial acceleration is that of the classical one minus w x vel. If the base moves, you
         must add the acceleration that the base causes.
-
-        Args:
-            q: (..., nq) rad, m.
-            v: (..., nv) rad/s, m/s; of planar and floating joints in the axes of the moving frame.
-            frame: Name of a link or joint, or a list of names, which adds an axis after the batch axes. None:
-                the robot's only tip.
-            reference: LOCAL_WORLD_ALIGNED: at the frame's origin, in world axes. LOCAL: at the frame's
-                origin, in the frame's axes. WORLD: at the body point that coincides with the world origin, in
-                world axes.
-            base: Motion of the root link; None: fixed at the world origin.
-            out: Output array, C-contiguous float64 of the result's shape.
-            verify: True: check this call with Pinocchio. "sample": check 100 of its configurations. None:
-                as chosen in `load`.
-            threads: Number of threads for a batch. None: all processors from 4,096 configurations on.
-
-        Raises:
-            InputError: a wrong length, a number that is not finite, or batch shapes that do not broadcast.
-            UnknownNameError: the frame, reference or joint does not exist.
-            VerificationError: Pinocchio's result differs by more than the bound.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -982,24 +919,6 @@ class Robot(Displayable):
         rows of column i of J, except within one floating joint. The difference is 0 for parallel axes. All
         angular rows are 0 on a planar arm.
 
-        Args:
-            q: (..., nq) rad, m.
-            frame: Name of a link or joint, or a list of names, which adds an axis after the batch axes. None:
-                the robot's only tip.
-            reference: LOCAL_WORLD_ALIGNED: at the frame's origin, in world axes. LOCAL: at the frame's
-                origin, in the frame's axes. WORLD: at the body point that coincides with the world origin, in
-                world axes.
-            base: Motion of the root link; None: fixed at the world origin.
-            out: Output array, C-contiguous float64 of the result's shape.
-            verify: True: check this call with Pinocchio. "sample": check 100 of its configurations. None:
-                as chosen in `load`.
-            threads: Number of threads for a batch. None: all processors from 4,096 configurations on.
-
-        Raises:
-            InputError: a wrong length, a number that is not finite, or batch shapes that do not broadcast.
-            UnknownNameError: the frame, reference or joint does not exist.
-            VerificationError: Pinocchio's result differs by more than the bound.
-
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link", verify=False)
         >>> H = arm.hessian([0.0, 0.0], "tip")
@@ -1027,34 +946,14 @@ class Robot(Displayable):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """Return the classical acceleration of a frame (..., 6), [linear; angular] (eq. 7.129, 7.130).
+        """Return the classical acceleration of a frame (..., 6), [linear; angular].
 
-        Units are m/s^2 and rad/s^2. The linear part is p'', the second derivative of the position of the
-        frame's origin. It is not the spatial acceleration p'' - w x p'. Pinocchio's function for the
-        classical acceleration is `getFrameClassicalAcceleration`. Gravity is not included; `imu` includes it.
+        The linear part is p'', the second derivative of the position of the frame's origin. It is not the
+        spatial acceleration p'' - w x p'. Pinocchio's function for the classical acceleration is
+        `getFrameClassicalAcceleration`. Gravity is not included; `imu` includes it.
 
         In LOCAL_WORLD_ALIGNED the result equals J a + J-dot v, with `jacobian` and `jacobian_rate`.
         `acceleration_breakdown` lists the contribution of each joint.
-
-        Args:
-            q: (..., nq) rad, m.
-            v: (..., nv) rad/s, m/s; of planar and floating joints in the axes of the moving frame.
-            a: (..., nv) rad/s^2, m/s^2; in the same axes as `v`.
-            frame: Name of a link or joint, or a list of names, which adds an axis after the batch axes. None:
-                the robot's only tip.
-            reference: LOCAL_WORLD_ALIGNED: at the frame's origin, in world axes. LOCAL: at the frame's
-                origin, in the frame's axes. WORLD: at the body point that coincides with the world origin, in
-                world axes.
-            base: Motion of the root link; None: fixed at the world origin.
-            out: Output array, C-contiguous float64 of the result's shape.
-            verify: True: check this call with Pinocchio. "sample": check 100 of its configurations. None:
-                as chosen in `load`.
-            threads: Number of threads for a batch. None: all processors from 4,096 configurations on.
-
-        Raises:
-            InputError: a wrong length, a number that is not finite, or batch shapes that do not broadcast.
-            UnknownNameError: the frame, reference or joint does not exist.
-            VerificationError: Pinocchio's result differs by more than the bound.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -1090,22 +989,11 @@ class Robot(Displayable):
         R^T w in rad/s (eq. 7.127).
 
         Args:
-            q: (..., nq) rad, m.
-            v: (..., nv) rad/s, m/s.
-            a: (..., nv) rad/s^2, m/s^2.
-            frame: Name of a link or joint, or a list of names; None: the robot's only tip.
             gravity: (3,) m/s^2 in world axes.
-            base: Motion of the root link; None: fixed at the world origin.
-            out: Output array, C-contiguous float64 of the result's shape.
-            verify: True: check this call with Pinocchio. "sample": check 100 of its configurations. None:
-                as chosen in `load`.
-            threads: Number of threads for a batch. None: all processors from 4,096 configurations on.
 
         Raises:
             InputError: a wrong length, a number that is not finite, batch shapes that do not broadcast, or a
                 gravity that is not three finite numbers.
-            UnknownNameError: the frame does not exist.
-            VerificationError: Pinocchio's result differs by more than the bound.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -1138,18 +1026,12 @@ class Robot(Displayable):
         `found.singularity()` names the lost direction and the joints that cause it.
 
         Args:
-            q: (..., nq) rad, m.
             frame: Name of a link or joint; None: the robot's only tip.
             rows: Rows of J: "all", "linear" or "angular".
-            base: Motion of the root link; None: fixed at the world origin.
-            verify: True: check this call with Pinocchio. "sample": check 100 of its configurations. None:
-                as chosen in `load`.
-            threads: Number of threads for a batch. None: all processors from 4,096 configurations on.
 
         Raises:
             InputError: a wrong length, a number that is not finite, batch shapes that do not broadcast, or
                 another value of `rows`.
-            UnknownNameError: the frame does not exist.
             VerificationError: Pinocchio's Jacobian differs by more than the bound.
 
         >>> import urdfkin
@@ -1194,16 +1076,10 @@ class Robot(Displayable):
         correct digits. The bound grows as 1 / s^2, where s is the sine or cosine of the middle angle.
 
         Args:
-            q: (..., nq) rad, m.
-            frame: Name of a link or joint, or a list of names; None: the robot's only tip.
             representation: Euler sequence by SciPy's name, "rpy" (the same as "xyz": roll, pitch, yaw), or
                 "quaternion". "ZYZ" is the textbook's.
             nearest: Smallest accepted distance from the representational singularity, rad.
             base: Placement of the root link; None: at the world origin.
-            out: Output array, C-contiguous float64 of the result's shape.
-            verify: True: check this call with Pinocchio. "sample": check 100 of its configurations. None:
-                as chosen in `load`.
-            threads: Number of threads for a batch. None: all processors from 4,096 configurations on.
 
         Returns:
             (..., 6, nv), or (..., 7, nv) for a quaternion.
@@ -1213,8 +1089,6 @@ class Robot(Displayable):
                 checked call the limit is at least the rounding error, about 1e-13 rad. The error gives the
                 distance. A quaternion has no singularity.
             UnknownNameError: the frame or representation does not exist.
-            InputError: a wrong length, a number that is not finite, or batch shapes that do not broadcast.
-            VerificationError: Pinocchio's result differs by more than the bound.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -1274,26 +1148,11 @@ class Robot(Displayable):
         contributions equals `acceleration` and is compared with Pinocchio's.
 
         Args:
-            q: (..., nq) rad, m.
-            v: (..., nv) rad/s, m/s; of planar and floating joints in the axes of the moving frame.
-            a: (..., nv) rad/s^2, m/s^2; in the same axes as `v`.
             frame: Name of a link or joint; None: the robot's only tip.
-            reference: LOCAL_WORLD_ALIGNED: at the frame's origin, in world axes. LOCAL: at the frame's
-                origin, in the frame's axes. WORLD: at the body point that coincides with the world origin, in
-                world axes.
-            base: Motion of the root link; None: fixed at the world origin.
             out: Output array for the terms, C-contiguous float64 (..., joints, 4, 6).
-            verify: True: check this call with Pinocchio. "sample": check 100 of its configurations. None:
-                as chosen in `load`.
-            threads: Number of threads for a batch. None: all processors from 4,096 configurations on.
 
         Returns:
             The contributions, with leading batch axes; `print` and notebooks show them as a table.
-
-        Raises:
-            InputError: a wrong length, a number that is not finite, or batch shapes that do not broadcast.
-            UnknownNameError: the frame, reference or joint does not exist.
-            VerificationError: Pinocchio's result differs by more than the bound.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -1428,6 +1287,7 @@ class Robot(Displayable):
         quantities: Sequence[str] = EXPORTED,
         reference: Reference | str = _ALIGNED,
         *,
+        form: str = "tree",
         name: str | None = None,
         verify: bool | None = None,
     ) -> str:
@@ -1441,12 +1301,15 @@ class Robot(Displayable):
             frame: Name of a link or joint; None: `tip_frame`.
             quantities: Any of "placement", "velocity", "jacobian", "jacobian_rate", "acceleration".
             reference: Reference frame of velocities, accelerations and Jacobians.
+            form: "tree": the steps are the URDF's joints. "dh": the rows of the table from `base_frame` to
+                the frame. "screws": the screws of this path. Results of "dh" and "screws" are in the axes of
+                `base_frame`.
             name: Prefix of the function names; None: made of the names of the robot and the frame.
             verify: True: check the code with Pinocchio. None: as chosen in `load`. The first line of
                 unchecked code states UNVERIFIED.
 
         Raises:
-            UnknownNameError: the language, frame, quantity or reference does not exist.
+            UnknownNameError: the language, frame, quantity, reference or form does not exist.
             InputError: no quantity is given, or one that cannot be exported.
             VerificationError: Pinocchio's result differs by more than the bound.
 
@@ -1457,13 +1320,10 @@ class Robot(Displayable):
         >>> scope["jacobian"]([0.0, 0.0])[:2].tolist()
         [[-0.0, -0.0], [0.9, 0.4]]
         """
-        from urdfkin.export import write  # noqa: PLC0415
-        from urdfkin.export.code import code_of  # noqa: PLC0415  loads python-flint
-
-        frame = as_choice(frame, self.tip_frame, "frame")
+        frame, form = as_choice(frame, self.tip_frame, "frame"), as_str(form, "form")
         name = None if name is None else as_str(name, "name")
-        code = code_of(self.verifier, self.plan, frame, quantities, reference, name=name, verify=verify)
-        return write(code, as_str(to, "to"))
+        code = hook("code of a robot")(self, frame, quantities, reference, form, name=name, verify=verify)
+        return str(hook("code in a language")(code, as_str(to, "to")))
 
     # -- chains and Denavit-Hartenberg tables ---------------------------------------------------------
 
@@ -1718,3 +1578,50 @@ class Robot(Displayable):
             plan = self.plan([self.tree.frame_link(frame)])
             prepared = self._prepared[key] = PreparedFrame(self, frame, Reference.of(reference), plan)
         return prepared
+
+
+# -- docstrings --------------------------------------------------------------------------------------
+
+#: An item of a list in the docstring of `Robot`, and of a section in that of a method.
+_SHARED_ITEM = re.compile(r"^- `(\w+)`: (.*(?:\n  .*)*)", re.MULTILINE)
+_ITEM = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
+
+
+def _completed(method: FunctionType, shared: dict[str, str], errors: dict[str, str]) -> str:
+    """Return the docstring of a method that computes, with its shared arguments and errors.
+
+    The shape of the result, its units and its equations come from the table of quantities.
+    """
+    text, start, example = cleandoc(method.__doc__ or "").partition("\n\n>>> ")
+    text, *parts = re.split(r"\n\n(Args|Returns|Raises):\n", text)
+    own = {"Args": "", "Returns": "", "Raises": ""} | dict(zip(parts[::2], parts[1::2], strict=True))
+    code, described = method.__code__, shared | dict(_ITEM.findall(own["Args"]))
+    names = code.co_varnames[1 : code.co_argcount + code.co_kwonlyargcount]
+    own["Args"] = _indented([f"{name}: {described[name]}" for name in names])
+    row = next((row for row in QUANTITIES.values() if row.method == method.__name__), None)
+    if row is not None:
+        shape, units = ", ".join(map(str, row.shape)), [f"{x} in {unit}" for x, unit in row.units.items()]
+        result = "; ".join((f"(..., {shape}), or (..., frames, {shape}) for a list of frames", *units))
+        source = f"Equation{'s' * (len(row.equations) > 1)} {', '.join(row.equations)}."
+        own["Returns"] = _indented([f"{own['Returns'] or f'{result}.'} {source}"])
+    raised = dict(_ITEM.findall(own["Raises"]))
+    own["Raises"] = _indented([f"{name}: {words}" for name, words in (raised | errors | raised).items()])
+    sections = (f"\n\n{title}:\n{section}" for title, section in own.items() if section)
+    return "".join((text, *sections, start, example))
+
+
+def _indented(items: Sequence[str]) -> str:
+    lines = (" ".join(item.split()) for item in items)
+    return "\n".join(fill(x, 98, initial_indent=4 * " ", subsequent_indent=8 * " ") for x in lines)
+
+
+def _complete_docstrings() -> None:
+    """Complete the docstrings of the methods that compute from the docstring of `Robot`."""
+    arguments, _, errors = cleandoc(Robot.__doc__ or "").partition("They share these errors:")
+    shared = dict(_SHARED_ITEM.findall(arguments)), dict(_SHARED_ITEM.findall(errors))
+    for method in vars(Robot).values():
+        if isinstance(method, FunctionType) and "threads" in method.__code__.co_varnames and method.__doc__:
+            method.__doc__ = _completed(method, *shared)
+
+
+_complete_docstrings()

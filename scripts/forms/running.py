@@ -19,10 +19,12 @@ import numpy as np
 
 from scripts.forms import poses
 from urdfkin.dh import DHTable, export, read_table, to_urdf
-from urdfkin.dh.convert import link_names
+from urdfkin.dh.convert import link_names, to_tree
 from urdfkin.dh.export.code import plain
+from urdfkin.export import LANGUAGES
 from urdfkin.lint import UrdfWarning
 from urdfkin.loading import load
+from urdfkin.model.configuration import coordinate_names
 from urdfkin.model.tree import FloatArray
 
 _STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror")
@@ -32,7 +34,7 @@ int main(void) {{
     double q[{length}], T[16];
     for (int s = 0; s < {count}; ++s) {{
         for (int k = 0; k < {n}; ++k) if (scanf("%lf", &q[k]) != 1) return 1;
-        table_placement(q, T);
+        {name}_placement(q, T);
         for (int i = 0; i < 16; ++i) printf("%.17g\\n", T[i]);
     }}
     return 0;
@@ -56,6 +58,13 @@ class Job:
     table: DHTable
     q: FloatArray
 
+    def given(self, form: str) -> list[list[float]]:
+        """Return the configurations in the order of the coordinates of the exported code."""
+        if form not in LANGUAGES or form == "sympy":
+            return list(self.q.tolist())
+        names = coordinate_names(to_tree(self.table))
+        return list(self.q[:, [self.table.joint_names.index(name) for name in names]].tolist())
+
 
 Poses = list[FloatArray]
 Run = Callable[[Sequence[Job], Path], Poses]
@@ -68,7 +77,7 @@ def in_python(form: str) -> Run:
         library = form if form != "ets" else "roboticstoolbox"
         if importlib.util.find_spec(library) is None:
             raise Missing(library)
-        return [np.array(poses.poses(form, export(job.table, form), job.q.tolist())) for job in jobs]
+        return [np.array(poses.poses(form, export(job.table, form), job.given(form))) for job in jobs]
 
     return run
 
@@ -91,10 +100,12 @@ def in_c(jobs: Sequence[Job], folder: Path) -> Poses:
     compiler, found = _program("cc"), Poses()
     for job in jobs:
         n = job.q.shape[1]
-        main = _MAIN.format(length=max(n, 1), n=n, count=len(job.q))
-        (folder / "code.c").write_text(export(replace(job.table, robot="table"), "c") + main, "utf-8")
+        text = export(job.table, "c")
+        name = re.findall(r"^void (\w+)_placement\(", text, re.MULTILINE)[0]
+        main = _MAIN.format(length=max(n, 1), n=n, count=len(job.q), name=name)
+        (folder / "code.c").write_text(text + main, "utf-8")
         subprocess.run([compiler, *_STRICT, "code.c", "-o", "code", "-lm"], cwd=folder, check=True)
-        numbers = "\n".join(map(repr, job.q.ravel().tolist()))
+        numbers = "\n".join(repr(x) for row in job.given("c") for x in row)
         done = subprocess.run(
             [str(folder / "code")], input=numbers, capture_output=True, text=True, check=True
         )
@@ -102,12 +113,12 @@ def in_c(jobs: Sequence[Job], folder: Path) -> Poses:
     return found
 
 
-def in_octave(form: str, lines_of: Callable[[int, Job], list[str]], first: str = "") -> Run:
+def in_octave(form: str, lines_of: Callable[[str, Job], list[str]], first: str = "") -> Run:
     """Run MATLAB's formats in Octave, all tables in one process.
 
     Args:
         form: Name of the format.
-        lines_of: Returns the statements that print the poses of a table, given its number.
+        lines_of: Returns the statements that print the poses of a table, given its function.
         first: Statements before all others.
     """
 
@@ -115,9 +126,9 @@ def in_octave(form: str, lines_of: Callable[[int, Job], list[str]], first: str =
         octave, lines = _program("octave-cli"), [first]
         for k, job in enumerate(jobs):
             text = export(replace(job.table, robot=f"t{k}"), form)
-            name = re.findall(r"(\w+)\(.*\)$", text.partition("\n")[0])[0]
+            name = re.findall(r"^function .*= (\w+)\(", text, re.MULTILINE)[0]
             (folder / f"{name}.m").write_text(text, "utf-8")
-            lines += [*lines_of(k, job), "printf('end\\n');"]
+            lines += [*lines_of(name, job), "printf('end\\n');"]
         (folder / "tables.m").write_text("\n".join(lines), "utf-8")
         command = [octave, "--no-init-file", "--quiet", "tables.m"]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
@@ -134,19 +145,20 @@ def _printed(value: str) -> str:
     return f"printf('%.17g\\n', ({value})');"
 
 
-def _plainly(k: int, job: Job) -> list[str]:
-    return [_printed(f"t{k}_placement([{'; '.join(map(repr, q))}])") for q in job.q.tolist()]
+def _plainly(name: str, job: Job) -> list[str]:
+    numbers = ("; ".join(map(repr, q)) for q in job.given("matlab"))
+    return [f"f = {name}();", *(_printed(f"f.placement([{q}])") for q in numbers)]
 
 
-def _symbolically(k: int, job: Job) -> list[str]:
+def _symbolically(name: str, job: Job) -> list[str]:
     exact = ("; ".join(f"vpa('{x!r}')" for x in q) for q in job.q.tolist())
-    return [f"[T, q] = t{k}_symbolic();", *(_printed(f"double(subs(T, q, [{q}]))") for q in exact)]
+    return [f"[T, q] = {name}();", *(_printed(f"double(subs(T, q, [{q}]))") for q in exact)]
 
 
-def _as_bodies(k: int, job: Job) -> list[str]:
+def _as_bodies(name: str, job: Job) -> list[str]:
     tip = f"{plain(job.table.tip_frame)}_tip"
     numbers = (", ".join(map(repr, q)) for q in job.q.tolist())
-    return [f"robot = t{k}_tree();", *(_printed(f"getTransform(robot, [{q}], '{tip}')") for q in numbers)]
+    return [f"robot = {name}();", *(_printed(f"getTransform(robot, [{q}], '{tip}')") for q in numbers)]
 
 
 def read_back(form: str) -> Run:

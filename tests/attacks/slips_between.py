@@ -49,7 +49,7 @@ from urdfkin.urdf.sources import Origin
 
 #: Where a user's numbers pass on their way to the result, and on their way to Pinocchio.
 MODULES = (
-    "verify.oracle_query", "verify.call", "model.chain", "model.configuration", "model.mimic",
+    "verify.oracle", "verify.call", "model.chain", "model.configuration", "model.mimic",
     "dh.convert", "model.configuration_like", "verify.pinocchio_inputs", "model.frame_names",
     "verify.table_check", "kinematics.bodies", "verify.pinocchio", "model.base_motion", "compiled.batch",
     "compiled.evaluate", "compiled.plan", "compiled.program", "model.reference", "robot",

@@ -12,6 +12,7 @@ from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import freed
 from urdfkin.robot import Robot
 from urdfkin.urdf.sources import Origin
+from urdfkin.verify.oracle import QueryBatch
 from urdfkin.verify.pinocchio_inputs import rules_of_text
 
 pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
@@ -97,7 +98,7 @@ def test_sine_and_cosine_are_right_to_the_last_digit_for_angles_of_any_size(expo
     x = np.random.default_rng(exponent).uniform(1.0, 10.0, 60) * 10.0**exponent
     level = urdfkin.load(text().replace('rpy="0.1 0.2 0.3"', ""), verify=False)
     ours = level.placement(x[:, np.newaxis], "l1")
-    theirs = level.verifier.oracle().placements(x[:, np.newaxis], ["l1"])[:, 0]
+    theirs = level.verifier.oracle().placements(QueryBatch(["l1"], (x[:, np.newaxis],)))[:, 0]
     with mpmath.workdps(50 + exponent):
         for k, angle in enumerate(x.tolist()):
             true = mpmath.cos(mpmath.mpf(angle)), mpmath.sin(mpmath.mpf(angle))

@@ -21,6 +21,7 @@ from urdfkin.model.frame_names import JointFrame, LinkFrame
 from urdfkin.model.tree import KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.validation.accuracy import judge
+from urdfkin.verify.oracle import QueryBatch
 
 #: What links and joints are called here.
 ASKED = (*POOL, *(f"{prefix}:{name}" for prefix in ("link", "joint") for name in POOL))
@@ -163,9 +164,9 @@ def test_the_remedy_for_an_ambiguous_name_works() -> None:
     assert robot.placement([], "joint:c")[:2, 3].tolist() == [1.0, 1.0]
     assert robot.placement([], "joint:b")[:2, 3].tolist() == [1.0, 0.0]
     with pytest.raises(OracleError, match="two of Pinocchio's frames have this name"):
-        robot.verifier.oracle().placements(np.zeros((1, 0)), ["b"])
+        robot.verifier.oracle().placements(QueryBatch(["b"], (np.zeros((1, 0)),)))
     with pytest.raises(OracleError, match="Pinocchio has no such frame: found 'link:d'"):
-        robot.verifier.oracle().placements(np.zeros((1, 0)), ["link:d"])
+        robot.verifier.oracle().placements(QueryBatch(["link:d"], (np.zeros((1, 0)),)))
 
 
 def meant(name: str, links: list[str], joints: list[str]) -> int | str:
@@ -217,7 +218,7 @@ def test_of_hostile_names_every_one_stands_for_the_same_frame_on_both_sides(
                 with pytest.raises(wanted):
                     robot.placement(q, name, base=base)
                 with pytest.raises(OracleError):
-                    robot.verifier.oracle(base).placements(q[np.newaxis], [name])
+                    robot.verifier.oracle(base).placements(QueryBatch([name], (q[np.newaxis],)))
             else:
                 found = robot.placement(q, name, base=base)[:3, 3]
                 np.testing.assert_allclose(found, T[:3, :3] @ places[where] + T[:3, 3], atol=1e-14)

@@ -92,8 +92,8 @@ FRAGMENTS = [
      "*at[rule.leader][::-1], rule.multiplier"),
     ("verify.pinocchio_inputs", "body, joint = self._bodies.get(name)",
      "body, joint = self._bodies.get(name[5:])"),
-    ("verify.oracle_query", "return spread[places]", "return spread[places][::-1]"),
-    ("verify.oracle_query", "return result.reshape(self.n, len(self.frames), *own)",
+    ("verify.oracle", "return spread[places]", "return spread[places][::-1]"),
+    ("verify.oracle", "return result.reshape(self.n, len(self.frames), *own)",
      "return result.reshape(self.n, len(self.frames), *own)[::-1]"),
 ]  # fmt: skip
 

@@ -29,7 +29,7 @@ ROBOT = {
     "order": [[], ["--format", "csv"], ["--from", "isaaclab", "--format", "json"], ["--to", FILE]],
     "placement": [
         [], ["--format", "json"], ["--format", "csv"], ["--frame", "FRAME"], ["--relative-to", "FRAME"],
-        ["--as", "rpy"], ["--base-placement", FILE],
+        ["--as", "rpy"], ["--base-placement", FILE], ["--trajectory", FILE], ["--convention", FILE],
     ],
     "analytical-jacobian": [[], ["--format", "csv"], ["--representation", FILE]],
     "chain": [["--no-mimic"], ["--format", "json"], ["--format", "csv"], ["--base", FILE]],
@@ -38,7 +38,9 @@ ROBOT = {
     "jacobian-rate": [[], ["--format", "csv"]],
     "hessian": [[], ["--format", "csv"]],
     "imu": [[], ["--format", "csv"], *(["--trajectory", file] for file in (FILE, f"{FILE}.npz"))],
-    "singular-values": [[], ["--format", "csv"], ["--format", "json"], ["--frame", FILE]],
+    "singular-values": [
+        [], ["--format", "csv"], ["--format", "json"], ["--frame", FILE], ["--trajectory", FILE],
+    ],
     "acceleration": [
         [], ["--breakdown", "--v", "random"], ["--breakdown", "--v", "random", "--format", "csv"],
     ],

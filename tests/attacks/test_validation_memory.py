@@ -21,7 +21,7 @@ from urdfkin.validation.campaign import validate
 from urdfkin.validation.chunk import chunks, run_chunk
 from urdfkin.validation.outcome import Verdict
 from urdfkin.validation.robot_input import subject
-from urdfkin.verify.pinocchio import Oracle, OracleError
+from urdfkin.verify.pinocchio import OracleError, PinocchioOracle
 
 GB = 10**9
 
@@ -76,9 +76,7 @@ def test_no_array_of_a_block_is_larger_than_a_block(monkeypatch: pytest.MonkeyPa
     for name in ("placements", "velocities", "accelerations", "jacobians", "jacobian_rates"):
         monkeypatch.setattr(evaluate, name, seen(getattr(evaluate, name)))
     for name in ("placements", "velocities", "accelerations", "jacobians", "jacobian_rates"):
-        monkeypatch.setattr(Oracle, name, seen(getattr(Oracle, name)))
-    for name in ("joint_jacobians", "joint_jacobian_rates"):
-        monkeypatch.setattr(Oracle, name, seen(getattr(Oracle, name)))
+        monkeypatch.setattr(PinocchioOracle, name, seen(getattr(PinocchioOracle, name)))
     monkeypatch.setattr(comparison, "BLOCK_BYTES", 100_000)
     (chunk,) = chunks(subject("talos"), 5, 3)
     run_chunk(chunk)
@@ -120,7 +118,7 @@ def test_a_robot_that_does_not_fit_is_not_verified_and_pinocchio_is_not_asked(
         raise AssertionError("Pinocchio was asked")
 
     monkeypatch.setattr(memory, "share", lambda processes=1: 2_000_000 // processes)
-    monkeypatch.setattr(Oracle, "__init__", asked)
+    monkeypatch.setattr(PinocchioOracle, "__init__", asked)
     monkeypatch.setattr(chunk_module, "_cache", {})
     robot = validate("talos", samples=1).robots[0]
     assert robot.verdict is Verdict.NOT_VERIFIED

@@ -144,7 +144,7 @@ def test_a_quaternion_that_changes_its_sign_is_the_same_orientation(tmp_path: Pa
 def test_what_a_plot_verifies_is_the_formula_and_not_the_rates(tmp_path: Path) -> None:
     robot = wheel()
     motion = read(robot, tmp_path / "w.csv", wrapped(2.0 * T))
-    words = foot(frame_motion(robot, motion.q, motion.v, motion.a, "b"), motion)
+    words = foot(frame_motion(robot, motion, "b"), motion)
     assert "verified by Pinocchio" in words
     assert "not whether v and a are the derivatives of q" in words
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -77,6 +79,46 @@ def test_a_wrong_convention_is_one_line(tmp_path: Path) -> None:
     assert run("jacobian", "panda", "--convention", "mujoco", "--no-mimic").code == 0
     done = run("acceleration", "ur5", "--convention", "mujoco", "--breakdown")
     assert done.code == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('joints = ["joint_1"]', "the order of joints lacks a joint: found joint_2"),
+        ('joints = ["joint_1", "joint_2", "elbow"]', "unknown joint 'elbow'"),
+        (
+            '[joint.joint_1]\nname = "joint_2"',
+            "two joints have the same name in the convention: found 'joint_2'",
+        ),
+        (
+            'joints = ["joint_2", "joint_2"]',
+            "two joints have the same name in the convention: found 'joint_2'",
+        ),
+    ],
+)
+def test_a_file_without_a_joint_or_with_two_columns_of_one_name_is_one_error(
+    text: str, words: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(text)
+    for command in (("placement", "--convention"), ("order", "--to")):
+        done = run(command[0], "planar_two_link", command[1], str(file))
+        assert (done.code, done.err.count("\n")) == (2, 1)
+        assert words in done.err
+        assert "mine" in done.err
+
+
+def test_a_batch_without_the_option_runs_no_line_of_conventions() -> None:
+    """Nothing can cost time that does not run: no module is loaded, in a process of its own."""
+    words = ["velocity", "a1", "--q", "random:100", "--v", "random", "--format", "csv"]
+    code = (
+        "import sys\nfrom tests.cli.running import urdfkin\n"
+        f"done = urdfkin(*{words})\n"
+        "loaded = [name for name in sys.modules if name.startswith('urdfkin.conventions')]\n"
+        "print(done.code, len(done.text.splitlines()) > 100, loaded)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "0 True []\n"
 
 
 def test_wxyz_is_the_quaternion_with_its_scalar_first() -> None:

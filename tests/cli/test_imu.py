@@ -82,7 +82,7 @@ def test_a_base_in_the_archive_moves_the_robot_and_rates_are_made_where_there_ar
     ("arrays", "words"),
     [
         ({"q": np.zeros((4, 5))}, "q must have the shape (n, 6)"),
-        ({"q": np.zeros((4, 6)), "v": np.zeros((4, 6))}, "v, a must be given together"),
+        ({"q": np.zeros((4, 6)), "a": np.zeros((4, 6))}, "joint accelerations need joint velocities"),
         ({"q": np.zeros((4, 6)), "t": np.zeros(3)}, "t must have the shape (n)"),
         ({"q": np.zeros((4, 6)), "t": np.zeros(4)}, "time must increase"),
         ({"q": np.zeros((2, 6))}, "at least 3 samples"),

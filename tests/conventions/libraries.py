@@ -1,4 +1,26 @@
-"""Each library's own forward kinematics, velocity and Jacobian, in its own convention."""
+"""Each library's own forward kinematics, velocity and Jacobian, in its own convention.
+
+The difference to urdfkin is bounded as between urdfkin and Pinocchio (`urdfkin.verify.bounds`), with the
+library's own roundings for each joint and factor. Counted as in `urdfkin.kinematics.roundings`, in units of
+eps = 2^-52 or, for single precision, 2^-23:
+
+| Library | How it computes a joint | Roundings of both together |
+|---|---|---|
+| Pinocchio | a rotation matrix; constants by a quaternion | ROUNDINGS |
+| Drake, iDynTree | a rotation matrix; constants from roll, pitch, yaw, 3.1; rotation about any axis by
+  Rodrigues' formula, 4.0; two products, 3.6 | 5.7 + 10.7, at most ROUNDINGS |
+| Robotics Toolbox | a product of 4 x 4 matrices: three elementary rotations for roll, pitch, yaw, and that of
+  the joint: 1.8 each, with the sine and cosine 0.5 each | 5.7 + 9.2, at most ROUNDINGS |
+| MuJoCo | a unit quaternion | MUJOCO |
+| Newton | a unit quaternion of single precision, 21.5; rounding q up to 2 pi, 3.2, the origin, 0.5, and roll,
+  pitch and yaw up to pi, 4.8, to single precision | SINGLE |
+
+A velocity and a Jacobian have these factors more: one for the conversion, which rotates the velocity of the
+base. One more for MuJoCo, iDynTree and Newton: MuJoCo moves velocities from the centre of mass to the link,
+Newton from that of the link, and iDynTree rotates them from the link's axes. The lever arms of MuJoCo are
+longer by the distance of the centre of mass, that of Newton's base by the distance of its centre of mass; it
+is at most that of the farthest centre of mass of a link.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +33,15 @@ from xml.etree.ElementTree import SubElement, tostring
 import numpy as np
 import pytest
 
+from urdfkin.conventions.convention import transcoded
+from urdfkin.kinematics.roundings import EPS, MUJOCO, ROUNDINGS
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.urdf.plain_xml import plain_xml
 
+#: Roundings of Newton's single precision, derived above.
+SINGLE = 30.0
+SINGLE_EPS = 2.0**-23
 #: Returns T (4, 4), the velocity (6,) and the Jacobian (6, nv) of a link, rows and columns as in the library.
 Evaluate = Callable[[FloatArray, FloatArray, str], tuple[FloatArray, FloatArray, FloatArray]]
 
@@ -25,8 +52,13 @@ class Library:
 
     names: list[str]
     evaluate: Evaluate
-    #: Largest difference to urdfkin: of double precision, and of single precision for Newton.
-    tolerance: float = 2e-12
+    #: Roundings for each joint and factor, of urdfkin and the library together, and their unit.
+    roundings: float = ROUNDINGS
+    eps: float = EPS
+    #: Factors of a velocity and a Jacobian beyond those of the comparison with Pinocchio.
+    more: int = 1
+    #: Whether lever arms begin at a centre of mass.
+    at_mass: bool = False
 
 
 def bare(text: str) -> str:
@@ -88,7 +120,8 @@ def mujoco(robot: Robot, folder: Path) -> Library:
         J = np.vstack((linear, angular))
         return T, J @ v, J
 
-    return Library([model.joint(i).name for i in range(model.njnt)], evaluate)
+    names = [model.joint(i).name for i in range(model.njnt)]
+    return Library(names, evaluate, roundings=MUJOCO, more=2, at_mass=True)
 
 
 def drake(robot: Robot, folder: Path) -> Library:
@@ -147,7 +180,7 @@ def idyntree(robot: Robot, folder: Path) -> Library:
         J = np.array(matrix.toNumPy())
         return T, kin.getFrameVel(link).toNumPy(), J if free else J[:, 6:]
 
-    return Library(["root_joint"] * free + names, evaluate)
+    return Library(["root_joint"] * free + names, evaluate, more=2)
 
 
 def rtb(robot: Robot, folder: Path) -> Library:
@@ -177,10 +210,23 @@ def newton(robot: Robot, folder: Path) -> Library:
     file = folder / "robot.urdf"
     file.write_text(bare(robot.urdf))
     builder = sim.ModelBuilder()
-    free = robot.root_joint is not None
-    builder.add_urdf(str(file), floating=free)
+    builder.add_urdf(str(file), floating=robot.root_joint is not None)
+    return _of_newton(robot, builder)
+
+
+def newton_usd(robot: Robot, folder: Path) -> Library:
+    sim = pytest.importorskip("newton")
+    builder = sim.ModelBuilder()
+    builder.add_usd(_stage(robot, folder))
+    return _of_newton(robot, builder, transcoded)
+
+
+def _of_newton(robot: Robot, builder: Any, spelled: Callable[[str], str] = str) -> Library:
+    import newton as sim  # noqa: PLC0415
+
     model = builder.finalize(device="cpu")
-    labels = [label.split("/")[-1] for label in builder.body_label]
+    free = robot.root_joint is not None
+    labels = [f"/{label}" for label in builder.body_label]
     kinds = zip(builder.joint_label, builder.joint_type, strict=True)
     names = [name.split("/")[-1] for name, kind in kinds if int(kind) != int(sim.JointType.FIXED)]
     names = ["root_joint", *names[1:]] if free else names
@@ -189,7 +235,7 @@ def newton(robot: Robot, folder: Path) -> Library:
     def evaluate(q: FloatArray, v: FloatArray, link: str) -> tuple[FloatArray, FloatArray, FloatArray]:
         state = model.state()
         state.joint_q.assign(q.astype(np.float32))
-        body = labels.index(link)
+        body = next(k for k, label in enumerate(labels) if label.endswith(f"/{spelled(link)}"))
 
         def twist(v: FloatArray) -> FloatArray:
             state.joint_qd.assign(v.astype(np.float32))
@@ -204,7 +250,93 @@ def newton(robot: Robot, folder: Path) -> Library:
         T[:3, :3], T[:3, 3] = _rotation(pose[3:]), pose[:3]
         return T, found, np.stack([twist(e) for e in np.eye(len(v))], axis=-1)
 
-    return Library(names, evaluate, 2e-5)
+    return Library(names, evaluate, SINGLE, SINGLE_EPS, more=2, at_mass=True)
+
+
+def _stage(robot: Robot, folder: Path) -> Any:
+    """Return the stage that urdf-usd-converter writes, without its joint to the world for a free base."""
+    converter = pytest.importorskip("urdf_usd_converter")
+    from pxr import Usd  # noqa: PLC0415
+
+    file = folder / "robot.urdf"
+    file.write_text(bare(robot.urdf))
+    made = converter.Converter(layer_structure=False, scene=False).convert(str(file), str(folder / "usd"))
+    stage = Usd.Stage.Open(made.path)
+    if robot.root_joint is not None:
+        stage.RemovePrim(stage.GetDefaultPrim().GetPath().AppendPath("Physics/root_joint"))
+    return stage
+
+
+@dataclass(frozen=True)
+class _Prim:
+    """A joint prim: its bodies' paths, its frame on either body, its axis (None: fixed), whether it turns."""
+
+    parent: str
+    child: str
+    before: FloatArray
+    behind: FloatArray
+    axis: FloatArray | None
+    turns: bool
+
+
+def usd(robot: Robot, folder: Path) -> Library:
+    """The joints of a stage, in its order; UsdPhysics defines q in degrees, and the base's velocities.
+
+    OpenUSD has no forward kinematics. It is computed here from the frames and axes of the joint prims.
+    """
+    stage = _stage(robot, folder)
+    from pxr import Gf, UsdPhysics  # noqa: PLC0415
+
+    def matrix(rotation: Any, place: Any = (0, 0, 0)) -> FloatArray:
+        T = Gf.Matrix4d(Gf.Rotation(Gf.Quatd(rotation)), Gf.Vec3d(*map(float, place)))
+        return np.array(T).T  # Gf multiplies a row vector by a matrix
+
+    def read(joint: Any) -> _Prim:
+        parent, child = (str((*x.GetTargets(), "")[0]) for x in (joint.GetBody0Rel(), joint.GetBody1Rel()))
+        before = matrix(joint.GetLocalRot0Attr().Get(), joint.GetLocalPos0Attr().Get())
+        end = matrix(joint.GetLocalRot1Attr().Get(), joint.GetLocalPos1Attr().Get())
+        prim, axis = joint.GetPrim(), None
+        turns = prim.IsA(UsdPhysics.RevoluteJoint)
+        if not prim.IsA(UsdPhysics.FixedJoint):
+            kind = UsdPhysics.RevoluteJoint if turns else UsdPhysics.PrismaticJoint
+            axis = np.eye(3)["XYZ".index(kind(prim).GetAxisAttr().Get())]
+        behind = np.asarray(np.linalg.inv(end), dtype=np.float64)
+        return _Prim(parent, child, before, behind, axis, turns)
+
+    joints = [UsdPhysics.Joint(prim) for prim in stage.Traverse() if prim.IsA(UsdPhysics.Joint)]
+    prims = {joint.GetPrim().GetName(): read(joint) for joint in joints}
+    moving = [name for name, prim in prims.items() if prim.axis is not None]
+    of_child = {prim.child: name for name, prim in prims.items()}
+    bodies = {path.split("/")[-1]: path for prim in prims.values() for path in (prim.parent, prim.child)}
+    free = robot.root_joint is not None
+
+    def walk(q: FloatArray, body: str) -> tuple[FloatArray, list[tuple[int, FloatArray, FloatArray | None]]]:
+        """Return T of a body, and of each joint on its path the column, z, and the origin if it turns."""
+        prim = prims.get(of_child.get(body, ""))
+        if prim is None or not prim.parent:
+            return matrix(Gf.Quatd(*q[3:7]), q[:3]) if free else np.eye(4), []
+        T, path = walk(q, prim.parent)
+        T = T @ prim.before
+        if prim.axis is not None:
+            column = moving.index(of_child[body])
+            value, z = float(q[column + 7 * free]), T[:3, :3] @ prim.axis
+            path = [*path, (column + 6 * free, z, T[:3, 3] if prim.turns else None)]
+            turn = Gf.Rotation(Gf.Vec3d(*prim.axis), value).GetQuat()  # degrees
+            T = T @ (matrix(turn) if prim.turns else matrix(Gf.Quatd(1.0), value * prim.axis))
+        return T @ prim.behind, path
+
+    def evaluate(q: FloatArray, v: FloatArray, link: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+        T, path = walk(q, bodies.get(transcoded(link), ""))  # a root without joints has none
+        if free:
+            path += [(3 + k, z, q[:3]) for k, z in enumerate(np.eye(3))]
+        J = np.zeros((6, len(v)))
+        J[:3, : 3 * free] = np.eye(3)[:, : 3 * free]
+        for column, z, origin in path:
+            J[:3, column] = z if origin is None else np.radians(np.cross(z, T[:3, 3] - origin))
+            J[3:, column] = 0.0 if origin is None else np.radians(z)
+        return T, J @ v, J
+
+    return Library(["root_joint"] * free + moving, evaluate, SINGLE, SINGLE_EPS)
 
 
 def _rotation(xyzw: FloatArray) -> FloatArray:
@@ -240,4 +372,6 @@ LIBRARIES = {
     "idyntree": idyntree,
     "rtb": rtb,
     "newton": newton,
+    "newton-usd": newton_usd,
+    "usd": usd,
 }

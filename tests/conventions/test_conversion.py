@@ -12,6 +12,7 @@ import urdfkin
 from tests.conventions.libraries import LIBRARIES
 from urdfkin.conventions import BUILT_IN, Convention, find_convention
 from urdfkin.conventions import convention as module
+from urdfkin.conventions.convention import spelled
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
@@ -63,6 +64,7 @@ def test_the_list_of_names_is_that_of_the_data_and_each_has_evidence() -> None:
     own = {"urdfkin", "urdf", "alphabetical"}  # nothing to run: the file itself, and Python's sort
     measured = {name for name in BUILT_IN if find_convention(name).evidence == "measured"}
     assert measured == own | set(LIBRARIES)
+    assert {name for name in BUILT_IN if find_convention(name).measured} == set(LIBRARIES)
 
 
 @pytest.mark.parametrize("convention", [*map(find_convention, FLOATING), *ODD], ids=lambda c: c.name)
@@ -239,15 +241,45 @@ def test_a_mimic_joint_has_a_column_that_must_follow_its_rule() -> None:
     assert free.jacobian(q).shape == (6, 9)
 
 
-def test_names_in_usd_are_identifiers() -> None:
-    so101 = urdfkin.load("so101", verify=False)
-    names = so101.convention("usd").joint_names
-    assert all(name.isidentifier() for name in names)
+NAMES = ("1", "12a", "a-b", "joint.1", "a b", "é", "-", "_x", "", "a/b-c", "ok_2", "漢😀-é.", "root_joint.x")
+#: What OpenUSD Exchange 3.0.1 and OpenUSD 26.8 return for these names; the libraries are asked below.
+IN_USD = (
+    "tn__1_", "tn__12a_", "tn__ab_h3", "tn__joint1_m9", "tn__ab_Z2", "tn__l6", "tn__j0", "_x", "tn__",
+    "tn__abc_w4B", "ok_2", None, "tn__root_jointx_ZH",
+)  # fmt: skip
+IDENTIFIERS = (
+    "_", "_2a", "a_b", "joint_1", "a_b", "__", "_", "_x", "_", "a_b_c", "ok_2", None, "root_joint_x",
+)  # fmt: skip
 
 
-def test_usd_names_are_those_of_the_library() -> None:
-    tf = pytest.importorskip("pxr.Tf")
-    from urdfkin.conventions.conversion import usd_name  # noqa: PLC0415
+@pytest.mark.parametrize(("name", "in_usd", "plain"), list(zip(NAMES, IN_USD, IDENTIFIERS, strict=True)))
+def test_a_name_is_written_as_in_usd(name: str, in_usd: str | None, plain: str | None) -> None:
+    assert spelled(name, "usd") == in_usd or in_usd is None
+    assert spelled(name, "identifier") == plain or plain is None
+    assert all(spelled(name, how).isidentifier() for how in ("usd", "identifier", "isaacsim"))
+    assert not spelled(name, "isaacsim").startswith("_")
 
-    for name in ("1", "12a", "a-b", "joint.1", "a b", "é", "-", "_x", "", "a/b-c", "ok_2"):
-        assert usd_name(name) == tf.MakeValidIdentifier(name)
+
+def test_a_name_that_begins_with_a_digit_is_written_as_isaac_sim_4_wrote_it() -> None:
+    assert spelled("00_fr_abad", "isaacsim") == "a_00_fr_abad"  # github.com/isaac-sim/IsaacLab/issues/2496
+
+
+def test_names_in_usd_are_those_of_the_libraries() -> None:
+    exchange, tf = pytest.importorskip("usdex.core"), pytest.importorskip("pxr.Tf")
+    rng = np.random.default_rng(0)
+    letters = list("abzAZ019_-./ :éß漢😀#")
+    drawn = ["".join(rng.choice(letters, rng.integers(0, 12))) for _ in range(2000)]
+    for name in (*NAMES, *drawn):
+        assert spelled(name, "usd") == exchange.getValidPrimName(name)
+        assert spelled(name, "identifier") == tf.MakeValidIdentifier(name)
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("name", ["newton", "newton-usd", "usd"])
+def test_a_library_writes_odd_names_as_the_convention_says(name: str, tmp_path: Path) -> None:
+    text = (
+        PLANAR.replace('type="planar"', 'type="continuous"').replace("plane", "1").replace('"turn"', '"a-b"')
+    )
+    robot = urdfkin.load(text.replace('"world"', '"ground"'), verify=False)
+    library = LIBRARIES[name](robot, tmp_path)
+    assert list(robot.convention(name).joint_names) == library.names

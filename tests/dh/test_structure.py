@@ -17,6 +17,7 @@ from urdfkin.dh.structure import Structure, structure
 from urdfkin.loading import load
 from urdfkin.model.chain import chain
 from urdfkin.model.tree import KinematicTree
+from urdfkin.verify.oracle import QueryBatch
 
 H = math.pi / 2
 PUMA: list[list[float]] = [
@@ -99,7 +100,10 @@ def test_a_spherical_joints_centre_stays_where_pinocchio_puts_it(name: str) -> N
     q = np.zeros((20, robot.nq))
     columns = [robot.tree.q_index[robot.tree.joint_index(joint)] for joint in kind.joints]
     q[1:, columns] = np.random.default_rng(0).uniform(-1, 1, (19, 3))
-    base, link = (robot.verifier.oracle().placements(q, [screws.base_frame, beyond])[:, k] for k in (0, 1))
+    base, link = (
+        robot.verifier.oracle().placements(QueryBatch([screws.base_frame, beyond], (q,)))[:, k]
+        for k in (0, 1)
+    )
     T = np.linalg.inv(base) @ link
     local = np.linalg.solve(T[0], [*kind.at, 1.0])
     centres = (T @ local)[:, :3]

@@ -13,9 +13,11 @@ import pytest
 from flint import arb
 
 import urdfkin
+from tests.cli.running import urdfkin as command
 from tests.export.writing import ALL, built, code, file, need, ran
 from tests.high_precision import mp, true_motion
 from tests.laws.subjects import robot_of, state
+from urdfkin.dh import export
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.export import LANGUAGES, write
 from urdfkin.export.check import check
@@ -243,6 +245,64 @@ def test_what_cannot_be_exported_is_refused_with_what_can() -> None:
     with pytest.raises(InputError, match="the Jacobian has no columns"):
         robot_of("single_link").export("c")
     assert "double" in robot_of("single_link").export("c", quantities=["placement"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("to", ["numpy", "c", "casadi", "matlab"])
+@pytest.mark.parametrize("form", ["dh", "screws"])
+def test_a_table_and_screws_are_code_in_every_language_with_its_check(
+    form: str, to: str, tmp_path: Path
+) -> None:
+    need(to)
+    path = tmp_path / f"arm{LANGUAGES[to][1]}"
+    path.write_text(urdfkin.load("ur5").export(to, "tool0", form=form), encoding="utf-8")
+    found = check(path)
+    assert found.good, found.lines
+    assert found.verified
+    assert len(found.lines) == len(_THREE) * (2 if to == "c" else 1)
+    head = path.read_text("utf-8")[:3000]
+    assert {"dh": "Rz(theta) Tz(d) Tx(a) Rx(alpha)", "screws": "space screws S"}[form] in head
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", ["dh", "screws"])
+def test_the_code_of_a_form_computes_what_pinocchio_computes(form: str, tmp_path: Path) -> None:
+    robot = urdfkin.load("panda")
+    path = tmp_path / "arm.py"
+    path.write_text(robot.export("numpy", "panda_hand", form=form), encoding="utf-8")
+    found, q = module(path), robot.sample(20)
+    own = q[:, :7]  # the fingers are not on the path
+    T = robot.relative_placement(q, "panda_hand", robot.base_frame)
+    np.testing.assert_allclose(found.placement(own), T, rtol=0.0, atol=1e-14)
+    assert robot.base_frame == robot.tree.frame_name(0)
+    J = robot.jacobian(q, "panda_hand")[..., :7]
+    np.testing.assert_allclose(found.jacobian(own), J, rtol=0.0, atol=1e-14)
+
+
+@pytest.mark.slow
+def test_a_changed_constant_in_the_code_of_a_table_is_noticed(tmp_path: Path) -> None:
+    text = export(urdfkin.load("ur5").dh("tool0"), "numpy")
+    path = tmp_path / "arm.py"
+    path.write_text(text, encoding="utf-8")
+    assert check(path).good
+    assert text.count("0.425 * ") > 1
+    path.write_text(text.replace("0.425 * ", "0.42500001 * "), encoding="utf-8")
+    found = check(path)
+    assert not found.good
+    assert not found.verified
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("to", ["numpy", "c", "casadi", "matlab"])
+def test_a_table_in_a_language_is_the_same_file_as_the_robot_in_the_form_dh(to: str) -> None:
+    table = command("dh", "ur5", "--tip", "tool0", "--format", to)
+    assert table.code == 0
+    assert table.out == command("export", "ur5", "--frame", "tool0", "--form", "dh", "--to", to).out
+
+
+def test_a_form_that_does_not_exist_is_refused() -> None:
+    with pytest.raises(UnknownNameError, match=r"unknown form 'hd'.*dh"):
+        urdfkin.load("planar_two_link").export("c", form="hd")
 
 
 @pytest.mark.slow

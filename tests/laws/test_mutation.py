@@ -19,7 +19,8 @@ from urdfkin.robot import Robot
 from urdfkin.urdf.sources import Origin
 from urdfkin.validation.accuracy import judge
 from urdfkin.verify.exact import recursion
-from urdfkin.verify.pinocchio import Oracle
+from urdfkin.verify.oracle import QueryBatch
+from urdfkin.verify.pinocchio import PinocchioOracle
 
 #: The relative change of a term.
 FACTOR = "1.0000000001"
@@ -137,7 +138,7 @@ def test_pinocchio_reads_the_text_itself() -> None:
     robot = urdfkin.load("panda")
     moved = robot.urdf.replace('xyz="0 0 0.333"', 'xyz="0 0 0.433"')
     assert moved != robot.urdf
-    q = robot.neutral()[np.newaxis]
-    here, there = (Oracle(text, robot.tree).placements(q, ["panda_link1"]) for text in (robot.urdf, moved))
+    x = QueryBatch(["panda_link1"], (robot.neutral()[np.newaxis],))
+    here, there = (PinocchioOracle(text, robot.tree).placements(x) for text in (robot.urdf, moved))
     assert there[0, 0, 2, 3] - here[0, 0, 2, 3] == pytest.approx(0.1)
     assert compile_tree(robot.tree, [1]).lengths.sum() == pytest.approx(0.333)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -15,7 +15,8 @@ from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.model.chain import chain
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Mimic, build_tree
 from urdfkin.verify.chain_checks import check_chain
-from urdfkin.verify.pinocchio import Oracle
+from urdfkin.verify.oracle import QueryBatch
+from urdfkin.verify.pinocchio import PinocchioOracle
 from urdfkin.verify.tables import TableError
 
 EPS = np.finfo(np.float64).eps
@@ -155,11 +156,11 @@ def test_the_wrong_number_of_coordinates_names_the_right_ones(walker: KinematicT
 
 def moved(name: str, T: FloatArray) -> Callable[..., FloatArray]:
     """Pinocchio's placements with one frame, by its name, moved in its own axes."""
-    right = Oracle.placements
+    right = PinocchioOracle.placements
 
-    def placements(self: Oracle, q: FloatArray, frames: Sequence[str], *more: object) -> FloatArray:
-        found = right(self, q, frames, *more).copy()  # type: ignore[arg-type]
-        found[:, [str(frame).endswith(name) for frame in frames]] @= T
+    def placements(self: PinocchioOracle, x: QueryBatch) -> FloatArray:
+        found = right(self, x).copy()
+        found[:, [str(frame).endswith(name) for frame in x.frames]] @= T
         return found
 
     return placements
@@ -187,7 +188,7 @@ def test_an_origin_or_a_direction_off_by_itself_is_a_disagreement(
     )
     path, q = robot.chain("tool"), np.zeros((1, 2))
     assert check_chain(robot.verifier, path, q) is not None
-    monkeypatch.setattr(Oracle, "placements", moved(frame, T))
+    monkeypatch.setattr(PinocchioOracle, "placements", moved(frame, T))
     with pytest.raises(TableError) as error:
         check_chain(robot.verifier, path, q)
     assert said in str(error.value)

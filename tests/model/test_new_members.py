@@ -27,6 +27,7 @@ from urdfkin.model.mechanisms.mechanism import coordinates_of, pose_of
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import JointKind
 from urdfkin.verify.bounds import magnitudes, movable
+from urdfkin.verify.oracle import QueryBatch
 from urdfkin.verify.oracles import WITNESSES
 from urdfkin.verify.quantities import QUANTITIES, Quantity
 
@@ -126,9 +127,10 @@ def test_the_oracles_refuse_a_new_reference_frame(
             return
     x = np.zeros((1, robot.nq))
     model = WITNESSES[oracle].oracle(robot.urdf, robot.tree)
-    of: Any = (robot.tip_frame,) if row.of == "frames" else slice(0, 1)
+    joints = row.of == "joints"
+    frame = f"joint:{robot.joint_names[0]}" if joints else robot.tip_frame
     with pytest.raises(REFUSED):
-        row.theirs(model, (x, x, x), of, reference)
+        row.ask(model, QueryBatch([frame], (x, x, x), reference, joints=joints))
 
 
 def test_the_kernels_and_the_command_line_know_the_members_of_the_enumeration() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 import urdfkin
 from urdfkin.errors import InputError, SourceError
-from urdfkin.motion.trajectory import line, read_trajectory
+from urdfkin.motion.trajectory import line, read_columns, read_trajectory
 from urdfkin.robot import Robot
 
 END = np.array([1.0, -1.2, 0.8, 0.4, -0.3, 2.0])
@@ -123,3 +123,114 @@ def test_a_spoiled_table_is_refused_by_name(
 def test_a_missing_table_says_so(robot: Robot, tmp_path: Path) -> None:
     with pytest.raises(SourceError, match="cannot be read"):
         read_trajectory(robot, tmp_path / "none.csv")
+
+
+@pytest.mark.parametrize("samples", [41, 100, 1001])
+def test_the_estimated_errors_of_differences_are_near_the_true_ones(
+    samples: int, robot: Robot, tmp_path: Path
+) -> None:
+    direct = line(robot, robot.neutral(), END, 2.0, samples)
+    columns = {"t": direct.t} | {name: direct.q[:, k] for k, name in enumerate(robot.coordinate_names)}
+    found = read_trajectory(robot, write(tmp_path / "x.csv", robot, columns))
+    assert found.errors is not None
+    for estimate, ours, theirs in zip(found.errors, (found.v, found.a), (direct.v, direct.a), strict=True):
+        assert 0.5 < estimate / np.abs(ours - theirs).max() < 2.0
+    assert "largest errors about" in found.derivation()
+
+
+def test_accelerations_alone_are_differences_of_the_given_velocities(robot: Robot, tmp_path: Path) -> None:
+    columns = columns_of(robot, rates=True)
+    given = {name: x for name, x in columns.items() if not name.startswith("a:")}
+    found = read_trajectory(robot, write(tmp_path / "x.csv", robot, given))
+    direct = line(robot, robot.neutral(), END, 2.0, 41)
+    np.testing.assert_array_equal(found.v, direct.v)
+    np.testing.assert_array_equal(found.a, np.gradient(direct.v, direct.t, axis=0, edge_order=2))
+    assert found.rates == "v as given, a by central differences of v"
+    without = {name: x for name, x in columns.items() if not name.startswith("v:")}
+    with pytest.raises(InputError, match="joint accelerations need joint velocities"):
+        read_trajectory(robot, write(tmp_path / "x.csv", robot, without))
+
+
+def test_times_that_are_too_large_for_their_steps_are_told(robot: Robot, tmp_path: Path) -> None:
+    columns = columns_of(robot, rates=False)
+    (note,) = read_trajectory(
+        robot, write(tmp_path / "x.csv", robot, columns | {"t": 1.7e9 + columns["t"]})
+    ).notes
+    assert "subtract the first time in the file" in note
+
+
+@pytest.mark.parametrize(
+    ("heading", "value"),
+    [
+        ("elbow", 30.0),
+        ("q:elbow", 30.0),
+        ("elbow [rad]", 30.0),
+        ("elbow_rad", 30.0),
+        ("elbow [deg]", np.pi / 6),
+        ("elbow (degrees)", np.pi / 6),
+        ("elbow[°]", np.pi / 6),
+        ("elbow_deg", np.pi / 6),
+        ("lift_mm", 0.03),
+        ("lift [mm]", 0.03),
+        ("wheel_deg", 30.0),
+        ("wheel_deg_deg", np.pi / 6),
+        ("v:elbow [deg/s]", np.pi / 6),
+        ("v:elbow_deg_per_s", np.pi / 6),
+        ("a:elbow [deg/s^2]", np.pi / 6),
+        ("a:elbow [rad/s²]", 30.0),
+        ("a:elbow_deg_s2", np.pi / 6),
+        ("Time", 30.0),
+        ("timestamp [ms]", 0.03),
+        ("time_ns", 3e-8),
+    ],
+)
+def test_a_heading_may_end_with_a_unit(heading: str, value: float) -> None:
+    """A joint may itself have a name that ends like a unit: `wheel_deg` is a name here."""
+    units = {"t": "s", "elbow": "rad", "lift": "m", "wheel_deg": "rad"}
+    units |= {"v:elbow": "rad/s", "a:elbow": "rad/s^2"}
+    (found,) = read_columns(f"{heading}\n30\n", "x.csv", "q", [], list(units), units=units).values()
+    assert found.tolist() == [value]
+
+
+def test_a_joint_may_have_the_name_of_a_time() -> None:
+    found = read_columns("t,time\n1,2\n", "x.csv", "q", ["time"], ["t"], units={"t": "s", "time": "rad"})
+    assert {name: x.tolist() for name, x in found.items()} == {"t": [1.0], "time": [2.0]}
+
+
+@pytest.mark.parametrize(
+    ("heading", "remedy"),
+    [
+        ("elbow [mm]", "use rad or deg"),
+        ("lift_deg", "use m or mm"),
+        ("v:elbow [rad/s^2]", "use rad/s or deg/s"),
+        ("elbow [pi]", "use rad or deg"),
+        ("root.qx [rad]", "use no unit"),
+        ("time_deg", "use s, sec"),
+    ],
+)
+def test_a_unit_that_does_not_fit_is_refused_with_those_that_do(heading: str, remedy: str) -> None:
+    units = {"t": "s", "elbow": "rad", "lift": "m", "v:elbow": "rad/s", "root.qx": ""}
+    with pytest.raises(InputError, match=f"wrong unit: found .*{remedy}"):
+        read_columns(f"{heading}\n30\n", "x.csv", "q", [], list(units), units=units)
+
+
+def test_a_table_in_a_convention_is_that_motion(tmp_path: Path) -> None:
+    robot = urdfkin.load("a1", root_joint="floating", verify=False)
+    start, end = robot.sample(2, seed=8)
+    x = line(robot, start, end, 2.0, 31)
+    mujoco = robot.convention("mujoco")
+    columns = {"time": x.t}
+    for prefix, names, values in zip(
+        ("", "v:", "a:"),
+        (mujoco.coordinate_names, mujoco.rate_names, mujoco.rate_names),
+        mujoco.to(x.q, x.v, x.a),
+        strict=True,
+    ):
+        columns |= {f"{prefix}{name}": values[:, k] for k, name in enumerate(names)}
+    path = write(tmp_path / "x.csv", robot, columns)
+    found = urdfkin.read_trajectory(robot, path, convention="mujoco")
+    for ours, theirs in ((found.q, x.q), (found.v, x.v), (found.a, x.a)):
+        np.testing.assert_allclose(ours, theirs, atol=1e-13)
+    del columns["FL_hip_joint"]
+    with pytest.raises(InputError, match="in the convention mujoco: found missing: FL_hip_joint"):
+        urdfkin.read_trajectory(robot, write(path, robot, columns), convention="mujoco")

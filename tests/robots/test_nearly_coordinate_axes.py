@@ -14,6 +14,7 @@ from urdfkin.kinematics.roundings import EPS
 from urdfkin.lint import Severity, check
 from urdfkin.model.tree import FloatArray, KinematicTree, freed, with_tilts
 from urdfkin.robot import Robot
+from urdfkin.verify.oracle import QueryBatch
 
 KINDS = {"revolute": "R", "continuous": "RUB", "prismatic": "P"}
 AXES = np.eye(3)
@@ -108,7 +109,7 @@ def test_the_two_differ_by_the_tilt_and_urdfkin_is_the_one_that_read_the_file(ki
     tilt = 1e-12
     robot = loaded(text(kind, near(0.99 * tilt, seed)))
     ours = robot.placement([2.0], "l1")
-    theirs = robot.verifier.oracle().placements(np.array([[2.0]]), ["l1"])[0, 0]
+    theirs = robot.verifier.oracle().placements(QueryBatch(["l1"], (np.array([[2.0]]),)))[0, 0]
     assert 0.1 * tilt < np.abs(ours - theirs).max() < 2.0 * tilt
     # Twice as long, the same direction is no longer taken for a coordinate axis: the two agree with ours.
     doubled = loaded(text(kind, 2.0 * near(0.99 * tilt, seed)))

@@ -29,7 +29,7 @@ from urdfkin.validation.accuracy import Errors, Judgement, Line, exact_quaternio
 from urdfkin.verify.analytical_reference import euler_jacobian, quaternion_jacobian
 from urdfkin.verify.exact import recursion as exact_recursion
 from urdfkin.verify.exact.numbers import exact, precision, read_exact
-from urdfkin.verify.oracle_query import BaseRows
+from urdfkin.verify.oracle import BaseRows
 from urdfkin.verify.quantities import QUANTITIES
 from urdfkin.verify.sampling import draw_base
 

@@ -16,7 +16,7 @@ from urdfkin.validation.campaign import validate
 from urdfkin.validation.outcome import Verdict
 from urdfkin.validation.robot_summary import MOST, chains_of
 from urdfkin.validation.timings import Clock, total
-from urdfkin.verify.pinocchio import Oracle
+from urdfkin.verify.pinocchio import PinocchioOracle
 
 
 def test_the_chains_of_a_catalogues_robot_are_its_limbs_checked_in_both_conventions() -> None:
@@ -93,14 +93,14 @@ def test_time_is_told_by_whose_work_it_was() -> None:
 
 
 def test_what_must_agree_exactly_and_does_not_can_still_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = Oracle.placements
+    right = PinocchioOracle.placements
 
     def wrong(*args: object) -> object:
         T = right(*args).copy()  # type: ignore[arg-type]
         T[..., 3, 0] = 1e-3
         return T
 
-    monkeypatch.setattr(Oracle, "placements", wrong)
+    monkeypatch.setattr(PinocchioOracle, "placements", wrong)
     report = validate("ur5", samples=2)
     assert not report.passed
     text = json.dumps(report.as_dict(), allow_nan=False)

@@ -19,7 +19,7 @@ from urdfkin.validation.document import Document
 from urdfkin.validation.error_stats import Pair, ThreeSides, plus, tally, three_sides
 from urdfkin.verify.bounds import Bound
 from urdfkin.verify.mujoco import MujocoOracle
-from urdfkin.verify.pinocchio import Oracle
+from urdfkin.verify.pinocchio import PinocchioOracle
 
 EPS = np.finfo(float).eps
 FIRST = Bound(np.ones((1, 1, 1)), np.full((1, 1, 1), 4.0))
@@ -158,7 +158,7 @@ def test_three_that_agree_are_told_side_by_side_in_every_form() -> None:
 
 
 @pytest.mark.parametrize(
-    ("oracle", "who"), [(Oracle, "Pinocchio"), (MujocoOracle, "MuJoCo")], ids=["Pinocchio", "MuJoCo"]
+    ("oracle", "who"), [(PinocchioOracle, "Pinocchio"), (MujocoOracle, "MuJoCo")], ids=["Pinocchio", "MuJoCo"]
 )
 def test_one_that_errs_stands_alone_in_the_report(
     oracle: type, who: str, monkeypatch: pytest.MonkeyPatch

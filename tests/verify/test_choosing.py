@@ -15,8 +15,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.verify import sampling, verifier
 from urdfkin.verify.certificate import Certificate
-from urdfkin.verify.oracle_query import QueryBatch
-from urdfkin.verify.pinocchio import Oracle
+from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.quantities import PLACEMENT, Quantity
 from urdfkin.verify.sampling import SAMPLE, Verify, parts
 

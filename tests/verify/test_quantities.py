@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 import json
 import shlex
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -26,7 +25,7 @@ from urdfkin.report.markdown import as_markdown
 from urdfkin.robot import Robot
 from urdfkin.verify import bounds
 from urdfkin.verify.bounds import Magnitudes
-from urdfkin.verify.pinocchio import Oracle
+from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.quantities import QUANTITIES, VELOCITY, Quantity, by_command, walked
 
 # -- a made-up row: the angular velocity alone ---------------------------------------------------------
@@ -48,10 +47,8 @@ def turning(
     return out
 
 
-def pinocchios(
-    oracle: Oracle, q: FloatArray, v: FloatArray, frames: Sequence[str], reference: Reference, *base: Any
-) -> FloatArray:
-    return oracle.velocities(q, v, frames, reference, *base)[..., 3:]
+def pinocchios(oracle: Oracle, x: QueryBatch) -> FloatArray:
+    return oracle.velocities(x)[..., 3:]
 
 
 def size(plan: CompiledTree, magnitudes: Magnitudes, reference: Reference) -> FloatArray:
@@ -149,7 +146,7 @@ def test_a_new_row_is_a_command_with_help_and_every_form() -> None:
 def test_a_new_row_is_checked_along_a_trajectory() -> None:
     robot = urdfkin.load("ur5")
     q = robot.sample(3)
-    x = frame_motion(robot, q, q, q, "tool0")
+    x = frame_motion(robot, (q, q, q), "tool0")
     assert x.agrees
     assert x.checks["angular velocity"].share.shape == (3,)
 

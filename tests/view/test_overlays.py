@@ -17,7 +17,7 @@ def x() -> FrameMotion:
     robot = urdfkin.load("panda")
     rng = np.random.default_rng(0)
     v, a = rng.standard_normal((2, 1, robot.nv))
-    return frame_motion(robot, robot.sample(1, 3), v, a, robot.tip_frame)
+    return frame_motion(robot, (robot.sample(1, 3), v, a), robot.tip_frame)
 
 
 @pytest.mark.parametrize("angular", [False, True])
@@ -41,7 +41,7 @@ def test_velocities_of_unit_rates_touch_the_ellipsoid_and_none_leaves_it(
 def test_a_flat_ellipsoid_can_still_be_seen() -> None:
     robot = urdfkin.load("ur5")
     zero = np.zeros((1, 6))
-    shape = velocity_ellipsoid(frame_motion(robot, zero, zero, zero, "base_link"), 2.0)
+    shape = velocity_ellipsoid(frame_motion(robot, (zero, zero, zero), "base_link"), 2.0)
     np.testing.assert_array_equal(shape.half, 0.004)
 
 

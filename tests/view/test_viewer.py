@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from urllib.request import urlopen
 
 import numpy as np
@@ -32,6 +33,7 @@ from urdfkin.view.viewer import (
     fixed_coordinates,
     missing_words,
     within_limits,
+    written,
 )
 
 viser = pytest.importorskip("viser")
@@ -99,6 +101,23 @@ def test_every_slider_equals_q_however_q_was_set(viewer: Viewer, units: str) -> 
     viewer.set_q(far)
     np.testing.assert_allclose(shown(viewer), far, rtol=1e-15)
     viewer.units.value = "degrees"
+
+
+@pytest.mark.slow
+def test_the_field_of_q_shows_and_reads_the_numbers_of_a_convention() -> None:
+    robot = urdfkin.load("a1", verify=False)
+    mujoco, server = robot.convention("mujoco"), new_server(port=free_port())
+    try:
+        viewer = Viewer(server, robot, conversion=mujoco)
+        viewer.set_q(q := robot.sample(1, 5)[0])
+        numbers = [float(x) for x in viewer.words_of_q.value.split(",")]
+        assert numbers == mujoco.to(q).tolist()
+        assert viewer.words_of_q.label == "q of mujoco, to copy or type"
+        viewer.words_of_q.value = written(mujoco.to(other := robot.sample(1, 6)[0]))
+        viewer._typed(SimpleNamespace(client=object()))
+        np.testing.assert_array_equal(viewer.q, other)
+    finally:
+        server.stop()
 
 
 def test_a_slider_ends_where_its_joint_does() -> None:

@@ -14,7 +14,7 @@ optionally quat (n, 4), scalar last.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -580,15 +580,22 @@ UNITS = {"m": 1.0, "mm": 1e-3}
 
 
 def read_poses(
-    path: Path, coordinates: tuple[str, ...], needed: tuple[str, ...], unit: str = "m"
+    path: Path,
+    coordinates: Sequence[str],
+    needed: Sequence[str],
+    unit: str = "m",
+    units: Mapping[str, str] | None = None,
+    rest: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Read configurations (s, nq), and poses (s, 4, 4) or positions (s, 3), metres.
 
     Args:
         path: The file; .npz by its suffix, else CSV.
         coordinates: Names of the coordinates of q.
-        needed: Names of the required columns. If another coordinate has no column, it has its neutral value.
+        needed: Names of the required columns.
         unit: Unit of the positions: "m" or "mm".
+        units: Unit of each coordinate, from `column_units`: its heading may end with a unit.
+        rest: (nq,) values of coordinates without a column; None: zeros.
 
     Raises:
         SourceError: the file cannot be read.
@@ -597,7 +604,9 @@ def read_poses(
     found = (
         _archive(path, len(coordinates))
         if path.suffix.lower() == ".npz"
-        else _table(path, coordinates, needed)
+        else _table(
+            path, coordinates, needed, units or {}, np.zeros(len(coordinates)) if rest is None else rest
+        )
     )
     q, T = found
     T = T.copy()
@@ -607,7 +616,11 @@ def read_poses(
 
 
 def _table(
-    path: Path, coordinates: tuple[str, ...], needed: tuple[str, ...]
+    path: Path,
+    coordinates: Sequence[str],
+    needed: Sequence[str],
+    units: Mapping[str, str],
+    rest: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     text, where = read_text(path, MOST_DATA, pipes=True), str(path)
     first = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
@@ -615,13 +628,11 @@ def _table(
     kind = _MATRIX if "T00" in names else _POSITION
     others = [name for name in coordinates if name not in needed]
     optional = [*others, "sample", "t", *(_QUATERNION if kind is _POSITION else _LAST_ROW)]
-    data = read_columns(text, where, "measured poses", [*needed, *kind], optional, named=True)
+    required = [*needed, *kind]
+    data = read_columns(text, where, "measured poses", required, optional, named=True, units=units)
     s = len(data[kind[0]])
-    q = (
-        np.stack([data.get(name, np.zeros(s)) for name in coordinates], axis=-1)
-        if coordinates
-        else np.empty((s, 0))
-    )
+    values = [data.get(name, np.full(s, x)) for name, x in zip(coordinates, rest, strict=True)]
+    q = np.stack(values, axis=-1) if values else np.empty((s, 0))
     part = [name for name in _QUATERNION if name in data]
     if 0 < len(part) < len(_QUATERNION):
         missing = ", ".join(name for name in _QUATERNION if name not in part)

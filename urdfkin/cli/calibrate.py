@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from urdfkin.cli.options import load_robot, reject_unused_options, robot_argument
+from urdfkin.cli.options import (
+    convention_of_input_option,
+    conversion_of,
+    load_robot,
+    reject_unused_options,
+    robot_argument,
+)
 from urdfkin.cli.output import (
     TEXTS,
     Answer,
@@ -26,6 +32,8 @@ from urdfkin.errors.display import TextDocument
 from urdfkin.errors.escape import json_text
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from urdfkin.calibration.calibrate import Calibration, ImplausibleError
     from urdfkin.calibration.write_back import Rewritten
     from urdfkin.dh.table import DHTable
@@ -40,6 +48,7 @@ _FORMS = (*TEXTS, "json")
 @click.option(
     "--poses", type=_FILE, help="File of measured poses, CSV or .npz; docs/calibration.md describes it."
 )
+@convention_of_input_option
 @click.option("--ur", type=_FILE, help="Factory calibration of a Universal Robots arm (YAML).")
 @click.option(
     "--order",
@@ -169,7 +178,7 @@ def _refusal(found: Calibration) -> ImplausibleError:
 
 
 def _reject_unused(context: click.Context, given: list[str]) -> None:
-    measured = ("noise", "drop_odd", "unit", "radians", "every", "force")
+    measured = ("convention", "noise", "drop_odd", "unit", "radians", "every", "force")
     if given != ["poses"]:
         reject_unused_options(context, measured, "without --poses")
     if given != ["ur"]:
@@ -187,19 +196,29 @@ def _run(context: click.Context, robot: Robot) -> Calibration:
     from urdfkin.calibration.calibrate import fitted_model, read_poses  # noqa: PLC0415
     from urdfkin.dh.parse_table import is_table_file, read_table_or_screws  # noqa: PLC0415
     from urdfkin.dh.table import DHTable  # noqa: PLC0415
+    from urdfkin.motion.trajectory import column_units  # noqa: PLC0415
 
     options = context.params
     tip, base = options["tip"], options["base"]
     table = read_table_or_screws(options["robot"]) if is_table_file(options["robot"]) else None
     source = table if isinstance(table, DHTable) else robot
     path = robot.chain(tip, base)
-    names = path.joint_names if source is robot else source.joint_names
-    coordinates = robot.coordinate_names if source is robot else names
+    names: Sequence[str] = path.joint_names if source is robot else source.joint_names
+    conversion = conversion_of(robot, options["convention"])
+    coordinates, rest = robot.coordinate_names if source is robot else names, None
+    if conversion is not None:
+        if source is not robot:
+            raise InputError("--convention needs a robot, not a table", remedy="leave it out")
+        coordinates, rest = conversion.coordinate_names, conversion.to(robot.neutral())
+        names = [coordinates[i] for name in names for i in conversion.q_and_v_indices[name][0]]
+    units = column_units(robot, "q", conversion)
     q, T = (
-        read_poses(options["poses"], coordinates, names, options["unit"])
+        read_poses(options["poses"], coordinates, names, options["unit"], units, rest)
         if options["poses"]
         else (None, None)
     )
+    if conversion is not None and q is not None:
+        q = conversion.from_(q)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the table is loaded again here; do not repeat its warnings
         return fitted_model(

@@ -170,7 +170,7 @@ def _format_table(work: Work, table: DHTable, check: TableCheck | None) -> str:
         from urdfkin.view.dh_drawing import drawing  # noqa: PLC0415  needs an extra
 
         return drawing(table)
-    text = export(table, work.format_, work.units)
+    text = export(table, work.format_, work.units, verify=bool(work.robot.verifier.policy))
     return f"{text}\n{_notes(work, table, check)}\n" if work.format_ in _PRINTED else text
 
 

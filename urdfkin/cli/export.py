@@ -18,7 +18,7 @@ from urdfkin.cli.options import (
 from urdfkin.cli.output import check_line, exit_code, write_file
 from urdfkin.cli.streams import say, say_file
 from urdfkin.errors import InputError
-from urdfkin.export import LANGUAGES, QUANTITIES
+from urdfkin.export import FORMS, LANGUAGES, QUANTITIES
 
 EXAMPLE = "urdfkin export panda --frame panda_hand --to c -o panda_hand.c"
 
@@ -38,6 +38,13 @@ EXAMPLE = "urdfkin export panda --frame panda_hand --to c -o panda_hand.c"
 @reference_option
 @click.option("--to", type=click.Choice(tuple(LANGUAGES)), default="c", show_default=True, help="Language.")
 @click.option(
+    "--form",
+    type=click.Choice(tuple(FORMS)),
+    default="tree",
+    show_default=True,
+    help="Steps of the code: the URDF's joints, or the table or screws from the base frame to the frame.",
+)
+@click.option(
     "--name", metavar="WORD", help="Prefix of the function names. Default: names of the robot and the frame."
 )
 @click.option(
@@ -56,6 +63,7 @@ def command(
     quantities: tuple[str, ...],
     reference: str,
     to: str,
+    form: str,
     name: str | None,
     file: Path | None,
     verify: bool,
@@ -79,15 +87,14 @@ def command(
             context, [p.name or "" for p in context.command.params if p.name != "file"], "with --check"
         )
         context.exit(_check(file))
-    from urdfkin.export import write  # noqa: PLC0415
-    from urdfkin.export.code import code_of  # noqa: PLC0415  keeps --help fast
+    from urdfkin.export import write  # noqa: PLC0415  keeps --help fast
+    from urdfkin.export.forms import code_of_robot  # noqa: PLC0415
 
     assert robot is not None
     loaded = load_robot(robot, verify=verify)
     wanted = [word.strip() for words in quantities for word in words.split(",")] or list(QUANTITIES)
-    code = code_of(
-        loaded.verifier, loaded.plan, frame or loaded.tip_frame, wanted, reference, name=name, verify=verify
-    )
+    frame = frame or loaded.tip_frame
+    code = code_of_robot(loaded, frame, wanted, reference, form, name=name, verify=verify)
     text = write(code, to)
     if output is None or output == Path("-"):
         say_file(text)

@@ -51,6 +51,11 @@ _PATH = click.Path(path_type=Path, dir_okay=False)
     "--certificate", type=_PATH, help="Write the result as a JSON certificate, which --recheck verifies."
 )
 @click.option(
+    "--write-map",
+    type=_PATH,
+    help="Write the joint names, order, senses and zeros of B as TOML for --convention.",
+)
+@click.option(
     "--recheck", type=_PATH, help="Verify this certificate for A and B instead of comparing them again."
 )
 @click.option("--markdown", type=_PATH, help="Write the result as Markdown for a pull request comment.")
@@ -102,6 +107,7 @@ def same_command(
         how_many = MOST if boxes is None else boxes
         found = same(*robots, map=parse_map(pairs), boxes=how_many, within=within)
     from urdfkin.comparison.certificate import certificate  # noqa: PLC0415
+    from urdfkin.conventions import as_toml  # noqa: PLC0415
     from urdfkin.report.same import as_html, command_of, document, markdown_of  # noqa: PLC0415
 
     question = Question(within, strict)
@@ -111,6 +117,7 @@ def same_command(
         "certificate": lambda: json_text(certificate(found, command_of(robots, question, words))) + "\n",
         "markdown": lambda: markdown_of(found, question),
         "html": lambda: as_html(found, robots, question, words),
+        "write_map": lambda: as_toml(found.convention()),
     }
     for name, form in forms.items():
         if (path := paths[name]) is not None:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from urdfkin.conventions import Conversion
     from urdfkin.model.base_motion import BaseMotion
     from urdfkin.model.tree import FloatArray
+    from urdfkin.motion.trajectory import Trajectory
     from urdfkin.robot import Robot
     from urdfkin.verify.oracles import WitnessName
 
@@ -290,11 +291,58 @@ a_option = click.option(
 convention_option = click.option(
     "--convention",
     metavar="NAME|FILE",
-    help="Convention of --q, --v, --a and of the result: the name of a tool (`urdfkin order` lists"
-    " them), or a TOML file.",
+    help="Convention of --q, --v, --a, --trajectory and of the result: the name of a tool (`urdfkin order`"
+    " lists them), or a TOML file.",
+)
+#: The same for a command whose result is in urdfkin's convention.
+convention_of_input_option = click.option(
+    "--convention",
+    metavar="NAME|FILE",
+    help="Convention of the joint values that are read: the name of a tool (`urdfkin order` lists them), or"
+    " a TOML file.",
 )
 
-TRAJECTORY_HELP = "Trajectory file: CSV with columns t, coordinates, v:NAME, a:NAME; or .npz with t, q, v, a."
+
+def trajectory_option(help_: str) -> Callable[[_F], _F]:
+    """Make the option for a file of samples."""
+    files = (
+        "CSV with columns t, coordinates, v:NAME, a:NAME, units as in 'elbow [deg]'; or .npz with t, q, v, a"
+    )
+    return click.option(
+        "--trajectory",
+        type=click.Path(path_type=Path),
+        metavar="FILE",
+        help=f"{help_} File: {files}.",
+    )
+
+
+def conversion_of(robot: Robot, name: str | None) -> Conversion | None:
+    """Return the conversion that --convention requests."""
+    return None if name is None else robot.convention(name)
+
+
+def read_motion(robot: Robot, path: Path, convention: str | None) -> Trajectory:
+    """Read a trajectory with joint velocities and accelerations, and write its notes to stderr."""
+    from urdfkin.motion.trajectory import read_trajectory  # noqa: PLC0415  keeps --help fast
+
+    motion = read_trajectory(robot, path, convention=convention)
+    tell_notes(motion)
+    tell_limits(robot, motion.q)
+    return motion
+
+
+def tell_notes(motion: Trajectory) -> None:
+    """Write the notes of a trajectory to stderr, and the origin of v and a if they are computed."""
+    for note in motion.notes:
+        say(f"warning: {note}", err=True)
+    if motion.rates != "as given":
+        say(f"rates {motion.derivation()}", err=True)
+
+
+def tell_limits(robot: Robot, q: FloatArray) -> None:
+    """Write a warning to stderr for each joint outside its limits."""
+    for line in robot.limit_violations(q):
+        say(f"warning: {line}", err=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -311,6 +359,7 @@ class Inputs:
         base: Motion of the root link, or None.
         said: Other settings on which the result depends; titles and JSON list them.
         conversion: The convention of q, v and a, if it is not urdfkin's.
+        along: Whether the samples are those of a --trajectory; then each is one row of CSV.
     """
 
     robot: Robot
@@ -322,6 +371,7 @@ class Inputs:
     base: BaseMotion | None = None
     said: Mapping[str, Any] = field(default_factory=dict)
     conversion: Conversion | None = None
+    along: bool = False
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
@@ -412,8 +462,7 @@ def read_inputs(
     q_, v_, a_ = (np.ascontiguousarray(np.broadcast_to(part, (n, part.shape[1]))) for part in rows)
     if conversion is not None:
         q_, v_, a_ = conversion.from_(q_, v_, a_)
-    for line in robot.limit_violations(q_):
-        say(f"warning: {line}", err=True)
+    tell_limits(robot, q_)
     said = {"lock": dict(robot.origin.lock)} if robot.origin.lock else {}
     return Inputs(robot, frame or robot.tip_frame, q_, v_, a_, said=said, conversion=conversion)
 
@@ -423,6 +472,7 @@ def _values(
 ) -> FloatArray:
     """Return the (n, width) values of one option, in the given convention."""
     from urdfkin.model.configuration import places  # noqa: PLC0415  keeps --help fast
+    from urdfkin.motion.trajectory import column_units  # noqa: PLC0415
     from urdfkin.verify.sampling import sample  # noqa: PLC0415
 
     known = conversion or robot
@@ -436,7 +486,7 @@ def _values(
         drawn = sample(robot.tree, n, rng)
         return conversion.to(drawn) if conversion else drawn
     if text.startswith("@"):
-        return read_batch(Path(text[1:]), where, (names,))[0]
+        return read_batch(Path(text[1:]), where, (names,), column_units(robot, letter, conversion))[0]
     layout = conversion.layout(letter) if conversion else places(robot.tree, letter)
     return layout.read(text, where)[None]
 
@@ -448,10 +498,12 @@ def _count(where: str, text: str) -> int:
     return count
 
 
-def read_batch(path: Path, option: str, layouts: Sequence[Sequence[str]]) -> tuple[FloatArray, Sequence[str]]:
+def read_batch(
+    path: Path, option: str, layouts: Sequence[Sequence[str]], units: Mapping[str, str] | None = None
+) -> tuple[FloatArray, Sequence[str]]:
     """Read a CSV file with one sample a line.
 
-    A first line of names may put the columns in any order.
+    A first line of names may put the columns in any order, and state the units of those in `units`.
 
     Returns:
         The (n, width) numbers, and the layout with as many columns as the file.
@@ -463,7 +515,7 @@ def read_batch(path: Path, option: str, layouts: Sequence[Sequence[str]]) -> tup
     text = _standard_input() if str(path) == "-" else read_text(path, MOST_DATA, pipes=True)
     width = width_of(text, str(path)) if len(layouts) > 1 else None
     names = next((names for names in layouts if len(names) == width), layouts[0])
-    columns = read_columns(text, str(path), option, names)
+    columns = read_columns(text, str(path), option, names, units=units)
     found = np.stack([columns[name] for name in names], axis=-1) if names else np.empty((0, 0))
     if not len(found):
         raise InputError(

@@ -13,6 +13,8 @@ import click
 from urdfkin.cli.options import (
     Number,
     Whole,
+    convention_of_input_option,
+    conversion_of,
     load_robot,
     path_options,
     q_option,
@@ -49,10 +51,13 @@ def _path_command(
     "chain",
     "urdfkin chain panda --base panda_link0 --tip panda_hand",
     q_option,
+    convention_of_input_option,
     seed_option,
     answers=answering(),
 )
-def chain_command(robot: str, base: str | None, tip: str | None, q: str, seed: int, verify: bool) -> Answer:
+def chain_command(
+    robot: str, base: str | None, tip: str | None, q: str, convention: str | None, seed: int, verify: bool
+) -> Answer:
     """List the joints between two frames (section 7.5), in one configuration and in the base's axes.
 
     Each joint has its axis z, its origin O and the interorigin vector d to the next origin, in metres. The
@@ -66,7 +71,8 @@ def chain_command(robot: str, base: str | None, tip: str | None, q: str, seed: i
 
     loaded = load_robot(robot, verify=verify)
     path = loaded.chain(tip, base)
-    at = read_inputs(loaded, path.tip, seed, q).q
+    given = read_inputs(loaded, path.tip, seed, q, conversion=conversion_of(loaded, convention))
+    at = given.q
     if len(at) != 1:
         raise InputError("the chain needs exactly one configuration", where="--q", found=str(len(at)))
     own = path.coupling.select(loaded.tree, at)[0]
@@ -79,6 +85,7 @@ def chain_command(robot: str, base: str | None, tip: str | None, q: str, seed: i
         rows.append((path.tip, "tip", "", _vector(origins[-1]), ""))
         heads = ("joint", "kind", "axis z", "origin O [m]", "d to the next origin [m]")
         title = f"{path.robot}: {path.base} to {path.tip}, coordinates {names}"
+        title += "" if convention is None else f", convention {convention}"
         return TextDocument(title, [Table(heads, rows, left=5, names=(0,))])
 
     def data() -> dict[str, Any]:
@@ -87,7 +94,8 @@ def chain_command(robot: str, base: str | None, tip: str | None, q: str, seed: i
             "source": loaded.source,
             "base": path.base,
             "tip": path.tip,
-            "q": at[0].tolist(),
+            "q": given.converted().q[0].tolist(),
+            **({} if convention is None else {"convention": convention}),
             "coordinates": list(path.joint_names),
             "path_q": own.tolist(),
             "joints": [

@@ -8,14 +8,17 @@ from typing import TYPE_CHECKING
 import click
 
 from urdfkin.cli.options import (
-    TRAJECTORY_HELP,
     Number,
     Whole,
+    convention_of_input_option,
+    conversion_of,
     frame_option,
     load_robot,
+    read_motion,
     reference_option,
     robot_argument,
     seed_option,
+    trajectory_option,
 )
 from urdfkin.cli.output import check_writable, compiling, write_file
 from urdfkin.cli.streams import say
@@ -39,7 +42,8 @@ EXAMPLE = "urdfkin plot ur5 --to 1,-1,1.2,0.3,0.5,0 --duration 2 --output ur5.sv
 @robot_argument
 @frame_option
 @reference_option
-@click.option("--trajectory", type=click.Path(path_type=Path), help=TRAJECTORY_HELP)
+@trajectory_option("Samples to plot.")
+@convention_of_input_option
 @click.option(
     "--from",
     "start",
@@ -84,6 +88,7 @@ def command(
     frame: str | None,
     reference: str,
     trajectory: Path | None,
+    convention: str | None,
     start: str,
     end: str | None,
     duration: float,
@@ -96,38 +101,45 @@ def command(
 
     The panels show q, v and a with their limits, the frame's position, velocity, acceleration and its parts,
     the singular values and the check. Each axis has one unit. The trajectory is a CSV or .npz file, or a line
-    in joint space from rest to rest, with --to. A floating base moves along a screw.
+    in joint space from rest to rest, with --to. A floating base moves along a screw. With --convention, the
+    file and --from, --to have a tool's names and numbers; the panels have those of the URDF, in rad and m.
 
     Exit 0: verified. 1: a disagreement. 3: Pinocchio could not check it.
     """
     if (trajectory is None) == (end is None):
         raise click.UsageError("give either --trajectory FILE.csv, or --to VALUES for a line in joint space")
     from urdfkin.motion.frame_motion import frame_motion  # noqa: PLC0415
-    from urdfkin.motion.trajectory import read_trajectory  # noqa: PLC0415
     from urdfkin.view.figure import save  # noqa: PLC0415  keeps --help fast
     from urdfkin.view.plot import foot, sheet  # noqa: PLC0415
 
     check_writable(output)
     loaded = load_robot(robot)
     if trajectory is not None:
-        motion = read_trajectory(loaded, trajectory)
-        for note in (*motion.notes, *loaded.limit_violations(motion.q)):
-            say(f"warning: {note}", err=True)
+        motion = read_motion(loaded, trajectory, convention)
     else:
-        motion = _line(loaded, start, end or "", duration, samples, seed)
+        motion = _line(loaded, start, end or "", duration, samples, seed, convention)
     with compiling():
-        found = frame_motion(loaded, motion.q, motion.v, motion.a, frame or loaded.tip_frame, reference)
+        found = frame_motion(loaded, motion, frame or loaded.tip_frame, reference)
     write_file(output, save(sheet(loaded, found, motion, panels), output))
     say(f"{loaded.name}: {found.frame}: {foot(found, motion)}")
     context.exit(3 if found.not_verified is not None else 0 if found.agrees else 1)
 
 
-def _line(robot: Robot, start: str, end: str, duration: float, samples: int, seed: int) -> Trajectory:
+def _line(
+    robot: Robot,
+    start: str,
+    end: str,
+    duration: float,
+    samples: int,
+    seed: int,
+    convention: str | None,
+) -> Trajectory:
     from urdfkin.cli.options import read_inputs  # noqa: PLC0415
     from urdfkin.motion.trajectory import line  # noqa: PLC0415
 
     given = (("--from", start), ("--to", end))
-    ends = [read_inputs(robot, None, seed, text, option=option).q for option, text in given]
+    how = conversion_of(robot, convention)
+    ends = [read_inputs(robot, None, seed, text, option=option, conversion=how).q for option, text in given]
     if any(len(q) != 1 for q in ends):
         raise InputError(
             "--from and --to need one configuration each", found=f"{len(ends[0])} and {len(ends[1])}"

@@ -8,18 +8,20 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from urdfkin.cli.options import (
-    TRAJECTORY_HELP,
     Inputs,
     NumberFrom,
     a_option,
     base_options,
     convention_option,
+    conversion_of,
     frame_name,
     frame_option,
     load_robot,
@@ -30,13 +32,15 @@ from urdfkin.cli.options import (
     reject_unused_options,
     robot_argument,
     seed_option,
+    tell_limits,
+    tell_notes,
     together,
+    trajectory_option,
     v_option,
     verify_option,
     with_base,
 )
 from urdfkin.cli.output import TEXTS, Answer, answering, check_line, compiling, exit_code, finite
-from urdfkin.cli.streams import say
 from urdfkin.errors.display import NOISE, Table, TextDocument, six_digits
 from urdfkin.errors.escape import csv_cell
 from urdfkin.verify.quantities import (
@@ -59,6 +63,7 @@ if TYPE_CHECKING:
 _F = TypeVar("_F", bound=Callable[..., Any])
 _VALUES = {"q": q_option, "v": v_option, "a": a_option}
 _BASE = ("base_placement", "base_velocity", "base_acceleration")
+_trajectory = trajectory_option("Samples in place of --q, --v and --a; CSV output has a row for each time.")
 #: Number of samples of a batch that a table shows.
 _SHOWN = 5
 
@@ -66,25 +71,55 @@ _SHOWN = 5
 def computing_options(inputs: str, *own: Any, last: tuple[Any, ...] = ()) -> Callable[[_F], _F]:
     """Combine the options: robot and frame, `own`, values, base, seed, checks, `last`, format and output."""
     return together(
-        *(robot_argument, frame_option, *own, *(_VALUES[letter] for letter in inputs), base_options(inputs)),
-        *(seed_option, verify_option, oracle_option, *last, answering(*TEXTS, "json", "csv", "npy")),
+        *(robot_argument, frame_option, *own, convention_option, *(_VALUES[letter] for letter in inputs)),
+        *(_trajectory, base_options(inputs), seed_option, verify_option, oracle_option, *last),
+        answering(*TEXTS, "json", "csv", "npy"),
     )
 
 
 def _load() -> Robot:
     """Load the robot of the running command."""
     options = click.get_current_context().params
-    return load_robot(options["robot"], verify=options["verify"], oracle=options["oracle"])
+    return load_robot(options["robot"], verify=options["verify"], oracle=options.get("oracle", "pinocchio"))
 
 
 def _read() -> Inputs:
-    """Load the robot of the running command, and read the values of q, v and a and the base."""
+    """Load the robot of the running command, and read q, v and a or the trajectory, and the base."""
     options = click.get_current_context().params
     values: dict[str, Any] = {letter: options[letter] for letter in "qva" if letter in options}
-    robot, name = _load(), options.get("convention")
-    values["conversion"] = None if name is None else robot.convention(name)
-    inputs = read_inputs(robot, options["frame"], options["seed"], **values)
+    robot = _load()
+    conversion = conversion_of(robot, options["convention"])
+    if options["trajectory"] is not None:
+        inputs = _along(robot, options["frame"], options["trajectory"], "".join(values), conversion)
+    else:
+        inputs = read_inputs(robot, options["frame"], options["seed"], **values, conversion=conversion)
     return with_base(inputs, *map(options.get, _BASE))
+
+
+def _along(
+    robot: Robot, frame: str | None, path: Path, letters: str, conversion: Conversion | None
+) -> Inputs:
+    """Read the samples of a trajectory; compute v and a by differences only if the command needs them."""
+    import numpy as np  # noqa: PLC0415  keeps --help fast
+
+    from urdfkin.motion.trajectory import read_samples, with_rates  # noqa: PLC0415
+
+    context = click.get_current_context()
+    reject_unused_options(context, ("q", "v", "a", "seed"), "along a --trajectory")
+    x = read_samples(robot, path, conversion)
+    if x.base is not None:
+        reject_unused_options(context, _BASE, "along a --trajectory with a moving base")
+    said: dict[str, Any] = {}
+    q, t, rates = x.q, x.t, {letter: getattr(x, letter) for letter in letters[1:]}
+    if any(value is None for value in rates.values()):
+        motion = with_rates(robot.tree, x)
+        q, t, rates = motion.q, motion.t, {letter: getattr(motion, letter) for letter in letters[1:]}
+        said["derivatives"] = motion.rates
+        tell_notes(motion)
+    tell_limits(robot, q)
+    v, a = (rates.get(letter, np.zeros((len(q), robot.nv))) for letter in "va")
+    frame = frame or robot.tip_frame
+    return Inputs(robot, frame, q, v, a, t, x.base, said, conversion, along=True)
 
 
 def _checked(x: Inputs, title: str, parts: Callable[[], Iterable[str | Table]], **data: Any) -> Answer:
@@ -122,25 +157,11 @@ _breakdown = click.option(
 )
 
 
-def _converted(
-    x: Inputs, conversion: Conversion, quantity: Quantity, reference: str, result: FloatArray
-) -> FloatArray:
-    """Return a result with the rows and columns of a convention."""
-    if quantity.axes == 1:
-        return conversion.six(result)
-    if quantity.name == "jacobian":
-        return conversion.jacobian(x.q, result)
-    J = x.robot.jacobian(x.q, x.frame, reference, base=x.base)
-    if quantity.name == "hessian":
-        return conversion.hessian(x.q, J, result)
-    return conversion.jacobian_rate(x.q, x.v, J, result)
-
-
 def command_of(quantity: Quantity) -> click.Command:
     """Make the command that computes a quantity."""
     has_breakdown = ACCELERATION_BREAKDOWN.command == f"{quantity.command} --breakdown"
 
-    own = [*([reference_option] if quantity.referred else []), convention_option]
+    own = [reference_option] if quantity.referred else []
 
     @computing_options(quantity.inputs, *own, last=(_breakdown,) if has_breakdown else ())
     def compute(*, reference: str = "local_world_aligned", breakdown: bool = False, **_: Any) -> Answer:
@@ -154,7 +175,8 @@ def command_of(quantity: Quantity) -> click.Command:
             inputs = [getattr(x, letter) for letter in quantity.inputs]
             result = x.robot.compute(quantity.name, inputs, x.frame, reference, base=x.base)
             if x.conversion is not None:
-                result = _converted(x, x.conversion, quantity, reference, result)
+                J = partial(x.robot.jacobian, x.q, x.frame, reference, base=x.base)
+                result = x.conversion.result(quantity.name, (x.q, x.v), result, J)
         return _answer(x, quantity, result, reference if quantity.referred else None)
 
     summary = f"{quantity.summary[0].upper()}{quantity.summary[1:]} (eq. {', '.join(quantity.equations)})."
@@ -212,7 +234,7 @@ def _data(x: Inputs, quantity: Quantity, reference: str | None, result: FloatArr
 
 
 def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[object]]:
-    if quantity.columns:
+    if quantity.columns and not x.along:
         rates = [csv_cell(name) for name in x.rate_names]
         # A Hessian's line is for one column of the Jacobian; its columns are for the joint velocities.
         keys = [[row] for row in quantity.labels]
@@ -222,11 +244,22 @@ def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[ob
         for k, J in enumerate(result.reshape(len(result), len(keys), len(rates)).tolist()):
             yield from ([k, *key, *map(repr, row)] for key, row in zip(keys, J, strict=True))
     else:
-        names = quantity.labels or [f"T{i}{j}" for i in range(4) for j in range(4)]
-        times = range(len(result)) if x.t is None else map(repr, x.t.tolist())
-        yield ["sample" if x.t is None else "t", *names]
-        samples = zip(times, result.reshape(len(result), -1).tolist(), strict=True)
+        names = list(quantity.labels) or [f"T{i}{j}" for i in range(4) for j in range(4)]
+        if quantity.columns:
+            several = product(names, *[x.rate_names] * (quantity.axes - 1))
+            names = [csv_cell(" ".join(words)) for words in several]
+        yield [_TIME[x.t is not None], *names]
+        samples = zip(_times(x), result.reshape(len(result), -1).tolist(), strict=True)
         yield from ([t, *map(repr, row)] for t, row in samples)
+
+
+#: Heading of the first column of CSV, without times and with them.
+_TIME = ("sample", "t")
+
+
+def _times(x: Inputs) -> Iterable[object]:
+    """Return the first cell of each sample's row: its time, or its index if there are no times."""
+    return range(len(x.q)) if x.t is None else map(repr, x.t.tolist())
 
 
 def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
@@ -279,11 +312,11 @@ def _parts(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
             yield Table(heads, cells, left=2)
 
     def rows() -> Iterator[list[object]]:
-        yield ["sample", "joint", "kind", *SIX]
-        for k in range(len(found.base)):
+        yield [_TIME[x.t is not None], "joint", "kind", *SIX]
+        for k, t in enumerate(_times(x)):
             for joint, kind, six in found.contributions((k,)):
-                yield [k, csv_cell(joint), kind, *map(repr, six.tolist())]
-            yield [k, "sum", "", *map(repr, found.total[k].tolist())]
+                yield [t, csv_cell(joint), kind, *map(repr, six.tolist())]
+            yield [t, "sum", "", *map(repr, found.total[k].tolist())]
 
     def data() -> dict[str, Any]:
         return {
@@ -295,6 +328,7 @@ def _parts(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
             "rows": list(SIX),
             "joints": list(found.joints),
             "kinds": list(KINDS),
+            **({} if x.t is None else {"t": x.t.tolist()}),
             **{letter: getattr(x, letter).tolist() for letter in "qva"},
             **{name: getattr(found, name).tolist() for name in ("base", "terms", "total")},
         }
@@ -332,7 +366,6 @@ _FORMS = {
 @click.command("placement", epilog=f"Example: {PLACEMENT.example}")
 @computing_options(
     PLACEMENT.inputs,
-    convention_option,
     frame_name("--relative-to", "Link or joint relative to which the pose is given. Default: the world."),
     click.option(
         "--as",
@@ -432,6 +465,8 @@ def analytical_jacobian_command(representation: str, nearest: float | None, **_:
     x, nearest = _read(), NEAREST if nearest is None else nearest
     with compiling():
         J = x.robot.analytical_jacobian(x.q, x.frame, representation, nearest=nearest, base=x.base)
+    if x.conversion is not None:
+        J = x.conversion.columns(x.q, J)
     row = replace(ANALYTICAL_JACOBIAN, labels=("x", "y", "z", *labels(representation)))
     return _answer(x.saying(representation=representation), row, J)
 
@@ -459,13 +494,8 @@ def labels(representation: str) -> tuple[str, ...]:
         show_default=True,
         help="Acceleration of gravity in the world's axes, m/s^2.",
     ),
-    click.option(
-        "--trajectory",
-        type=click.Path(path_type=Path),
-        help=f"{TRAJECTORY_HELP[:-1]}, base_placement, base_velocity, base_acceleration.",
-    ),
 )
-def imu_command(frame: str | None, gravity: str, trajectory: Path | None, **_: Any) -> Answer:
+def imu_command(gravity: str, **_: Any) -> Answer:
     """Compute the readings of an accelerometer and a gyroscope on a frame, in the frame's own axes.
 
     The accelerometer reads the proper acceleration in m/s^2: the second derivative of the frame's position
@@ -478,27 +508,10 @@ def imu_command(frame: str | None, gravity: str, trajectory: Path | None, **_: A
     """
     from urdfkin.motion.trajectory import numbers  # noqa: PLC0415  keeps --help fast
 
-    if trajectory is None:
-        x = _read()
-    else:
-        robot = _load()
-        idle = ("q", "v", "a", *_BASE, "seed")
-        reject_unused_options(click.get_current_context(), idle, "along a --trajectory")
-        x = _along(robot, frame, trajectory)
+    x = _read()
     g = numbers(gravity.split(","), "--gravity", ("x", "y", "z"))
     with compiling():
         return _answer(x, IMU, x.robot.imu(x.q, x.v, x.a, x.frame, gravity=g, base=x.base))
-
-
-def _along(robot: Robot, frame: str | None, path: Path) -> Inputs:
-    from urdfkin.motion.trajectory import read_trajectory  # noqa: PLC0415
-
-    motion = read_trajectory(robot, path, with_base=True)
-    for note in (*motion.notes, *robot.limit_violations(motion.q)):
-        say(f"warning: {note}", err=True)
-    if motion.rates != "as given":
-        say(f"rates {motion.rates}", err=True)
-    return Inputs(robot, frame or robot.tip_frame, motion.q, motion.v, motion.a, motion.t, motion.base)
 
 
 @click.command(
@@ -514,13 +527,13 @@ def _along(robot: Robot, frame: str | None, path: Path) -> Inputs:
     show_default=True,
     help="Rows of the Jacobian; `all` mixes metres and radians.",
 )
+@convention_option
 @q_option
+@_trajectory
 @seed_option
 @verify_option
 @answering()
-def singular_values_command(
-    robot: str, frame: str | None, rows: str, q: str, seed: int, verify: bool
-) -> Answer:
+def singular_values_command(rows: str, **_: Any) -> Answer:
     """Compute the singular values, condition number and manipulability of a frame's Jacobian.
 
     Each value has a guaranteed lower and upper bound. The bounds include the error of the Jacobian and the
@@ -530,11 +543,17 @@ def singular_values_command(
     At a singularity the command prints the rank, the lost directions and the joints that cause them. There
     the manipulability may have no derivative; it is nan in CSV and null in JSON. See `urdfkin explain
     singularity`.
+
+    With --convention, the derivatives are for the tool's joint velocities. The singular values are always for
+    joint velocities in rad/s and m/s.
     """
-    x = read_inputs(load_robot(robot, verify=verify), frame, seed, q)
+    x = _read()
     with compiling():
-        found = x.robot.singular_values(x.q, x.frame, rows)
-        gradient = found.manipulability_gradient(x.robot.hessian(x.q, x.frame))
+        found = x.robot.singular_values(x.q, x.frame, rows, base=x.base)
+        gradient = found.manipulability_gradient(x.robot.hessian(x.q, x.frame, base=x.base))
+    if x.conversion is not None:
+        gradient = x.conversion.columns(x.q, gradient[:, None])[:, 0]
+    x = x.converted()
     names = [f"sigma_{k + 1}" for k in range(found.values.value.shape[-1])]
 
     def parts() -> Iterator[str | Table]:
@@ -546,7 +565,7 @@ def singular_values_command(
                 if singularity := found.singularity(k):
                     yield from str(singularity).splitlines()
                     continue  # the manipulability has no derivative
-                slopes = zip(x.robot.rate_names, gradient[k].tolist(), strict=True)
+                slopes = zip(x.rate_names, gradient[k].tolist(), strict=True)
                 yield Table(("joint", "manipulability changes by"), list(slopes), names=(0,))
 
     def data() -> dict[str, Any]:
@@ -556,9 +575,11 @@ def singular_values_command(
             "source": x.robot.source,
             "frame": x.frame,
             "rows": rows,
-            "coordinates": list(x.robot.coordinate_names),
-            "rates": list(x.robot.rate_names),
+            "coordinates": list(x.coordinate_names),
+            "rates": list(x.rate_names),
+            **({} if x.t is None else {"t": x.t.tolist()}),
             "q": x.q.tolist(),
+            **x.said,
             **{
                 name: {side: finite(numbers.tolist()) for side, numbers in between._asdict().items()}
                 for name, between in (*named, ("manipulability", found.manipulability))
@@ -575,12 +596,13 @@ def singular_values_command(
     def lines() -> Iterator[list[object]]:
         sides = ("", " lower", " upper")
         heads = [name + side for name in (*names, "condition", "manipulability") for side in sides]
-        yield ["sample", *heads, *(csv_cell(f"by {rate}") for rate in x.robot.rate_names)]
-        for k, slopes in enumerate(gradient.tolist()):
+        yield [_TIME[x.t is not None], *heads, *(csv_cell(f"by {rate}") for rate in x.rate_names)]
+        for k, (t, slopes) in enumerate(zip(_times(x), gradient.tolist(), strict=True)):
             numbers = [n for _, sides in _between(names, found, k) for n in sides]
-            yield [k, *map(repr, numbers), *map(repr, slopes)]
+            yield [t, *map(repr, numbers), *map(repr, slopes)]
 
-    return _checked(x, f"singular values of {x.frame}, {rows} rows", parts, json=data, csv=lines)
+    title = "".join(f", {name} {word}" for name, word in x.said.items())
+    return _checked(x, f"singular values of {x.frame}, {rows} rows{title}", parts, json=data, csv=lines)
 
 
 def _between(names: list[str], found: SingularValues, k: int) -> Iterator[tuple[str, list[float]]]:

@@ -9,13 +9,16 @@ from pathlib import Path
 import click
 
 from urdfkin.cli.options import (
-    TRAJECTORY_HELP,
     Whole,
+    convention_of_input_option,
+    conversion_of,
     load_robot,
     q_option,
     read_inputs,
+    read_motion,
     robot_argument,
     seed_option,
+    trajectory_option,
 )
 from urdfkin.cli.output import compiling
 from urdfkin.cli.streams import say
@@ -37,7 +40,8 @@ EXAMPLE = "urdfkin view panda --q 0,-0.8,0,-2.4,0,1.6,0.8,0.04"
 @click.option(
     "--browser/--no-browser", default=None, help="Open the browser.  [default: if there is a screen]"
 )
-@click.option("--trajectory", type=click.Path(path_type=Path), help=TRAJECTORY_HELP)
+@trajectory_option("Samples to play.")
+@convention_of_input_option
 @click.option("--port", type=Whole(1, 65535), default=8080, show_default=True, help="Port to listen on.")
 def command(
     robot: str,
@@ -46,6 +50,7 @@ def command(
     host: str,
     port: int,
     trajectory: Path | None,
+    convention: str | None,
     browser: bool | None,
 ) -> None:
     """Show a robot in a browser tab, with sliders, shapes, frames, DH frames and arrows.
@@ -54,12 +59,12 @@ def command(
     numbers of the chosen frame as the robot moves. The viewer needs the extra `urdfkin[view]`. Ctrl-C stops
     it.
 
-    With --trajectory, a CSV or .npz file as in `urdfkin plot`, the viewer plays the samples of the file.
+    With --trajectory, a CSV or .npz file as in `urdfkin plot`, the viewer plays the samples of the file. With
+    --convention, the field of q reads and shows a tool's numbers too.
 
     The printed address contains a key. Open the whole address, and show it only to people who may see and
     move the robot. Other web pages and other users of this machine are refused.
     """
-    from urdfkin.motion.trajectory import read_trajectory  # noqa: PLC0415
     from urdfkin.view.server import (  # noqa: PLC0415
         has_screen,
         new_server,
@@ -68,7 +73,8 @@ def command(
     from urdfkin.view.viewer import Viewer  # noqa: PLC0415
 
     loaded = load_robot(robot)
-    begin = None if q == "neutral" else read_inputs(loaded, None, seed, q).q
+    conversion = conversion_of(loaded, convention)
+    begin = None if q == "neutral" else read_inputs(loaded, None, seed, q, conversion=conversion).q
     if begin is not None and len(begin) != 1:
         raise InputError(
             "the viewer needs exactly one start configuration", where="--q", found=str(len(begin))
@@ -79,12 +85,17 @@ def command(
             raise click.UsageError(
                 "--q and --trajectory cannot be used together: a trajectory has its own start"
             )
-        played = read_trajectory(loaded, trajectory)
-        for note in (*played.notes, *loaded.limit_violations(played.q)):
-            say(f"warning: {note}", err=True)
+        played = read_motion(loaded, trajectory, convention)
+        if played.base is not None:
+            raise InputError(
+                "the viewer does not move the root link",
+                where=str(trajectory),
+                found="base_placement",
+                remedy="use --root-joint floating, and write the pose of the root link into q",
+            )
     server = new_server(host, port)
     with compiling():
-        Viewer(server, loaded, None if begin is None else begin[0], played)
+        Viewer(server, loaded, None if begin is None else begin[0], played, conversion)
     try:
         say(f"{loaded.name}: {server.address}")
         sys.stdout.flush()  # the reader of a pipe needs the address now

@@ -53,6 +53,7 @@ from urdfkin.model.pose import inverse, pose
 from urdfkin.model.ranges import WIDEST
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
+from urdfkin.verify.oracle import QueryBatch
 from urdfkin.verify.sampling import sample
 
 #: Number of random configurations at the start of a search, and number of configurations with each variable
@@ -273,7 +274,7 @@ def urdfkins(robot: Robot, q: FloatArray, frames: Sequence[str]) -> FloatArray:
 
 def pinocchios(robot: Robot, q: FloatArray, frames: Sequence[str]) -> FloatArray:
     """Return poses (n, frames, 4, 4) computed by Pinocchio from the robot's text."""
-    return robot.verifier.oracle().placements(q, frames)
+    return robot.verifier.oracle().placements(QueryBatch(frames, (q,)))
 
 
 def _value(line: Line, values: dict[str, FloatArray]) -> FloatArray | float:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +22,9 @@ from urdfkin.model.mechanisms.alignment import IDENTITY, Alignment, FramePair, S
 from urdfkin.model.mechanisms.mechanism import JointTransform, Mechanism, Tolerance, apart, tolerance_of
 from urdfkin.model.tree import FloatArray, Joint, KinematicTree, Mimic
 from urdfkin.system.lazy_import import hook
+
+if TYPE_CHECKING:
+    from urdfkin.conventions import Convention
 
 #: Smallest number printed with a unit prefix (0.1 to four digits). From 9 times this number on, the unit
 #: without a prefix is used.
@@ -369,6 +373,59 @@ class Sameness(Displayable):
         [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
         """
         return _mapped(self.trees, {one.a: one for one in self.joints}, checked(self.trees[0], q, "q"))
+
+    def convention(self) -> Convention:
+        """Return B's joint names, order, senses and zeros as a convention of A.
+
+        A's `robot.convention(...)` then converts q, v, a and Jacobians of A to those of B. At these
+        configurations both models have the same poses, except for `base` and `tools`.
+
+        Raises:
+            InputError: a coordinate of one model has none in the other, or a free joint has another frame.
+
+        >>> import urdfkin
+        >>> found = urdfkin.same("ur5", "ur5_limited")
+        >>> found.convention().joints[:2]
+        ('shoulder_pan_joint', 'shoulder_lift_joint')
+        """
+        from urdfkin.conventions import Convention, Conversion, JointRule  # noqa: PLC0415  keeps same light
+
+        tree_a, tree_b = self.trees
+        of_b = {one.b: one for one in self.joints}
+        rules, joints = {}, list[str]()
+        for joint in tree_b.joints:
+            if not joint.kind.nq or joint.mimic is not None:
+                continue
+            one = of_b.get(joint.name)
+            if one is None or tree_a.joints[tree_a.joint_index(one.a)].kind.nq != joint.kind.nq:
+                raise InputError(
+                    "a joint of B has no joint of A",
+                    where="map",
+                    found=joint.name,
+                    remedy="match it with map={JOINT_OF_A: JOINT_OF_B} (--map), or make it fixed in B",
+                )
+            if one.conversion is not None:
+                raise InputError(
+                    "a free joint has another frame in B",
+                    where="map",
+                    found=joint.name,
+                    remedy="convert q with to_b: a convention has no frames of joints",
+                )
+            joints.append(joint.name)
+            rule = JointRule(joint.name if one.b != one.a else None, float(one.sense), one.offset)
+            if rule != JointRule():
+                rules[one.a] = rule
+        how = f"equivalent up to {', '.join(self.up_to)}" if self.up_to else self.verdict.value
+        found = Convention(
+            name=self.names[1],
+            title=f"{self.sources[0]} with the joints of {self.sources[1]}",
+            note=f"found by urdfkin same {' '.join(self.sources)}: {how}",
+            order="given",
+            joints=tuple(joints),
+            rules=rules,
+        )
+        Conversion(tree_a, "", found)  # a joint of A without a column is an error here
+        return found
 
 
 def _mapped(

@@ -1,6 +1,6 @@
 """Conventions of other tools: joint order, quaternions, row order, axes of base velocities, units, zeros."""
 
-from urdfkin.conventions.convention import BUILT_IN, Convention, JointRule, find_convention
+from urdfkin.conventions.convention import BUILT_IN, Convention, JointRule, as_toml, find_convention
 from urdfkin.conventions.conversion import Conversion, Reordering, reordering
 from urdfkin.conventions.robot import ConventionRobot
 
@@ -11,6 +11,7 @@ __all__ = [
     "Conversion",
     "JointRule",
     "Reordering",
+    "as_toml",
     "find_convention",
     "reordering",
 ]

@@ -17,7 +17,10 @@ The value in the tool is `sign * value * factor + zero`.
 
 from __future__ import annotations
 
+import json
 import math
+import re
+import string
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -38,6 +41,7 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
         "depth first, by file",
         "depth first, by link",
         "breadth first, by name",
+        "breadth first, by file",
         "breadth first, with fixed joints",
         "file",
         "name",
@@ -53,7 +57,7 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
     "point": ("origin", "centre of mass"),
     "planar": ("body", "parent"),
     "six": ("linear first", "angular first"),
-    "names": ("urdf", "usd"),
+    "names": ("urdf", "usd", "identifier", "isaacsim"),
     "angle": _ANGLES,
 }
 
@@ -64,16 +68,29 @@ class JointRule:
 
     Attributes:
         name: Its name in the tool; None: the name in the URDF.
-        factor: Sign times units per rad or m; None: the convention's unit.
+        sign: 1 or -1.
         zero: The tool's value where the URDF's joint is at 0.
-        of: "angle" or "length" if the unit fits only one of them, else "".
+        unit: "rad", "deg", "turn", "m", "mm", or the units of one turn; None: the convention's unit.
     """
 
     name: str | None = None
-    factor: float | None = None
-    zero: float = 0.0
     sign: float = 1.0
-    of: str = ""
+    zero: float = 0.0
+    unit: str | float | None = None
+
+    @property
+    def factor(self) -> float | None:
+        """Sign times units per rad or m; None: the convention's unit."""
+        if self.unit is None:
+            return None
+        return self.sign * (_UNITS[self.unit] if isinstance(self.unit, str) else self.unit / math.tau)
+
+    @property
+    def of(self) -> str:
+        """Whether the unit is one of an "angle" or of a "length"; "" for the convention's unit."""
+        if self.unit is None:
+            return ""
+        return "length" if self.unit in _LENGTHS else "angle"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,6 +121,7 @@ class Convention:
     angle: str = "rad"
     rules: Mapping[str, JointRule] = field(default_factory=dict)
     evidence: str = ""
+    measured: str = ""
     sources: tuple[str, ...] = ()
     note: str = ""
 
@@ -124,8 +142,8 @@ def _built_in() -> dict[str, Convention]:
 
 #: Names of the built-in conventions, in the order of tables; a test compares them with conventions.toml.
 BUILT_IN = (
-    "urdfkin", "pinocchio", "urdf", "mujoco", "drake", "idyntree", "rtb", "kdl", "isaaclab", "isaacgym",
-    "newton", "usd", "ros", "alphabetical",
+    "urdfkin", "pinocchio", "urdf", "mujoco", "drake", "idyntree", "rtb", "kdl", "isaaclab", "isaaclab3",
+    "isaacgym", "newton", "newton-usd", "usd", "ros", "alphabetical",
 )  # fmt: skip
 
 
@@ -146,7 +164,9 @@ def find_convention(name: str | Path | Convention) -> Convention:
     path = Path(name)
     if path.suffix == ".toml" or exists(path):
         return read_convention(read_text(path), shortened(path), path.stem)
-    raise UnknownNameError("convention", str(name), BUILT_IN)
+    error = UnknownNameError("convention", str(name), BUILT_IN)
+    error.remedy = f"{error.remedy} `urdfkin order ROBOT` lists all; a file's name ends with .toml"
+    raise error
 
 
 def read_convention(text: str, where: str, name: str) -> Convention:
@@ -163,7 +183,7 @@ def read_convention(text: str, where: str, name: str) -> Convention:
     like = found.pop("like", "urdf")
     if like not in _built_in():
         raise UnknownNameError("convention", str(like), BUILT_IN, where=where)
-    base = replace(_built_in()[like], name=name, title=name, evidence="", sources=(), note="")
+    base = replace(_built_in()[like], name=name, title=name, evidence="", measured="", sources=(), note="")
     changes: dict[str, Any] = {}
     for word in ("name", "title", "note"):
         if word in found:
@@ -221,15 +241,107 @@ def _rule(rule: dict[str, Any], where: str) -> JointRule:
         raise InputError("`sign` must be 1 or -1", where=where, found=safe_repr(rule["sign"]))
     zero = _number(rule.get("zero", 0.0), "zero", where)
     unit = rule.get("unit")
-    if unit is None:
-        return JointRule(name, None, zero, sign)
     if isinstance(unit, str):
         if unit not in _UNITS:
             raise UnknownNameError("unit", unit, _UNITS, where=where)
-        return JointRule(name, sign * _UNITS[unit], zero, sign, "length" if unit in _LENGTHS else "angle")
-    per_turn = _number(unit, "unit", where)
-    if per_turn <= 0.0:
-        raise InputError(
-            "`unit` must be positive: the number of units in one turn", where=where, found=safe_repr(unit)
-        )
-    return JointRule(name, sign * per_turn / math.tau, zero, sign, "angle")
+    elif unit is not None:
+        unit = _number(unit, "unit", where)
+        if unit <= 0.0:
+            raise InputError(
+                "`unit` must be positive: the number of units in one turn", where=where, found=safe_repr(unit)
+            )
+    return JointRule(name, sign, zero, unit)
+
+
+def as_toml(how: Convention) -> str:
+    """Return the text of a file with this convention; `read_convention` returns it again.
+
+    >>> print(as_toml(Convention(name="mine", order="given", joints=("b", "a"))), end="")
+    like = "urdfkin"
+    joints = ["b", "a"]
+    """
+    lines = [f"{word} = {_quoted(text)}" for word in ("title", "note") if (text := getattr(how, word))]
+    lines.append('like = "urdfkin"')
+    if how.order == "given":
+        lines.append(f"joints = [{', '.join(map(_quoted, how.joints))}]")
+    plain = Convention(name="")
+    for key in _CHOICES:
+        value = getattr(how, key)
+        if value != getattr(plain, key) and value != "given":
+            lines.append(f"{key} = {value if isinstance(value, int) else _quoted(value)}")
+    for joint, rule in how.rules.items():
+        lines += ["", f"[joint.{_quoted(joint)}]"]
+        lines += [] if rule.name is None else [f"name = {_quoted(rule.name)}"]
+        lines += [] if rule.sign == 1.0 else ["sign = -1"]
+        lines += [] if not rule.zero else [f"zero = {float(rule.zero)!r}"]
+        if rule.unit is not None:
+            lines.append(f"unit = {_quoted(rule.unit) if isinstance(rule.unit, str) else repr(rule.unit)}")
+    return "\n".join(lines) + "\n"
+
+
+def _quoted(text: str) -> str:
+    """Return a text as a basic string of TOML, which has the escapes of JSON; DEL needs one as well."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+# -- names -------------------------------------------------------------------------------------------
+
+_IDENTIFIER = re.compile("[A-Za-z_][A-Za-z0-9_]*")
+_DIGITS = string.digits + string.ascii_uppercase + string.ascii_lowercase
+#: Digits from this one on continue a number of a transcoded name.
+_CONTINUES = 31
+
+
+def spelled(name: str, how: str) -> str:
+    """Return a name as a tool writes it; `how` is a choice of `Convention.names`.
+
+    >>> [spelled("1", how) for how in ("urdf", "usd", "identifier", "isaacsim")]
+    ['1', 'tn__1_', '_', 'a_1']
+    """
+    match how:
+        case "usd":
+            return transcoded(name)
+        case "identifier":
+            return identifier(name)
+        case "isaacsim":
+            valid = identifier(f"_{name}" if re.match("[0-9]", name) else name)
+            return f"a{valid}" if valid.startswith("_") else valid
+    return name
+
+
+def identifier(name: str) -> str:
+    """Return a name as OpenUSD's `TfMakeValidIdentifier` makes it: "_" for each byte that is not allowed.
+
+    >>> identifier("1"), identifier("arm-2")
+    ('_', 'arm_2')
+    """
+    octets = name.encode().decode("latin-1")
+    return re.sub(r"^[^A-Za-z_]|[^A-Za-z0-9_]", "_", octets) or "_"
+
+
+def transcoded(name: str) -> str:
+    """Return a name as `usdex.core.getValidPrimName` of OpenUSD Exchange makes it; each name has its own.
+
+    The result begins with "tn__", followed by the characters that are allowed and "_". After that comes a
+    number with digits of base 62 for each other character, in the order of code points. The number is the
+    difference to the previous code point, times the number of places, plus the place (Bootstring).
+    Source: github.com/PixarAnimationStudios/OpenUSD-proposals, proposals/transcoding_invalid_identifiers.
+
+    >>> transcoded("1"), transcoded("arm-2"), transcoded("arm_2")
+    ('tn__1_', 'tn__arm2_g6', 'arm_2')
+    """
+    if _IDENTIFIER.fullmatch(name):
+        return name
+    placed = [i for i, letter in enumerate(name) if letter == "_" or (letter.isascii() and letter.isalnum())]
+    out = "tn__" + "".join(name[i] for i in placed) + ("_" if placed else "")
+    previous = 0
+    for code, i in sorted((ord(letter), i) for i, letter in enumerate(name) if i not in set(placed)):
+        number = (code - previous) * (len(placed) + 1) + sum(k < i for k in placed)
+        while number >= _CONTINUES:
+            rest, digit = divmod(number - _CONTINUES, len(_DIGITS) - _CONTINUES)
+            out += _DIGITS[_CONTINUES + digit]
+            number = rest
+        out += _DIGITS[number]
+        placed.append(i)
+        previous = code
+    return out

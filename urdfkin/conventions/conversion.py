@@ -8,17 +8,16 @@ of a floating or planar joint.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from urdfkin.conventions.convention import Convention, JointRule
-from urdfkin.errors import InputError, Question
+from urdfkin.conventions.convention import Convention, JointRule, spelled
+from urdfkin.errors import InputError, Question, UnknownNameError
 from urdfkin.kinematics.inputs import scalars
 from urdfkin.kinematics.rotation.quaternion import NORM_TOLERANCE, rotation_of
 from urdfkin.model import configuration
@@ -89,7 +88,7 @@ class Conversion:
         self.tree, self.convention = tree, convention
         self._urdf = urdf
         for name in convention.rules:
-            tree.joint_index(name)
+            self._index(name)
         self._order = self._ordered()
         self._columns, self._units = list[_Column](), list[str]()
         self._v_names, self._v_units = list[str](), list[str]()
@@ -130,7 +129,7 @@ class Conversion:
                 " TOML file",
             )
         own = {rule.name: joint for joint, rule in how.rules.items() if rule.name is not None}
-        order = [self.tree.joint_index(own.get(name, name)) for name in how.joints]
+        order = [self._index(own.get(name, name)) for name in how.joints]
         for name, i in zip(how.joints, order, strict=True):
             if i not in moving:
                 raise InputError("the order of joints contains a fixed joint", where=how.name, found=name)
@@ -138,13 +137,24 @@ class Conversion:
             raise InputError(
                 "two joints have the same name in the convention", where=how.name, found=", ".join(how.joints)
             )
-        missing = [self.tree.joints[i].name for i in sorted(moving - set(order))]
-        missing = [name for name in missing if not self.tree.joints[self.tree.joint_index(name)].mimic]
+        joints, covered = self.tree.joints, {self.tree.q_index[i] for i in order if self._follows(i)}
+        missing = [joints[i].name for i in sorted(moving - set(order)) if self.tree.q_index[i] not in covered]
         if missing:
             raise InputError(
                 "the order of joints lacks a joint", where=how.name, found=", ".join(missing[:8])
             )
         return order
+
+    def _index(self, joint: str) -> int:
+        """Return the index of a joint that the convention names."""
+        if joint not in (names := [one.name for one in self.tree.joints]):
+            raise UnknownNameError("joint", joint, names, where=f"{self.convention.name}, {self.tree.name}")
+        return self.tree.joint_index(joint)
+
+    def _follows(self, i: int) -> bool:
+        """Whether the value of a joint determines its coordinate; that of a mimic joint may be constant."""
+        rule = self.tree.joints[i].mimic
+        return rule is None or rule.multiplier != 0.0
 
     def _all_in_order(self) -> list[int]:
         tree, order = self.tree, self.convention.order
@@ -163,15 +173,22 @@ class Conversion:
         for i, joint in enumerate(tree.joints):
             children.setdefault(joint.parent, []).append(i)
         if order.startswith("breadth first"):
-            return self._breadth_first(children, merged=order.endswith("by name"))
+            of_joints = [joint.name for joint in tree.joints]
+            keys = of_joints if order.endswith(("by name", "fixed joints")) else place
+            return self._breadth_first(children, keys, merged=not order.endswith("fixed joints"))
         found, stack = [], sorted(children.get(0, []), key=place.__getitem__, reverse=True)
         while stack:
             found.append(i := stack.pop())
             stack += sorted(children.get(i + 1, []), key=place.__getitem__, reverse=True)
         return found
 
-    def _breadth_first(self, children: Mapping[int, list[int]], *, merged: bool) -> list[int]:
-        """Return the joints by depth; if `merged`, links that a fixed joint connects are one link."""
+    def _breadth_first(
+        self, children: Mapping[int, list[int]], keys: Sequence[Any], *, merged: bool
+    ) -> list[int]:
+        """Return the joints by depth, siblings by their keys.
+
+        If `merged`, links that a fixed joint connects are one link.
+        """
 
         def below(link: int) -> list[int]:
             found, fixed = list[int](), [link]
@@ -181,7 +198,7 @@ class Conversion:
                         found.append(i)
                     else:
                         fixed.append(i + 1)
-            return sorted(found, key=lambda i: self.tree.joints[i].name)
+            return sorted(found, key=keys.__getitem__)
 
         order = below(0)
         for i in order:
@@ -192,7 +209,7 @@ class Conversion:
         """Add the columns of a joint; return its name in the tool."""
         how, joint = self.convention, self.tree.joints[i]
         rule = how.rules.get(joint.name, JointRule())
-        name = rule.name or (usd_name(joint.name) if how.names == "usd" else joint.name)
+        name = rule.name or spelled(joint.name, how.names)
         q, v = self.tree.q_index[i], self.tree.v_index[i]
         if joint.kind is JointKind.FLOATING:
             self._refuse_rule(joint)
@@ -290,18 +307,23 @@ class Conversion:
         self._plain_q = bool((self._q_factor == 1.0).all() and not self._q_zero.any())
         self._plain_q &= not any(c.part for c in columns)
         self._same_q = self._plain_q and np.array_equal(self._q_index, np.arange(self.tree.nq))
-        # For each number of our q, find the first of the tool's columns that is not a copy for a mimic joint.
+        # For each number of our q, find the tool's column: that of a mimic joint only if there is no other.
         self._q_source = [
-            next(k for k, c in enumerate(columns) if c.at == at and not c.copy) for at in range(self.tree.nq)
+            min((k for k, c in enumerate(columns) if c.at == at and c.factor), key=lambda k: columns[k].copy)
+            for at in range(self.tree.nq)
         ]
         self._v_at = np.array(self._v_index, dtype=np.intp)
         self._v_scale = np.array(self._v_factor)
         self._plain_v = bool((self._v_scale == 1.0).all()) and not self._blocks
         self._same_v = self._plain_v and np.array_equal(self._v_at, np.arange(self.tree.nv))
         self._v_source = [
-            next(k for k, x in enumerate(self._v_index) if x == at and k not in self._v_copies)
+            min(
+                (k for k, x in enumerate(self._v_index) if x == at and self._v_factor[k]),
+                key=self._v_copies.__contains__,
+            )
             for at in range(self.tree.nv)
         ]
+        self._v_copies -= set(self._v_source)
         self.angular_first = how.six == "angular first"
 
     @property
@@ -629,8 +651,23 @@ class Conversion:
         Raises:
             InputError: a column of J belongs to several joints of the tool, because one mimics the other.
         """
+        return self.columns(q, self.six(J, -2))
+
+    def columns(self, q: Given, J: ArrayLike) -> FloatArray:
+        """Convert the columns of a matrix (..., rows, nv) with any rows: J M^-1.
+
+        Its rows are derivatives of numbers that the convention does not change, such as Euler angles.
+
+        Raises:
+            InputError: a column of J belongs to several joints of the tool, because one mimics the other.
+
+        >>> import urdfkin
+        >>> a1 = urdfkin.load("a1", verify=False)
+        >>> a1.convention("mujoco").columns(a1.neutral(), [range(12)])[0, :4].tolist()
+        [3.0, 4.0, 5.0, 0.0]
+        """
         self._demand_own_columns()
-        array = self.six(J, -2)
+        array = np.asarray(J, dtype=np.float64)
         if self._plain_v:
             return array if self._same_v else array[..., self._v_at]
         return array @ _for_frames(self.inverse_matrix(q), array.ndim)
@@ -800,13 +837,3 @@ def _cross(x: FloatArray) -> FloatArray:
     found[..., 0, 1], found[..., 0, 2], found[..., 1, 2] = -x[..., 2], x[..., 1], -x[..., 0]
     found -= np.swapaxes(found.copy(), -1, -2)
     return found
-
-
-def usd_name(name: str) -> str:
-    """Return a name as a USD identifier, as `TfMakeValidIdentifier` makes it.
-
-    >>> usd_name("1"), usd_name("arm-2")
-    ('_', 'arm_2')
-    """
-    octets = name.encode().decode("latin-1")  # the function replaces each byte
-    return re.sub(r"^[^A-Za-z_]|[^A-Za-z0-9_]", "_", octets) or "_"

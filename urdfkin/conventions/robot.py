@@ -117,6 +117,15 @@ class ConventionRobot:
         ours, H = self._call(self.robot.hessian, (q,), frame, *more, **options)
         return self.conversion.hessian(ours[0], self.robot.jacobian(ours[0], frame, *more, **options), H)
 
+    def analytical_jacobian(self, q: ArrayLike, frame: Any = None, *more: Any, **options: Any) -> FloatArray:
+        """Return the analytical Jacobian, columns as in the tool; see `Robot.analytical_jacobian`."""
+        ours, J = self._call(self.robot.analytical_jacobian, (q,), frame, *more, **options)
+        return self.conversion.columns(ours[0], J)
+
+    def imu(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, frame: Any = None, **options: Any) -> FloatArray:
+        """Return an IMU's readings (..., 6), the accelerometer's first in every tool; see `Robot.imu`."""
+        return self._call(self.robot.imu, (q, v, a), frame, **options)[1]
+
     def _call(
         self, method: Callable[..., FloatArray], given: tuple[Any, ...], *more: Any, **options: Any
     ) -> tuple[tuple[FloatArray, ...], FloatArray]:

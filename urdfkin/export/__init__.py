@@ -23,6 +23,8 @@ LANGUAGES: dict[str, tuple[str, str, str]] = {
     "matlab": ("urdfkin.export.matlab", "_kinematics.m", "MATLAB and Octave"),
     "latex": ("urdfkin.export.latex", ".tex", "LaTeX formulas in the textbook's symbols"),
 }
+#: Form of a chain -> one-line summary.
+FORMS = {"tree": "the URDF's links", "dh": "its Denavit-Hartenberg table", "screws": "its screws"}
 #: Quantities that are exported by default.
 QUANTITIES = ("placement", "jacobian", "acceleration")
 

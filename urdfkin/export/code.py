@@ -12,7 +12,7 @@ from urdfkin.errors.validators import as_names, as_str
 from urdfkin.export import recursion
 from urdfkin.export.expression import Node, Number
 from urdfkin.export.function import Function, function_of
-from urdfkin.export.naming import all_safe, shown, title
+from urdfkin.export.naming import all_safe, quiet, shown, title
 from urdfkin.export.proof import Proof, prove
 from urdfkin.export.seal import SEAL
 from urdfkin.model.configuration import coordinate_names, rate_names
@@ -40,6 +40,7 @@ class Code:
         rates: Names of the coordinates of v and a.
         joints: Names of the path's moving joints.
         words: Identifiers for the numbers of each input, by the input's letter, and for the path's joints.
+        about: Lines for the header that describe the table or the screws of the chain; empty for a URDF.
         vouched: The proof; None for code that urdfkin compiles for itself.
     """
 
@@ -52,6 +53,7 @@ class Code:
     rates: tuple[str, ...]
     joints: tuple[str, ...]
     words: dict[str, list[str]]
+    about: tuple[str, ...] = ()
     vouched: Proof | None = None
 
     @property
@@ -92,7 +94,7 @@ class Code:
         lines += [f"q[{i}] {name}" for i, name in enumerate(self.coordinates)]
         if self.rates != self.coordinates:
             lines += [f"v[{i}], a[{i}] {name}" for i, name in enumerate(self.rates)]
-        return lines
+        return [*lines, *([""] if self.about else []), *self.about]
 
 
 def code_of(
@@ -104,8 +106,19 @@ def code_of(
     *,
     name: str | None,
     verify: bool | None,
+    about: str = "",
 ) -> Code:
     """Make the code of a frame, with its proof.
+
+    Args:
+        verifier: Verifier of the robot.
+        plan_of: Function that returns the compiled tree for some links.
+        frame: Name of a link or joint.
+        quantities: Names of quantities.
+        reference: Reference frame of velocities, accelerations and Jacobians.
+        name: Prefix of the names of functions; None: made of the names of the robot and the frame.
+        verify: As in `Robot.export`.
+        about: Text about the table or the screws of the chain, for the header.
 
     Raises:
         UnknownNameError: the frame, a quantity or the reference is unknown.
@@ -123,7 +136,8 @@ def code_of(
             remedy="export the placement instead",
         )
     code = bare(tree, plan, frame, rows, reference, title("", name) if name else title(tree.name, frame))
-    return replace(code, vouched=prove(verifier, plan_of, frame, reference, code.functions, verify))
+    proof = prove(verifier, plan_of, frame, reference, code.functions, verify)
+    return replace(code, vouched=proof, about=tuple(map(quiet, about.splitlines())))
 
 
 def bare(

@@ -6,15 +6,19 @@ The equations are in sections 7.5 to 7.7 of the textbook. If urdfkin and Pinocch
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from urdfkin.compiled.breakdown import AccelerationBreakdown, acceleration_breakdown
+from urdfkin.errors import InputError
 from urdfkin.errors.validators import as_str
+from urdfkin.model.configuration_like import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
+from urdfkin.motion.trajectory import Trajectory
 from urdfkin.robot import Robot
 from urdfkin.verify.bounds import movable, result_k
 from urdfkin.verify.call import Call
@@ -40,7 +44,7 @@ class Check:
 
 @dataclass(frozen=True, eq=False)
 class FrameMotion:
-    """The motion of one frame in n samples; six-vectors are [linear; angular].
+    """The motion of one frame in n samples, from `urdfkin.frame_motion`; six-vectors are [linear; angular].
 
     Attributes:
         frame: Name of the frame.
@@ -54,6 +58,10 @@ class FrameMotion:
         checks: Comparison with Pinocchio, by the name of the quantity; empty if Pinocchio cannot check the
             robot.
         not_verified: The reason why Pinocchio cannot check the robot; None if it can.
+
+    >>> import urdfkin
+    >>> urdfkin.frame_motion(urdfkin.load("planar_two_link"), ([[0, 0]], [[1, 0]], [[0, 0]]), "tip")
+    <FrameMotion of tip: 1 samples, verified by Pinocchio>
     """
 
     frame: str
@@ -67,18 +75,39 @@ class FrameMotion:
     checks: dict[str, Check]
     not_verified: str | None
 
+    def __repr__(self) -> str:
+        verdict = "verified by" if self.agrees else "DISAGREES with"
+        words = f"{verdict} Pinocchio" if self.not_verified is None else "not verified"
+        return f"<FrameMotion of {self.frame}: {len(self.placement)} samples, {words}>"
+
     @property
     def agrees(self) -> bool:
-        """Whether every sample is within its bound."""
+        """Whether every sample is within its bound; also True if Pinocchio cannot check the robot.
+
+        >>> import urdfkin
+        >>> urdfkin.frame_motion(urdfkin.load("ur5"), [np.zeros((3, 6))] * 3, "tool0").agrees
+        True
+        """
         return all((check.share <= 1.0).all() for check in self.checks.values())
 
     @property
     def singular_values(self) -> FloatArray:
-        """(n, min(6, nv)) singular values of the Jacobian, largest first; its rows mix metres and radians."""
+        """(n, min(6, nv)) singular values of the Jacobian, largest first; its rows mix metres and radians.
+
+        >>> import urdfkin
+        >>> urdfkin.frame_motion(urdfkin.load("ur5"), [np.zeros((3, 6))] * 3, "tool0").singular_values.shape
+        (3, 6)
+        """
         return self.singular_values_of(slice(0, 6))
 
     def singular_values_of(self, rows: slice) -> FloatArray:
-        """Return the singular values (n, ...) of the given rows of the Jacobian, largest first."""
+        """Return the singular values (n, ...) of the given rows of the Jacobian, largest first.
+
+        >>> import urdfkin
+        >>> tip = urdfkin.frame_motion(urdfkin.load("planar_two_link"), [[[0.3, 1.0]]] * 3, "tip")
+        >>> tip.singular_values_of(slice(0, 2)).round(4).tolist()
+        [[0.865, 0.1946]]
+        """
         return np.asarray(np.linalg.svd(self.jacobian[:, rows], compute_uv=False), dtype=np.float64)
 
     def manipulability(self, rows: slice = slice(0, 6)) -> FloatArray:
@@ -92,6 +121,11 @@ class FrameMotion:
 
         Returns:
             (n,) one value for each sample.
+
+        >>> import urdfkin
+        >>> tip = urdfkin.frame_motion(urdfkin.load("planar_two_link"), [[[0.3, 1.0]]] * 3, "tip")
+        >>> tip.manipulability(slice(0, 2)).round(4).tolist()  # 0.5 * 0.4 * sin(1)
+        [0.1683]
         """
         part = self.jacobian[:, rows]
         moving = self.movable[rows].any(axis=0)
@@ -103,30 +137,40 @@ class FrameMotion:
 
 def frame_motion(
     robot: Robot,
-    q: FloatArray,
-    v: FloatArray,
-    a: FloatArray,
+    motion: Trajectory | Sequence[Given],
     frame: str,
     reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
 ) -> FrameMotion:
-    """Compute a frame's motion and compare it with Pinocchio's.
+    """Compute the motion of a frame along a trajectory, and compare every sample with Pinocchio.
+
+    A disagreement is no error: `agrees` and `checks` of the result state it.
 
     Args:
         robot: The robot.
-        q: (n, nq) rad, m.
-        v: (n, nv) rad/s, m/s.
-        a: (n, nv) rad/s^2, m/s^2.
+        motion: A trajectory, as from `urdfkin.read_trajectory`; or q (n, nq), v (n, nv) and a (n, nv) in rad,
+            m and s.
         frame: A link's or joint's name.
         reference: Reference frame of velocity, acceleration and Jacobian.
 
     Raises:
         InputError: an array has a wrong length, or contains a number that is not finite.
-        UnknownNameError: the frame does not exist.
+        UnknownNameError: the frame or reference does not exist.
+
+    >>> import urdfkin
+    >>> arm = urdfkin.load("planar_two_link")
+    >>> q, v, a = [[0.0, 0.0], [0.1, 0.0]], [[1.0, 0.0], [1.0, 0.0]], [[0.0, 0.0], [0.0, 0.0]]
+    >>> tip = urdfkin.frame_motion(arm, (q, v, a), "tip")
+    >>> tip.velocity[0].tolist(), tip.agrees
+    ([0.0, 0.9, 0.0, 0.0, 0.0, 1.0], True)
     """
-    call = Call(robot.tree, robot.plan, as_str(frame, "frame"), reference, None, (q, v, a))
-    inputs, reference = (call.q, *call.rates), call.reference
-    ours = {row: call.compute(row.ours, call.plan, inputs, reference) for row in validated()}
-    reason = robot.verifier.cannot()
+    base = motion.base if isinstance(motion, Trajectory) else None
+    given = (motion.q, motion.v, motion.a) if isinstance(motion, Trajectory) else tuple(motion)
+    if len(given) != len("qva"):
+        raise InputError("a motion is a trajectory, or q, v and a", found=f"{len(given)} arrays")
+    call = Call(robot.tree, robot.plan, as_str(frame, "frame"), reference, base, given)
+    inputs, reference, state = (call.q, *call.rates), call.reference, call.state
+    ours = {row: call.compute(row.ours, call.plan, inputs, reference, base=state) for row in validated()}
+    reason = robot.verifier.cannot(call.base)
     placement, velocity, acceleration, jacobian = (
         ours[row][:, 0] for row in (PLACEMENT, VELOCITY, ACCELERATION, JACOBIAN)
     )
@@ -138,14 +182,14 @@ def frame_motion(
         acceleration,
         jacobian,
         movable(call.plan, reference)[0],
-        call.compute(acceleration_breakdown, robot.tree, call.links[0], *inputs, reference),
+        call.compute(acceleration_breakdown, robot.tree, call.links[0], *inputs, reference, state),
         {} if reason else {row.name: _check(row, robot, call, results) for row, results in ours.items()},
         reason,
     )
 
 
 def _check(row: Quantity, robot: Robot, call: Call, ours: FloatArray) -> Check:
-    theirs, bound = held_against(row, robot.verifier.oracle(), call.part(slice(0, call.n)), ours)
+    theirs, bound = held_against(row, robot.verifier.oracle(call.base), call.part(slice(0, call.n)), ours)
     units = worst_of_each(ours, theirs, bound.scale, 2)
     k = np.broadcast_to(result_k(bound, units.shape), units.shape)
     return Check(units[:, 0], (units / k)[:, 0], k[:, 0])

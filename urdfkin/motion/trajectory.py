@@ -2,7 +2,9 @@
 
 A line is parameterised by s = 10 u^3 - 15 u^4 + 6 u^5 with u = t / duration. It starts and ends at rest, and
 its acceleration is continuous. If a file has no joint velocities, they are computed by central differences of
-the configurations, after the angles are unwrapped.
+the configurations, after the angles are unwrapped. The error of these differences falls with the square of
+the time step; that of joint accelerations from configurations falls with the time step at both ends. The
+differences with half of the samples give an estimate of it.
 
 A log often wraps the angle of a wheel to [-pi, pi] or [0, 2 pi]. The jump from one end of this range to the
 other is not a motion. Its difference quotient, however, would be a huge joint velocity. The angle of a planar
@@ -15,28 +17,32 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 import zipfile
 import zlib
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from urdfkin.errors import InputError, SourceError
-from urdfkin.errors.numbers import parse_float, remedy
+from urdfkin.errors.numbers import UNITS, in_radians, parse_float, parse_quantity, remedy
 from urdfkin.errors.validators import real_number, whole_number
 from urdfkin.kinematics.inputs import FloatArray, scalars
 from urdfkin.kinematics.rotation.quaternion import angular_velocity_from_quaternion_rates, rotation_of
 from urdfkin.model.base_motion import BaseMotion
-from urdfkin.model.configuration import checked
+from urdfkin.model.configuration import checked, places
 from urdfkin.model.configuration_like import Given, listed, wrong_count
 from urdfkin.model.integration import difference, integrate
 from urdfkin.model.tree import Joint, JointKind, KinematicTree, frozen
 from urdfkin.system.files import MOST_DATA, read_bytes, read_text
 
 if TYPE_CHECKING:
+    from urdfkin.conventions import Convention, Conversion
     from urdfkin.robot import Robot
 
 
@@ -114,21 +120,50 @@ def _check_names(path: Path, names: Sequence[str], shapes: Shapes, required: Seq
 _FEWEST = 3
 #: Names of the arrays for the fields of `BaseMotion`, in an .npz file.
 _BASE = "base_placement", "base_velocity", "base_acceleration"
+#: Largest rounding of a time, relative to the smallest time step, that needs no note.
+_TIME_ROUNDING = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """n samples of a file, in urdfkin's convention; None for numbers that the file does not contain.
+
+    Attributes:
+        where: Name of the file.
+        q: (n, nq) configurations, as they are in the file.
+        t: (n,) seconds, increasing.
+        v: (n, nv) joint velocities.
+        a: (n, nv) joint accelerations; only together with v.
+        base: Motion of the root link, a batch of n.
+    """
+
+    where: str
+    q: FloatArray
+    t: FloatArray | None = None
+    v: FloatArray | None = None
+    a: FloatArray | None = None
+    base: BaseMotion | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """n samples of a robot's motion.
+    """n samples of a robot's motion, from `urdfkin.read_trajectory`.
 
     Attributes:
         t: (n,) seconds, increasing.
-        q: (n, nq) configurations.
-        v: (n, nv) joint velocities.
-        a: (n, nv) joint accelerations.
+        q: (n, nq) configurations, rad and m.
+        v: (n, nv) joint velocities, rad/s and m/s.
+        a: (n, nv) joint accelerations, rad/s^2 and m/s^2.
         rates: Origin of v and a, as text.
         exact: Whether v and a are the derivatives of q up to rounding; if False, their error is unknown.
         notes: Remarks for the user about the samples, for example unwrapped angles; one line each.
         base: Motion of the root link, a batch of n; None if it is fixed at the world's origin.
+        errors: Estimates of the largest errors of v and a if they are differences, in their units; None if
+            they are given or the samples are too few.
+
+    >>> import urdfkin
+    >>> line(urdfkin.load("ur5"), "neutral", "ready", 2.0, 101)
+    <Trajectory: 101 samples in 2 s, rates of the line>
     """
 
     t: FloatArray
@@ -139,6 +174,25 @@ class Trajectory:
     exact: bool = False
     notes: tuple[str, ...] = ()
     base: BaseMotion | None = None
+    errors: tuple[float, float] | None = None
+
+    def __repr__(self) -> str:
+        return f"<Trajectory: {len(self.t)} samples in {self.t[-1] - self.t[0]:.4g} s, rates {self.rates}>"
+
+    def derivation(self) -> str:
+        """Return the origin of v and a with the estimates of their errors, as a line.
+
+        >>> import urdfkin
+        >>> line(urdfkin.load("ur5"), "neutral", "ready", 2.0, 101).derivation()
+        'of the line'
+        """
+        if self.errors is None:
+            return self.rates
+        v, a = self.errors
+        return (
+            f"{self.rates}; largest errors about {v:.1e} (v) and {a:.1e} (a), in rad or m per s and s^2,"
+            " estimated with half of the samples"
+        )
 
 
 def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) -> Trajectory:
@@ -185,82 +239,168 @@ def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) 
     return Trajectory(frozen(t), frozen(q), frozen(s_1 * step), frozen(s_2 * step), "of the line", exact=True)
 
 
-def read_trajectory(robot: Robot, path: Path, *, with_base: bool = False) -> Trajectory:
-    """Read samples from a CSV file with column names in its first line, or from an .npz file.
+def read_trajectory(
+    robot: Robot, path: str | Path, *, convention: str | Path | Convention | None = None
+) -> Trajectory:
+    r"""Read samples from a CSV file with column names in its first line, or from an .npz file.
 
     | Content | CSV columns | .npz array |
     |---|---|---|
-    | time, s | `t` | t (n,) |
+    | time, s | `t`, `time` or `timestamp` | t (n,) |
     | configuration | the names of the coordinates | q (n, nq) |
     | joint velocities | `v:NAME` | v (n, nv) |
     | joint accelerations | `a:NAME` | a (n, nv) |
+    | motion of the root link | | base_placement (n, 4, 4), base_velocity (n, 6), base_acceleration (n, 6) |
 
-    Without t, the samples are one second apart. v and a must be given together. Without v and a, the angles
-    of continuous, planar and floating joints are unwrapped, and v and a are computed by central differences.
+    A heading may end with a unit: `elbow [deg]`, `elbow_deg`, `v:elbow [deg/s]`, `lift_mm`, `time [ms]`.
+    Without t, the samples are one second apart. Without a, a is computed by central differences of v.
+    Without v and a, the angles of continuous, planar and floating joints are unwrapped, and both are computed
+    by central differences. `rates`, `errors` and `notes` of the result state this.
 
     Args:
         robot: The robot.
         path: The file; the suffix .npz selects the second format.
-        with_base: Whether an .npz file may also contain the motion of the root link (`BaseMotion`): the
-            arrays base_placement (n, 4, 4), base_velocity (n, 6) and base_acceleration (n, 6), all three
-            together.
+        convention: Convention of the file's names and numbers, as in `Robot.convention`; None: urdfkin's.
 
     Raises:
         SourceError: the file cannot be read.
-        InputError: a column or array is unknown, missing or duplicate, a cell is not a number, time does not
-            increase, or there are too few samples.
+        InputError: the header is missing; a column or array is unknown, missing or duplicate; a cell is not a
+            number; a unit does not fit; time does not increase; or there are too few samples.
+        UnknownNameError: the convention does not exist.
+
+    >>> import urdfkin
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> arm = urdfkin.load("planar_two_link")
+    >>> with TemporaryDirectory() as folder:
+    ...     log = Path(folder, "log.csv")
+    ...     _ = log.write_text("time,joint_1 [deg],joint_2\n0,0,1\n0.1,9,1\n0.2,18,1\n")
+    ...     motion = urdfkin.read_trajectory(arm, log)
+    >>> motion.q[2].round(4).tolist(), motion.v[1].round(4).tolist(), motion.rates
+    ([0.3142, 1.0], [1.5708, 0.0], 'by central differences')
     """
+    conversion = None if convention is None else robot.convention(convention)
+    return with_rates(robot.tree, read_samples(robot, Path(path), conversion))
+
+
+def read_samples(robot: Robot, path: Path, conversion: Conversion | None = None) -> Samples:
+    """Read the samples of a file without computing any; `read_trajectory` explains file and errors."""
     archive = path.suffix.lower() == ".npz"
-    data = _arrays(robot, path, with_base=with_base) if archive else _table(robot, path)
+    data = _arrays(path, conversion or robot) if archive else _table(robot, path, conversion)
+    t, v, a = (data.get(name) for name in "tva")
+    if a is not None and v is None:
+        raise InputError("joint accelerations need joint velocities", where=str(path), found="a without v")
+    if t is not None and (np.diff(t) <= 0.0).any():
+        found = f"sample {int(np.argmax(np.diff(t) <= 0.0)) + 1}"
+        raise InputError("time must increase", where=str(path), found=found)
     q = data["q"]
-    if len(q) < _FEWEST:
-        raise InputError(f"a trajectory needs at least {_FEWEST} samples", where=str(path), found=str(len(q)))
-    t = data.get("t", np.arange(len(q), dtype=np.float64))
-    if (np.diff(t) <= 0.0).any():
-        raise InputError(
-            "time must increase", where=str(path), found=f"sample {int(np.argmax(np.diff(t) <= 0.0)) + 1}"
-        )
-    q = checked(robot.tree, q, "q")
+    if conversion is None:
+        q = checked(robot.tree, q, "q")
+        v, a = (x if x is None else checked(robot.tree, x, name) for name, x in (("v", v), ("a", a)))
+    elif v is None:
+        q = conversion.from_(q)
+    elif a is None:
+        q, v = conversion.from_(q, v)
+    else:
+        q, v, a = conversion.from_(q, v, a)
+    if not len(q):
+        raise InputError("no samples", where=str(path), remedy="write one line for each sample")
     base = BaseMotion(*(data[name] for name in _BASE)) if _BASE[0] in data else None
-    if "v" in data:
-        v, a = data["v"], data["a"]
-        return Trajectory(frozen(t), frozen(q), frozen(v), frozen(a), "as given", base=base)
-    found = unwrapped(robot.tree, q)
-    v = _rates(robot.tree, found.q, t)
-    words = "by central differences"
+    t, v, a = (x if x is None else frozen(x) for x in (t, v, a))
+    return Samples(str(path), frozen(q), t, v, a, base)
+
+
+def with_rates(tree: KinematicTree, x: Samples) -> Trajectory:
+    """Return the trajectory of some samples; compute v and a by central differences if they are missing.
+
+    Raises:
+        InputError: there are too few samples.
+    """
+    n = len(x.q)
+    if n < _FEWEST:
+        raise InputError(f"a trajectory needs at least {_FEWEST} samples", where=x.where, found=str(n))
+    t = np.arange(n, dtype=np.float64) if x.t is None else x.t
+    if x.v is not None and x.a is not None:
+        return Trajectory(frozen(t), x.q, x.v, x.a, "as given", base=x.base)
+    found = Unwrapped(x.q, (), ()) if x.v is not None else unwrapped(tree, x.q)
+    v, a = _differences(tree, found.q, t, x.v)
+    errors = None
+    if n >= 2 * _FEWEST - 1:
+        half = slice(None, None, 2)
+        coarse = _differences(tree, found.q[half], t[half], None if x.v is None else x.v[half])
+        # With half of the samples, an error of second order is four times as large, one of first order twice.
+        order = 1 if x.v is None else 2
+        errors = _error(v[half], coarse[0], 2), _error(a[half], coarse[1], order)
+    words = "by central differences" if x.v is None else "v as given, a by central differences of v"
     if found.joints:
         words += f", after unwrapping {', '.join(found.joints)}"
-    rows = frozen(t), frozen(found.q), frozen(v), frozen(_gradient(v, t))
-    return Trajectory(*rows, words, notes=found.notes, base=base)
+    notes = (*found.notes, *_time_notes(t, given=x.t is not None))
+    rows = frozen(t), frozen(found.q), frozen(v), frozen(a)
+    return Trajectory(*rows, words, notes=notes, base=x.base, errors=errors)
 
 
-def _table(robot: Robot, path: Path) -> dict[str, FloatArray]:
+def _differences(
+    tree: KinematicTree, q: FloatArray, t: FloatArray, v: FloatArray | None
+) -> tuple[FloatArray, FloatArray]:
+    v = _rates(tree, q, t) if v is None else v
+    return v, _gradient(v, t)
+
+
+def _error(fine: FloatArray, coarse: FloatArray, order: int) -> float:
+    """Estimate the largest error of differences of some order from those with half of the samples."""
+    return float(np.abs(fine - coarse).max(initial=0.0)) / (2.0**order - 1.0)
+
+
+def _time_notes(t: FloatArray, *, given: bool) -> Iterator[str]:
+    if not given:
+        yield "there is no time: the samples are taken as one second apart"
+        return
+    step, rounding = float(np.diff(t).min()), float(np.spacing(np.abs(t).max()))
+    if rounding > _TIME_ROUNDING * step:
+        yield (
+            f"times near {t[-1]:.0f} s are rounded to {rounding:.1g} s, and the smallest step is"
+            f" {step:.1g} s: subtract the first time in the file"
+        )
+
+
+def _table(robot: Robot, path: Path, conversion: Conversion | None) -> dict[str, FloatArray]:
     """Return the arrays t, q, v and a that a CSV file contains."""
-    columns = {x: [f"{x}:{name}" for name in robot.rate_names] for x in "va"}
-    optional = ["t", *columns["v"], *columns["a"]]
+    names: dict[str, list[str]] = {}
+    units = {"t": "s"}
+    for x, prefix in (("q", ""), ("v", "v:"), ("a", "a:")):
+        own = column_units(robot, x, conversion)
+        names[x] = [f"{prefix}{name}" for name in own]
+        units |= {f"{prefix}{name}": unit for name, unit in own.items()}
+    optional = ["t", *names["v"], *names["a"]]
+    what = (
+        "a trajectory"
+        if conversion is None
+        else f"a trajectory in the convention {conversion.convention.name}"
+    )
     text = read_text(path, MOST_DATA, pipes=True)
-    data = read_columns(text, str(path), "a trajectory", robot.coordinate_names, optional, named=True)
-    found = {"q": _columns(path, data, robot.coordinate_names)}
-    if "t" in data:
-        found["t"] = data["t"]
-    if any(name in data for name in optional[1:]):
-        found |= {x: _columns(path, data, names) for x, names in columns.items()}
-    return found
+    data = read_columns(text, str(path), what, names["q"], optional, named=True, units=units)
+    found = {x: _columns(path, data, names[x]) for x in "qva" if x == "q" or any(n in data for n in names[x])}
+    return found | ({"t": data["t"]} if "t" in data else {})
 
 
-def _arrays(robot: Robot, path: Path, *, with_base: bool) -> dict[str, FloatArray]:
+def column_units(robot: Robot, letter: str, conversion: Conversion | None = None) -> dict[str, str]:
+    """Return the unit of each number of "q", "v" or "a" by its name: "rad", "m/s", or "" without a unit."""
+    layout = conversion.layout(letter) if conversion else places(robot.tree, letter)
+    per = {"q": "", "v": "/s", "a": "/s^2"}[letter]
+    return {
+        name: f"{unit}{per}" if unit else "" for name, unit in zip(layout.names, layout.units, strict=True)
+    }
+
+
+def _arrays(path: Path, known: Robot | Conversion) -> dict[str, FloatArray]:
     """Return the arrays t, q, v, a and of the base's motion that an .npz file contains."""
-    shapes = {"t": (), "q": (robot.nq,), "v": (robot.nv,), "a": (robot.nv,)}
-    base = dict(zip(_BASE, ((4, 4), (6,), (6,)), strict=True)) if with_base else {}
+    shapes = {"t": (), "q": (known.nq,), "v": (known.nv,), "a": (known.nv,)}
+    base = dict(zip(_BASE, ((4, 4), (6,), (6,)), strict=True))
     data = read_arrays(path, shapes | base, ["q"])
-    for together in (("v", "a"), tuple(base)):
-        missing = [name for name in together if name not in data]
-        if 0 < len(missing) < len(together):
-            raise InputError(
-                f"{', '.join(together)} must be given together",
-                where=str(path),
-                found=f"no {', '.join(missing)}",
-            )
+    missing = [name for name in base if name not in data]
+    if 0 < len(missing) < len(base):
+        found = f"no {', '.join(missing)}"
+        raise InputError(f"{', '.join(base)} must be given together", where=str(path), found=found)
     return data
 
 
@@ -305,6 +445,7 @@ def read_columns(
     optional: Sequence[str] = (),
     *,
     named: bool = False,
+    units: Mapping[str, str] | None = None,
 ) -> Mapping[str, FloatArray]:
     r"""Parse CSV text into columns of finite numbers.
 
@@ -318,26 +459,114 @@ def read_columns(
         required: Names of the required columns.
         optional: Names of the optional columns.
         named: Whether the first line must contain the names.
+        units: SI unit of each column whose heading may end with a unit, such as `elbow [deg]`, `elbow_deg`.
 
     Returns:
-        An array (n,) for each column that is present; n may be zero.
+        An array (n,) for each column that is present, in SI units; n may be zero.
 
     Raises:
-        InputError: a column is unknown, missing or duplicate; a line has a wrong number of cells; or a cell
-            is not a finite number in decimal digits.
+        InputError: the names are missing; a column is unknown, missing or duplicate; a unit does not fit; a
+            line has a wrong number of cells; or a cell is not a finite number in decimal digits.
 
     >>> read_columns("b,a\n1,2\n3,4\n", "x.csv", "q", ["a", "b"])["a"].tolist()
     [2.0, 4.0]
+    >>> read_columns("a_deg\n90\n", "x.csv", "q", ["a"], units={"a": "rad"})["a"].tolist()
+    [1.5707963267948966]
     """
-    rows = list(_rows(text, where))
-    names = list(required)
-    if rows and (named or _is_header(rows[0][1], names)):
-        line, names = rows.pop(0)
-        _check_columns(names, f"{where}:{line}", what, required, optional)
-    table = np.empty((len(rows), len(names)))
-    for k, (line, cells) in enumerate(rows):
-        table[k] = numbers(cells, f"{where}:{line}", names)
-    return {name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(names)}
+    rows = _rows(text, where)
+    names, written = list(required), list[str]()
+    first = next(rows, None)
+    if first is not None and (named or _is_header(first[1], names)):
+        line, cells = first
+        headings = [_heading(cell, f"{where}:{line}", units or {}) for cell in cells]
+        names, written = [name for name, _ in headings], [unit for _, unit in headings]
+        if named and not {*names} & {*required, *optional} and all(parse_float(x) is not None for x in cells):
+            raise InputError(
+                f"no header: the first line must name the columns of {what}",
+                where=f"{where}:{line}",
+                found=f"only numbers: {', '.join(cells[:3])}{', ...' if len(cells) > 3 else ''}",
+                remedy=f"write a line with names above it: {listed([*optional[:1], *required])}",
+            )
+        _check_columns(names, cells, f"{where}:{line}", what, required, optional)
+    elif first is not None:
+        rows = chain([first], rows)
+    values = chain.from_iterable(numbers(cells, f"{where}:{line}", names) for line, cells in rows)
+    table = np.fromiter(values, np.float64).reshape(-1, max(1, len(names)))
+    found = {name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(names)}
+    return found | {
+        name: _in_si(found[name], unit) for name, unit in zip(names, written, strict=False) if unit
+    }
+
+
+#: Names of the column of time, and units of time in one second.
+_TIMES = ("t", "time", "timestamp")
+_PER_SECOND = {
+    **dict.fromkeys(("s", "sec", "second", "seconds"), 1.0),
+    "ms": 1e3, "us": 1e6, "µs": 1e6, "ns": 1e9,
+}  # fmt: skip
+#: A unit at the end of a heading: `v:elbow_deg_s`, `a:elbow_rad_per_s2`; `elbow_deg`.
+_SUFFIXES = (
+    re.compile(r"(.+)_(deg|rad|mm|m)_(?:per_)?(s2?)", re.DOTALL),
+    re.compile(r"(.+)_(deg|rad|mm|m|s|ms|us|ns)", re.DOTALL),
+)
+
+
+def _heading(cell: str, where: str, units: Mapping[str, str]) -> tuple[str, str]:
+    """Return the column that a heading names, and the unit of its numbers; "" for the SI unit.
+
+    >>> units = {"t": "s", "elbow": "rad", "v:elbow": "rad/s"}
+    >>> [_heading(x, "x.csv", units) for x in ("Time [ms]", "elbow_deg", "v:elbow [deg/s]", "wrist")]
+    [('t', 'ms'), ('elbow', 'deg'), ('v:elbow', 'deg'), ('wrist', '')]
+    """
+    if (name := _column_name(cell, units)) in units:
+        return name, ""
+    found = list[tuple[str, str]]()
+    if cell.endswith(("]", ")")):
+        at = max(cell.rfind("[" if cell.endswith("]") else "("), 0)
+        found.append((cell[:at].rstrip(), cell[at + 1 : -1]))
+    matches = (suffix.fullmatch(cell) for suffix in _SUFFIXES)
+    found += [(match[1], "/".join(match.groups()[1:])) for match in matches if match]
+    for heading, unit in found:
+        if (name := _column_name(heading, units)) in units:
+            return name, _unit(unit, f"{where}, {cell}", units[name])
+    return cell, ""
+
+
+def _column_name(heading: str, units: Mapping[str, str]) -> str:
+    if heading not in units:
+        if heading.lower() in _TIMES:
+            return "t"
+        if heading.startswith("q:"):
+            return heading[2:]
+    return heading
+
+
+def _unit(text: str, where: str, expected: str) -> str:
+    """Return the short name of a unit that a heading names; "" for the SI unit.
+
+    Raises:
+        InputError: the unit is unknown, or does not fit the column.
+    """
+    if expected == "s":
+        if (factor := _PER_SECOND.get(text.strip().lower())) is None:
+            raise InputError("wrong unit", where=where, found=text, remedy=f"use {', '.join(_PER_SECOND)}")
+        return "" if factor == 1.0 else text.strip().lower()
+    kind, _, per = expected.partition("/")
+    found = parse_quantity(f"1 {text}")
+    word = text.lower().replace("°", "deg").partition("/")[0].strip()
+    order = ("", "s", "s^2").index(per)
+    if found is None or word not in UNITS or found.unit != kind or found.per not in (0, order):
+        known = {"rad": ("rad", "deg"), "m": ("m", "mm")}.get(kind, ())
+        fit = " or ".join("/".join(filter(None, (unit, per))) for unit in known)
+        raise InputError("wrong unit", where=where, found=text, remedy=f"use {fit or 'no unit'}")
+    return "" if UNITS[word] == kind else UNITS[word]
+
+
+def _in_si(column: FloatArray, unit: str) -> FloatArray:
+    """Return a column in SI units; one number has the same bits as the text `30deg`."""
+    if unit == "deg":
+        return np.fromiter(map(in_radians, column.tolist()), np.float64, len(column))
+    return column / _PER_SECOND.get(unit, 1000.0)
 
 
 def width_of(text: str, where: str) -> int:
@@ -380,13 +609,19 @@ def _is_header(cells: Sequence[str], names: Sequence[str]) -> bool:
 
 
 def _check_columns(
-    names: Sequence[str], where: str, what: str, required: Sequence[str], optional: Sequence[str]
+    names: Sequence[str],
+    headings: Sequence[str],
+    where: str,
+    what: str,
+    required: Sequence[str],
+    optional: Sequence[str],
 ) -> None:
-    known = {*required, *optional}
+    """Raise InputError if a column is unknown, missing or duplicate; `headings` are the names as written."""
+    known, given = {*required, *optional}, Counter(names)
     wrong = {
         "unknown": [name for name in names if name not in known],
-        "missing": [name for name in required if name not in names],
-        "duplicate": sorted({name for name in names if names.count(name) > 1}),
+        "missing": [name for name in required if name not in given],
+        "duplicate": sorted({h for name, h in zip(names, headings, strict=True) if given[name] > 1}),
     }
     if any(wrong.values()):
         also = f", and optionally {listed(optional)}" if optional else ""

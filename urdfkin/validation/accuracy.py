@@ -37,7 +37,7 @@ from urdfkin.verify.bounds import (
 from urdfkin.verify.call import Call
 from urdfkin.verify.exact.numbers import DIGITS, enough_digits, exact, precision, read_exact
 from urdfkin.verify.exact.recursion import move, on_base
-from urdfkin.verify.oracle_query import BaseRows
+from urdfkin.verify.oracle import BaseRows
 from urdfkin.verify.pinocchio_inputs import BaseNumbers, davenport
 from urdfkin.verify.quantities import ANALYTICAL_JACOBIAN, JACOBIAN, PLACEMENT, Quantity, validated
 from urdfkin.verify.sampling import Samples, draw

@@ -24,8 +24,8 @@ from urdfkin.validation.error_stats import Key, Tally
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.validation.robot_summary import RobotSummary
 from urdfkin.validation.timings import Clock, total
+from urdfkin.verify.oracle import Oracle
 from urdfkin.verify.oracles import PINOCCHIO
-from urdfkin.verify.pinocchio import Oracle
 from urdfkin.verify.sampling import Samples, draw
 
 #: Samples in one draw.

@@ -11,20 +11,20 @@ from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
-from typing import Any
 
 import numpy as np
 
 from urdfkin.compiled.plan import compile_tree
 from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.frame_names import JointFrame
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree, freed
 from urdfkin.robot import Robot
 from urdfkin.validation.error_stats import Inputs, Key, Tally, ThreeSides, tally, three_sides
 from urdfkin.validation.timings import Clock
 from urdfkin.verify.bounds import Bound, magnitudes
+from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.oracles import Witness
-from urdfkin.verify.pinocchio import Oracle
 from urdfkin.verify.quantities import SCREWS, Quantity, validated
 from urdfkin.verify.sampling import Samples
 
@@ -37,14 +37,13 @@ class SecondWitness:
     """A second oracle besides Pinocchio, and its model of the robot."""
 
     witness: Witness
-    oracle: Any
+    oracle: Oracle
 
     def three_sides(
         self, block: _Block, row: Quantity, reference: Reference | None, ours: FloatArray, theirs: FloatArray
     ) -> ThreeSides:
         """Compare its results with those of urdfkin and Pinocchio, for the frames or joints of the block."""
-        inputs = block.x.q, block.x.v, block.x.a
-        answers = block.clock.witness(row.theirs, self.oracle, inputs, block.asked(row)[0], reference)
+        answers = block.clock.witness(row.ask, self.oracle, block.asked(row, reference))
         bounds = (
             row.bound(block.plan, size, reference) for size in (block.size, self.witness.size(block.size))
         )
@@ -124,9 +123,9 @@ class _Block(_Work):
         # A joint's Jacobian is that of its child link. Links come first among the frames, the root before
         # all.
         moving = [i + 1 for i, joint in enumerate(tree.joints) if joint.kind.nv]
-        self.joints = slice(bisect_left(moving, frames.start), bisect_left(moving, frames.stop))
-        self.joint_rows = [link - frames.start for link in moving[self.joints]]
-        self.joint_names = robot.joint_names[self.joints]
+        joints = slice(bisect_left(moving, frames.start), bisect_left(moving, frames.stop))
+        self.joint_rows = [link - frames.start for link in moving[joints]]
+        self.joint_names = robot.joint_names[joints]
 
     def tallies(self, second: SecondWitness | None) -> Iterator[tuple[Key, Tally]]:
         """Yield the error statistics of each quantity.
@@ -147,9 +146,13 @@ class _Block(_Work):
         """Return the part of a bound on frames that belongs to the joints."""
         return Bound(bound.scale[:, self.joint_rows], bound.k[:, self.joint_rows])
 
-    def asked(self, row: Quantity) -> tuple[Any, tuple[str, ...]]:
-        """Return the frames or joints that a quantity compares, and their names."""
-        return (self.joints, self.joint_names) if row.of == "joints" else (self.frames, self.frames)
+    def asked(self, row: Quantity, reference: Reference | None) -> QueryBatch:
+        """Return the query of the frames or joints that a quantity compares."""
+        joints = row.of == "joints"
+        frames = [JointFrame.of(name) for name in self.joint_names] if joints else self.frames
+        inputs = self.x.q, self.x.v, self.x.a
+        reference = Reference.LOCAL_WORLD_ALIGNED if reference is None else reference
+        return QueryBatch(frames, inputs, reference, joints=joints)
 
     def _compare(
         self,
@@ -159,9 +162,8 @@ class _Block(_Work):
         bound: Bound,
         second: SecondWitness | None,
     ) -> tuple[Key, Tally]:
-        asked, names = self.asked(row)
-        inputs = self.x.q, self.x.v, self.x.a
-        theirs = self.clock.theirs(row.theirs, self.oracle, inputs, asked, reference)
+        names = self.joint_names if row.of == "joints" else self.frames
+        theirs = self.clock.theirs(row.ask, self.oracle, self.asked(row, reference))
         found = self.tally(ours, theirs, bound, names)
         if second is not None:
             found = replace(found, three_sides=second.three_sides(self, row, reference, ours, theirs))
@@ -175,7 +177,7 @@ class _Screws(_Work):
         robot, x = self.robot, self.x
         tree = freed(robot.tree)
         q_free = _expand_mimic(robot.tree, tree, x.q)
-        theirs = self.clock.theirs(SCREWS.ask, self.oracle, x.q).swapaxes(1, 2)
+        theirs = self.clock.theirs(SCREWS.ask, self.oracle, QueryBatch((), (x.q,))).swapaxes(1, 2)
         moving = [i for i, joint in enumerate(tree.joints) if joint.kind.nv]
         column = 0
         for block in blocks(len(moving), frame_bytes(len(x.q), tree.nv)):

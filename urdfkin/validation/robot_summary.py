@@ -25,7 +25,7 @@ from urdfkin.system.documents import plain
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.validation.document import Chain, Model, Row, SecondReading
 from urdfkin.validation.document import Finding as FindingEntry
-from urdfkin.verify.pinocchio import Oracle
+from urdfkin.verify.oracle import Oracle
 from urdfkin.verify.sampling import draw
 from urdfkin.verify.second_reader import second_reading
 from urdfkin.verify.tables import check_table

@@ -18,7 +18,7 @@ from urdfkin.model.configuration import checked, numbers, shaped
 from urdfkin.model.configuration_like import Given, by_name
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
-from urdfkin.verify.oracle_query import OracleQuery, QueryBatch
+from urdfkin.verify.oracle import OracleQuery, QueryBatch
 
 T = TypeVar("T")
 

@@ -16,6 +16,7 @@ from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, of_joints
 from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.frame_names import JointFrame
 from urdfkin.model.tree import FloatArray
+from urdfkin.verify.oracle import QueryBatch
 from urdfkin.verify.sampling import sample
 from urdfkin.verify.tables import TableError
 from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
@@ -44,7 +45,7 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
         return None
     tree = verifier.tree
     names = [path.base, *(JointFrame.of(joint.name) for joint in path.joints), path.tip]
-    theirs = verifier.oracle().placements(q, names)
+    theirs = verifier.oracle().placements(QueryBatch(names, (q,)))
     base, theirs = theirs[:, :1], theirs[:, 1:]
     values = path.coupling.values(path.coupling.select(tree, q))
     ours = base @ path.frames(path.coupling.select(tree, q))
@@ -80,7 +81,7 @@ def check_opw(verifier: Verifier, path: FrameChain, found: Opw) -> str | None:
     if verifier.cannot() is not None:
         return None
     q = sample(verifier.tree, TABLE_SAMPLES, np.random.default_rng(0))
-    base, tip = np.moveaxis(verifier.oracle().placements(q, [path.base, path.tip]), 1, 0)
+    base, tip = np.moveaxis(verifier.oracle().placements(QueryBatch([path.base, path.tip], (q,))), 1, 0)
     own = path.coupling.values(path.coupling.select(verifier.tree, q))
     off = np.abs(base @ found.placement(own) - tip)[:, :3]
     return (
@@ -105,7 +106,8 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
     if verifier.cannot() is not None:
         return None
     q = sample(verifier.tree, TABLE_SAMPLES, np.random.default_rng(0))
-    base, tip = np.moveaxis(verifier.oracle().placements(q, [screws.base_frame, screws.tip_frame]), 1, 0)
+    ends = QueryBatch([screws.base_frame, screws.tip_frame], (q,))
+    base, tip = np.moveaxis(verifier.oracle().placements(ends), 1, 0)
     own = screws.coupling.select(verifier.tree, q)
     off = np.abs(base @ screws.placement(own) - tip)[:, :3]
     path = chain(verifier.tree, screws.tip_frame, screws.base_frame)

@@ -25,8 +25,8 @@ from urdfkin.verify import bounds
 from urdfkin.verify.analytical_reference import euler_jacobian, quaternion_jacobian
 from urdfkin.verify.bounds import Bound, bound_of, imu_scale, magnitudes
 from urdfkin.verify.call import Part
+from urdfkin.verify.oracle import Oracle
 from urdfkin.verify.oracles import Witness
-from urdfkin.verify.pinocchio import Oracle
 
 
 def check_analytical_jacobian(
@@ -42,13 +42,12 @@ def check_analytical_jacobian(
         by: The oracle.
     """
     aligned = Reference.LOCAL_WORLD_ALIGNED
-    q, frames, base = x.asked.inputs[0], x.asked.frames, x.asked.base
-    J_v = oracle.jacobians(q, frames, aligned, base)
+    J_v = oracle.jacobians(x.asked._replace(reference=aligned))
     size = by.size(magnitudes(x.plan, x.q, None, None, x.state))
     bound = bound_of(x.plan, size, aligned)
     representation = str(x.options["representation"])
     if representation == "quaternion":
-        quat = oracle.quaternions(q, frames, base)
+        quat = oracle.quaternions(x.asked)
         bound = bounds.quaternion_jacobian_bound(bound)
         theirs, hidden = quaternion_jacobian(quat, J_v), bounds.hidden_scalar(bound, quat.shape[:-1])
         # q and -q are the same rotation. The quaternion with qw >= 0 is used. If rounding hides the sign of
@@ -57,7 +56,7 @@ def check_analytical_jacobian(
         turned = with_other & (np.abs(quat[..., 3]) <= hidden)
         theirs[..., 3:, :] *= np.where(turned, -1.0, 1.0)[..., np.newaxis, np.newaxis]
         return theirs, bound
-    R = oracle.placements(q, frames, base)[..., :3, :3]
+    R = oracle.placements(x.asked)[..., :3, :3]
     theirs, apart = euler_jacobian(representation, R, J_v)
     return theirs, bounds.euler_jacobian_bound(bound, size, apart)
 
@@ -80,8 +79,8 @@ def check_relative_placement(
         ours: urdfkin's results; not used.
         by: The oracle.
     """
-    (q,), other = x.asked.inputs, cast("str", x.options["relative_to"])
-    T = oracle.placements(q, [*x.asked.frames, other])
+    other = cast("str", x.options["relative_to"])
+    T = oracle.placements(x.asked._replace(frames=[*x.asked.frames, other]))
     back = T[:, -1:, :3, :3].swapaxes(-1, -2)
     theirs = np.zeros((*T.shape[:1], T.shape[1] - 1, 4, 4))
     theirs[..., :3, :] = back @ T[:, :-1, :3, :]
@@ -104,11 +103,10 @@ def check_imu(oracle: Oracle, x: Part, ours: FloatArray, by: Witness) -> tuple[F
         ours: urdfkin's results; not used.
         by: The oracle.
     """
-    (q, v, a), frames, base = x.asked.inputs, x.asked.frames, x.asked.base
-    v_flat, a_flat = x.rates
+    asked, (v_flat, a_flat) = x.asked._replace(reference=_LOCAL), x.rates
     gravity = np.asarray(x.options["gravity"], dtype=np.float64)
-    R = oracle.placements(q, frames, base)[..., :3, :3]
-    proper = oracle.accelerations(q, v, a, frames, _LOCAL, base)[..., :3] - gravity @ R  # R^T g
-    w = oracle.velocities(q, v, frames, _LOCAL, base)[..., 3:]
+    R = oracle.placements(asked)[..., :3, :3]
+    proper = oracle.accelerations(asked)[..., :3] - gravity @ R  # R^T g
+    w = oracle.velocities(asked)[..., 3:]
     size = by.size(magnitudes(x.plan, x.q, v_flat, a_flat, x.state))
     return np.concatenate((proper, w), axis=-1), bound_of(imu_scale(size, gravity), 3, size, _LOCAL)

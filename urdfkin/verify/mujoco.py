@@ -19,10 +19,8 @@ of its slides.
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any, assert_never
 from xml.etree.ElementTree import Element, SubElement, tostring
 from xml.parsers.expat import ExpatError
@@ -30,16 +28,14 @@ from xml.parsers.expat import ExpatError
 import numpy as np
 
 from urdfkin.errors import OracleError
-from urdfkin.model.frame_names import JointFrame, LinkFrame
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree, Mimic
 from urdfkin.urdf.mujoco import compiled, library
 from urdfkin.urdf.plain_xml import plain_xml
-from urdfkin.verify.pinocchio import demand_the_same, depth_of
-from urdfkin.verify.pinocchio_inputs import BaseNumbers, locked_by_rules, nearest_quaternion, rules_of_text
+from urdfkin.verify.oracle import Oracle, QueryBatch, mimic_rules
+from urdfkin.verify.pinocchio import depth_of
+from urdfkin.verify.pinocchio_inputs import WORLD, Frames, locked_by_rules, nearest_quaternion
 
-#: Parent of a root joint or of a moving base.
-WORLD = "universe"
 #: Mass (kg) and moments of inertia (kg m^2) that each link has while MuJoCo reads the text.
 _MASS = "1"
 #: Longest chain of links that is accepted. MuJoCo refuses more than 1,023 links, after a time that grows with
@@ -80,62 +76,41 @@ class _Place:
     offset: float
 
 
-class MujocoOracle:
-    """MuJoCo's results for one robot in urdfkin's layout, with the methods of `pinocchio.Oracle`.
+class MujocoOracle(Oracle):
+    """MuJoCo's results for one robot. MuJoCo must know all features of the text."""
 
-    Args:
-        text: The URDF text.
-        tree: urdfkin's tree, only for a comparison of the joints and their order.
-        mimic: True: couple mimic joints. False: each moves freely.
-        moving_base: Connect the root to the world by a floating joint, which receives the base's motion.
-        root_joint: "floating" or "planar" if the tree has such a root joint.
-        lock: Value (rad or m) of each locked joint. MuJoCo's model keeps these joints; they have no numbers
-            in q, v and a.
+    title = "MuJoCo"
 
-    Raises:
-        OracleError: MuJoCo does not accept the text, or the text has a feature that MuJoCo lacks.
-    """
-
-    def __init__(
-        self,
-        text: str,
-        tree: KinematicTree,
-        *,
-        mimic: bool = True,
-        moving_base: bool = False,
-        root_joint: str | None = None,
-        lock: Mapping[str, float] = MappingProxyType({}),
-    ) -> None:
-        self._mujoco, self._name, self._moving_base = library(), tree.name, moving_base
+    def __init__(self, text: str, tree: KinematicTree, **how: Any) -> None:
+        super().__init__(text, tree, **how)
+        self._mujoco, self.nv = library(), tree.nv
         if (depth := depth_of(tree)) > _DEEPEST:
             raise OracleError(
                 f"MuJoCo checks chains of up to {_DEEPEST:,} links",
                 where=tree.name,
                 found=f"{depth:,}",
             )
-        self._stands_on_world = root_joint is not None
         try:
-            joints, self._links = _ordered(text, root_joint)
-            moving = [joint.name for joint in joints if joint.kind != "fixed"]
-            rules = rules_of_text(text, set(moving)) if mimic else {}
+            joints, links = _ordered(text, self.root_joint)
         except (ValueError, KeyError, ExpatError) as error:
             raise OracleError("the oracle cannot read the text", where=tree.name, found=str(error)) from error
-        held = locked_by_rules(lock, rules)
-        moving = [name for name in moving if name not in held]
-        self._children = {joint.name: joint.child for joint in joints}
-        carrier = [_Joint("", "floating", "", self._links[0])] if moving_base else []
-        self._bodies = {link: f"l{i}" for i, link in enumerate([*([""] if carrier else []), *self._links])}
-        self._model = self._compiled([*carrier, *joints])
+        moving = [joint.name for joint in joints if joint.kind != "fixed"]
+        coupled = mimic_rules(text, moving, tree.name) if self.mimic else {}
+        held = locked_by_rules(self.lock, coupled)  # MuJoCo's model keeps locked joints, at these values
+        rules = self.rules([name for name in moving if name not in held])
+        carrier = [_Joint("", "floating", "", links[0])] if self.moving_base else []
+        self._bodies = {link: f"l{i}" for i, link in enumerate([*([""] if carrier else []), *links])}
+        self._model = self._compiled([*carrier, *joints], links[0])
         self._places = list(self._laid_out([*carrier, *joints], rules, held))
-        self.nq, self.nv = tree.nq, tree.nv
-        demand_the_same("MuJoCo", tree, moving, [name for name in moving if name not in rules])
-        self._moving = [JointFrame.of(name) for name in moving]
+        bodies = {link: self._model.body(self._bodies[link]).id for link in links}
+        own = {joint.name: bodies[joint.child] for joint in joints}
+        self._frames = Frames(self.title, tree.name, bodies, own, {})
         self._constant = all(place.kind not in _PARTS for place in self._places)
-        self._local = threading.local()
+        self.new_data = lambda: self._mujoco.MjData(self._model)
 
     # -- the model -----------------------------------------------------------------------------------
 
-    def _compiled(self, joints: Sequence[_Joint]) -> Any:
+    def _compiled(self, joints: Sequence[_Joint], root: str) -> Any:
         """Return MuJoCo's model of the links and joints."""
         mujoco = self._mujoco
         robot = Element("robot", name="r")
@@ -157,10 +132,12 @@ class MujocoOracle:
                     kind = getattr(mujoco.mjtJoint, f"mjJNT_{what.upper()}")
                     body = spec.body(self._bodies[joint.child])
                     body.add_joint(name=f"j{i} {part}", type=kind, axis=_AXES[axis or "z"])
-            return _weighing_its_root(compiled(spec), self._bodies[self._links[0]])
+            return _weighing_its_root(compiled(spec), self._bodies[root])
         except (ValueError, RuntimeError, mujoco.FatalError) as error:
             first = str(error).strip().replace("\n", "; ")
-            raise OracleError("MuJoCo does not accept this robot", where=self._name, found=first) from error
+            raise OracleError(
+                "MuJoCo does not accept this robot", where=self.tree.name, found=first
+            ) from error
 
     def _joint(self, i: int, joint: _Joint) -> Element:
         """Return a joint element for MuJoCo with the original text of origin and axis only."""
@@ -207,174 +184,89 @@ class MujocoOracle:
                 joint.kind, int(own.qposadr[0]), int(own.dofadr[0]), *at, rule.multiplier, rule.offset
             )
 
-    def _ids(self, frames: Sequence[str]) -> list[int]:
-        """Return the indices of MuJoCo's bodies; a joint's frame is that of its child link."""
-        return [self._model.body(self._bodies[self._link(name)]).id for name in frames]
-
-    def _link(self, name: str) -> str:
-        if isinstance(name, LinkFrame | JointFrame):
-            kind, _, own = str(name).partition(":")
-            return own if kind == "link" else self._children[own]
-        if name in self._bodies and name:
-            return name
-        if name in self._children:
-            return self._children[name]
-        kind, _, own = name.partition(":")
-        if kind == "link" and own in self._bodies:
-            return own
-        if kind == "joint" and own in self._children:
-            return self._children[own]
-        raise OracleError("MuJoCo has no such frame", where=self._name, found=repr(name))
-
     # -- quantities ----------------------------------------------------------------------------------
 
-    def placements(self, q: FloatArray, frames: Sequence[str], base: BaseNumbers | None = None) -> FloatArray:
+    def placements(self, x: QueryBatch) -> FloatArray:
         """Return T_world_frame (n, frames, 4, 4) by `mj_kinematics`: `xpos` and `xmat` of the bodies."""
-        return self._poses(q, None, None, frames, base, lambda data, body, k: None)
+        return self._poses(x, 1, lambda body, at: None)
 
-    def quaternions(
-        self, q: FloatArray, frames: Sequence[str], base: BaseNumbers | None = None
-    ) -> FloatArray:
-        """Return quaternions (n, frames, 4), `xquat` of the bodies, scalar last, with qw >= 0."""
-        out = np.empty((len(q), len(frames), 4))
-
-        def read(data: Any, body: int, at: tuple[int, int]) -> None:
-            out[at] = np.roll(data.xquat[body], -1)
-
-        self._poses(q, None, None, frames, base, read)
-        return np.where(out[..., 3:] < 0.0, -out, out)
-
-    def velocities(
-        self,
-        q: FloatArray,
-        v: FloatArray,
-        frames: Sequence[str],
-        reference: Reference | str,
-        base: BaseNumbers | None = None,
-    ) -> FloatArray:
+    def velocities(self, x: QueryBatch) -> FloatArray:
         """Return velocities (n, frames, 6) by `mj_objectVelocity`, which returns [angular; linear]."""
-        poses, velocity = self._moved(q, v, None, frames, base)[:2]
-        return _referred(reference, poses, velocity)
+        poses, velocity, _ = self._moved(x, 2)
+        return _referred(x.reference, poses, velocity)
 
-    def hessians(self, *asked: object) -> FloatArray:
-        """Raise an error: MuJoCo has no derivative of a Jacobian by the coordinates.
-
-        Raises:
-            OracleError: always.
-        """
-        raise OracleError("MuJoCo computes no Hessian", where=self._name, remedy="use oracle='pinocchio'")
-
-    def accelerations(
-        self,
-        q: FloatArray,
-        v: FloatArray,
-        a: FloatArray,
-        frames: Sequence[str],
-        reference: Reference | str,
-        base: BaseNumbers | None = None,
-    ) -> FloatArray:
+    def accelerations(self, x: QueryBatch) -> FloatArray:
         """Return classical accelerations (n, frames, 6) by `mj_objectAcceleration` without gravity."""
-        poses, velocity, acceleration = self._moved(q, v, a, frames, base)
-        if not Reference.of(reference).at_world:
-            return _referred(reference, poses, acceleration)
+        poses, velocity, acceleration = self._moved(x, 3)
+        if not Reference.of(x.reference).at_world:
+            return _referred(x.reference, poses, acceleration)
         # Move the spatial acceleration to the world origin, then convert it to the classical one.
         spatial = acceleration.copy()
         spatial[..., :3] -= np.cross(velocity[..., 3:], velocity[..., :3])
-        out, there = _referred(reference, poses, spatial), _referred(reference, poses, velocity)
+        out, there = _referred(x.reference, poses, spatial), _referred(x.reference, poses, velocity)
         out[..., :3] += np.cross(there[..., 3:], there[..., :3])
         return out
 
-    def jacobians(
-        self,
-        q: FloatArray,
-        frames: Sequence[str],
-        reference: Reference | str,
-        base: BaseNumbers | None = None,
-    ) -> FloatArray:
+    def jacobians(self, x: QueryBatch) -> FloatArray:
         """Return Jacobians (n, frames, 6, nv) by `mj_jac` at the body's origin."""
-        J = np.empty((len(q), len(frames), 6, self.nv))
-        spread = self._spread(q)
+        J = np.empty((len(x.q), len(x.frames), 6, self.nv))
+        spread = self._spread(x.q)
 
-        def read(data: Any, body: int, at: tuple[int, int]) -> None:
-            J[at] = self._columns(self._mujoco.mj_jac, data, body) @ spread[at[0] % len(spread)]
+        def read(body: int, at: tuple[int, int]) -> None:
+            J[at] = self._columns(self._mujoco.mj_jac, body) @ spread[at[0] % len(spread)]
 
-        poses = self._poses(q, None, None, frames, base, read)
-        return _referred(reference, poses, J, columns=True)
+        poses = self._poses(x, 1, read)
+        return _referred(x.reference, poses, J, columns=True)
 
-    def jacobian_rates(
-        self,
-        q: FloatArray,
-        v: FloatArray,
-        frames: Sequence[str],
-        reference: Reference | str,
-        base: BaseNumbers | None = None,
-    ) -> FloatArray:
+    def jacobian_rates(self, x: QueryBatch) -> FloatArray:
         """Return J-dot (n, frames, 6, nv) by `mj_jacDot` at the body's origin, the derivative of `mj_jac`."""
-        J, rate = np.empty((2, len(q), len(frames), 6, self.nv))
-        velocity = np.empty((len(q), len(frames), 6))
-        spread, spread_rate = self._spread(q), self._spread_rate(q, v)
+        J, rate = np.empty((2, len(x.q), len(x.frames), 6, self.nv))
+        velocity = np.empty((len(x.q), len(x.frames), 6))
+        spread, spread_rate = self._spread(x.q), self._spread_rate(x.q, x.v)
 
-        def read(data: Any, body: int, at: tuple[int, int]) -> None:
+        def read(body: int, at: tuple[int, int]) -> None:
             S, S_rate = spread[at[0] % len(spread)], spread_rate[at[0] % len(spread_rate)]
-            J_full = self._columns(self._mujoco.mj_jac, data, body)
+            J_full = self._columns(self._mujoco.mj_jac, body)
             J[at] = J_full @ S
-            rate[at] = self._columns(self._mujoco.mj_jacDot, data, body) @ S + J_full @ S_rate
-            velocity[at] = self._six(self._mujoco.mj_objectVelocity, data, body)
+            rate[at] = self._columns(self._mujoco.mj_jacDot, body) @ S + J_full @ S_rate
+            velocity[at] = self._six(self._mujoco.mj_objectVelocity, body)
 
-        poses = self._poses(q, v, None, frames, base, read)
+        poses = self._poses(x, 2, read)
         vel, w = velocity[..., None, :3], velocity[..., None, 3:]
-        which = Reference.of(reference)
+        which = Reference.of(x.reference)
         if which.own_axes:  # the derivative in rotating axes
             for rows in (slice(0, 3), slice(3, 6)):
                 rate[..., rows, :] -= np.cross(w, J[..., rows, :].swapaxes(-1, -2)).swapaxes(-1, -2)
-        out = _referred(reference, poses, rate, columns=True)
+        out = _referred(which, poses, rate, columns=True)
         if which.at_world:  # the term p x J_angular also changes with p
             out[..., :3, :] += np.cross(vel, J[..., 3:, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         return out
 
-    def joint_jacobians(self, q: FloatArray, among: slice, reference: Reference | str) -> FloatArray:
-        """Return Jacobians (n, joints, 6, nv) of a slice of the moving joints, in tree order."""
-        return self.jacobians(q, self._moving[among], reference)
-
-    def joint_jacobian_rates(
-        self, q: FloatArray, v: FloatArray, among: slice, reference: Reference | str
-    ) -> FloatArray:
-        """Return J-dot (n, joints, 6, nv) of a slice of the moving joints, in tree order."""
-        return self.jacobian_rates(q, v, self._moving[among], reference)
-
-    def _moved(
-        self,
-        q: FloatArray,
-        v: FloatArray,
-        a: FloatArray | None,
-        frames: Sequence[str],
-        base: BaseNumbers | None,
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _moved(self, x: QueryBatch, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return placements, velocities, classical accelerations (n, frames, ...) in LOCAL_WORLD_ALIGNED."""
-        velocity, acceleration = np.empty((2, len(q), len(frames), 6))
+        velocity, acceleration = np.empty((2, len(x.q), len(x.frames), 6))
 
-        def read(data: Any, body: int, at: tuple[int, int]) -> None:
-            velocity[at] = self._six(self._mujoco.mj_objectVelocity, data, body)
-            if a is not None:
-                acceleration[at] = self._six(self._mujoco.mj_objectAcceleration, data, body)
+        def read(body: int, at: tuple[int, int]) -> None:
+            velocity[at] = self._six(self._mujoco.mj_objectVelocity, body)
+            if count == len("qva"):
+                acceleration[at] = self._six(self._mujoco.mj_objectAcceleration, body)
 
-        return self._poses(q, v, a, frames, base, read), velocity, acceleration
+        return self._poses(x, count, read), velocity, acceleration
 
-    def _poses(
-        self,
-        q: FloatArray,
-        v: FloatArray | None,
-        a: FloatArray | None,
-        frames: Sequence[str],
-        base: BaseNumbers | None,
-        read: Callable[[Any, int, tuple[int, int]], None],
-    ) -> FloatArray:
-        """Return placements (n, frames, 4, 4); call `read` with MuJoCo's data at each sample and frame."""
-        mujoco, model, data, bodies = self._mujoco, self._model, self._data, self._ids(frames)
-        out = np.zeros((len(q), len(bodies), 4, 4))
+    def _poses(self, x: QueryBatch, count: int, read: Callable[[int, tuple[int, int]], None]) -> FloatArray:
+        """Return placements (n, frames, 4, 4); call `read` for each sample and frame.
+
+        Args:
+            x: The query.
+            count: Number of inputs to use: 1 for q, 2 for q and v, 3 for q, v and a.
+            read: Function (body, index) that reads `self.data`.
+        """
+        mujoco, model, data = self._mujoco, self._model, self.data
+        bodies = [self._frames.index(name) for name in x.frames]
+        out = np.zeros((len(x.q), len(bodies), 4, 4))
         out[..., 3, 3] = 1.0
-        qpos, rates, second = self._states(q, v, a, base)
-        for k in range(len(q)):
+        qpos, rates, second = self._states(x, count)
+        for k in range(len(x.q)):
             data.qpos[:] = qpos[k]
             mujoco.mj_kinematics(model, data)
             mujoco.mj_comPos(model, data)
@@ -386,37 +278,28 @@ class MujocoOracle:
                 mujoco.mj_rnePostConstraint(model, data)
             for f, body in enumerate(bodies):
                 out[k, f, :3, :3], out[k, f, :3, 3] = data.xmat[body].reshape(3, 3), data.xpos[body]
-                read(data, body, (k, f))
+                read(body, (k, f))
         return out
 
-    def _columns(self, function: Callable[..., None], data: Any, body: int) -> FloatArray:
+    def _columns(self, function: Callable[..., None], body: int) -> FloatArray:
         """Return the Jacobian (6, MuJoCo's nv) of the body's origin, [linear; angular]."""
         J = np.zeros((6, self._model.nv))
         linear, angular = np.zeros((3, self._model.nv)), np.zeros((3, self._model.nv))
-        function(self._model, data, linear, angular, data.xpos[body], body)
+        function(self._model, self.data, linear, angular, self.data.xpos[body], body)
         J[:3], J[3:] = linear, angular
         return J
 
-    def _six(self, function: Callable[..., None], data: Any, body: int) -> FloatArray:
+    def _six(self, function: Callable[..., None], body: int) -> FloatArray:
         """Return [linear; angular] (6,) of the body's origin in world axes; MuJoCo has [angular; linear]."""
         six = np.empty(6)
-        function(self._model, data, self._mujoco.mjtObj.mjOBJ_XBODY, body, six, 0)
+        function(self._model, self.data, self._mujoco.mjtObj.mjOBJ_XBODY, body, six, 0)
         return np.roll(six, 3)
-
-    @property
-    def _data(self) -> Any:
-        """MuJoCo's data structure; each thread has its own."""
-        if not hasattr(self._local, "data"):
-            self._local.data = self._mujoco.MjData(self._model)
-        return self._local.data
 
     # -- layout --------------------------------------------------------------------------------------
 
-    def _states(
-        self, q: FloatArray, v: FloatArray | None, a: FloatArray | None, base: BaseNumbers | None
-    ) -> tuple[FloatArray, FloatArray | None, FloatArray | None]:
+    def _states(self, x: QueryBatch, count: int) -> tuple[FloatArray, FloatArray | None, FloatArray | None]:
         """Return MuJoCo's inputs qpos, qvel and qacc (n, ...)."""
-        n = len(q)
+        q, base, n = x.q, x.base, len(x.q)
         qpos = np.zeros((n, self._model.nq))
         for place in self._places:
             at, own = place.their_q, q[:, place.q : place.q + 7]
@@ -435,15 +318,15 @@ class MujocoOracle:
                 qpos[:, at] = place.offset
             else:
                 qpos[:, at] = place.multiplier * own[:, 0] + place.offset
-        if v is None:
+        if count == 1:
             return qpos, None, None
-        S = self._spread(q)
+        S, v = self._spread(q), x.v
         rates = (S @ v[..., None])[..., 0]
         second = None
-        if a is not None:
-            second = (S @ a[..., None] + self._spread_rate(q, v) @ v[..., None])[..., 0]
+        if count == len("qva"):
+            second = (S @ x.a[..., None] + self._spread_rate(q, v) @ v[..., None])[..., 0]
         rates = np.array(np.broadcast_to(rates, (n, self._model.nv)))
-        if self._moving_base and base is not None:
+        if self.moving_base and base is not None:
             # Velocities of the slides are in world axes, that of the ball in the base's own axes.
             at, back = self._places[0].their_v, np.swapaxes(_rotation(qpos[:, 3:7]), -1, -2)
             velocity, acceleration = np.asarray(base.velocity), np.asarray(base.acceleration)

@@ -55,7 +55,7 @@ PINOCCHIO = Witness(
     "Pinocchio",
     "pin",
     lazy_import("urdfkin.verify.pinocchio:version"),
-    lazy_import("urdfkin.verify.pinocchio:Oracle"),
+    lazy_import("urdfkin.verify.pinocchio:PinocchioOracle"),
     lambda size: size,
 )
 MUJOCO = Witness(

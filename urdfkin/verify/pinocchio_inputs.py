@@ -126,23 +126,19 @@ class Layout:
     Attributes:
         nq: Length of q.
         nv: Length of v.
-        joint_ids: Pinocchio's indices of the moving joints, mimic joints included.
-        coordinates: Names of the joints with coordinates.
-        rate_columns: Indices of Pinocchio's Jacobian columns of the moving joints, in the order of
-            `joint_ids`.
+        rate_columns: Indices of Pinocchio's Jacobian columns of the moving joints, mimic joints included.
     """
 
     def __init__(
         self, model: Any, joints: Sequence[int], names: Sequence[str], rules: Mapping[str, Mimic]
     ) -> None:
-        self._model, self.joint_ids = model, list(joints)
+        self._model = model
         sizes = [(int(model.joints[j].nq), int(model.joints[j].nv)) for j in joints]
         at, self.nq, self.nv = dict[str, tuple[int, int]](), 0, 0
         for name, own in zip(names, sizes, strict=True):
             if name not in rules:
                 at[name] = self.nq, self.nv
                 self.nq, self.nv = self.nq + _COORDINATES[own], self.nv + own[1]
-        self.coordinates = tuple(at)
         self._places = list[_Place]()
         for j, name, own in zip(joints, names, sizes, strict=True):
             rule = rules.get(name, Mimic(name, 1.0, 0.0))
@@ -209,24 +205,27 @@ _PREFIXED = re.compile(r"(link|joint):(.*)", re.DOTALL)
 
 
 class Frames:
-    """Pinocchio's frames by name.
+    """An oracle's frames by name.
 
     Args:
-        model: Pinocchio's model, as its parser returned it.
-        pin: The module of Pinocchio.
-        stands_on_world: Whether the robot has a root joint. If it has one, the world counts as a link.
+        oracle: Title of the oracle.
+        robot: Name of the robot, for errors.
+        bodies: Index of the frame of each link.
+        joints: Index of the frame of each joint.
+        carriers: Index of the joint's frame for the frame of each link that a joint carries. A frame that is
+            not in it serves for both.
     """
 
-    def __init__(self, model: Any, pin: Any, *, stands_on_world: bool) -> None:
-        self._robot = str(model.name)
-        self._bodies, self._joints = dict[str, int](), dict[str, int]()
-        self._parents = [int(frame.parentFrame) for frame in model.frames]
-        for index, frame in enumerate(model.frames):
-            if index:  # the first is the world
-                names = self._bodies if frame.type == pin.FrameType.BODY else self._joints
-                names[frame.name] = index
-        if stands_on_world:
-            self._bodies[WORLD] = 0
+    def __init__(
+        self,
+        oracle: str,
+        robot: str,
+        bodies: Mapping[str, int],
+        joints: Mapping[str, int],
+        carriers: Mapping[int, int],
+    ) -> None:
+        self._oracle, self._robot = oracle, robot
+        self._bodies, self._joints, self._carriers = bodies, joints, carriers
 
     def index(self, name: str) -> int:
         """Return the index of the frame with a name.
@@ -239,23 +238,41 @@ class Frames:
         if isinstance(name, JointFrame):
             return self._known(self._joints, name, str(name)[6:])
         body, joint = self._bodies.get(name), self._joints.get(name)
-        if body is not None and joint is not None and self._parents[body] != joint:
-            raise self._error("two of Pinocchio's frames have this name", name)
+        if body is not None and joint is not None and self._carriers.get(body, body) != joint:
+            raise self._error(f"two of {self._oracle}'s frames have this name", name)
         if body is not None:
             return body
         if joint is not None:
             return joint
         if (parts := _PREFIXED.fullmatch(name)) is None:
-            raise self._error("Pinocchio has no such frame", name)
+            raise self._error(f"{self._oracle} has no such frame", name)
         return self._known(self._bodies if parts[1] == "link" else self._joints, name, parts[2])
 
-    def _known(self, names: dict[str, int], asked: str, own: str) -> int:
+    def _known(self, names: Mapping[str, int], asked: str, own: str) -> int:
         if (index := names.get(own)) is None:
-            raise self._error("Pinocchio has no such frame", asked)
+            raise self._error(f"{self._oracle} has no such frame", asked)
         return index
 
     def _error(self, what: str, name: str) -> OracleError:
         return OracleError(what, where=self._robot, found=repr(str(name)))
+
+
+def frames_of(model: Any, pin: Any, *, stands_on_world: bool) -> Frames:
+    """Return the frames of Pinocchio's model, as its parser returned it.
+
+    Args:
+        model: The model.
+        pin: The module of Pinocchio.
+        stands_on_world: Whether the robot has a root joint. If it has one, the world counts as a link.
+    """
+    bodies, joints = dict[str, int](), dict[str, int]()
+    for index, frame in enumerate(model.frames):
+        if index:  # the first is the world
+            (bodies if frame.type == pin.FrameType.BODY else joints)[frame.name] = index
+    if stands_on_world:
+        bodies[WORLD] = 0
+    parents = {index: int(frame.parentFrame) for index, frame in enumerate(model.frames)}
+    return Frames("Pinocchio", str(model.name), bodies, joints, parents)
 
 
 class BaseNumbers(Protocol):

@@ -33,8 +33,7 @@ if TYPE_CHECKING:
     from urdfkin.model.reference import Reference
     from urdfkin.model.tree import FloatArray
     from urdfkin.verify.bounds import Bound, Magnitudes
-    from urdfkin.verify.pinocchio import Oracle
-    from urdfkin.verify.pinocchio_inputs import BaseNumbers
+    from urdfkin.verify.oracle import Oracle, QueryBatch
 
 #: The rows of a velocity, an acceleration or a Jacobian.
 SIX = ("vx", "vy", "vz", "wx", "wy", "wz")
@@ -42,11 +41,11 @@ SIX = ("vx", "vy", "vz", "wx", "wy", "wz")
 Against = Callable[..., "tuple[FloatArray, Bound]"]
 
 
-def oracle_method(name: str) -> Callable[..., Any]:
-    """Return a function that calls the method `name` of an oracle."""
+def oracle_method(name: str) -> Callable[[Oracle, QueryBatch], FloatArray]:
+    """Return a function that calls the method `name` of an oracle with a query."""
 
-    def ask(oracle: Any, *arguments: Any) -> Any:
-        return getattr(oracle, name)(*arguments)
+    def ask(oracle: Any, x: QueryBatch) -> Any:
+        return getattr(oracle, name)(x)
 
     return ask
 
@@ -66,9 +65,7 @@ class Quantity:
         equations: Equations of the textbook.
         compute: Function (plan, *inputs, reference, base=, out=, threads=) that returns (n, frames, ...). If
             `walked` is False, a method of `Robot` calls it in another way.
-        ask: Function (oracle, *inputs, frames, reference, base) that returns the oracle's (n, frames, ...).
-            For joints, `frames` is a slice of the moving joints. If `referred` is False, `compute` and `ask`
-            take no reference.
+        ask: Function (oracle, query) that returns the oracle's (n, frames, ...).
         scale: Function (plan, magnitudes, reference) for the size of its terms (`urdfkin.verify.bounds`).
         factors: Number of rotated vectors in each term of [linear; angular], in LOCAL_WORLD_ALIGNED.
         against: Function (oracle, part, ours, by) that returns the oracle's results and the bound, for
@@ -77,7 +74,8 @@ class Quantity:
         walked: True if the forward recursion computes it for any frames.
         validated: True if `validate`, the accuracy study and plots include it. A Hessian is left out. It has
             nv times as many numbers as a Jacobian, and consists of products of the Jacobian's columns.
-        referred: True if it depends on a reference frame; a placement does not.
+        referred: True if it depends on a reference frame; a placement does not. If False, `compute` takes
+            none.
         of: What the quantity belongs to, and a validation compares: "frames", "joints" or "columns".
         head: Heading of the column in reports. Quantities with the same heading share a column.
         labels: Names of a result's rows, if any.
@@ -94,7 +92,7 @@ class Quantity:
     shape: tuple[int | Literal["nv"], ...]
     equations: tuple[str, ...]
     compute: Callable[..., Any]
-    ask: Callable[..., Any]
+    ask: Callable[[Oracle, QueryBatch], FloatArray]
     scale: Callable[..., Any]
     factors: int
     against: Against | None = None
@@ -144,20 +142,6 @@ class Quantity:
         found: FloatArray = self.compute(plan, *inputs[: len(self.inputs)], *self._in(reference), **how)
         return found
 
-    def theirs(
-        self,
-        oracle: Oracle,
-        inputs: Sequence[FloatArray],
-        of: Sequence[str] | slice,
-        reference: Reference | str | None,
-        base: BaseNumbers | None = None,
-    ) -> FloatArray:
-        """Return the oracle's results (n, frames, ...) of named frames or of a slice of moving joints."""
-        moving = () if base is None else (base,)
-        given = inputs[: len(self.inputs)]
-        found: FloatArray = self.ask(oracle, *given, of, *self._in(reference), *moving)
-        return found
-
     def bound(self, plan: CompiledTree, size: Magnitudes, reference: Reference | None) -> Bound:
         """Return the bound between urdfkin's and the oracle's results."""
         scale = self.scale(plan, size, *self._in(reference))
@@ -170,7 +154,7 @@ class Quantity:
         values: NDArray[Any] = self.exact(motion, link, *self._in(reference))
         return values
 
-    def _in(self, reference: Reference | str | None) -> tuple[Reference | str | None, ...]:
+    def _in(self, reference: Reference | None) -> tuple[Reference | None, ...]:
         return (reference,) if self.referred else ()
 
 
@@ -327,15 +311,9 @@ IMU = replace(
     units={"proper acceleration": "m/s^2", "angular velocity": "rad/s"},
     command="",
 )
-JOINT_JACOBIAN = replace(
-    JACOBIAN, name="joint jacobian", title="joint Jacobian", ask=oracle_method("joint_jacobians"), of="joints"
-)
+JOINT_JACOBIAN = replace(JACOBIAN, name="joint jacobian", title="joint Jacobian", of="joints")
 JOINT_JACOBIAN_RATE = replace(
-    JACOBIAN_RATE,
-    name="joint jacobian rate",
-    title="joint Jacobian rate",
-    ask=oracle_method("joint_jacobian_rates"),
-    of="joints",
+    JACOBIAN_RATE, name="joint jacobian rate", title="joint Jacobian rate", of="joints"
 )
 SCREWS = replace(
     JACOBIAN,

@@ -192,9 +192,10 @@ class SingularValues(Displayable):
         others = np.ones_like(value)
         for k in range(count):
             others[..., k] = _product(np.delete(value, k, axis=-1))
-        slopes: FloatArray = np.einsum(
-            "...k,...rk,...rij,...ik->...j", others, self.U, H[..., self.rows, :, :], self.V, optimize=True
-        )
+        weights = (self.U * others[..., np.newaxis, :]) @ np.swapaxes(self.V, -1, -2)
+        batch, (rows, nv) = weights.shape[:-2], weights.shape[-2:]
+        derivatives = H[..., self.rows, :, :].reshape(*batch, rows * nv, nv)
+        slopes: FloatArray = (weights.reshape(*batch, 1, rows * nv) @ derivatives)[..., 0, :]
         if count:
             slopes[self.values.lower[..., -1] <= 0.0] = np.nan
         return slopes

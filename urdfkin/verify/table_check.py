@@ -14,6 +14,7 @@ from urdfkin.dh.table import DHTable
 from urdfkin.kinematics.roundings import EPS, ROW, of_rows, of_rows_read_back
 from urdfkin.model.frame_names import LinkFrame
 from urdfkin.model.tree import FloatArray
+from urdfkin.verify.oracle import QueryBatch
 from urdfkin.verify.sampling import sample
 from urdfkin.verify.tables import TableError
 from urdfkin.verify.verifier import Verifier
@@ -36,7 +37,7 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
         return
     q = sample(verifier.tree, _SAMPLES, np.random.default_rng(0))
     own = table.coupling.select(verifier.tree, q)
-    theirs = verifier.oracle().placements(q, [LinkFrame.of(link_names(table)[-1])])[:, 0]
+    theirs = verifier.oracle().placements(QueryBatch([LinkFrame.of(link_names(table)[-1])], (q,)))[:, 0]
     off = np.abs(theirs - table.placement(own))[:, :3]
     # The matrices of base and tool may be rotations to six digits only, but the URDF contains exact
     # rotations.

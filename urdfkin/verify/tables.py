@@ -39,7 +39,7 @@ from urdfkin.kinematics.roundings import EPS, NOT_ZERO, of_joints, of_rows
 from urdfkin.model.chain import chain
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
-from urdfkin.verify.pinocchio import Oracle
+from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.sampling import Samples
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
@@ -214,13 +214,11 @@ class RelativeMotion:
 
 def relative_motion(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Samples) -> RelativeMotion:
     """Return the tip's motion relative to the table's base, from Pinocchio's motions of both."""
-    frames = [table.base_frame, table.tip_frame]
-    T = oracle.placements(samples.q, frames)
+    x = QueryBatch([table.base_frame, table.tip_frame], (samples.q, samples.v, samples.a))
+    T = oracle.placements(x)
     R = T[:, 0, :3, :3]
     r = T[:, 1, :3, 3] - T[:, 0, :3, 3]
-    J = oracle.jacobians(samples.q, frames, _ALIGNED)
-    vel = oracle.velocities(samples.q, samples.v, frames, _ALIGNED)
-    acc = oracle.accelerations(samples.q, samples.v, samples.a, frames, _ALIGNED)
+    J, vel, acc = oracle.jacobians(x), oracle.velocities(x), oracle.accelerations(x)
     J_base, J_tip = J[:, 0], J[:, 1]
     J_linear = J_tip[:, :3] - J_base[:, :3] - np.cross(J_base[:, 3:], r[..., None], axis=1)
     J_angular = J_tip[:, 3:] - J_base[:, 3:]

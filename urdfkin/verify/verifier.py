@@ -22,9 +22,9 @@ from urdfkin.verify import bounds
 from urdfkin.verify.bounds import Bound, magnitudes
 from urdfkin.verify.call import Call, Part
 from urdfkin.verify.certificate import Certificate, Comparison, Ledger, VerificationError, compare
-from urdfkin.verify.oracle_query import QueryBatch
+from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.oracles import PINOCCHIO, Witness, WitnessName, witness_of
-from urdfkin.verify.pinocchio import Oracle, OracleError, build_model
+from urdfkin.verify.pinocchio import OracleError, build_model
 from urdfkin.verify.pinocchio_module import pinocchio, version
 from urdfkin.verify.quantities import Quantity
 from urdfkin.verify.replay import replay_line
@@ -317,7 +317,7 @@ class Verifier:
         tree = self.tree
         q = draw(tree, TABLE_SAMPLES, np.random.default_rng(0), with_special=True).q
         ours = parameters.placements(q)
-        theirs = self.oracle().placements(q, tree.link_frames[1:])
+        theirs = self.oracle().placements(QueryBatch(tree.link_frames[1:], (q,)))
         error = np.abs(ours - theirs)[..., :3, :]
         reach = parameters.reach(q)
         units = max(
@@ -364,7 +364,7 @@ def urdfkins(quantity: Quantity, x: Part) -> FloatArray:
 )  # a value that is not finite counts as a disagreement
 def theirs_of(quantity: Quantity, oracle: Oracle, asked: QueryBatch) -> FloatArray:
     """Return an oracle's results (n, frames, ...) for the user's arguments."""
-    return quantity.theirs(oracle, asked.inputs, asked.frames, asked.reference, asked.base)
+    return quantity.ask(oracle, asked)
 
 
 def _warn(reason: str) -> None:

@@ -73,7 +73,7 @@ class Player:
     def check(self) -> None:
         """Check the chosen frame along the whole trajectory, and write the result."""
         viewer, x = self._viewer, self.trajectory
-        motion = frame_motion(viewer.robot, x.q, x.v, x.a, viewer.frame.value, viewer.reference.value)
+        motion = frame_motion(viewer.robot, x, viewer.frame.value, viewer.reference.value)
         mark = "! " if motion.not_verified is not None else "✓ " if motion.agrees else "✗ "
         self._whole = mark + foot(motion, x)
         self._write()

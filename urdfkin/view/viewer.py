@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from urdfkin.conventions import Conversion
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import UrdfkinError
 from urdfkin.errors.escape import markdown_text, printable
@@ -292,6 +293,7 @@ class Viewer:
         robot: The robot to show.
         q: (nq,) start configuration; None: the neutral configuration, moved to within the limits.
         trajectory: A trajectory to play; it starts at its first sample.
+        conversion: The convention of the field of q, to copy or type; None: urdfkin's.
 
     Attributes:
         q: (nq,) configuration of the sliders, rad and m.
@@ -302,9 +304,14 @@ class Viewer:
     """
 
     def __init__(
-        self, server: Any, robot: Robot, q: Given | None = None, trajectory: Trajectory | None = None
+        self,
+        server: Any,
+        robot: Robot,
+        q: Given | None = None,
+        trajectory: Trajectory | None = None,
+        conversion: Conversion | None = None,
     ) -> None:
-        self.server, self.robot = server, robot
+        self.server, self.robot, self._conversion = server, robot, conversion
         self.stage = Stage(server, robot)
         self._start = within_limits(robot, robot.neutral())
         self.q = self._start if q is None else checked(robot.tree, q, "q").copy()
@@ -364,8 +371,11 @@ class Viewer:
         with joints:
             if fixed := fixed_coordinates(robot):
                 gui.add_markdown(f"joints fixed by equal limits: {markdown_text(', '.join(fixed))}")
+            tool = "" if self._conversion is None else f" of {self._conversion.convention.name}"
             self.words_of_q = gui.add_text(
-                "q, to copy or type", "", hint="Write values as in --q: 0.5, 30deg, ready, ready,elbow=30deg."
+                printable(f"q{tool}, to copy or type"),
+                "",
+                hint="Write values as in --q: 0.5, 30deg, ready, ready,elbow=30deg.",
             )
             self.wrong = gui.add_markdown("")
             neutral, random = gui.add_button("neutral, within the limits"), gui.add_button("random")
@@ -468,7 +478,7 @@ class Viewer:
             self.update()
 
     def _write_q(self) -> None:
-        self.words_of_q.value = written(self.q)
+        self.words_of_q.value = written(self.q if self._conversion is None else self._conversion.to(self.q))
         self.wrong.content = ""
 
     def _typed(self, event: Any) -> None:
@@ -477,7 +487,12 @@ class Viewer:
             return
         with self._lock:
             try:
-                self.q = checked(self.robot.tree, self.words_of_q.value, "q", look=False).copy()
+                text = self.words_of_q.value
+                if self._conversion is not None:
+                    q = self._conversion.from_(self._conversion.layout("q").read(text))
+                else:
+                    q = checked(self.robot.tree, text, "q", look=False)
+                self.q = q.copy()
             except UrdfkinError as error:
                 self.wrong.content = markdown_text(str(error))
                 return
@@ -537,7 +552,7 @@ class Viewer:
 
     def _motion(self, reference: Reference) -> FrameMotion:
         q, v, a = (x[np.newaxis] for x in (self.q, self.v, self.a))
-        return frame_motion(self.robot, q, v, a, self.frame.value, reference)
+        return frame_motion(self.robot, (q, v, a), self.frame.value, reference)
 
     def _draw(self, x: FrameMotion) -> None:
         stage, reach, rates = self.stage, self.stage.reach, self.robot.rate_names

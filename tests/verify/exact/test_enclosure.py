@@ -27,6 +27,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.verify.exact import recursion
 from urdfkin.verify.exact.enclosure import Enclosure, Enclosures
+from urdfkin.verify.oracle import QueryBatch
 from urdfkin.verify.quantities import QUANTITIES
 
 pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
@@ -134,11 +135,11 @@ def test_pinocchios_doubles_are_those_that_it_is_asked_for(base: BaseMotion | No
     robot = robot_of("panda")
     x, frame = sample(robot), robot.tip_frame
     enclosed = robot.enclose(*x, frame, "world", base=base)
-    q, v, a = (row[np.newaxis] for row in x)
-    asked = robot.verifier.oracle(base)
-    expected = asked.accelerations(q, v, a, [frame], Reference.WORLD, base)[0, 0]
+    asked = QueryBatch([frame], tuple(row[np.newaxis] for row in x), Reference.WORLD, base)
+    oracle = robot.verifier.oracle(base)
+    expected = oracle.accelerations(asked)[0, 0]
     assert (enclosed.acceleration.pinocchio == expected).all()
-    assert (enclosed.placement.pinocchio == asked.placements(q, [frame], base)[0, 0]).all()
+    assert (enclosed.placement.pinocchio == oracle.placements(asked)[0, 0]).all()
 
 
 @pytest.mark.slow

@@ -26,7 +26,7 @@ Case = tuple[Robot, FrameMotion, Trajectory]
 def case() -> Case:
     robot = urdfkin.load("panda")
     x = line(robot, robot.sample(1, 1)[0], robot.sample(1, 2)[0], 1.0, 21)
-    return robot, frame_motion(robot, x.q, x.v, x.a, robot.tip_frame), x
+    return robot, frame_motion(robot, x, robot.tip_frame), x
 
 
 def test_the_command_offers_every_panel_there_is() -> None:
@@ -72,7 +72,7 @@ def _of(bounds: Any) -> tuple[set[float], set[float]]:
 def test_panels_are_as_wide_as_the_sheet_lets_them_be_whatever_their_legends_say() -> None:
     robot = urdfkin.load("a1", root_joint="floating")
     x = line(robot, robot.poses["ready"], robot.sample(1, 3)[0], 1.0, 11)
-    figure = sheet(robot, frame_motion(robot, x.q, x.v, x.a, "FL_foot"), x)
+    figure = sheet(robot, frame_motion(robot, x, "FL_foot"), x)
     figure.draw_without_rendering()
     assert min(axes.get_position().width for axes in figure.axes) > 0.72 / 3
     for axes in figure.axes:
@@ -87,7 +87,7 @@ def test_of_many_joints_those_outside_their_limits_are_named_and_the_others_coun
     far = [robot.coordinate_names.index(name) for name in ("LElbowYaw", "RWristPitch")]
     end[far] = robot.limits[1, far] + 0.5
     x = line(robot, robot.neutral(), end, 1.0, 11)
-    (axes, *_) = sheet(robot, frame_motion(robot, x.q, x.v, x.a, robot.tip_frame), x, ["q"]).axes
+    (axes, *_) = sheet(robot, frame_motion(robot, x, robot.tip_frame), x, ["q"]).axes
     legend = axes.get_legend()
     assert legend is not None
     words = [text.get_text() for text in legend.get_texts()]
@@ -114,7 +114,7 @@ def test_a_sheet_fits_a_page_and_no_curve_touches_the_top(panels: list[str], cas
 def test_where_a_limit_is_left_a_cross_stands(case: Case) -> None:
     robot, *_ = case
     x = line(robot, robot.poses["ready"], robot.poses["neutral"], 1.0, 21)
-    (axes, _) = sheet(robot, frame_motion(robot, x.q, x.v, x.a, robot.tip_frame), x, ["q"]).axes
+    (axes, _) = sheet(robot, frame_motion(robot, x, robot.tip_frame), x, ["q"]).axes
     crosses = next(drawn for drawn in axes.lines if drawn.get_label() == "outside the limits")
     outside = x.q[:, 3] > robot.limits[1, 3]
     assert outside.any()
@@ -138,7 +138,7 @@ def test_no_axis_mixes_metres_and_radians(case: Case) -> None:
 def test_a_floating_base_is_plotted_with_its_place_and_its_quaternion(tmp_path: Path) -> None:
     robot = urdfkin.load("a1", root_joint="floating")
     x = line(robot, robot.poses["ready"], robot.sample(1, 3)[0], 1.0, 11)
-    motion = frame_motion(robot, x.q, x.v, x.a, "FL_foot")
+    motion = frame_motion(robot, x, "FL_foot")
     assert motion.agrees
     *axes, _ = sheet(robot, motion, x, ["q", "v"]).axes
     assert [one.get_ylabel().split("\n")[0] for one in axes] == [

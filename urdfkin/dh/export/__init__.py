@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, cast
 
 from urdfkin.dh.units import Units
 from urdfkin.errors import UnknownNameError
+from urdfkin.system.lazy_import import hook
 
 if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
 
-#: Format name -> (module with `write_NAME`, one-line summary).
+#: Format name -> (module with `write_NAME`, or "" for a language of `urdfkin export`; one-line summary).
 FORMATS: dict[str, tuple[str, str]] = {
     "terminal": ("urdfkin.dh.export.text", "aligned text"),
     "markdown": ("urdfkin.dh.export.text", "a Markdown table"),
@@ -20,25 +21,29 @@ FORMATS: dict[str, tuple[str, str]] = {
     "csv": ("urdfkin.dh.export.data", "comma-separated, read back by urdfkin"),
     "json": ("urdfkin.dh.export.data", "JSON, read back by urdfkin"),
     "toml": ("urdfkin.dh.export.data", "TOML, read back by urdfkin"),
-    "numpy": ("urdfkin.dh.export.code", "Python code on NumPy"),
-    "matlab": ("urdfkin.dh.export.code", "MATLAB code, plain matrices"),
+    "numpy": ("", "Python code on NumPy, with its check"),
+    "matlab": ("", "MATLAB and Octave code, with its check"),
     "sympy": ("urdfkin.dh.export.code", "Python code for SymPy, exact"),
-    "casadi": ("urdfkin.dh.export.code", "Python code for CasADi"),
+    "casadi": ("", "Python code for CasADi, with its check"),
     "matlab-symbolic": ("urdfkin.dh.export.code", "MATLAB code for the Symbolic Math Toolbox"),
     "matlab-rst": ("urdfkin.dh.export.toolboxes", "MATLAB code for the Robotics System Toolbox"),
     "roboticstoolbox": ("urdfkin.dh.export.toolboxes", "Python code for roboticstoolbox's DHRobot"),
     "ets": ("urdfkin.dh.export.toolboxes", "elementary transforms, Python code for roboticstoolbox"),
-    "c": ("urdfkin.dh.export.code", "C99 code"),
+    "c": ("", "C99 code, with its check"),
 }
 
 
-def export(table: DHTable, format: str, units: Units | None = None) -> str:
+def export(table: DHTable, format: str, units: Units | None = None, *, verify: bool = True) -> str:
     """Return the table in a format.
+
+    Code on numbers contains the placement, the Jacobian and the acceleration of the tip, and its proof
+    (`urdfkin export --form dh`).
 
     Args:
         table: Any table.
         format: A name in `FORMATS`.
         units: Number format of printed tables; data and code are in metres and radians.
+        verify: Whether Pinocchio checks code with a proof.
 
     Raises:
         UnknownNameError: an unknown format.
@@ -46,5 +51,7 @@ def export(table: DHTable, format: str, units: Units | None = None) -> str:
     """
     if format not in FORMATS:
         raise UnknownNameError("format", format, FORMATS)
+    if not FORMATS[format][0]:
+        return str(hook("code in a language")(hook("code of a chain")(table, verify=verify), format))
     write = getattr(importlib.import_module(FORMATS[format][0]), "write_" + format.replace("-", "_"))
     return cast("str", write(table, units or Units()))

@@ -1,15 +1,8 @@
-"""Export a table as code that computes with numbers or with symbols.
+"""Export a table as code that computes with exact symbols, and write names and numbers in code.
 
-To compute with numbers, the languages are Python with NumPy, C99, and MATLAB (also Octave). The code contains
-the rows as constants and one function. It needs no other library. The constants are exact to the last bit.
-The other modules that write code use this module's functions for identifiers, headers and numbers.
-
-To compute with symbols, the languages are Python with SymPy or CasADi, and MATLAB with the Symbolic Math
-Toolbox.
-
-- SymPy: pi/2 stays pi/2, and 0.425 becomes 17/40, so that the algebra is exact.
-- CasADi: the pose is an expression of SX, MX or DM, for functions and their derivatives.
-- MATLAB: the code also runs in Octave with the package symbolic.
+`urdfkin.export` writes code that computes with doubles. This module writes the rows themselves, so that the
+algebra is exact: pi/2 stays pi/2, and 0.425 becomes 17/40. The languages are Python with SymPy, and MATLAB
+with the Symbolic Math Toolbox, or Octave with the package symbolic.
 """
 
 from __future__ import annotations
@@ -68,11 +61,6 @@ def numbers(values: FloatArray | list[float]) -> str:
     return ", ".join(repr(float(value)) for value in values)
 
 
-def row_numbers(table: DHTable) -> list[list[float]]:
-    """Return a, alpha, d, theta, beta, 1 for revolute or 0 for prismatic, and sense of each row."""
-    return [[*row.cells, float(row.kind.turns), float(row.sense)] for row in table.rows]
-
-
 def demand_free(table: DHTable, what: str) -> None:
     """Raise InputError for a table with mimic joints, which the format `what` does not support."""
     if any(row.mimic is not None for row in table.rows):
@@ -88,176 +76,6 @@ def bounds(row: DHRow) -> str:
     return numbers([row.limit.lower, row.limit.upper]) if is_bounded(row.limit) else ""
 
 
-_NUMPY_BODY = '''
-
-def placement(q):
-    """Return the (..., 4, 4) pose of the tip in the base for q (..., {n}), rad and m."""
-    q = np.asarray(q, dtype=float) @ COUPLING.T + COUPLING_OFFSET
-    T = np.broadcast_to(BASE, (*q.shape[:-1], 4, 4))
-    for i, (a, alpha, d, theta, beta, turns, sense) in enumerate(ROWS):
-        moved = sense * q[..., i]
-        S = along_axis(theta + turns * moved, d + (1 - turns) * moved)
-        X = between_axes(a, alpha, beta)
-        T = T @ {product}
-    return T @ TOOL
-
-
-def along_axis(theta, d):
-    """Return Rz(theta) Tz(d)."""
-    S = np.zeros((*theta.shape, 4, 4))
-    S[..., 0, 0] = S[..., 1, 1] = np.cos(theta)
-    S[..., 1, 0] = np.sin(theta)
-    S[..., 0, 1] = -S[..., 1, 0]
-    S[..., 2, 2] = S[..., 3, 3] = 1.0
-    S[..., 2, 3] = d
-    return S
-
-
-def between_axes(a, alpha, beta):
-    """Return Tx(a) Rx(alpha) Ry(beta)."""
-    ca, sa, cb, sb = np.cos(alpha), np.sin(alpha), np.cos(beta), np.sin(beta)
-    return np.array([[cb, 0, sb, a], [sa * sb, ca, -sa * cb, 0], [-ca * sb, sa, ca * cb, 0], [0, 0, 0, 1.0]])
-'''
-
-
-def write_numpy(table: DHTable, units: Units) -> str:
-    """Return a module with `placement(q)`."""
-    del units
-    coupling = table.coupling
-    lines = [
-        '"""' + header(table)[0] + ".",
-        "",
-        *(f"{line}." for line in header(table)[1:]),
-        '"""',
-        "",
-        "import numpy as np",
-        "",
-    ]
-    lines += ["# a, alpha, d, theta, beta, 1 for revolute and 0 for prismatic, sense", "ROWS = np.array("]
-    lines += [
-        "    [",
-        *(f"        [{numbers(row)}]," for row in row_numbers(table)),
-        "    ]",
-        ").reshape(-1, 7)",
-    ]
-    lines.append(
-        f"COUPLING = np.array([{numbers(coupling.matrix.ravel())}]).reshape({coupling.matrix.shape})"
-    )
-    lines.append(f"COUPLING_OFFSET = np.array([{numbers(coupling.offset)}])")
-    for name, T in (("BASE", table.base), ("TOOL", table.tool)):
-        lines += [f"{name} = np.array(", "    [", *(f"        [{numbers(row)}]," for row in T), "    ]", ")"]
-    product = "S @ X" if table.convention is Convention.STANDARD else "X @ S"
-    return "\n".join(lines) + "\n" + _NUMPY_BODY.format(n=len(table.joint_names), product=product)
-
-
-_C_BODY = """
-static void {name}_multiply(double T[16], const double M[16])
-{{
-    double P[16];
-    for (int r = 0; r < 4; ++r)
-        for (int c = 0; c < 4; ++c) {{
-            P[4 * r + c] = 0.0;
-            for (int k = 0; k < 4; ++k)
-                P[4 * r + c] += T[4 * r + k] * M[4 * k + c];
-        }}
-    for (int i = 0; i < 16; ++i)
-        T[i] = P[i];
-}}
-
-/* T: pose of the tip in the base, row by row; q: {n} numbers, rad and m. */
-void {name}_placement(const double *q, double T[16])
-{{
-    for (int i = 0; i < 16; ++i)
-        T[i] = {name}_base[i];
-    for (int i = 0; i < {rows}; ++i) {{
-        const double *row = {name}_rows[i];
-        double value = {name}_coupling_offset[i];
-        for (int k = 0; k < {n}; ++k)
-            value += {name}_coupling[i][k] * q[k];
-        const double turned = row[3] + (row[5] != 0.0 ? row[6] * value : 0.0);
-        const double slid = row[2] + (row[5] != 0.0 ? 0.0 : row[6] * value);
-        const double ct = cos(turned), st = sin(turned);
-        const double ca = cos(row[1]), sa = sin(row[1]), cb = cos(row[4]), sb = sin(row[4]);
-        const double S[16] = {{ct, -st, 0, 0, st, ct, 0, 0, 0, 0, 1, slid, 0, 0, 0, 1}};
-        const double X[16] = {{cb, 0, sb, row[0], sa * sb, ca, -sa * cb, 0,
-                              -ca * sb, sa, ca * cb, 0, 0, 0, 0, 1}};
-        {name}_multiply(T, {first});
-        {name}_multiply(T, {second});
-    }}
-    {name}_multiply(T, {name}_tool);
-}}
-"""
-
-
-def write_c(table: DHTable, units: Units) -> str:
-    """Return a translation unit with `ROBOT_placement`."""
-    del units
-    name, n, rows = identifier(table.robot), len(table.joint_names), row_numbers(table)
-    lines = [
-        "/* " + "\n * ".join(line.replace("/", "_") for line in header(table)) + " */",
-        "#include <math.h>",
-        "",
-    ]
-    # C has no empty arrays, so the code of a table without rows has one unused row.
-    lines += ["/* a, alpha, d, theta, beta, 1 for revolute and 0 for prismatic, sense */"]
-    lines += [f"static const double {name}_rows[{max(len(rows), 1)}][7] = {{"]
-    lines += [f"    {{{numbers(row)}}}," for row in rows or [[0.0] * 7]]
-    lines += ["};", f"static const double {name}_coupling[{max(len(rows), 1)}][{max(n, 1)}] = {{"]
-    lines += [f"    {{{numbers(row)}}}," for row in (table.coupling.matrix if rows else [[0.0]])]
-    lines += ["};", f"static const double {name}_coupling_offset[{max(len(rows), 1)}] = {{"]
-    lines += [f"    {numbers(table.coupling.offset) if rows else '0.0'}", "};"]
-    for what, T in (("base", table.base), ("tool", table.tool)):
-        lines += [f"static const double {name}_{what}[16] = {{", *(f"    {numbers(row)}," for row in T), "};"]
-    order = ("S", "X") if table.convention is Convention.STANDARD else ("X", "S")
-    return (
-        "\n".join(lines)
-        + "\n"
-        + _C_BODY.format(name=name, n=n, rows=len(rows), first=order[0], second=order[1])
-    )
-
-
-_VALUES = """
-one = eye(4);
-T = base;
-for i = 1:size(rows, 1)
-    a = rows(i, 1); alpha = rows(i, 2); d = rows(i, 3); theta = rows(i, 4); beta = rows(i, 5);
-    if rows(i, 6)
-        theta = theta + rows(i, 7) * values(i);
-    else
-        d = d + rows(i, 7) * values(i);
-    end
-"""
-_FRAMES = """\
-    S = one; S(1:2, 1:2) = [cos(theta), -sin(theta); sin(theta), cos(theta)]; S(3, 4) = d;
-    X = one; X(2:3, 2:3) = [cos(alpha), -sin(alpha); sin(alpha), cos(alpha)]; X(1, 4) = a;
-    Y = one; Y([1, 3], [1, 3]) = [cos(beta), sin(beta); -sin(beta), cos(beta)];
-    T = T * {product};
-end
-T = T * tool;
-end
-"""
-
-
-def write_matlab(table: DHTable, units: Units) -> str:
-    """Return a function file `ROBOT_placement.m`."""
-    del units
-    lines = [f"function T = {identifier(table.robot)}_placement(q)"]
-    lines += [f"% {line}" for line in header(table)]
-    lines += ["% columns: a, alpha, d, theta, beta, 1 for revolute and 0 for prismatic, sense"]
-    lines += matrix("rows", row_numbers(table), 7)
-    lines += matrix("coupling", table.coupling.matrix.tolist(), len(table.joint_names))
-    lines += [f"values = coupling * q(:) + [{'; '.join(numbers([x]) for x in table.coupling.offset)}];"]
-    for what, T in (("base", table.base), ("tool", table.tool)):
-        lines += matrix(what, T.tolist(), 4)
-    return "\n".join(lines) + _VALUES + frames(table)
-
-
-def frames(table: DHTable) -> str:
-    """Return the end of the loop over rows; this code computes T from a, alpha, d, theta and beta."""
-    product = "S * (X * Y)" if table.convention is Convention.STANDARD else "(X * Y) * S"
-    return _FRAMES.format(product=product)
-
-
 def matrix(name: str, rows: list[list[float]] | FloatArray, columns: int) -> list[str]:
     """Return the lines that assign a matrix; the matrix may have no rows."""
     if not len(rows):
@@ -268,38 +86,10 @@ def matrix(name: str, rows: list[list[float]] | FloatArray, columns: int) -> lis
 #: Largest denominator and largest integer of a number that is written as a fraction; other numbers are
 #: decimals.
 _LONGEST = 10**9
-_BODY = '''
-def step(a, alpha, d, theta, beta=0):
-    """Return {formula}."""
-    ct, st, ca, sa, cb, sb = cos(theta), sin(theta), cos(alpha), sin(alpha), cos(beta), sin(beta)
-    S = matrix([[ct, -st, 0, 0], [st, ct, 0, 0], [0, 0, 1, d], [0, 0, 0, 1]])
-    X = matrix([[cb, 0, sb, a], [sa * sb, ca, -sa * cb, 0], [-ca * sb, sa, ca * cb, 0], [0, 0, 0, 1]])
-    return {product}
 
 
-def placement(q):
-    """Return the 4 x 4 pose of the tip in the base for {n} {kind}, rad and m."""
-    T = BASE
-    for row in rows(q):
-        T = T @ step(*row)
-    return T @ TOOL
-'''
-
-
-class Doubles(Units):
-    """Exact decimal numbers in metres and radians."""
-
-    def length(self, metres: float) -> str:
-        """Format a length or another number."""
-        return repr(metres) if metres else "0"
-
-    def angle(self, radians: float, pi: str = "pi") -> str:
-        """Format an angle."""
-        return self.length(radians)
-
-
-class Fractions(Doubles):
-    """Exact multiples of pi, and exact fractions (0.425 is 17/40).
+class Fractions(Units):
+    """SymPy's exact multiples of pi, and exact fractions (0.425 is 17/40).
 
     Other angles and numbers with many digits are decimals.
     """
@@ -331,60 +121,76 @@ def columns(table: DHTable) -> str:
     return "a, alpha, d, theta" + (", beta" if table.has_hayati_rows else "")
 
 
-def rows(table: DHTable, number: Doubles, **style: Any) -> list[str]:
+def rows(table: DHTable, number: Fractions, **style: Any) -> list[str]:
     """Return the cells of each row, separated by commas."""
     return [", ".join(cells(table, row, number, number=number.length, **style)) for row in table.rows]
 
 
-def pose_rows(T: FloatArray, number: Doubles) -> list[str]:
-    """Return the rows of a pose as text."""
-    return [", ".join(map(number.length, row)) for row in T.tolist()]
+_SYMPY = '''from sympy import Matrix, Rational, cos, pi, sin
 
 
-def module(table: DHTable, number: Doubles, imports: str, kind: str, split: str = "q") -> str:
-    """Return Python code with `rows(q)` and `placement(q)`.
-
-    Args:
-        table: Any table.
-        number: Number format.
-        imports: Code that imports cos, sin and matrix.
-        kind: Description of q's elements.
-        split: Expression for the list of q's elements.
-    """
-    head, names = header(table), [f"q{i}" for i in range(1, len(table.joint_names) + 1)]
-    lines = ['"""' + head[0] + ".", "", *(f"{line}." for line in head[1:]), '"""', "", imports]
-    lines += ["", "", "def rows(q):", f'    """Return {columns(table)} of each row."""']
-    lines += [f"    [{', '.join(names)}] = {split}", "    return ["]
-    lines += [f"        ({row})," for row in rows(table, number, times=" * ")] + ["    ]", "", ""]
-    for what, T in (("BASE", table.base), ("TOOL", table.tool)):
-        entries = (f"        [{row}]," for row in pose_rows(T, number))
-        lines += [f"{what} = matrix(", "    [", *entries, "    ]", ")"]
-    product = "S @ X" if table.convention is Convention.STANDARD else "X @ S"
-    body = _BODY.format(formula=formula(table), product=product, n=len(names), kind=kind)
-    return "\n".join([*lines, ""]) + "\n" + body
+def rows(q):
+    """Return {columns} of each row."""
+    [{names}] = q
+    return [
+{rows}
+    ]
 
 
-_SYMPY_IMPORTS = "from sympy import Matrix as matrix\nfrom sympy import Rational, cos, pi, sin"
+BASE = Matrix({base})
+TOOL = Matrix({tool})
+
+
+def step(a, alpha, d, theta, beta=0):
+    """Return {formula}."""
+    ct, st, ca, sa, cb, sb = cos(theta), sin(theta), cos(alpha), sin(alpha), cos(beta), sin(beta)
+    S = Matrix([[ct, -st, 0, 0], [st, ct, 0, 0], [0, 0, 1, d], [0, 0, 0, 1]])
+    X = Matrix([[cb, 0, sb, a], [sa * sb, ca, -sa * cb, 0], [-ca * sb, sa, ca * cb, 0], [0, 0, 0, 1]])
+    return {product}
+
+
+def placement(q):
+    """Return the 4 x 4 pose of the tip in the base for {n} symbols or numbers, rad and m."""
+    T = BASE
+    for row in rows(q):
+        T = T @ step(*row)
+    return T @ TOOL
+'''
 
 
 def write_sympy(table: DHTable, units: Units) -> str:
     """Return a module with `placement(q)`, for `q = symbols("q1:7")` or numbers."""
     del units
-    return module(table, Fractions(), _SYMPY_IMPORTS, "symbols or numbers")
+    number, n = Fractions(), len(table.joint_names)
+    base, tool = (
+        "[" + ", ".join(f"[{', '.join(map(number.length, row))}]" for row in T.tolist()) + "]"
+        for T in (table.base, table.tool)
+    )
+    return (
+        "\n".join(docstring(table))
+        + "\n"
+        + _SYMPY.format(
+            columns=columns(table),
+            names=", ".join(f"q{i}" for i in range(1, n + 1)),
+            rows="\n".join(f"        ({row})," for row in rows(table, number, times=" * ")),
+            base=base,
+            tool=tool,
+            formula=formula(table),
+            product="S @ X" if table.convention is Convention.STANDARD else "X @ S",
+            n=n,
+        )
+    )
 
 
-_CASADI_IMPORTS = '''from casadi import cos, horzcat, sin, vertcat, vertsplit
-
-
-def matrix(rows):
-    """Make a matrix from its rows."""
-    return vertcat(*(horzcat(*row) for row in rows))'''
-
-
-def write_casadi(table: DHTable, units: Units) -> str:
-    """Return a module with `placement(q)`, for a column `q = SX.sym("q", 6)`."""
-    del units
-    return module(table, Doubles(), _CASADI_IMPORTS, "numbers of a column SX, MX or DM", "vertsplit(q)")
+_FRAMES = """\
+    S = one; S(1:2, 1:2) = [cos(theta), -sin(theta); sin(theta), cos(theta)]; S(3, 4) = d;
+    X = one; X(2:3, 2:3) = [cos(alpha), -sin(alpha); sin(alpha), cos(alpha)]; X(1, 4) = a;
+    Y = one; Y([1, 3], [1, 3]) = [cos(beta), sin(beta); -sin(beta), cos(beta)];
+    T = T * {product};
+end
+T = T * tool;
+end
+"""
 
 
 class _Matlab(Fractions):
@@ -416,4 +222,5 @@ def write_matlab_symbolic(table: DHTable, units: Units) -> str:
     lines += ["T = base;", "for i = 1:size(rows, 1)"]
     lines += ["    a = rows(i, 1); alpha = rows(i, 2); d = rows(i, 3); theta = rows(i, 4);"]
     lines += [f"    beta = {'rows(i, 5)' if table.has_hayati_rows else '0'};"]
-    return "\n".join([*lines, frames(table)])
+    product = "S * (X * Y)" if table.convention is Convention.STANDARD else "(X * Y) * S"
+    return "\n".join([*lines, _FRAMES.format(product=product)])

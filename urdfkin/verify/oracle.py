@@ -1,7 +1,8 @@
-"""Convert the arguments of a call to flat batches for the oracle, independently of `urdfkin.verify.call`.
+"""The base class of the oracles, and the query that its methods take.
 
-`urdfkin.verify.call` converts the same arguments for the recursion. Apart from the exceptions below, the two
-modules share no code. A wrong broadcast, order or name in one of them therefore leads to a disagreement.
+`OracleQuery` converts the arguments of a call to flat batches for the oracle. `urdfkin.verify.call` converts
+the same arguments for the recursion. Apart from the exceptions below, the two modules share no code. A wrong
+broadcast, order or name in one of them therefore leads to a disagreement.
 
 Names are looked up here a second time, among the joints in their order. The oracle compares that order of the
 joints with its own. Both modules use the same numbers of named poses and the same parser of units
@@ -12,9 +13,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+import threading
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from typing import NamedTuple
+from types import MappingProxyType
+from typing import Any, ClassVar, NamedTuple
+from xml.parsers.expat import ExpatError
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,8 +27,11 @@ from urdfkin.compiled.plan import IntArray
 from urdfkin.errors import OracleError
 from urdfkin.errors.numbers import parse_float, parse_quantity
 from urdfkin.model.reference import Reference
-from urdfkin.model.tree import FloatArray
-from urdfkin.verify.pinocchio_inputs import BaseNumbers
+from urdfkin.model.tree import FloatArray, KinematicTree, Mimic
+from urdfkin.verify.pinocchio_inputs import BaseNumbers, nearest_quaternion, rules_of_text
+
+#: Largest number of names that an error lists.
+_NAMED = 5
 
 #: Suffixes of the names of coordinates and joint velocities, by the number of joint velocities of a joint.
 _OF_Q = {3: ("x", "y", "angle"), 6: ("x", "y", "z", "qx", "qy", "qz", "qw")}
@@ -95,19 +102,41 @@ class BaseRows(NamedTuple):
 
 
 class QueryBatch(NamedTuple):
-    """Some configurations of a query as a flat batch.
+    """A query: some configurations as a flat batch.
 
     Attributes:
-        frames: Names of the frames, as the user gave them.
-        reference: The reference frame, as the user gave it.
-        inputs: q (n, nq), or q and v (n, nv), or q, v and a (n, nv).
+        frames: Names of the frames, as the user gave them, or the frames of moving joints.
+        inputs: q (n, nq), or q and v (n, nv), or q, v and a (n, nv). A method ignores inputs that it does not
+            need.
+        reference: The reference frame, as the user gave it. Placements ignore it.
         base: Motion of the base; None: fixed at the world origin.
+        joints: True: use the library's functions for joints, if it has them. Each frame is a `JointFrame`.
+
+    >>> x = QueryBatch(["tool0"], (np.zeros((1, 6)), np.ones((1, 6))))
+    >>> x.q.shape, x.v.shape, x.reference.name
+    ((1, 6), (1, 6), 'LOCAL_WORLD_ALIGNED')
     """
 
-    frames: tuple[str, ...]
-    reference: Reference | str
+    frames: Sequence[str]
     inputs: tuple[FloatArray, ...]
-    base: BaseNumbers | None
+    reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
+    base: BaseNumbers | None = None
+    joints: bool = False
+
+    @property
+    def q(self) -> FloatArray:
+        """Configurations (n, nq)."""
+        return self.inputs[0]
+
+    @property
+    def v(self) -> FloatArray:
+        """Joint velocities (n, nv)."""
+        return self.inputs[1]
+
+    @property
+    def a(self) -> FloatArray:
+        """Joint accelerations (n, nv)."""
+        return self.inputs[2]
 
 
 class OracleQuery:
@@ -182,7 +211,7 @@ class OracleQuery:
         base = self.base
         if base is not None:
             base = BaseRows(pick(base.placement, 2), pick(base.velocity), pick(base.acceleration))
-        return QueryBatch(self.frames, self.reference, tuple(map(pick, self._inputs)), base)
+        return QueryBatch(self.frames, tuple(map(pick, self._inputs)), self.reference, base)
 
     def flat(self, result: FloatArray, axes: int) -> FloatArray:
         """Return (n, frames, ...) of a result in the user's shape; one result has `axes` axes.
@@ -196,3 +225,125 @@ class OracleQuery:
                 "the batch shape of a result does not match that of the arguments", found=str(result.shape)
             )
         return result.reshape(self.n, len(self.frames), *own)
+
+
+def mimic_rules(text: str, joints: Sequence[str], robot: str) -> dict[str, Mimic]:
+    """Return the mimic rules of some joints of the text, read independently of urdfkin's reader.
+
+    Raises:
+        OracleError: a rule cannot be read.
+    """
+    try:
+        return rules_of_text(text, set(joints))
+    except (ValueError, ExpatError) as error:
+        raise OracleError(
+            "the oracle's reader cannot read the mimic rules", where=robot, found=str(error)
+        ) from error
+
+
+class Oracle:
+    """A library's results for one robot, in urdfkin's layout of q, v and Jacobian columns.
+
+    A subclass builds the library's model in `__init__` and computes the five quantities below. Each of these
+    methods takes a query and returns an array (n, frames, ...).
+
+    Args:
+        text: The URDF text.
+        tree: urdfkin's tree of the same text, only for a comparison of the joints, their order and the mimic
+            joints.
+        mimic: True: couple mimic joints. False: each moves freely.
+        moving_base: Build the model on a free-flyer, which receives the base's motion.
+        root_joint: "floating" or "planar" if the tree has such a root joint, which the text does not contain.
+        lock: Value (rad or m) of each locked joint; the tree has it as a fixed joint.
+
+    Attributes:
+        title: Name of the library.
+        new_data: Function that returns a new data structure of the library; each thread has its own.
+
+    Raises:
+        OracleError: the library does not accept the text, or reads other joints from it.
+        InstallationError: the library is missing.
+    """
+
+    title: ClassVar[str]
+    new_data: Callable[[], Any]
+
+    def __init__(
+        self,
+        text: str,
+        tree: KinematicTree,
+        *,
+        mimic: bool = True,
+        moving_base: bool = False,
+        root_joint: str | None = None,
+        lock: Mapping[str, float] = MappingProxyType({}),
+    ) -> None:
+        self.lock = lock
+        self.text, self.tree, self.mimic = text, tree, mimic
+        self.moving_base, self.root_joint, self._local = moving_base, root_joint, threading.local()
+
+    def rules(self, joints: Sequence[str]) -> dict[str, Mimic]:
+        """Return the mimic rules of the text, read independently of urdfkin's reader.
+
+        Args:
+            joints: Names of the moving joints that the library found, in order.
+
+        Raises:
+            OracleError: the rules cannot be read, or the joints or their order differ from the tree's. The
+                numbers of q would then belong to different joints.
+        """
+        tree = self.tree
+        rules = mimic_rules(self.text, joints, tree.name) if self.mimic else {}
+        coordinates = [name for name in joints if name not in rules]
+        for what, theirs, own in (
+            ("joints", list(joints), [joint.name for joint in tree.joints if joint.kind.nv]),
+            ("coordinates", coordinates, [joint.name for joint in tree.joints if joint.nv]),
+        ):
+            if theirs != own:
+                found = ", ".join(sorted(set(theirs) ^ set(own))[:_NAMED]) or "the same in another order"
+                raise OracleError(
+                    f"{self.title} finds other {what} in this robot", where=tree.name, found=found
+                )
+        return rules
+
+    @property
+    def data(self) -> Any:
+        """The library's data structure of this thread."""
+        if not hasattr(self._local, "data"):
+            self._local.data = self.new_data()
+        return self._local.data
+
+    def placements(self, x: QueryBatch) -> FloatArray:
+        """Return T_world_frame (n, frames, 4, 4)."""
+        raise NotImplementedError
+
+    def velocities(self, x: QueryBatch) -> FloatArray:
+        """Return velocities (n, frames, 6)."""
+        raise NotImplementedError
+
+    def accelerations(self, x: QueryBatch) -> FloatArray:
+        """Return classical accelerations (n, frames, 6)."""
+        raise NotImplementedError
+
+    def jacobians(self, x: QueryBatch) -> FloatArray:
+        """Return Jacobians (n, frames, 6, nv)."""
+        raise NotImplementedError
+
+    def jacobian_rates(self, x: QueryBatch) -> FloatArray:
+        """Return J-dot (n, frames, 6, nv)."""
+        raise NotImplementedError
+
+    def hessians(self, x: QueryBatch) -> FloatArray:
+        """Return Hessians (n, frames, 6, nv, nv).
+
+        Raises:
+            OracleError: the library has no derivative of a Jacobian by the coordinates.
+        """
+        raise OracleError(
+            f"{self.title} computes no Hessian", where=self.tree.name, remedy="use oracle='pinocchio'"
+        )
+
+    def quaternions(self, x: QueryBatch) -> FloatArray:
+        """Return the quaternions (n, frames, 4) of the placements, scalar last, with qw >= 0."""
+        out = nearest_quaternion(self.placements(x)[..., :3, :3])
+        return np.where(out[..., 3:] < 0.0, -out, out)

@@ -1,0 +1,376 @@
+"""`--trajectory FILE`: each row is the command at that configuration, in any units and names of the file."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.cli.running import urdfkin as run
+from urdfkin.cli import cli
+from urdfkin.model.tree import FloatArray
+from urdfkin.verify.quantities import by_command
+
+N = 9  # the forward recursion computes eight configurations at a time
+COMMANDS = {
+    **{name: [row.inputs] for name, row in by_command().items()},
+    "analytical-jacobian": ["q", "--representation", "quaternion"],
+    "singular-values": ["q", "--rows", "linear"],
+    "imu": ["qva"],
+}
+
+
+@pytest.fixture(scope="module")
+def motion() -> dict[str, FloatArray]:
+    robot, rng = urdfkin.load("panda"), np.random.default_rng(5)
+    v, a = rng.standard_normal((2, N, robot.nv))
+    return {"t": np.cumsum(rng.uniform(0.01, 0.1, N)), "q": robot.sample(N, 2), "v": v, "a": a}
+
+
+@pytest.fixture
+def log(motion: dict[str, FloatArray], tmp_path: Path) -> Path:
+    return write(tmp_path / "log.csv", urdfkin.load("panda"), motion)
+
+
+def write(path: Path, robot: Any, motion: dict[str, FloatArray], time: str = "t") -> Path:
+    """Write the arrays of a motion as CSV with the names of a robot or of a convention."""
+    names = {"t": [time], "q": robot.coordinate_names}
+    names |= {x: [f"{x}:{name}" for name in robot.rate_names] for x in "va"}
+    heads = [name for x in motion for name in names[x]]
+    rows = np.column_stack(list(motion.values())).tolist()
+    path.write_text("\n".join([",".join(heads), *(",".join(map(repr, row)) for row in rows)]))
+    return path
+
+
+def commands_with(*names: str) -> dict[str, set[str]]:
+    """Return the parameters of every command that has one of the given parameters."""
+    found: dict[str, set[str]] = {}
+
+    def visit(command: click.Command, name: str) -> None:
+        if isinstance(command, click.Group):
+            context = click.Context(command)
+            for one in command.list_commands(context):
+                visit(command.get_command(context, one) or command, f"{name} {one}".strip())
+        else:
+            given = {parameter.name or "" for parameter in command.params}
+            if given & set(names):
+                found[name] = given
+
+    visit(cli, "")
+    return found
+
+
+def test_every_command_that_takes_joint_values_has_a_convention() -> None:
+    found = commands_with("q", "trajectory", "poses")
+    assert {*COMMANDS, "placement", "chain", "plot", "view", "calibrate"} <= found.keys()
+    assert [name for name, given in found.items() if "convention" not in given] == []
+
+
+def test_every_command_that_takes_a_batch_takes_a_trajectory() -> None:
+    of_one_configuration = {"chain"}
+    found = commands_with("q").items()
+    assert {name for name, given in found if "trajectory" not in given} == of_one_configuration
+
+
+@pytest.mark.parametrize("command", ["placement", *COMMANDS])
+def test_each_row_has_the_bits_of_the_single_command(
+    command: str, motion: dict[str, FloatArray], log: Path
+) -> None:
+    inputs, *options = COMMANDS.get(command, ["q"])
+    words = (command, "panda", "--frame", "panda_hand", *options)
+    done = run(*words, "--trajectory", str(log), "--format", "json")
+    assert done.code == 0, done.err
+    assert done.data["t"] == motion["t"].tolist()
+    assert f" {N} " in done.data["check"]
+    results = [key for key in done.data if key in ("result", "singular_values", "manipulability_gradient")]
+    for k in (0, 3, N - 1):
+        given = [f"--{x}={','.join(map(repr, motion[x][k].tolist()))}" for x in inputs]
+        one = run(*words, *given, "--format", "json")
+        for key in results:
+            batch, single = done.data[key], one.data[key]
+            if key == "singular_values":
+                batch, single = batch["value"], single["value"]
+            assert batch[k] == single[0], key
+
+
+@pytest.mark.parametrize("command", ["placement", *COMMANDS])
+def test_csv_has_one_row_for_each_time(command: str, motion: dict[str, FloatArray], log: Path) -> None:
+    _, *options = COMMANDS.get(command, ["q"])
+    words = (command, "panda", "--frame", "panda_hand", *options, "--trajectory", str(log))
+    head, *rows = csv.reader(io.StringIO(run(*words, "--format", "csv").text))
+    assert head[0] == "t"
+    assert len({*head}) == len(head)
+    table = np.array(rows, dtype=float)
+    np.testing.assert_array_equal(table[:, 0], motion["t"])
+    if command == "singular-values":
+        assert head[1:4] == ["sigma_1", "sigma_1 lower", "sigma_1 upper"]
+        return
+    result = np.array(run(*words, "--format", "json").data["result"])
+    np.testing.assert_array_equal(table[:, 1:], result.reshape(N, -1))
+    if command == "jacobian":
+        assert head[1:3] == ["vx panda_joint1", "vx panda_joint2"]
+
+
+def test_every_sample_is_checked_and_the_worst_case_is_printed(log: Path) -> None:
+    line = run("velocity", "panda", "--frame", "panda_hand", "--trajectory", str(log)).text.splitlines()[-1]
+    assert f"{N} velocity results, worst disagreement " in line
+    assert "of the bound" in line
+
+
+def test_a_breakdown_has_the_times_too(motion: dict[str, FloatArray], log: Path) -> None:
+    words = ("acceleration", "panda", "--frame", "panda_hand", "--breakdown", "--trajectory", str(log))
+    head, first, *_ = csv.reader(io.StringIO(run(*words, "--format", "csv").text))
+    assert head[:3] == ["t", "joint", "kind"]
+    assert float(first[0]) == motion["t"][0]
+
+
+def test_degrees_and_milliseconds_in_a_heading_are_the_texts_with_these_units(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(
+        "time [ms],joint_1 [deg],joint_2_deg,v:joint_1_deg_s,v:joint_2 [deg/s]\n250,30,-7.7,90,1e1\n"
+    )
+    words = ("velocity", "planar_two_link", "--format", "json")
+    along = run(*words, "--trajectory", str(path)).data
+    one = run(*words, "--q", "30deg,-7.7deg", "--v", "90deg/s,10deg/s").data
+    assert (along["result"], along["q"], along["v"]) == (one["result"], one["q"], one["v"])
+    assert along["t"] == [0.25]
+
+
+def test_units_are_read_in_a_batch_of_q_too(tmp_path: Path) -> None:
+    (tmp_path / "q.csv").write_text("joint_2_deg,joint_1\n90,0.5\n")
+    found = run("placement", "planar_two_link", "--q", f"@{tmp_path / 'q.csv'}", "--format", "json").data
+    assert found["q"] == [[0.5, np.pi / 2]]
+
+
+@pytest.mark.parametrize("name", ["mujoco", "drake", "isaaclab"])
+def test_a_file_in_a_convention_gives_the_results_of_the_robot_in_it(name: str, tmp_path: Path) -> None:
+    robot = urdfkin.load("a1", root_joint="floating", verify=False)
+    other, rng = robot.with_convention(name), np.random.default_rng(1)
+    values = other.conversion.to(robot.sample(4, 3), *rng.standard_normal((2, 4, robot.nv)))
+    given = {"t": np.arange(4.0), **dict(zip("qva", values, strict=True))}
+    path = write(tmp_path / "log.csv", other, given)
+    words = (
+        "--root-joint",
+        "floating",
+        "--frame",
+        "FL_foot",
+        "--convention",
+        name,
+        "--trajectory",
+        str(path),
+    )
+    for command in ("placement", "velocity", "acceleration", "jacobian", "analytical-jacobian", "imu"):
+        done = run(command, "a1", *words, "--format", "json")
+        assert done.code == 0, done.err
+        method = getattr(other, command.replace("-", "_"))
+        inputs = COMMANDS.get(command, ["q"])[0]
+        options = {"representation": "quaternion"} if command == "analytical-jacobian" else {}
+        expected = method(*(given[x] for x in inputs), "FL_foot", **options)
+        shown = [f"--{k}={v}" for k, v in options.items()]
+        done = run(command, "a1", *words, *shown, "--format", "json")
+        assert np.allclose(done.data["result"], expected, 0, 1e-12), command
+        assert done.data["convention"] == name
+        assert np.allclose(done.data["q"], given["q"], 0, 1e-15)
+
+
+def test_singular_values_do_not_depend_on_the_convention_and_the_gradient_follows_it(tmp_path: Path) -> None:
+    robot = urdfkin.load("a1", verify=False)
+    mujoco, q = robot.convention("mujoco"), robot.sample(1, 4)
+    words = ("singular-values", "a1", "--frame", "FL_foot", "--rows", "linear", "--format", "json")
+    plain = run(*words, f"--q={','.join(map(repr, q[0].tolist()))}").data
+    text = f"--q={','.join(map(repr, mujoco.to(q)[0].tolist()))}"
+    found = run(*words, text, "--convention", "mujoco").data
+    assert found["singular_values"] == plain["singular_values"]
+    order = mujoco.rate_permutation
+    assert order is not None
+    expected = np.array(plain["manipulability_gradient"])[:, order]
+    assert found["manipulability_gradient"] == expected.tolist()
+    assert (found["rates"], found["convention"]) == (list(mujoco.rate_names), "mujoco")
+    assert "convention mujoco" in run(*words[:-2], text, "--convention", "mujoco").text.splitlines()[0]
+
+
+def test_a_placement_needs_no_time_and_keeps_the_angles_of_the_file(tmp_path: Path) -> None:
+    """Differences need three samples and unwrapped angles; a placement does not."""
+    path = tmp_path / "log.csv"
+    path.write_text("wheel\n3.1\n")
+    (tmp_path / "w.urdf").write_text(
+        '<robot name="w"><link name="a"/><link name="b"/><joint name="wheel" type="continuous">'
+        '<parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint></robot>'
+    )
+    words = (str(tmp_path / "w.urdf"), "--trajectory", str(path))
+    assert run("placement", *words, "--format", "csv").text.splitlines()[1].startswith("0,")
+    assert "at least 3 samples" in run("velocity", *words).err
+    path.write_text("wheel\n3.1\n-3.1\n-3\n")
+    assert run("placement", *words, "--format", "json").data["q"] == [[3.1], [-3.1], [-3.0]]
+    done = run("velocity", *words, "--format", "json")
+    assert done.data["q"][1][0] == pytest.approx(2 * np.pi - 3.1)
+    assert "one second apart" in done.err
+    assert "angle jumps by a whole turn" in done.err
+
+
+def test_velocities_of_the_file_are_used_and_what_is_computed_is_said(
+    motion: dict[str, FloatArray], tmp_path: Path
+) -> None:
+    robot = urdfkin.load("panda")
+    path = write(tmp_path / "log.csv", robot, {x: motion[x] for x in "tqv"})
+    words = ("panda", "--frame", "panda_hand", "--trajectory", str(path))
+    velocity = run("velocity", *words, "--format", "json")
+    assert velocity.data["v"] == motion["v"].tolist()
+    assert "rates" not in velocity.err
+    done = run("acceleration", *words)
+    assert "derivatives v as given, a by central differences of v" in done.text.splitlines()[0]
+    assert "largest errors about" in done.err
+    assert "estimated with half of the samples" in done.err
+    exact = run("acceleration", *words, "--format", "json").data
+    np.testing.assert_array_equal(exact["a"], np.gradient(motion["v"], motion["t"], axis=0, edge_order=2))
+
+
+def test_a_base_of_the_options_or_of_the_file_moves_the_robot(
+    motion: dict[str, FloatArray], log: Path, tmp_path: Path
+) -> None:
+    words = ("placement", "panda", "--frame", "panda_hand", "--format", "json")
+    shifted = run(*words, "--trajectory", str(log), "--base-placement", "1,2,3,0,0,0").data["result"]
+    fixed = np.array(run(*words, "--trajectory", str(log)).data["result"])
+    np.testing.assert_allclose(np.array(shifted)[:, :3, 3] - fixed[:, :3, 3], [[1, 2, 3]] * N, atol=1e-15)
+    T = np.tile(np.eye(4), (N, 1, 1))
+    T[:, 0, 3] = 1.0
+    arrays: dict[str, Any] = {**motion, "base_placement": T}
+    arrays |= {f"base_{name}": np.zeros((N, 6)) for name in ("velocity", "acceleration")}
+    np.savez(tmp_path / "log.npz", **arrays)
+    found = np.array(run(*words, "--trajectory", str(tmp_path / "log.npz")).data["result"])
+    np.testing.assert_allclose(found[:, 0, 3] - fixed[:, 0, 3], 1.0, atol=1e-15)
+    both = run(*words, "--trajectory", str(tmp_path / "log.npz"), "--base-placement", "0,0,0,0,0,0")
+    assert (both.code, both.err.count("\n")) == (2, 1)
+    assert "--base-placement does nothing along a --trajectory with a moving base" in both.err
+
+
+@pytest.mark.parametrize("option", ["--q=ready", "--seed=1"])
+def test_a_value_beside_a_trajectory_is_refused(option: str, log: Path) -> None:
+    done = run("placement", "panda", "--trajectory", str(log), option)
+    assert done.code == 2
+    assert "does nothing along a --trajectory" in done.err
+
+
+def _spoiled(log: Path) -> dict[str, tuple[str, str]]:
+    text = log.read_text()
+    return {
+        "header": (text.partition("\n")[2], "log.csv:1: no header: the first line must name the columns"),
+        "missing": (text.replace("panda_joint3,", "x3,", 1), "missing: panda_joint3"),
+        "unknown": (text.replace("panda_joint3,", "x3,", 1), "unknown: x3"),
+        "duplicate": (
+            text.replace("panda_joint3,", "panda_joint2_deg,", 1),
+            "duplicate: panda_joint2, panda_j",
+        ),
+        "two times": (text.replace("panda_joint3,", "time,", 1), "duplicate: t, time"),
+        "unit": (
+            text.replace("panda_joint3,", "panda_joint3 [mm],", 1),
+            "[mm]: wrong unit: found mm; use rad",
+        ),
+        "unit of time": (text.replace("t,", "t [h],", 1), "t [h]: wrong unit: found h; use s"),
+        "rates": (text.replace("v:panda_joint3", "v:panda_joint3 [m/s]", 1), "use rad/s or deg/s"),
+        "half": (text.replace("v:", "w:", 1), "unknown: w:panda_joint1"),
+    }
+
+
+@pytest.mark.parametrize(
+    "what",
+    ["header", "missing", "unknown", "duplicate", "two times", "unit", "unit of time", "rates", "half"],
+)
+def test_what_is_wrong_with_a_file_is_one_line(what: str, log: Path) -> None:
+    text, message = _spoiled(log)[what]
+    log.write_text(text)
+    done = run("placement", "panda", "--trajectory", str(log))
+    assert (done.code, done.err.count("\n")) == (2, 1)
+    assert message in done.err
+
+
+@pytest.mark.parametrize("command", ["placement", "singular-values", "chain", "imu", "view"])
+def test_an_unknown_convention_points_to_the_list_of_all(command: str) -> None:
+    done = run(command, "panda", "--convention", "mujocco", *(["--q", "ready"] if command == "view" else []))
+    assert done.code == 2
+    assert "did you mean mujoco" in done.err
+    assert "`urdfkin order ROBOT` lists all" in done.err
+
+
+def test_a_chain_reads_q_in_a_convention_and_says_so() -> None:
+    robot = urdfkin.load("a1", verify=False)
+    q, mujoco = robot.sample(1, 2)[0], robot.convention("mujoco")
+    words = ("chain", "a1", "--base", "trunk", "--tip", "FL_foot")
+    text = ",".join(map(repr, mujoco.to(q).tolist()))
+    found = run(*words, "--convention", "mujoco", "--q", text, "--format", "json").data
+    plain = run(*words, "--q", ",".join(map(repr, q.tolist())), "--format", "json").data
+    assert found["path_q"] == plain["path_q"]
+    assert (found["q"], found["convention"]) == (mujoco.to(q).tolist(), "mujoco")
+    assert "convention mujoco" in run(*words, "--convention", "mujoco", "--q", text).text.splitlines()[0]
+
+
+def test_measured_poses_in_a_convention_and_in_degrees_are_those_in_radians(tmp_path: Path) -> None:
+    robot = urdfkin.load("planar_two_link")
+    q = robot.sample(12, 1)
+    p = robot.placement(q, "tip")[:, :3, 3] + [0.01, 0.0, 0.0]
+    (tmp_path / "motors.toml").write_text(
+        'joints = ["elbow", "joint_1"]\n[joint.joint_1]\nunit = "deg"\nsign = -1\n'
+        '[joint.joint_2]\nname = "elbow"\n'
+    )
+    heads = {"plain": "joint_1,joint_2", "degrees": "joint_1 [deg],joint_2_deg", "motors": "joint_1,elbow"}
+    values = {"plain": q, "degrees": np.degrees(q), "motors": q * [-180.0 / np.pi, 1.0]}
+    found = {}
+    for name, head in heads.items():
+        path = tmp_path / f"{name}.csv"
+        np.savetxt(path, np.hstack([values[name], p]), delimiter=",", header=f"{head},x,y,z", comments="")
+        how = str(tmp_path / "motors.toml")
+        more = ["--convention", how] if name == "motors" else []
+        done = run(
+            "calibrate", "planar_two_link", "--poses", str(path), "--fit", "base", *more, "--format", "json"
+        )
+        assert done.code == 0, done.err
+        found[name] = done.data["origins"]
+    for name in ("degrees", "motors"):
+        for joint, T in found["plain"].items():
+            np.testing.assert_allclose(found[name][joint], T, atol=1e-9)
+    table = run("calibrate", "planar_two_link", "--convention", "mujoco")
+    assert "--convention does nothing without --poses" in table.err
+
+
+@pytest.mark.slow
+def test_a_plot_reads_the_motion_in_a_convention(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    robot = urdfkin.load("planar_two_link")
+    how = tmp_path / "motors.toml"
+    how.write_text('joints = ["elbow", "joint_1"]\nangle = "deg"\n[joint.joint_2]\nname = "elbow"\n')
+    names = robot.with_convention(how)
+    t = np.linspace(0.0, 1.0, 5)
+    write(tmp_path / "log.csv", names, {"t": t, "q": np.outer(t, [90.0, 30.0])})
+    for given in (["--trajectory", str(tmp_path / "log.csv")], ["--from", "0,0", "--to", "90,30"]):
+        words = ("plot", "planar_two_link", "--frame", "tip", *given, "--convention", str(how), "--samples=5")
+        if "--trajectory" in given:
+            words = words[:-1]
+        done = run(*words, "--panel", "position", "-o", str(tmp_path / "x.svg"))
+        assert done.code == 0, done.err
+        end = robot.placement([np.pi / 6, np.pi / 2], "tip")[:2, 3]
+        title = " ".join((tmp_path / "x.svg").read_text().split())
+        assert f"to ({end[0]:.3g}, {end[1]:.3g}, 0)" in title
+
+
+@pytest.mark.slow
+def test_a_hundred_thousand_rows_are_read_computed_and_checked(tmp_path: Path) -> None:
+    n, robot = 100_000, urdfkin.load("ur5")
+    t = np.linspace(0.0, 100.0, n)
+    q = np.sin(np.outer(t, np.arange(1, 7)))
+    np.savetxt(
+        tmp_path / "log.csv", np.column_stack([t, q]), delimiter=",", comments="",
+        header=",".join(["time", *robot.coordinate_names]),
+    )  # fmt: skip
+    out = tmp_path / "v.csv"
+    done = run(
+        "velocity", "ur5", "--frame", "tool0", "--trajectory", str(tmp_path / "log.csv"), "-o", str(out)
+    )
+    assert done.code == 0
+    assert f"{n} velocity results" in done.err
+    assert len(out.read_text().splitlines()) == n + 1

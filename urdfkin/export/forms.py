@@ -1,0 +1,104 @@
+"""The code of a chain in one of its forms: the URDF's joints, a Denavit-Hartenberg table, or screws.
+
+A table or a product of exponentials becomes a robot, as by `urdfkin.load`. Its joints are the rows or the
+screws, and the code is made of this robot.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Collection
+from dataclasses import replace
+from typing import Any
+
+from urdfkin.dh.convert import link_names
+from urdfkin.dh.export.text import document
+from urdfkin.dh.export.toolboxes import screws_document
+from urdfkin.dh.screws import ProductOfExponentials
+from urdfkin.dh.table import DHTable
+from urdfkin.dh.units import Units
+from urdfkin.errors import UnknownNameError
+from urdfkin.export import FORMS, QUANTITIES
+from urdfkin.export.code import Code, code_of
+from urdfkin.export.naming import all_safe, safe
+from urdfkin.model.reference import Reference
+from urdfkin.system.lazy_import import hook
+from urdfkin.urdf.findings import UrdfWarning
+
+
+def code_of_robot(
+    robot: Any,
+    frame: str,
+    quantities: Collection[str],
+    reference: Reference | str,
+    form: str = "tree",
+    *,
+    name: str | None = None,
+    verify: bool | None = None,
+) -> Code:
+    """Return the code of a frame of a `Robot`, with its proof; arguments and errors as in `Robot.export`."""
+    if form not in FORMS:
+        raise UnknownNameError("form", form, FORMS)
+    verify = bool(robot.verifier.wanted(verify))
+    if form == "tree":
+        return code_of(robot.verifier, robot.plan, frame, quantities, reference, name=name, verify=verify)
+    chain = robot.dh(frame, verify=verify) if form == "dh" else robot.screws(frame, verify=verify)
+    return code_of_chain(chain, quantities, reference, name=name, verify=verify)
+
+
+def code_of_chain(
+    chain: DHTable | ProductOfExponentials,
+    quantities: Collection[str] | None = None,
+    reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
+    *,
+    name: str | None = None,
+    verify: bool = True,
+) -> Code:
+    """Return the code of a table's tip, or of the tip of screws, with its proof.
+
+    The steps of the code are those of the table or the screws. Results are in the axes of the chain's base.
+
+    Args:
+        chain: A table, or a product of exponentials.
+        quantities: As in `Robot.export`. None: its default, or the placement if no joint moves.
+        reference: As in `Robot.export`.
+        name: As in `Robot.export`.
+        verify: Whether to compare the code with Pinocchio.
+
+    Raises:
+        InputError: a quantity cannot be exported.
+        VerificationError: Pinocchio computes another result.
+    """
+    if isinstance(chain, DHTable):
+        text, chain = document(chain, Units()).text(), _with_safe_names(chain)
+    else:
+        text = screws_document(chain).text()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UrdfWarning)  # about a URDF that only the code is made of
+        robot = hook("a robot of a source")(chain, verify=verify)
+    tip = link_names(chain)[-1] if isinstance(chain, DHTable) else chain.tip_frame
+    frame = robot.tree.frame_name(robot.link_names.index(tip))
+    if quantities is None:
+        quantities = QUANTITIES if robot.nv else QUANTITIES[:1]
+    return code_of(
+        robot.verifier,
+        robot.plan,
+        frame,
+        quantities,
+        reference,
+        name=name,
+        verify=verify,
+        about=text,
+    )
+
+
+def _with_safe_names(table: DHTable) -> DHTable:
+    """Return the table with names that a URDF can contain, whatever a stranger's file has as names."""
+    names = [table.base_frame, *(row.joint for row in table.rows), *table.joint_names, table.tip_frame]
+    to = dict(zip(dict.fromkeys(names), all_safe(dict.fromkeys(names)), strict=True))
+    rows = tuple(
+        replace(row, joint=to[row.joint], mimic=row.mimic and replace(row.mimic, leader=to[row.mimic.leader]))
+        for row in table.rows
+    )
+    base, tip = to[table.base_frame], to[table.tip_frame]
+    return replace(table, robot=safe(table.robot), base_frame=base, tip_frame=tip, rows=rows)
