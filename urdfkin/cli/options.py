@@ -345,6 +345,11 @@ def tell_limits(robot: Robot, q: FloatArray) -> None:
         say(f"warning: {line}", err=True)
 
 
+def said_of(robot: Robot) -> dict[str, Any]:
+    """Return the settings of a robot that JSON lists with a result: its locked joints."""
+    return {"lock": dict(robot.origin.lock)} if robot.origin.lock else {}
+
+
 @dataclass(frozen=True, slots=True)
 class Inputs:
     """A robot, a frame and the values to compute with.
@@ -463,8 +468,7 @@ def read_inputs(
     if conversion is not None:
         q_, v_, a_ = conversion.from_(q_, v_, a_)
     tell_limits(robot, q_)
-    said = {"lock": dict(robot.origin.lock)} if robot.origin.lock else {}
-    return Inputs(robot, frame or robot.tip_frame, q_, v_, a_, said=said, conversion=conversion)
+    return Inputs(robot, frame or robot.tip_frame, q_, v_, a_, said=said_of(robot), conversion=conversion)
 
 
 def _values(

@@ -31,6 +31,7 @@ from urdfkin.cli.options import (
     reference_option,
     reject_unused_options,
     robot_argument,
+    said_of,
     seed_option,
     tell_limits,
     tell_notes,
@@ -109,7 +110,7 @@ def _along(
     x = read_samples(robot, path, conversion)
     if x.base is not None:
         reject_unused_options(context, _BASE, "along a --trajectory with a moving base")
-    said: dict[str, Any] = {}
+    said = said_of(robot)
     q, t, rates = x.q, x.t, {letter: getattr(x, letter) for letter in letters[1:]}
     if any(value is None for value in rates.values()):
         motion = with_rates(robot.tree, x)
@@ -601,7 +602,7 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
             numbers = [n for _, sides in _between(names, found, k) for n in sides]
             yield [t, *map(repr, numbers), *map(repr, slopes)]
 
-    title = "".join(f", {name} {word}" for name, word in x.said.items())
+    title = "".join(f", {name} {word}" for name, word in x.said.items() if isinstance(word, str))
     return _checked(x, f"singular values of {x.frame}, {rows} rows{title}", parts, json=data, csv=lines)
 
 
