@@ -40,6 +40,7 @@ from tests.report.browser import Browser, opened
 from urdfkin.comparison.result import Question
 from urdfkin.comparison.verdict import same
 from urdfkin.report.html import as_html
+from urdfkin.report.reading import read_document
 from urdfkin.report.same import as_html as same_page
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.document import Document
@@ -55,16 +56,23 @@ IMPACTS = ("serious", "critical")
 _PRESSES, _PAGES = 60, 12
 #: Parts of a page that other projects draw: selectors that axe leaves out, with the reason.
 FOREIGN = {
-    "site": {".md-search__form": "Material's search form has a label that axe does not see before it is opened"},
+    "site": {
+        ".md-search__form": "Material's search form has a label that axe does not see before it is opened"
+    },
 }
 
 _AXE = """
 const done = arguments[arguments.length - 1], [excluded] = arguments;
 axe.run({ exclude: excluded.map((one) => [one]) }, { resultTypes: ["violations"] })
   .then((found) => done(found.violations.map((v) => [
-    v.impact, v.id, v.nodes.length, v.nodes.slice(0, 3).map((n) => n.target.join(" ") + " " + n.html.slice(0, 160)),
+    v.impact, v.id, v.nodes.length,
+    v.nodes.slice(0, 3).map((n) => n.target.join(" ") + " " + n.html.slice(0, 160)),
   ])), (error) => done([["critical", "axe failed: " + error, 1, []]]));
 """
+#: Tables that must fit every screen and do not: name, width, and width of the box around them.
+_CUT = """return [...document.querySelectorAll("#overview, .checks, #history, .same table")]
+  .filter((t) => t.checkVisibility() && t.scrollWidth > t.parentElement.clientWidth)
+  .map((t) => [t.id || t.className, t.scrollWidth, t.parentElement.clientWidth]);"""
 #: The element with the focus: a description, and whether an outline, border or shadow shows the focus.
 _FOCUS = """
 let e = document.activeElement;
@@ -104,7 +112,7 @@ class Faults:
 
 
 def axe_script() -> str | None:
-    """Return the source of axe: npm's in the cache folder, else that of the extra `test`; None without both."""
+    """Return the source of axe, from npm or from the extra `test`; None if it is missing."""
     if (path := TOOLS / "axe-core" / "axe.min.js").is_file():
         return path.read_text("utf-8")
     found = util.find_spec("axe_core_python")
@@ -128,7 +136,7 @@ def disagreement() -> Document:
         return validate(["panda", "ur5"], samples=6).as_dict()
 
 
-def reports(folder: Path) -> Iterator[tuple[str, Callable[[], str]]]:
+def reports(folder: Path, fleet: Path | None) -> Iterator[tuple[str, Callable[[], str]]]:
     """Yield the name of each page of a report or comparison, and the function that makes it."""
     bad = folder / "broken.urdf"
     bad.write_text('<robot name="broken"><link name="a"/><link name="a"/><joint name="j"/></robot>')
@@ -136,8 +144,15 @@ def reports(folder: Path) -> Iterator[tuple[str, Callable[[], str]]]:
     yield "one", lambda: as_html(validate("panda", samples=20).as_dict())
     yield "unreadable", lambda: as_html(validate([str(bad), "ur5"], samples=6).as_dict())
     yield "disagreement", lambda: as_html(disagreement())
-    yield "fleet", lambda: as_html(validate(_all_robots(), samples=1).as_dict())
-    for name, b, within in (("same", "ur5", None), ("differs", "ur10", None), ("within", "ur5_limited", 1e-3)):
+    yield (
+        "fleet",
+        lambda: as_html(read_document(fleet) if fleet else validate(_all_robots(), samples=1).as_dict()),
+    )
+    for name, b, within in (
+        ("same", "ur5", None),
+        ("differs", "ur10", None),
+        ("within", "ur5_limited", 1e-3),
+    ):
         yield f"same-{name}", lambda b=b, within=within: _same(b, within)  # type: ignore[misc]
 
 
@@ -150,10 +165,10 @@ def _same(b: str, within: float | None) -> str:
     return same_page(same(*robots, within=within), robots, Question(within))
 
 
-def made(folder: Path, only: list[str]) -> Iterator[Page]:
+def made(folder: Path, only: list[str], fleet: Path | None = None) -> Iterator[Page]:
     """Write the pages of reports and comparisons, and yield them."""
     unfold = "document.querySelectorAll('details').forEach((part) => { part.open = true; })"
-    for name, make in reports(folder):
+    for name, make in reports(folder, fleet):
         if only and not any(name.startswith(word) for word in only):
             continue
         path = folder / f"{name}.html"
@@ -172,8 +187,19 @@ def site(folder: Path) -> Iterator[Page]:
     config = load_config(str(ROOT / "mkdocs.yml"), site_dir=str(folder / "site"), strict=False)
     config.plugins.on_startup(command="build", dirty=False)
     build(config)
-    for name in ("index", "questions", "reports", "viewer", "equations", "lessons/planar-arm", "cli", "api/robot"):
-        yield Page(f"site-{name.replace('/', '-')}", (folder / "site" / f"{name}.html").as_uri(), printed=False)
+    for name in (
+        "index",
+        "questions",
+        "reports",
+        "viewer",
+        "equations",
+        "lessons/planar-arm",
+        "cli",
+        "api/robot",
+    ):
+        yield Page(
+            f"site-{name.replace('/', '-')}", (folder / "site" / f"{name}.html").as_uri(), printed=False
+        )
 
 
 @contextmanager
@@ -204,6 +230,15 @@ def load(browser: Browser, page: Page) -> None:
     browser.settle()
 
 
+def scroll_through(browser: Browser) -> None:
+    """Bring each view into sight, so that it is drawn, and return to the top."""
+    for k in range(browser.js("return document.querySelectorAll('canvas').length")):
+        browser.js("document.querySelectorAll('canvas')[arguments[0]].scrollIntoView()", k)
+        browser.settle()
+    browser.js("scrollTo(0, 0)")
+    browser.settle()
+
+
 def look(
     browser: Browser, page: Page, width: int, dark: bool, axe: str | None, output: Path | None = None
 ) -> list[str]:
@@ -227,7 +262,10 @@ def look(
             (faults.add if impact in IMPACTS else _note)(
                 where, f"{impact} {rule}, {count} times: {'; '.join(nodes)}"
             )
+    for name, inner, room in browser.js(_CUT):
+        faults.add(where, f"table {name}: {inner} pixels wide in {room}")
     if output is not None:
+        scroll_through(browser)
         _photograph(browser, output / f"{page.name}-{where.replace(' ', '-')}.png", width)
     return faults.lines
 
@@ -241,7 +279,10 @@ def _photograph(browser: Browser, path: Path, width: int, most: int = 6000) -> N
     height = min(most, browser.js("return document.documentElement.scrollHeight"))
     shot = browser.chrome.execute_cdp_cmd(
         "Page.captureScreenshot",
-        {"captureBeyondViewport": True, "clip": {"x": 0, "y": 0, "width": width, "height": height, "scale": 1}},
+        {
+            "captureBeyondViewport": True,
+            "clip": {"x": 0, "y": 0, "width": width, "height": height, "scale": 1},
+        },
     )
     path.write_bytes(base64.b64decode(shot["data"]))
 
@@ -278,7 +319,10 @@ def html_errors(page: Page, jar: Path) -> list[str]:
         capture_output=True, text=True, check=False, timeout=120,
     )  # fmt: skip
     messages = json.loads(done.stderr or "{}").get("messages", [])
-    return [f"{page.name}, HTML: line {m.get('lastLine')}: {m['message']}: {m.get('extract', '')[:120]!r}" for m in messages]
+    return [
+        f"{page.name}, HTML: line {m.get('lastLine')}: {m['message']}: {m.get('extract', '')[:120]!r}"
+        for m in messages
+    ]
 
 
 def as_pdf(browser: Browser, page: Page) -> bytes:
@@ -293,7 +337,12 @@ def as_pdf(browser: Browser, page: Page) -> bytes:
 
 def audit(browser: Browser, page: Page, output: Path | None, axe: str | None, jar: Path | None) -> list[str]:
     """Return all faults of a page."""
-    lines = [line for width in WIDTHS for dark in (False, True) for line in look(browser, page, width, dark, axe, output)]
+    lines = [
+        line
+        for width in WIDTHS
+        for dark in (False, True)
+        for line in look(browser, page, width, dark, axe, output)
+    ]
     lines += walk(browser, page)
     if jar is not None and page.url.startswith("file:") and not page.prepare:
         lines += html_errors(page, jar)
@@ -301,7 +350,16 @@ def audit(browser: Browser, page: Page, output: Path | None, axe: str | None, ja
         pdf = output / f"{page.name}.pdf"
         pdf.write_bytes(as_pdf(browser, page))
         if shutil.which("pdftoppm"):
-            command = ["pdftoppm", "-r", "60", "-png", "-l", str(_PAGES), str(pdf), str(output / f"{page.name}-print")]
+            command = [
+                "pdftoppm",
+                "-r",
+                "60",
+                "-png",
+                "-l",
+                str(_PAGES),
+                str(pdf),
+                str(output / f"{page.name}-print"),
+            ]
             subprocess.run(command, check=True, timeout=120)
     return lines
 
@@ -311,6 +369,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--only", nargs="*", default=[], help="beginnings of names: good, same, site, viewer")
     parser.add_argument("--output", type=Path, help="folder for pictures and printed pages")
+    parser.add_argument(
+        "--fleet", type=Path, help="report of many robots; by default all robots are validated"
+    )
     given = parser.parse_args()
     axe, jar, only = axe_script(), html_checker(), given.only
     if given.output is not None:
@@ -324,7 +385,7 @@ def main() -> None:
         print(f"{page.name}: {len(found)} faults", *found, sep="\n  ", flush=True)
 
     with tempfile.TemporaryDirectory() as folder, opened(Path(folder) / "profile") as browser:
-        for page in made(Path(folder), only):
+        for page in made(Path(folder), only, given.fleet):
             visit(browser, page)
         if not only or any(word.startswith("site") for word in only):
             for page in site(Path(folder)):
