@@ -65,7 +65,7 @@ def test_a_terminal_shows_runs_robots_changes_and_the_latest_verdict(month: Path
     assert done.code == 0
     assert "run 5, REGRESSION panda: verdict: verified -> disagrees" in done.text
     assert "panda        ✓✓✓✓✗✓✓✓  verified" in done.text
-    assert done.text.splitlines()[-1] == "8 runs; the latest is verified, as in the 2 runs before"
+    assert done.text.splitlines()[-1] == "8 runs; latest verdict: verified, as in the 2 runs before"
 
 
 def test_only_the_latest_runs_and_changes_are_shown_unless_all_are_asked_for(
@@ -189,5 +189,5 @@ def test_the_page_is_written_by_its_suffix_and_follows_the_latest_verdict(tmp_pa
         assert urdfkin("report", "history", *map(str, words), "--output", str(path)).code == 0
         pages.append(path.read_text(encoding="utf-8"))
     assert '<div class="verdict bad">' in pages[0]
-    assert "2 runs; the latest is disagrees, the one before is verified" in pages[0]
+    assert "2 runs; latest verdict: disagrees, before: verified" in pages[0]
     assert '<div class="verdict good">' in pages[1]
