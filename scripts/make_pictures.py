@@ -119,7 +119,9 @@ def photograph_viewer(folder: Path) -> None:
                     browser.wait("return document.getElementById('fold') !== null")
                     browser.js("document.getElementById('fold').click()")
                 time.sleep(5)
-                browser.js("window.requestAnimationFrame = () => 0")  # a frame takes seconds; keep the last one
+                browser.js(
+                    "window.requestAnimationFrame = () => 0"
+                )  # a frame takes seconds; keep the last one
                 time.sleep(2)
                 keep(browser, f"{name}{theme}")
     finally:
