@@ -382,9 +382,7 @@ def headline(found: History) -> str:
     if len(verdicts) == 1:
         return f"1 run: {verdicts[0]}"
     if same == 1:
-        return (
-            f"{counted(len(verdicts), 'run')}; latest verdict: {verdicts[-1]}, before: {verdicts[-2]}"
-        )
+        return f"{counted(len(verdicts), 'run')}; latest verdict: {verdicts[-1]}, before: {verdicts[-2]}"
     before = "the run before" if same == 2 else f"the {same - 1:,} runs before"
     return f"{counted(len(verdicts), 'run')}; latest verdict: {verdicts[-1]}, as in {before}"
 
