@@ -76,7 +76,7 @@ axe.run({ resultTypes: ["violations"] })
   ])), (error) => done([["critical", "axe failed: " + error, 1, []]]));
 """
 #: Tables that must fit every screen and do not: name, width, and width of the box around them.
-_CUT = """return [...document.querySelectorAll("#overview, .checks, #history, .same table")]
+_CUT = """return [...document.querySelectorAll("#overview, .checks, #history, section > .scroll > table")]
   .filter((t) => t.checkVisibility() && t.scrollWidth > t.parentElement.clientWidth)
   .map((t) => [t.id || t.className, t.scrollWidth, t.parentElement.clientWidth]);"""
 #: The element with the focus: a description, and whether an outline, border or shadow shows the focus.
@@ -155,6 +155,7 @@ def reports(folder: Path, fleet: Path | None) -> Iterator[tuple[str, Callable[[]
         "fleet",
         lambda: as_html(read_document(fleet) if fleet else validate(_all_robots(), samples=1).as_dict()),
     )
+    yield "history", lambda: _history(folder)
     for name, b, within in (
         ("same", "ur5", None),
         ("differs", "ur10", None),
