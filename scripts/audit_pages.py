@@ -48,7 +48,7 @@ from urdfkin.report.reading import read_document
 from urdfkin.report.same import as_html as same_page
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.document import Document
-from urdfkin.verify.pinocchio import Oracle
+from urdfkin.verify.pinocchio import PinocchioOracle
 
 ROOT = Path(__file__).parents[1]
 #: Folder of npm's packages axe-core and vnu-jar.
@@ -134,12 +134,12 @@ def html_checker() -> Path | None:
 
 def disagreement() -> Document:
     """Return the report of a real disagreement: the oracle's velocities are bent by a millionth."""
-    right = Oracle.velocities
+    right = PinocchioOracle.velocities
 
     def bent(*args: Any) -> Any:
         return right(*args) * (1.0 + 1e-6)
 
-    with patch.object(Oracle, "velocities", bent):
+    with patch.object(PinocchioOracle, "velocities", bent):
         return validate(["panda", "ur5"], samples=6).as_dict()
 
 
