@@ -272,7 +272,7 @@ class PinocchioOracle(Oracle):
         ids: Sequence[int],
         *reference: Any,
     ) -> FloatArray:
-        """Return (n, ids, *own): call `compute` for each configuration, then `get` for each frame or joint."""
+        """Return (n, ids, *own): `compute` for each configuration, then `get` for each frame or joint."""
         model, data, steps = self._model, self.data, self._each(compute, inputs)
         return _stacked(
             lambda n: [get(model, data, one, *reference) for _ in islice(steps, n) for one in ids],
