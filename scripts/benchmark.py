@@ -29,6 +29,7 @@ from scripts.benchmarking.machine import USES, first_uses, machine, peak_over_ou
 from scripts.benchmarking.operations import operations
 from scripts.benchmarking.sections import (
     batch_rows,
+    checked_rows,
     frame_rows,
     joint_rows,
     single_rows,
@@ -42,7 +43,7 @@ from scripts.benchmarking.where import parts_of_batches, parts_of_calls
 from urdfkin.compiled.preload import only
 from urdfkin.verify.oracles import versions
 
-SECTIONS = ("batch", "single", "verified", "where", "first", "joints", "frames", "sizes", "memory")
+SECTIONS = ("batch", "single", "checked", "verified", "where", "first", "joints", "frames", "sizes", "memory")
 
 
 @dataclass(frozen=True)
@@ -85,6 +86,7 @@ def rows(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender]) -
     ways: dict[str, Callable[[], Iterator[Row]]] = {
         "batch": lambda: batch_rows(n, contenders, rounds),
         "single": lambda: single_rows(n, contenders, rounds),
+        "checked": lambda: checked_rows(n, rounds),
         "verified": lambda: verified_rows(n, rounds),
         "joints": lambda: joint_rows(plan.joints, plan.numbers, rounds),
         "frames": lambda: frame_rows(plan.frame_configurations, plan.frames, rounds),

@@ -148,6 +148,12 @@ def on_page_content(content: str, **_: Any) -> str:
     return _FORMULA.sub(mathml, content)
 
 
+def on_post_page(output: str, **_: Any) -> str:
+    """Name the search dialog, which the theme leaves without a name."""
+    dialog = 'data-md-component="search" role="dialog"'
+    return output.replace(dialog, f'{dialog} aria-label="Search"')
+
+
 def notebook(page: str) -> dict[str, Any]:
     """Convert a page to a notebook with text, code, and the output on the page, which a test compares."""
     cells: list[dict[str, Any]] = []

@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 import tempfile
 import time
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,6 +33,10 @@ if TYPE_CHECKING:
     pass
 
 POSE = [0.0, -0.8, 0.0, -2.4, 0.0, 1.6, 0.8, 0.04]
+
+
+#: Endings of the names of screenshots, and whether the theme is dark.
+THEMES = (("", False), ("-dark", True))
 
 
 def _axes(axes: Any, at: FloatArray, R: FloatArray) -> None:
@@ -81,27 +86,29 @@ def reference_frames() -> Any:
 
 
 def photograph_report(folder: Path) -> None:
-    """Make a screenshot of a report about two robots, with the first one expanded."""
+    """Make screenshots of a report about two robots, with the first one expanded: light and dark."""
     page = folder / "report.html"
     found = urdfkin.validate(["panda", "ur5"], samples=1000)
     text = as_html(found.as_dict())
     installed = str(Path(urdfkin.load("panda").path or "").parents[2])  # leave out the name of the machine
     page.write_text(text.replace(installed, "example-robot-data"), encoding="utf-8")
-    with opened(folder / "report", width=1000, height=1250) as browser:
-        browser.open(page)
-        browser.js("document.querySelector('details.robot').open = true; scrollTo(0, 0)")
-        browser.settle()
-        keep(browser, "report")
+    for theme, dark in THEMES:
+        with opened(folder / f"report{theme}", width=1000, height=1250, dark=dark) as browser:
+            browser.open(page)
+            browser.js("document.querySelector('details.robot').open = true; scrollTo(0, 0)")
+            browser.settle()
+            keep(browser, f"report{theme}")
 
 
 def photograph_viewer(folder: Path) -> None:
-    """Make screenshots of the viewer with its controls, and on a phone."""
+    """Make screenshots of the viewer with its controls, and on a phone: light and dark."""
     server = new_server(port=8099)
     try:
         viewer = Viewer(server, urdfkin.load("panda"), POSE)
         viewer.dh.value = "standard"
-        for name, width, height in (("viewer", 1100, 1240), ("viewer-phone", 400, 800)):
-            with opened(folder / name, width=width, height=height) as browser:
+        screens = ("viewer", 1100, 1240), ("viewer-phone", 400, 800)
+        for (name, width, height), (theme, dark) in product(screens, THEMES):
+            with opened(folder / f"{name}{theme}", width=width, height=height, dark=dark) as browser:
                 browser.chrome.get(server.address)
                 browser.wait("return document.querySelector('canvas') !== null")
                 time.sleep(30)  # shapes fade in, and a software renderer is slow
@@ -112,7 +119,11 @@ def photograph_viewer(folder: Path) -> None:
                     browser.wait("return document.getElementById('fold') !== null")
                     browser.js("document.getElementById('fold').click()")
                 time.sleep(5)
-                keep(browser, name)
+                browser.js(
+                    "window.requestAnimationFrame = () => 0"
+                )  # a frame takes seconds; keep the last one
+                time.sleep(2)
+                keep(browser, f"{name}{theme}")
     finally:
         server.stop()
 

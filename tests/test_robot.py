@@ -185,7 +185,7 @@ def test_a_result_that_is_no_number_is_a_disagreement(monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(evaluate, "jacobians", lambda plan, q, *_, **__: np.full((len(q), 1, 6, 8), np.nan))
     with pytest.raises(urdfkin.VerificationError, match="disagrees"):
-        panda.jacobian(panda.neutral(), "panda_hand")
+        panda.jacobian(panda.neutral()[np.newaxis], "panda_hand")
 
 
 def test_a_disagreement_whose_share_is_no_number_is_raised_too(

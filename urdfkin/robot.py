@@ -166,12 +166,14 @@ class Robot(Displayable):
         self._tip_frame = tip_frame
         self._has_one_tip = tip_frame is not None or len(list(tree.leaves())) == 1
         self._plans: dict[tuple[int, ...], CompiledTree] = {}
+        #: The evaluators of unchecked and of checked calls, by frame.
         self._prepared: dict[object, PreparedFrame] = {}
+        self._checked: dict[object, PreparedFrame] = {}
         self._compiled: dict[object, CompiledFrame] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         # Compiled trees are not copied, because they are cheap to rebuild. A copy has its own verifier.
-        empty: dict[str, Any] = {"_plans": {}, "_prepared": {}, "_compiled": {}}
+        empty: dict[str, Any] = {"_plans": {}, "_prepared": {}, "_checked": {}, "_compiled": {}}
         return {**self.__dict__, "verifier": copy(self.verifier), **empty}
 
     def __repr__(self) -> str:
@@ -1229,17 +1231,25 @@ class Robot(Displayable):
         inputs, hessian = (q, v, a), as_bool(hessian, "hessian")
         return enclose(self.verifier, self.plan, inputs, frame, reference, base, digits, hessian=hessian)
 
-    def prepare(self, frame: str | None = None, reference: Reference | str = _ALIGNED) -> PreparedFrame:
-        """Return a fast evaluator of one frame without checks, one configuration per call.
+    def prepare(
+        self,
+        frame: str | None = None,
+        reference: Reference | str = _ALIGNED,
+        *,
+        verify: bool = False,
+    ) -> PreparedFrame:
+        """Return a fast evaluator of one frame, one configuration per call.
 
         `PreparedFrame` lists its methods.
 
         Args:
             frame: Name of a link or joint; None: the robot's only tip.
             reference: Reference frame of its results.
+            verify: True: check each result with Pinocchio, as the robot's methods do. False: check none.
 
         Raises:
             UnknownNameError: the frame or reference does not exist.
+            InputError: `verify` is neither True nor False.
 
         >>> import urdfkin
         >>> tip = urdfkin.load("planar_two_link").prepare("tip")
@@ -1247,7 +1257,7 @@ class Robot(Displayable):
         [0.0, 0.9, 0.0, 0.0, 0.0, 1.0]
         """
         frame = self._default_frame() if frame is None else frame
-        prepared = self._prepare(frame, reference)
+        prepared = self._prepare(frame, reference, verify=as_bool(verify, "verify"))
         prepared.wanted = True
         return prepared
 
@@ -1533,8 +1543,9 @@ class Robot(Displayable):
         call = Call(self.tree, self.plan, frame, reference, base, inputs, **options)
         to = call.flat(out, row.own_shape(self.nv))
         self.verifier.ready(verify)
-        flat = (call.plan, (call.q, *call.rates), call.reference)
-        found = call.compute(row.ours, *flat, base=call.state, out=to, threads=threads, **options)
+        flat, read = (call.plan, (call.q, *call.rates), call.reference), self.verifier.wanted(verify) is True
+        how = {"base": call.state, "out": to, "threads": threads, "read": read}
+        found = call.compute(row.ours, *flat, **how, **options)
         result = call.in_shape(found) if out is None else out
         self.verifier.check(row, call, result, verify)
         return result
@@ -1551,32 +1562,35 @@ class Robot(Displayable):
     def _fast(
         self, frame: str | Sequence[str] | None, reference: Reference | str, verify: Verify | None
     ) -> PreparedFrame | None:
-        """Return the fast evaluator for an unchecked call; None if the call needs the general code."""
-        if verify is not False and (verify is not None or self.verifier.policy is not False):
+        """Return the fast evaluator for a call; None if the call needs the general code."""
+        wanted = self.verifier.policy if verify is None else verify
+        if wanted is not True and wanted is not False:
             return None
         if frame is None:
             frame = self._default_frame()
         if not isinstance(frame, str):
             return None
-        if reference is _ALIGNED and type(frame) is str and (fast := self._prepared.get(frame)) is not None:
+        known = self._checked if wanted else self._prepared
+        if reference is _ALIGNED and type(frame) is str and (fast := known.get(frame)) is not None:
             return fast
-        return self._prepare(frame, reference)
+        return self._prepare(frame, reference, verify=wanted)
 
-    def _prepare(self, frame: str, reference: Reference | str) -> PreparedFrame:
+    def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
         """Return the fast evaluator of a frame; it is made once."""
         # Hashing an enumeration member takes longer than the rest of this function, so a plain name is a key
         # by itself. The types in the key distinguish a member from an equal number, and `LinkFrame("link:a")`
         # from a link with the literal name "link:a".
         plain = reference is _ALIGNED and type(frame) is str
         key = frame if plain else (type(frame), frame, type(reference), reference)
+        known = self._checked if verify else self._prepared
         try:
-            prepared = self._prepared.get(key)
+            prepared = known.get(key)
         except TypeError:  # not hashable, therefore not a valid name
             self.tree.frame_link(frame)
-            return self._prepare(frame, Reference.of(reference))
+            return self._prepare(frame, Reference.of(reference), verify=verify)
         if prepared is None:
-            plan = self.plan([self.tree.frame_link(frame)])
-            prepared = self._prepared[key] = PreparedFrame(self, frame, Reference.of(reference), plan)
+            plan, of = self.plan([self.tree.frame_link(frame)]), Reference.of(reference)
+            prepared = known[key] = PreparedFrame(self, frame, of, plan, verify=verify)
         return prepared
 
 

@@ -107,21 +107,32 @@ def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
 def urdfkin_calls(subject: Subject, quantity: str) -> Iterator[Calls]:
     """Yield the calls of the robot's method, and of a prepared frame with and without `out=`."""
     robot, arguments = subject.robot, "q" if quantity == "jacobian" else "q, v, a"
-    names = {
-        "robot": robot,
-        "frame": subject.frame,
-        "out": np.empty(subject.width(quantity)),
-        "fast": robot.prepare(subject.frame),
-        "own": robot.compiled(subject.frame),
-    }
-    for line in (
+    names = {"fast": robot.prepare(subject.frame), "own": robot.compiled(subject.frame)}
+    lines = (
         f"robot.{quantity}({arguments}, frame, verify=False)",
         f"fast.{quantity}({arguments})",
         f"fast.{quantity}({arguments}, out=out)",
         f"own.{quantity}({arguments}, out=out)",
-    ):
+    )
+    yield from _urdfkin_lines(subject, quantity, names, lines)
+
+
+def checked_calls(subject: Subject, quantity: str) -> Iterator[Calls]:
+    """Yield the calls of the robot's method and of a prepared frame, each with a check."""
+    arguments = "q" if quantity == "jacobian" else "q, v, a"
+    lines = f"robot.{quantity}({arguments}, frame, verify=True)", f"fast.{quantity}({arguments})"
+    names = {"fast": subject.robot.prepare(subject.frame, verify=True)}
+    yield from _urdfkin_lines(subject, quantity, names, lines)
+
+
+def _urdfkin_lines(
+    subject: Subject, quantity: str, more: dict[str, Any], lines: Sequence[str]
+) -> Iterator[Calls]:
+    out = np.empty(subject.width(quantity))
+    names = {"robot": subject.robot, "frame": subject.frame, "out": out, **more}
+    for line in lines:
         who, _, given = line.replace("fast", "prepared").replace("own", "compiled").partition("(")
-        shown = [word for word in ("verify=False", "out=") if word in given]
+        shown = [word for word in ("verify=False", "verify=True", "out=") if word in given]
         yield Calls(f"urdfkin, {who}({', '.join(shown)})", names, (line,))
 
 
@@ -152,11 +163,9 @@ def pinocchio_calls(urdf: str, frame: str, quantity: str) -> Calls:
     )
 
 
-def oracle_calls(subject: Subject, quantity: str) -> Calls:
-    """Return the calls of urdfkin's check: `computeJointJacobians` and `getFrameJacobian`, or as above."""
-    usual = pinocchio_calls(subject.urdf, subject.frame, quantity)
-    if quantity == "acceleration":
-        return usual
+def all_joints_calls(subject: Subject) -> Calls:
+    """Return the calls for all joints: `computeJointJacobians` and `getFrameJacobian`."""
+    usual = pinocchio_calls(subject.urdf, subject.frame, "jacobian")
     names = {**usual.names, "compute": pin.computeJointJacobians, "get": pin.getFrameJacobian}
     return Calls(LOOP, names, ("compute(model, data, q)", "get(model, data, frame, aligned)"))
 

@@ -6,6 +6,7 @@ results.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -17,7 +18,8 @@ from scripts.benchmarking.contenders import (
     ONE,
     PROCESSES,
     Contender,
-    oracle_calls,
+    all_joints_calls,
+    checked_calls,
     pinocchio_calls,
     urdfkin_batches,
 )
@@ -25,9 +27,11 @@ from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, TIP, Subject, cha
 from scripts.benchmarking.timing import Row, Table, Work, agree, measure
 from urdfkin.model.tree import FloatArray
 
-#: Name of the calls of Pinocchio that a check contains.
-OWN = "Pinocchio's own calls, Python loop"
-FEWEST = "Pinocchio, computeFrameJacobian, Python loop"
+#: Names of Pinocchio's loops: the cheapest calls with and without storing results, and the calls that compute
+#: all joints.
+STORED = "Pinocchio's cheapest calls, results stored"
+NOT_STORED = "Pinocchio's cheapest calls, nothing stored"
+ALL_JOINTS = "Pinocchio's calls for all joints, results stored"
 ONE_PASS, ONE_BY_ONE = "urdfkin, all in one pass", "urdfkin, one after the other"
 
 
@@ -52,15 +56,25 @@ def single_rows(n: int, contenders: Sequence[Contender], rounds: int) -> Iterato
 
 
 def verified_rows(n: int, rounds: int) -> Iterator[Row]:
-    """Measure the check of every result and of a sample, compared with the calls of a check."""
+    """Measure the check of every result and of a sample, compared with Pinocchio's cheapest calls."""
     for subject, quantity, table in _contests("verified", n):
-        own = replace(oracle_calls(subject, quantity).batch(subject, quantity), who=OWN)
-        works = [*(_verified(subject, quantity, verify) for verify in (True, "sample", False)), own]
+        calls = pinocchio_calls(subject.urdf, subject.frame, quantity)
+        stored = replace(calls.batch(subject, quantity), who=STORED)
+        works = [*(_verified(subject, quantity, verify) for verify in (True, "sample", False)), stored]
+        works.append(replace(calls.single(subject, quantity), who=NOT_STORED))
         if quantity == "jacobian":
-            fewest = pinocchio_calls(subject.urdf, subject.frame, quantity).batch(subject, quantity)
-            works.append(replace(fewest, who=FEWEST))
-        agree(works, own, f"{subject.name}, verified {quantity}")
-        yield from measure(table, works, rounds, own)
+            works.append(replace(all_joints_calls(subject).batch(subject, quantity), who=ALL_JOINTS))
+        agree(works, stored, f"{subject.name}, verified {quantity}")
+        yield from measure(table, works, rounds, stored, time.thread_time)
+
+
+def checked_rows(n: int, rounds: int) -> Iterator[Row]:
+    """Measure single calls with a check, compared with Pinocchio's calls."""
+    for subject, quantity, table in _contests("checked", n):
+        calls = pinocchio_calls(subject.urdf, subject.frame, quantity)
+        works = [one.single(subject, quantity) for one in (*checked_calls(subject, quantity), calls)]
+        agree(works, calls.batch(subject, quantity), f"{subject.name}, checked {quantity}")
+        yield from measure(table, works, rounds, works[-1], time.thread_time)
 
 
 def _verified(subject: Subject, quantity: str, verify: bool | str) -> Work:

@@ -40,7 +40,7 @@ def tables(figures: Mapping[str, Any]) -> Iterator[Words]:
     """Yield the tables of a run, in order."""
     entries = figures["rows"]
     for (section, robot, quantity), group in groupby(
-        (row for row in entries if row["section"] in ("batch", "single", "verified")),
+        (row for row in entries if row["section"] in ("batch", "single", "checked", "verified")),
         key=lambda row: (row["section"], row["robot"], row["quantity"]),
     ):
         yield _contest(section, f"{robot}, {quantity}", list(group))
@@ -84,8 +84,9 @@ def show(figures: Mapping[str, Any], console: Console | None = None) -> None:
 
 
 def _contest(section: str, title: str, rows: list[Entry]) -> Words:
-    own, single = section == "verified", section == "single"
-    ratio = "cost, Pinocchio's own = 1" if own else f"times Pinocchio's {'calls' if single else 'loop'}"
+    cost, single = section in ("checked", "verified"), section in ("single", "checked")
+    what = "calls" if single else "results stored" if cost else "loop"
+    ratio = f"cost, Pinocchio's {what} = 1" if cost else f"times Pinocchio's {what}"
     remarks = tuple(dict.fromkeys(row["remark"] for row in rows if row["remark"]))
     marks = {remark: f" [{i + 1}]" for i, remark in enumerate(remarks)}
     ceiling = _generated(rows)
@@ -94,7 +95,7 @@ def _contest(section: str, title: str, rows: list[Entry]) -> Words:
         yield row["who"] + marks.get(row["remark"], "")
         yield number(row["median_ns"])
         yield number(row["minimum_ns"])
-        yield number(1 / row["ratio"] if own else row["ratio"])
+        yield number(1 / row["ratio"] if cost else row["ratio"])
         if ceiling:
             yield number(ceiling / row["median_ns"])
         yield f"{1 if single else row['n']:,}"

@@ -114,7 +114,9 @@ def agree(works: Sequence[Work], reference: Work, what: str) -> None:
             raise DifferenceError(f"{what}: {work.who} and {reference.who} differ by {worst:.3g}")
 
 
-def times(works: Sequence[Work], rounds: int) -> dict[str, list[float]]:
+def times(
+    works: Sequence[Work], rounds: int, clock: Callable[[], float] = time.perf_counter
+) -> dict[str, list[float]]:
     """Return the nanoseconds for one configuration; each of `works` runs once a round, in varying order."""
     found: dict[str, list[float]] = {work.who: [] for work in works}
     shuffled, order = list(works), random.Random(0)
@@ -125,16 +127,22 @@ def times(works: Sequence[Work], rounds: int) -> dict[str, list[float]]:
             order.shuffle(shuffled)
             for work in shuffled:
                 work.compute()
-                begin = time.perf_counter()
+                begin = clock()
                 work.compute()
-                found[work.who].append((time.perf_counter() - begin) / work.n * 1e9)
+                found[work.who].append((clock() - begin) / work.n * 1e9)
     finally:
         if collecting:
             gc.enable()
     return found
 
 
-def measure(table: Table, works: Sequence[Work], rounds: int, baseline: Work | None = None) -> list[Row]:
+def measure(
+    table: Table,
+    works: Sequence[Work],
+    rounds: int,
+    baseline: Work | None = None,
+    clock: Callable[[], float] = time.perf_counter,
+) -> list[Row]:
     """Time `works`.
 
     Args:
@@ -142,8 +150,9 @@ def measure(table: Table, works: Sequence[Work], rounds: int, baseline: Work | N
         works: Contenders that have computed once, so that nothing is compiled here.
         rounds: Number of rounds, at least one.
         baseline: The one of `works` that the others are compared with.
+        clock: Returns seconds.
     """
-    found = times(works, rounds)
+    found = times(works, rounds, clock)
     medians = {who: statistics.median(values) for who, values in found.items()}
 
     def row(work: Work) -> Row:

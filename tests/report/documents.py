@@ -92,3 +92,24 @@ def beyond_numbers(check: Check, place: int, frame: str) -> None:
     check["median"], check["p99"] = (
         percentile(check["histogram"], edges, math.inf, percent) for percent in (50.0, 99.0)
     )
+
+
+def run_on(day: int, document: Document) -> Document:
+    """The document as a run on a day of November."""
+    return document | {"started": f"2026-11-{day:02}T08:00:00+00:00", "seconds": float(day)}
+
+
+def months_runs() -> list[Document]:
+    """Eight runs of two arms: a warning that comes and goes, a disagreement, a changed axis."""
+    runs = [run_on(day, arms()) for day in range(1, 9)]
+    for document in runs[2:4]:
+        finding = copy.deepcopy(document["robots"][0]["findings"][0])
+        document["robots"][0]["findings"].append(finding | {"severity": "warning", "code": "URDF305"})
+    runs[4] = run_on(5, failing())
+    for document in runs[5:]:
+        model = document["robots"][1]["model"]
+        assert model is not None
+        model["joints"][2]["axis"] = [-x for x in model["joints"][2]["axis"] or ()]
+        model["sha256"] = document["sha256"][1] = "0" * 64
+        document["versions"] = document["versions"] | {"pin": "4.2.0"}
+    return runs

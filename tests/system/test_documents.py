@@ -5,21 +5,23 @@ from __future__ import annotations
 import json
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
 from jsonschema import Draft202012Validator
 
 import urdfkin
-from tests.report.documents import arms
+from tests.report.documents import arms, run_on
 from urdfkin.comparison.certificate import SAME, certificate
 from urdfkin.errors import InputError
 from urdfkin.report.compare import COMPARISON, compare
+from urdfkin.report.history import HISTORY, history
 from urdfkin.system.documents import Header, Layout, as_data, plain
 from urdfkin.validation.document import VALIDATION
 from urdfkin.verify.certificate import CERTIFICATE
 
-LAYOUTS: list[Layout[Any]] = [VALIDATION, COMPARISON, SAME, CERTIFICATE]
+LAYOUTS: list[Layout[Any]] = [VALIDATION, COMPARISON, HISTORY, SAME, CERTIFICATE]
 
 
 @cache
@@ -35,6 +37,11 @@ def _made(name: str) -> str:
         new = arms()
         new["samples"] = 3
         return json.dumps(compare(arms(), new).as_dict("urdfkin compare"))
+    if name == HISTORY.name:
+        with TemporaryDirectory() as folder:
+            for day in (1, 2):
+                (Path(folder) / f"{day}.json").write_text(json.dumps(run_on(day, arms())))
+            return json.dumps(history([Path(folder)]).as_dict("urdfkin report history"))
     return json.dumps(arms())
 
 
@@ -110,7 +117,7 @@ def test_another_layout_and_an_unknown_version_are_two_errors(layout: Layout[Any
             layout.checked(data, "a.json")
 
 
-@pytest.mark.parametrize("layout", [COMPARISON, SAME, CERTIFICATE], ids=ids)
+@pytest.mark.parametrize("layout", [COMPARISON, HISTORY, SAME, CERTIFICATE], ids=ids)
 def test_an_unknown_entry_of_a_certificate_is_refused_with_its_place(layout: Layout[Any]) -> None:
     with pytest.raises(InputError, match=r"found \$: unknown entry 'more'"):
         layout.checked(made(layout) | {"more": 1}, "a.json")

@@ -199,5 +199,37 @@ def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) 
     return Answer(lambda: document(before, after, found), data, code=found.exit_code)
 
 
+@report_command.command(
+    "history",
+    short_help="Show how verdicts, results and findings changed over runs.",
+    epilog="Example: urdfkin report history nightly --output history.html",
+)
+@click.argument("paths", metavar="DIR|RESULTS.json...", nargs=-1, type=click.Path(path_type=Path))
+@click.option("--all", "all_", is_flag=True, help="Show all runs and changes, not only the latest.")
+@click.option("--schema", is_flag=True, help="Print the JSON Schema of the data and exit.")
+@answering(*TEXTS, "json")
+def report_history(paths: tuple[Path, ...], all_: bool, schema: bool) -> Answer:
+    """Show the verdicts, results, findings and changes of each robot from run to run.
+
+    Give reports, stores, or folders with them. Runs are ordered by their start; robots are matched by their
+    source, and renamed files by the robot's name. Changes and regressions are those of `report compare`. With
+    `--output history.html` it writes an offline page with charts.
+
+    A file that cannot be used is named with the reason; the others are shown.
+    Exit 0: every file was used. 2: a file cannot be used.
+    """
+    from urdfkin.report.history import HISTORY, as_html, document, history  # noqa: PLC0415
+
+    if schema:
+        click.echo(HISTORY.schema_text(), nl=False)
+        click.get_current_context().exit()
+    if not paths:
+        raise click.UsageError("give reports, or a folder with reports: urdfkin report history DIR")
+    found = history(paths)
+    words = shlex.join(["urdfkin", "report", "history", *map(str, paths), "--format"])
+    data = {"json": lambda: found.as_dict(f"{words} json"), "html": lambda: as_html(found, f"{words} html")}
+    return Answer(lambda: document(found, all_=all_), data, code=found.exit_code)
+
+
 report_command.add_command(status, "status")
 report_command.add_command(merge, "merge")

@@ -44,11 +44,13 @@ class How(TypedDict, total=False):
         base: (n, 24) or (1, 24) state of the base (`BaseMotion.state`).
         out: C-contiguous float64 array of the result's size, for the result.
         threads: Largest number of threads; None uses all processors for large batches.
+        read: Whether the caller reads the results at once, so that they should stay in the caches.
     """
 
     base: FloatArray
     out: FloatArray | None
     threads: int | None
+    read: bool
 
 
 def placements(plan: CompiledTree, q: FloatArray, **how: Unpack[How]) -> FloatArray:
@@ -134,6 +136,7 @@ def _compute(
     base: FloatArray = STILL_STATE,
     out: FloatArray | None = None,
     threads: int | None = None,
+    read: bool = False,
 ) -> FloatArray:
     """Return (n, frames, *shape), computed from q, or q and v, or q, v and a.
 
@@ -145,7 +148,7 @@ def _compute(
     out = np.empty(shape) if out is None else out.reshape(shape)
     inputs = [base, *(x[:1] if _is_broadcast(x) else x for x in inputs)]
     if (odd := _interpreted(name, program, reference, inputs, out, threads)) is None:
-        odd = _compiled(name, program, reference, inputs, out, threads)
+        odd = _compiled(name, program, reference, inputs, out, threads, staged=is_staged(out) and not read)
     if odd or plan.is_large or _is_large(base):
         _check_finite(inputs, out)
     return out
@@ -207,9 +210,11 @@ def _compiled(
     inputs: Sequence[FloatArray],
     out: FloatArray,
     threads: int | None,
+    *,
+    staged: bool,
 ) -> int:
     """Compute with a kernel; return whether an input is not ordinary."""
-    core, staged = preload.kernel(name), is_staged(out)
+    core = preload.kernel(name)
 
     def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
         task, kept = task_of(program, reference, parts, part, staged=staged)

@@ -143,6 +143,11 @@ class CompiledTree:
         numbers = self.geometry, self.offsets, self.lengths
         return any(float(np.abs(x).max(initial=0.0)) >= LARGE for x in numbers)
 
+    @cached_property
+    def turns_only(self) -> bool:
+        """Whether every step turns, so that the lengths of all paths are the same in every configuration."""
+        return bool((self.steps[:, Step.KIND] == Motion.TURN).all())
+
     def __reduce__(self) -> tuple[type[CompiledTree], tuple[Any, ...]]:
         return type(self), tuple(getattr(self, field.name) for field in fields(self))
 

@@ -51,13 +51,15 @@ class _Robot(Protocol):
 class PreparedFrame:
     """Fast evaluation of one frame in one reference frame; create it with `Robot.prepare`.
 
-    Results have the same bits as those of `Robot` with `verify=False`, and the ledger counts them as not
-    checked. Contiguous float64 arrays are used directly. For other arguments `Robot` computes the result, or
-    raises the error, as usual. Several threads may share one object, also on free-threaded Python.
+    Results have the same bits as those of `Robot`. Without `verify` the ledger counts them as not checked.
+    With `verify` each result is compared with Pinocchio's within the same bound as the robot's.
+    Contiguous float64 arrays are used directly. For other arguments `Robot` computes the result, or raises
+    the error, as usual. Several threads may share one object, also on free-threaded Python.
 
     Attributes:
         frame: The frame's name.
         reference: The reference frame of velocities, Jacobians, Hessians and accelerations.
+        verify: Whether each result is checked.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("panda")
@@ -71,11 +73,13 @@ class PreparedFrame:
 
     __slots__ = (
         "_acceleration", "_hessian", "_jacobian", "_placement", "_plan", "_robot", "_velocity", "frame",
-        "reference", "wanted",
+        "reference", "verify", "wanted",
     )  # fmt: skip
 
-    def __init__(self, robot: _Robot, frame: str, reference: Reference, plan: CompiledTree) -> None:
-        self.frame, self.reference = frame, reference
+    def __init__(
+        self, robot: _Robot, frame: str, reference: Reference, plan: CompiledTree, *, verify: bool = False
+    ) -> None:
+        self.frame, self.reference, self.verify = frame, reference, verify
         self._robot, self._plan = robot, plan
         #: Whether the user asked for this object, and so for machine code at the first call.
         self.wanted = False
@@ -88,9 +92,9 @@ class PreparedFrame:
 
     def __reduce__(self) -> tuple[Callable[..., PreparedFrame], tuple[str, Reference]]:
         # The object contains addresses of this process, so a copy is created by `Robot.prepare`.
-        return self._robot.prepare, (self.frame, self.reference)
+        return partial(self._robot.prepare, verify=self.verify), (self.frame, self.reference)
 
-    # The functions count their results for the ledger themselves.
+    # The functions count or check their results for the ledger themselves.
 
     def placement(self, q: Given, out: FloatArray | None = None) -> FloatArray:
         """Return T_world_frame (4, 4): eq. 7.77.
@@ -102,7 +106,7 @@ class PreparedFrame:
         """
         if (pose := self._placement(q, out)) is not None:
             return pose
-        return self._robot.placement(q, self.frame, out=out, verify=False, threads=1)
+        return self._robot.placement(q, self.frame, out=out, verify=self.verify, threads=1)
 
     def velocity(self, q: Given, v: Given, out: FloatArray | None = None) -> FloatArray:
         """Return the velocity (6,), [linear; angular], m/s and rad/s: eq. 7.127, 7.128.
@@ -114,7 +118,7 @@ class PreparedFrame:
         """
         if (six := self._velocity(q, v, out)) is not None:
             return six
-        return self._robot.velocity(q, v, self.frame, self.reference, out=out, verify=False, threads=1)
+        return self._robot.velocity(q, v, self.frame, self.reference, out=out, verify=self.verify, threads=1)
 
     def jacobian(self, q: Given, out: FloatArray | None = None) -> FloatArray:
         """Return the Jacobian (6, nv): eq. 7.85.
@@ -126,7 +130,7 @@ class PreparedFrame:
         """
         if (J := self._jacobian(q, out)) is not None:
             return J
-        return self._robot.jacobian(q, self.frame, self.reference, out=out, verify=False, threads=1)
+        return self._robot.jacobian(q, self.frame, self.reference, out=out, verify=self.verify, threads=1)
 
     def hessian(self, q: Given, out: FloatArray | None = None) -> FloatArray:
         """Return the derivatives (6, nv, nv) of `jacobian` by each joint velocity.
@@ -138,7 +142,7 @@ class PreparedFrame:
         """
         if (H := self._hessian(q, out)) is not None:
             return H
-        return self._robot.hessian(q, self.frame, self.reference, out=out, verify=False, threads=1)
+        return self._robot.hessian(q, self.frame, self.reference, out=out, verify=self.verify, threads=1)
 
     def acceleration(self, q: Given, v: Given, a: Given, out: FloatArray | None = None) -> FloatArray:
         """Return the classical acceleration (6,), [linear; angular], m/s^2 and rad/s^2: eq. 7.129, 7.130.
@@ -150,7 +154,9 @@ class PreparedFrame:
         """
         if (six := self._acceleration(q, v, a, out)) is not None:
             return six
-        return self._robot.acceleration(q, v, a, self.frame, self.reference, out=out, verify=False, threads=1)
+        return self._robot.acceleration(
+            q, v, a, self.frame, self.reference, out=out, verify=self.verify, threads=1
+        )
 
     def _first(self, quantity: str, q: Given, *others: object) -> FloatArray | None:
         """Create the function of a quantity, and call it; None as long as that does not pay."""
@@ -166,7 +172,11 @@ class PreparedFrame:
         if not arrays_are_known():
             return None
         compute, task = single(quantity, self._plan, self.reference)
-        self._robot.verifier.ledger.account(quantity).counters.append((task, KernelArgs.COUNT))
+        verifier = self._robot.verifier
+        if self.verify:
+            compute = verifier.checked(quantity, compute, self._plan, self.frame, self.reference)
+        else:
+            verifier.ledger.account(quantity).counters.append((task, KernelArgs.COUNT))
         setattr(self, f"_{quantity}", compute)
         if (found := compute(q, *others)) is not None:
             warn_of_degrees(

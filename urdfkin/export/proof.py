@@ -24,7 +24,7 @@ from urdfkin.model.recursion import Number
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.lazy_import import own_version
-from urdfkin.verify.call import Call
+from urdfkin.verify.call import Call, Part
 from urdfkin.verify.certificate import Certificate
 from urdfkin.verify.exact.numbers import DIGITS, enough_digits, exact, precision, read_exact
 from urdfkin.verify.exact.recursion import move
@@ -155,11 +155,10 @@ def _single(x: FloatArray) -> FloatArray:
     return x.astype(np.float32).astype(np.float64)
 
 
-def _within(function: Function, part: object) -> FloatArray:
+def _within(function: Function, part: Part) -> FloatArray:
     """Return the error bounds k * scale, (n, numbers), in eps."""
-    bound = bound_of(function.quantity, part)  # type: ignore[arg-type]
+    bound, n = bound_of(function.quantity, part), len(part.q)
     scale = np.where(bound.scale > 0.0, np.maximum(bound.scale, SMALLEST), 0.0)
-    n = len(scale)
     shape = (n, 1, *function.shape)
     return np.asarray(np.broadcast_to(scale * bound.k, shape)).reshape(n, -1)
 

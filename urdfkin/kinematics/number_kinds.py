@@ -17,6 +17,9 @@ number.
 
 from __future__ import annotations
 
+from operator import add
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -38,13 +41,22 @@ array_equations = bound(
 FloatArray = NDArray[np.float64]
 
 
-def product(x: FloatArray | float, y: FloatArray | float) -> FloatArray:
-    """Return x y of numbers >= 0; at least `SMALLEST` if neither of them is zero."""
+#: A length: an array with a number for each configuration, or Python's number for one configuration.
+Length = Any
+
+
+def product(x: Length, y: Length) -> Length:
+    """Return x y of numbers >= 0; at least `SMALLEST` if neither of them is zero.
+
+    >>> product(1e-200, 1e-200) == SMALLEST, product(0.0, 1e-200), product(np.array([2.0]), 3.0)
+    (True, 0.0, array([6.]))
+    """
+    if type(x) is float and type(y) is float:
+        return SMALLEST if x * y < SMALLEST and x != 0.0 and y != 0.0 else x * y
     xy = np.asarray(np.multiply(x, y))
-    small = xy < SMALLEST
-    if not small.any():
+    if xy.min(initial=np.inf) >= SMALLEST:
         return xy
-    return np.where(small & (np.not_equal(x, 0.0) & np.not_equal(y, 0.0)), SMALLEST, xy)
+    return np.where((xy < SMALLEST) & (np.not_equal(x, 0.0) & np.not_equal(y, 0.0)), SMALLEST, xy)
 
 
 def counted(x: FloatArray) -> FloatArray:
@@ -62,11 +74,11 @@ def norm(x: FloatArray) -> FloatArray:
     return counted(np.hypot.reduce(x, axis=-1))
 
 
-#: The equations on lengths. Each number or vector is replaced by an array of absolute values or lengths; the
-#: arrays broadcast. A unit vector has length 1.
+#: The equations on lengths. Each number or vector is replaced by its absolute value or length, as Python's
+#: number or as an array; arrays broadcast. A unit vector has length 1.
 length_equations = bound(
-    plus=np.add,
-    minus=np.add,
+    plus=add,
+    minus=add,
     times=product,
     dot=product,
     cross=product,

@@ -297,8 +297,8 @@ def _mapping(prefix: str, old: Mapping[str, str], new: Mapping[str, str]) -> Ite
 
 
 def _robots(old: Document, new: Document, factor: float) -> Iterator[Change]:
-    before, after = _by_source(old), _by_source(new)
-    renamed = _renamed(before, after)
+    before, after = by_source(old), by_source(new)
+    renamed = renamed_files(before, after)
     for source in dict.fromkeys([*before, *after]):
         if source in renamed:
             yield Change(source, "file", source, renamed[source])
@@ -314,7 +314,7 @@ def _robots(old: Document, new: Document, factor: float) -> Iterator[Change]:
             yield from _robot(source, before[source], after[source], factor)
 
 
-def _by_source(document: Document) -> dict[str, Robot]:
+def by_source(document: Document) -> dict[str, Robot]:
     """Return robots by their source. If a source occurs several times, a number is added to it."""
     named: dict[str, Robot] = {}
     for robot in document["robots"]:
@@ -326,7 +326,7 @@ def _by_source(document: Document) -> dict[str, Robot]:
     return named
 
 
-def _renamed(before: Mapping[str, Robot], after: Mapping[str, Robot]) -> dict[str, str]:
+def renamed_files(before: Mapping[str, Robot], after: Mapping[str, Robot]) -> dict[str, str]:
     """Return renamed files: a missing and a new source with the same robot name."""
     gone, new = _by_name(before, after), _by_name(after, before)
     return {

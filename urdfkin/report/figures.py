@@ -39,7 +39,7 @@ def distributions(robot: Robot, edges: Sequence[float], prefix: str) -> str:
         axes = figure.add_subplot()
         right = _right(robot["checks"], edges)
         for row, name in enumerate(names):
-            _row(axes, len(names) - 1 - row, of_quantity(robot, name), np.asarray(edges))
+            _row(axes, len(names) - 1 - row, of_quantity(robot, name), np.asarray(edges), right)
         _decorate(axes, names, right)
         descriptions = (
             f"{quantity_name(name)}: worst {units(worst(c['worst'] for c in of_quantity(robot, name)))}"
@@ -59,7 +59,7 @@ def _right(checks: Sequence[Check], edges: Sequence[float]) -> float:
     return float(min(max(ends) * 2.0, edges[-1] * 10.0))
 
 
-def _row(axes: Axes, base: int, checks: Sequence[Check], edges: np.ndarray) -> None:
+def _row(axes: Axes, base: int, checks: Sequence[Check], edges: np.ndarray, right: float) -> None:
     counts = np.sum([check["histogram"] for check in checks], axis=0)
     results = counts.sum()
     first = int(np.searchsorted(edges, _LEFT))
@@ -91,9 +91,9 @@ def _row(axes: Axes, base: int, checks: Sequence[Check], edges: np.ndarray) -> N
     )
     _bound(axes, base, checks)
     largest = worst(check["worst"] for check in checks)
-    if largest is None:  # NaN or infinity: draw a separate mark at the right end
+    if largest is None or largest > right:  # not on the axis: draw a separate mark at its right end
         axes.annotate(
-            "✗ not finite",
+            "✗ not finite" if largest is None else f"✗ {units(largest)} ▸",
             (1.0, base + 0.13),
             xycoords=("axes fraction", "data"),
             ha="right",

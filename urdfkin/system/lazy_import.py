@@ -20,13 +20,15 @@ from urdfkin.system.locks import importing
 
 
 def lazy_import(home: str) -> Callable[..., Any]:
-    """Return a function that imports `module:name` when it is called, and calls it."""
+    """Return a function that imports `module:name` when it is first called, and calls it."""
     module, _, name = home.partition(":")
+    get, imported = attrgetter(name), list[Any]()
 
     def call(*arguments: Any, **options: Any) -> Any:
-        with importing:
-            found = import_module(module)
-        return attrgetter(name)(found)(*arguments, **options)
+        if not imported:
+            with importing:
+                imported.append(import_module(module))
+        return get(imported[0])(*arguments, **options)
 
     return call
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from urdfkin.compiled import preload
-from urdfkin.verify.comparison import KERNELS
+from urdfkin.verify.comparison import CHECKS, KERNELS
 
 
 def load_kernels() -> None:
     """Compile each kernel or read it from disk, before worker processes start that would each compile it."""
     preload.load_kernels()
-    for name in ("worst", "coupling"):
+    for name in CHECKS:
         preload.load(name, KERNELS)

@@ -37,12 +37,13 @@ The scale of alpha includes it, because the equation receives the w of the link 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from urdfkin.compiled.plan import Column, CompiledTree, Geometry, Motion, Step
-from urdfkin.kinematics.number_kinds import counted, norm, product
+from urdfkin.kinematics.number_kinds import Length, counted, norm, product
 from urdfkin.kinematics.number_kinds import length_equations as eq
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, MUJOCO, ROUNDINGS, of_joints
 from urdfkin.model.reference import Reference
@@ -88,30 +89,87 @@ def magnitudes(
         a: (n, nv) or None.
         base: (1 or n, 24) state of the moving base.
     """
+    n = len(q)
     if v is not None and a is None:
         a = np.zeros((1, plan.nv))
-    states = [[norm(base[:, at : at + 3]) for at in (9, 12, 15, 18, 21)]]
-    lengths = counted(plan.lengths)
-    for i in range(len(plan.steps)):
-        state = states[plan.parents[i] + 1]
+    # The numbers of each coordinate; Python's numbers for one configuration.
+    rows, rates, rates_2, still = (None if x is None else _columns(x, n) for x in (q, v, a, base))
+    assert rows is not None
+    assert still is not None
+    states = [[_norm(still[at : at + 3]) for at in (9, 12, 15, 18, 21)]]
+    lengths = _lengths(plan)
+    for link in lengths.links:
+        state = states[link.parent + 1]
         moved = (
-            _place(plan, i, state, lengths[i], q)
-            if v is None or a is None
-            else _step(plan, i, state, lengths[i], q, v, a)
+            _place(link, state, rows)
+            if rates is None or rates_2 is None
+            else _step(link, state, rows, rates, rates_2)
         )
         states.append(moved)
     carry = _carry if v is not None else _carry_place
-    out = np.empty((6, len(q), len(plan.frames)))
-    for f, (step, place) in enumerate(plan.frames):
-        carried = carry(states[step + 1], lengths[len(plan.steps) + f])
+    out = np.empty((6, n, len(lengths.ends)))
+    for end in lengths.ends:
+        carried = carry(states[end.step + 1], end.length)
         for row, values in zip(out, carried, strict=False):
-            row[:, place] = values  # a value equal for all configurations is a scalar
+            row[:, end.place] = values  # a value equal for all configurations is a scalar
     turned = (base[:, :9] != _UNTURNED).any(axis=1)  # a rotated base rounds like a joint
     out[5] = of_joints(plan.depth + 1 + turned[:, np.newaxis], plan.tilts)
     return Magnitudes(*out)
 
 
-def _carry(state: list[FloatArray], d: FloatArray | float) -> list[FloatArray]:
+class _Link(NamedTuple):
+    """A step of the recursion on lengths; the multiplier and the constant are absolute values."""
+
+    kind: int
+    q: int
+    v: int
+    parent: int
+    length: float
+    multiplier: float
+    constant: float
+
+
+class _End(NamedTuple):
+    """A frame: its step, its index in the output, and the length from the step to the frame."""
+
+    step: int
+    place: int
+    length: float
+
+
+class _Lengths(NamedTuple):
+    links: list[_Link]
+    ends: list[_End]
+
+
+def _lengths(plan: CompiledTree) -> _Lengths:
+    """Return the steps and frames of a plan as Python's numbers; they are collected once."""
+    found: _Lengths | None = plan.made.get("lengths")
+    if found is None:
+        lengths, count = counted(plan.lengths).tolist(), len(plan.steps)
+        rules = np.abs(plan.geometry[:, Geometry.MULTIPLIER :]).tolist()
+        steps = zip(plan.steps.tolist(), plan.parents.tolist(), lengths[:count], rules, strict=True)
+        links = [
+            _Link(kind, q, v, parent, length, multiplier, float(counted(constant)))
+            for (kind, q, v), parent, length, (multiplier, constant) in steps
+        ]
+        frames = zip(plan.frames.tolist(), lengths[count:], strict=True)
+        ends = [_End(step, place, length) for (step, place), length in frames]
+        found = plan.made["lengths"] = _Lengths(links, ends)
+    return found
+
+
+def _columns(x: FloatArray, n: int) -> Any:
+    """Return the columns of (n or 1, ...) numbers, or Python's numbers of one row."""
+    return x[0].tolist() if n == len(x) == 1 else x.T
+
+
+def _norm(x: Any) -> Length:
+    """Return the length of a vector of columns or of Python's numbers."""
+    return norm(x.T) if isinstance(x, np.ndarray) else float(norm(np.array(x))) if any(x) else 0.0
+
+
+def _carry(state: list[Length], d: Length) -> list[Length]:
     p, w, vel, alpha, acc = state
     return [
         eq.point_position(p, None, d),
@@ -122,41 +180,27 @@ def _carry(state: list[FloatArray], d: FloatArray | float) -> list[FloatArray]:
     ]
 
 
-def _carry_place(state: list[FloatArray], d: FloatArray | float) -> list[FloatArray]:
+def _carry_place(state: list[Length], d: Length) -> list[Length]:
     return [eq.point_position(state[0], None, d), *state[1:]]
 
 
-def _slid(plan: CompiledTree, i: int, q: FloatArray) -> FloatArray:
-    """Return a bound on the displacement of a prismatic, planar or floating joint, (n,) m."""
-    kind, at = int(plan.steps[i, Step.KIND]), int(plan.steps[i, Step.Q])
-    if kind != Motion.SLIDE:
-        return norm(q[:, at : at + (2 if kind == Motion.PLANAR else 3)])
-    multiplier, constant = np.abs(plan.geometry[i, Geometry.MULTIPLIER :])
-    return product(multiplier, np.abs(q[:, at])) + counted(constant)
+def _slid(link: _Link, q: Any) -> Length:
+    """Return a bound on the displacement of a prismatic, planar or floating joint, m."""
+    if link.kind != Motion.SLIDE:
+        return _norm(q[link.q : link.q + (2 if link.kind == Motion.PLANAR else 3)])
+    return product(link.multiplier, abs(q[link.q])) + link.constant
 
 
-def _place(
-    plan: CompiledTree, i: int, state: list[FloatArray], length: float, q: FloatArray
-) -> list[FloatArray]:
-    turns = plan.steps[i, Step.KIND] == Motion.TURN
-    return _carry_place(state, length if turns else length + _slid(plan, i, q))
+def _place(link: _Link, state: list[Length], q: Any) -> list[Length]:
+    return _carry_place(state, link.length if link.kind == Motion.TURN else link.length + _slid(link, q))
 
 
-def _step(
-    plan: CompiledTree,
-    i: int,
-    state: list[FloatArray],
-    length: float,
-    q: FloatArray,
-    v: FloatArray,
-    a: FloatArray,
-) -> list[FloatArray]:
-    kind, rate_at = int(plan.steps[i, Step.KIND]), int(plan.steps[i, Step.V])
-    d = length if kind == Motion.TURN else length + _slid(plan, i, q)
+def _step(link: _Link, state: list[Length], q: Any, v: Any, a: Any) -> list[Length]:
+    kind, at = link.kind, link.v
+    d = link.length if kind == Motion.TURN else link.length + _slid(link, q)
     p, w, vel, alpha, acc = _carry(state, d)
     if kind in (Motion.TURN, Motion.SLIDE):
-        multiplier = abs(plan.geometry[i, Geometry.MULTIPLIER])
-        rate, rate_2 = (product(multiplier, np.abs(x[:, rate_at])) for x in (v, a))
+        rate, rate_2 = product(link.multiplier, abs(v[at])), product(link.multiplier, abs(a[at]))
         if kind == Motion.SLIDE:
             acc = eq.sliding_acceleration(acc, w, _Z, rate, rate_2)
             return [p, w, eq.sliding_velocity(vel, _Z, rate), alpha, acc]
@@ -164,8 +208,7 @@ def _step(
         return [p, w, vel, eq.angular_acceleration(alpha, w, _Z, rate, rate_2), acc]
     slides, turns = (2, 1) if kind == Motion.PLANAR else (3, 3)
     (u, o), (u_rate, o_rate) = (
-        (norm(x[:, rate_at : rate_at + slides]), norm(x[:, rate_at + slides : rate_at + slides + turns]))
-        for x in (v, a)
+        (_norm(x[at : at + slides]), _norm(x[at + slides : at + slides + turns])) for x in (v, a)
     )
     alpha = eq.free_angular_acceleration(alpha, eq.plus(w, o), o, o_rate)
     acc = eq.free_acceleration(acc, w, o, u, u_rate)
@@ -197,7 +240,8 @@ def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
     A k that is not finite and positive becomes NaN, so that no result is within its bound.
     """
     k = bound.k.reshape(bound.k.shape[: len(leading)])
-    return np.broadcast_to(np.where((k > 0.0) & (k < np.inf), k, np.nan), leading)
+    k = np.where((k > 0.0) & (k < np.inf), k, np.nan)
+    return k if k.shape == leading else np.broadcast_to(k, leading)
 
 
 def bound_of(scale: FloatArray, factors: int, size: Magnitudes, reference: Reference = _ALIGNED) -> Bound:

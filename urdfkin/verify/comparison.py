@@ -15,8 +15,9 @@ from urdfkin.compiled import preload
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
 from urdfkin.model.tree import FloatArray
 
-#: The module of the kernels of checks.
+#: The module of the kernels of checks, and these kernels.
 KERNELS = "urdfkin.verify.kernels"
+CHECKS = "worst", "coupling"
 
 
 def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes: int) -> FloatArray:
@@ -32,18 +33,27 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
         An array of the leading axes' shape, in eps * scale.
     """
     leading, own = ours.shape[:axes], ours.shape[axes:]
-    flat = [
-        np.ascontiguousarray(np.broadcast_to(x, ours.shape)).reshape(math.prod(leading), math.prod(own))
-        for x in (ours, theirs, scale)
-    ]
+    n, numbers = math.prod(leading), math.prod(own)
+    # The scale of one configuration is not copied for the others.
+    shared = axes > 0 and scale.ndim == ours.ndim and len(scale) == 1
+    shape = (1, *ours.shape[1:]) if shared else ours.shape
+    one, other = _rows(ours, ours.shape, n, numbers), _rows(theirs, ours.shape, n, numbers)
+    size = _rows(scale, shape, math.prod(shape[:axes]), numbers)
     if (kernel := preload.kernel("worst", home=KERNELS)) is None:
         begin = time.thread_time()
-        worst = _worst(*flat)
+        worst = _worst(one, other, size if len(size) == n else size[np.arange(n) % len(size)])
         preload.spend("worst", time.thread_time() - begin)
     else:
-        worst = np.zeros(len(flat[0]))
-        kernel(*flat, worst)
+        worst = np.empty(n)
+        kernel(one, other, size, worst)
     return worst.reshape(leading)
+
+
+def _rows(x: FloatArray, shape: tuple[int, ...], n: int, numbers: int) -> FloatArray:
+    """Return an array that broadcasts to a shape, as `n` rows."""
+    if x.shape != shape:
+        x = np.broadcast_to(x, shape)
+    return np.ascontiguousarray(x).reshape(n, numbers)
 
 
 @np.errstate(all="ignore")

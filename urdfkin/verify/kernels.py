@@ -17,24 +17,76 @@ def _finite(x, i):
     return total == 0.0
 
 
+@helper(fastmath={"reassoc"})
+def _finite_difference(x, y, i):
+    """Return whether the differences of two rows are finite; they are not if a number of a row is not."""
+    total = 0.0
+    for j in range(x.shape[1]):
+        total += 0.0 * (x[i, j] - y[i, j])
+    return total == 0.0
+
+
 @helper(fastmath={"nnan", "nsz"})
-def _largest(ours, theirs, scale, i):
-    """Return the largest difference in a row of finite numbers; the compiler may reorder the comparisons."""
+def _units(difference, size):
+    """Return a difference in multiples of eps * scale."""
+    must_be_equal = math.inf if difference > 0.0 else 0.0
+    return difference / max(EPS * size, LEAST_UNIT) if size > 0.0 else must_be_equal
+
+
+@helper(fastmath={"nnan", "nsz"})
+def _largest(ours, theirs, scale, i, k):
+    """Return the largest difference in a row of finite numbers; the compiler may reorder the comparisons.
+
+    The scale is in row `k`.
+    """
     largest = 0.0
     for j in range(ours.shape[1]):
-        size, difference = scale[i, j], abs(ours[i, j] - theirs[i, j])
-        must_be_equal = math.inf if difference > 0.0 else 0.0
-        units = difference / max(EPS * size, LEAST_UNIT) if size > 0.0 else must_be_equal
-        largest = max(largest, units)
+        largest = max(largest, _units(abs(ours[i, j] - theirs[i, j]), scale[k, j]))
+    return largest
+
+
+@helper()
+def _is_in_threes(scale, k):
+    """Return whether the three linear rows of a scale are equal, and the three angular rows."""
+    width = scale.shape[1] // 6
+    equal = scale.shape[1] == 6 * width
+    for first in range(0, 6 * width, max(3 * width, 1)):
+        for j in range(first, first + width):
+            equal = equal and scale[k, j] == scale[k, j + width] == scale[k, j + 2 * width]
+    return equal
+
+
+@helper(fastmath={"nnan", "nsz"})
+def _largest_of_threes(ours, theirs, scale, i, k):
+    """Return `_largest` of six rows; three rows share a scale, so the largest of three numbers is divided."""
+    largest, width = 0.0, ours.shape[1] // 6
+    for half in range(2):
+        for j in range(3 * half * width, (3 * half + 1) * width):
+            x = abs(ours[i, j] - theirs[i, j])
+            y = abs(ours[i, j + width] - theirs[i, j + width])
+            z = abs(ours[i, j + 2 * width] - theirs[i, j + 2 * width])
+            largest = max(largest, _units(max(x, y, z), scale[k, j]))
     return largest
 
 
 @kernel(ROWS, ROWS, ROWS, SCRATCH)
 def worst(ours, theirs, scale, out):
-    """Write the largest difference in each row; inf for a row that is not finite."""
+    """Write the largest difference in each row; inf for a row that is not finite.
+
+    If the scale has fewer rows, they are repeated.
+    """
+    known = in_threes = len(scale) < len(out)
+    for k in range(len(scale)):
+        known = known and _finite(scale, k)
+        in_threes = in_threes and _is_in_threes(scale, k)
     for i in range(len(out)):
-        good = _finite(ours, i) and _finite(theirs, i) and _finite(scale, i)
-        out[i] = _largest(ours, theirs, scale, i) if good else math.inf
+        k = i % len(scale)
+        if not (_finite_difference(ours, theirs, i) and (known or _finite(scale, k))):
+            out[i] = math.inf
+        elif in_threes:
+            out[i] = _largest_of_threes(ours, theirs, scale, i, k)
+        else:
+            out[i] = _largest(ours, theirs, scale, i, k)
     return 0
 
 

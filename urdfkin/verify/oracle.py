@@ -192,7 +192,7 @@ class OracleQuery:
         if self.base is not None:
             axes += [self.base.placement.shape[:-2], self.base.velocity.shape[:-1]]
             axes.append(self.base.acceleration.shape[:-1])
-        return np.broadcast_shapes(*axes)
+        return axes[0] if len(set(axes)) == 1 else np.broadcast_shapes(*axes)
 
     @cached_property
     def n(self) -> int:
@@ -201,12 +201,14 @@ class OracleQuery:
 
     def rows(self, part: slice | IntArray) -> QueryBatch:
         """Return some of the configurations, by index in the flat batch (C order)."""
-        numbers = np.arange(part.start, part.stop) if isinstance(part, slice) else part
-        places = np.unravel_index(numbers, self.shape) if self.shape else (np.zeros(1, dtype=np.int64),)
 
         def pick(x: FloatArray, own: int = 1) -> FloatArray:
-            spread: FloatArray = np.broadcast_to(x, (*(self.shape or (1,)), *x.shape[x.ndim - own :]))
-            return spread[places]
+            batch, one = x.shape[: x.ndim - own], x.shape[x.ndim - own :]
+            if batch == self.shape:
+                return x.reshape(self.n, *one)[part]
+            numbers = np.arange(part.start, part.stop) if isinstance(part, slice) else part
+            spread: FloatArray = np.broadcast_to(x, (*self.shape, *one))
+            return spread[np.unravel_index(numbers, self.shape)]
 
         base = self.base
         if base is not None:

@@ -12,7 +12,9 @@ index "full" marks Pinocchio's vectors, in which mimic joints have numbers of th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import islice, repeat
 from types import MappingProxyType
 from typing import Any
 
@@ -44,6 +46,9 @@ _SHALLOW = 100
 #: below 2 GB.
 MOST_RATES = 315
 
+#: Number of values of Pinocchio's results that are collected before they are copied together. They fit into
+#: the processor's cache.
+_AT_A_TIME = 16384
 #: Name of the free-flyer of a moving base.
 _BASE = "base"
 
@@ -210,13 +215,25 @@ class PinocchioOracle(Oracle):
         return self._six(x, 3, self._pin.getFrameClassicalAcceleration)
 
     def _six(self, x: QueryBatch, count: int, get: Callable[..., Any]) -> FloatArray:
-        inputs, ids, wanted = self._inputs(x, count), self._ids(x), self._reference(x.reference)
-        compute = self._pin.forwardKinematics
-        return self._collected((6,), inputs, compute, lambda *which: get(*which).vector, ids, wanted)
+        model, data, ids, wanted = self._model, self.data, self._ids(x), self._reference(x.reference)
+        steps = self._each(self._pin.forwardKinematics, self._inputs(x, count))
+        return _stacked(
+            lambda n: [get(model, data, one, wanted).vector for _ in islice(steps, n) for one in ids],
+            *(len(x.q), len(ids), 6),
+        )
 
     def jacobians(self, x: QueryBatch) -> FloatArray:
-        """Return Jacobians (n, frames, 6, nv) by `getFrameJacobian`, or `getJointJacobian` of joints."""
+        """Return Jacobians (n, frames, 6, nv), of one frame by `computeFrameJacobian`.
+
+        That function computes only the joints of the frame's path. Jacobians of several frames are computed
+        by `getFrameJacobian`, those of joints by `getJointJacobian`.
+        """
         pin = self._pin
+        if len(x.frames) == 1 and not x.joints:
+            (one,), wanted = self._ids(x), self._reference(x.reference)
+            found = self._each(pin.computeFrameJacobian, self._inputs(x, 1), one, wanted)
+            J = _stacked(lambda n: list(islice(found, n)), len(x.q), 1, 6, self._model.nv)
+            return self._layout.couple(J)
         get = pin.getJointJacobian if x.joints else pin.getFrameJacobian
         return self._columns(x, 1, pin.computeJointJacobians, get)
 
@@ -269,6 +286,12 @@ class PinocchioOracle(Oracle):
             out[k] = J.reshape(6, model.nv)[:, columns]
         return out
 
+    def _each(
+        self, function: Callable[..., Any], inputs: Sequence[FloatArray], *others: object
+    ) -> Iterator[Any]:
+        """Call a function of Pinocchio for each configuration."""
+        return map(function, repeat(self._model), repeat(self.data), *inputs, *map(repeat, others))
+
     def _collected(
         self,
         own: tuple[int, ...],
@@ -278,26 +301,32 @@ class PinocchioOracle(Oracle):
         ids: Sequence[int],
         *reference: Any,
     ) -> FloatArray:
-        """Return (n, ids, *own): call `compute` for each configuration, then `get` for each frame or joint.
+        """Return (n, ids, *own): `compute` for each configuration, then `get` for each frame or joint."""
+        model, data, steps = self._model, self.data, self._each(compute, inputs)
+        return _stacked(
+            lambda n: [get(model, data, one, *reference) for _ in islice(steps, n) for one in ids],
+            *(len(inputs[0]), len(ids), *own),
+        )
 
-        The loop for one frame is separate from the loop for several, to make the check of one frame fast.
-        """
-        model, data, n = self._model, self.data, len(inputs[0])
-        out = np.empty((n, len(ids), *own))
-        if not all(own):  # Pinocchio 4.1 crashes the process for a Jacobian without columns
-            return out
-        flat = out.reshape(n, len(ids), *((6,) if own == (6, 1) else own))
-        if len(ids) == 1:
-            (one,), alone = ids, flat[:, 0]
-            for k, x in enumerate(zip(*inputs, strict=True)):
-                compute(model, data, *x)
-                alone[k] = get(model, data, one, *reference)
-            return out
-        for to, x in zip(flat, zip(*inputs, strict=True), strict=True):
-            compute(model, data, *x)
-            for place, one in enumerate(ids):
-                to[place] = get(model, data, one, *reference)
+
+def _stacked(compute: Callable[[int], list[FloatArray]], *shape: int) -> FloatArray:
+    """Return results as one array of a shape (n, frames, ...); without numbers none is computed.
+
+    Pinocchio 4.1 crashes the process for a Jacobian without columns, and returns a vector for one column.
+
+    Args:
+        compute: Returns the results of all frames for the next configurations, at most the given number.
+        shape: Shape of all results.
+    """
+    out = np.empty(shape)
+    if 0 in shape:
         return out
+    rows = out.reshape(-1, *(size for size in shape[3:] if size > 1))
+    n = max(_AT_A_TIME // math.prod(shape[1:]), 1)
+    step = n * shape[1] * shape[2]
+    for at in range(0, len(rows), step):
+        np.concatenate(compute(n), out=rows[at : at + step])
+    return out
 
 
 def depth_of(tree: KinematicTree) -> int:

@@ -150,11 +150,24 @@ class Layout:
             self._places.append(_Place(own, *full, *at[rule.leader], rule.multiplier, rule.offset))
         self.rate_columns = [place.full_v + c for place in self._places for c in range(place.sizes[1])]
         self._index, self._factor = self._rates()
+        self._columns = np.array(self.rate_columns, dtype=np.int64)
+        self._free = [place for place in self._places if place.sizes in (_PLANAR, _FLOATING)]
+        self._single, self._angles = (self._of_sizes(sizes) for sizes in ((1, 1), _CONTINUOUS))
         #: True if Pinocchio's coordinates, or joint velocities, are equal to the robot's.
         plain = [(p.q, (1, 1), 1.0, 0.0) == (p.full_q, p.sizes, p.multiplier, p.offset) for p in self._places]
         self._same_q = all(plain) and model.nq == self.nq
         self._same_v = model.nv == self.nv and bool((self._factor == 1.0).all())
         self._same_v &= bool((self._index == np.arange(model.nv)).all())
+
+    def _of_sizes(self, sizes: tuple[int, int]) -> tuple[Places, Places, FloatArray, FloatArray]:
+        """Return the indices in Pinocchio's and urdfkin's q, and the rules, of the joints of some sizes."""
+        own = [place for place in self._places if place.sizes == sizes]
+        return (
+            np.array([place.full_q for place in own], dtype=np.int64),
+            np.array([place.q for place in own], dtype=np.int64),
+            np.array([place.multiplier for place in own]),
+            np.array([place.offset for place in own]),
+        )
 
     def _rates(self) -> tuple[Places, FloatArray]:
         """Return the index in v and the factor in G of each joint velocity of Pinocchio; 0 for the base."""
@@ -170,23 +183,25 @@ class Layout:
         if self._same_q:
             return np.array(q)
         full = np.zeros((len(q), self._model.nq))
-        for sizes, at, _, own, _, multiplier, offset in self._places:
+        to, of, multiplier, offset = self._single
+        full[:, to] = multiplier * q[:, of] + offset
+        to, of, multiplier, offset = self._angles
+        if len(to):
+            angles = multiplier * q[:, of] + offset
+            full[:, to], full[:, to + 1] = np.cos(angles), np.sin(angles)
+        for sizes, at, _, own, *_ in self._free:
             if sizes == _FLOATING:
                 full[:, at : at + 7] = q[:, own : own + 7]
                 full[:, at + 3 : at + 7] /= np.linalg.norm(full[:, at + 3 : at + 7], axis=1, keepdims=True)
-            elif sizes == _PLANAR:
+            else:
                 full[:, at : at + 2] = q[:, own : own + 2]
                 full[:, at + 2], full[:, at + 3] = np.cos(q[:, own + 2]), np.sin(q[:, own + 2])
-            else:
-                value = multiplier * q[:, own] + offset
-                if sizes == _CONTINUOUS:
-                    full[:, at], full[:, at + 1] = np.cos(value), np.sin(value)
-                else:
-                    full[:, at] = value
         return full
 
     def rates(self, v: FloatArray) -> FloatArray:
         """Return v_full = G v, Pinocchio's joint velocities (n, model.nv) for v (n, nv)."""
+        if self._same_v:
+            return np.array(v)
         if not self.nv:
             return np.zeros((len(v), self._model.nv))
         full: FloatArray = v[:, self._index] * self._factor
@@ -196,7 +211,7 @@ class Layout:
         """Return J_full G: add each mimic joint's column to its mimicked joint's; omit the base's columns."""
         if self._same_v:
             return full
-        return coupled(full, np.array(self.rate_columns, dtype=np.int64), self._index, self._factor, self.nv)
+        return coupled(full, self._columns, self._index, self._factor, self.nv)
 
 
 #: Pinocchio's name of the world, the parent of a root joint.

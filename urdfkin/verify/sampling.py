@@ -113,7 +113,7 @@ SAMPLE = 100
 #: Largest number of values, and of configurations, that are compared at a time. It is large enough for
 #: efficient array expressions and small enough for the processor's cache. It also limits the memory for large
 #: batches.
-_AT_A_TIME = 131_072
+_AT_A_TIME = 262_144
 _MOST = 4096
 
 

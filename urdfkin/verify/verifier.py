@@ -6,15 +6,18 @@ returns.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from urdfkin.compiled.plan import IntArray
+from urdfkin.compiled import preload
+from urdfkin.compiled.plan import CompiledTree, IntArray
 from urdfkin.errors import RangeError, warn_caller
 from urdfkin.kinematics.roundings import EPS, NOT_ZERO, of_joints
-from urdfkin.model.base_motion import BaseMotion
+from urdfkin.model.base_motion import STILL_STATE, BaseMotion
+from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.system.lazy_import import own_version
 from urdfkin.urdf.sources import Origin
@@ -22,11 +25,12 @@ from urdfkin.verify import bounds
 from urdfkin.verify.bounds import Bound, magnitudes
 from urdfkin.verify.call import Call, Part
 from urdfkin.verify.certificate import Certificate, Comparison, Ledger, VerificationError, compare
+from urdfkin.verify.comparison import CHECKS, KERNELS
 from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.oracles import PINOCCHIO, Witness, WitnessName, witness_of
 from urdfkin.verify.pinocchio import OracleError, build_model
 from urdfkin.verify.pinocchio_module import pinocchio, version
-from urdfkin.verify.quantities import Quantity
+from urdfkin.verify.quantities import QUANTITIES, Quantity
 from urdfkin.verify.replay import replay_line
 from urdfkin.verify.sampling import SAMPLE, Verify, checked_choice, draw, parts
 
@@ -221,6 +225,50 @@ class Verifier:
         if left := call.results - total.results:
             ledger.unchecked(quantity.name, left, f'verify="sample" checks {SAMPLE} configurations of a call')
 
+    def checked(
+        self,
+        name: str,
+        compute: Callable[..., FloatArray | None],
+        plan: CompiledTree,
+        frame: str,
+        reference: Reference,
+    ) -> Callable[..., FloatArray | None]:
+        """Return a function that calls `compute`, checks its result as `check` does, and records the check.
+
+        The new function returns None if `compute` does so, and always if the oracle cannot check the robot.
+
+        Args:
+            name: Name of a quantity.
+            compute: Function of the inputs and `out` for one configuration; None for unsupported arguments.
+            plan: The compiled tree of the frame.
+            frame: Name of the frame, as the user gave it.
+            reference: Reference frame of the results.
+        """
+        quantity, by, frames = QUANTITIES[name], self.witness, (frame,)
+        if self.cannot(None, by) is not None:
+            return lambda *given: None
+        for kernel in CHECKS:  # Numba is imported already
+            preload.kernel(kernel, preload.LOADING, KERNELS)
+
+        def compute_and_check(*given: Any) -> FloatArray | None:
+            result = compute(*given)
+            if result is None:
+                return None
+            rows = tuple(x[np.newaxis] for x in given[:-1])
+            asked = QueryBatch(frames, rows, reference)
+            x = Part(plan, reference, rows[0], rows[1:], STILL_STATE, asked)
+            ours = result[np.newaxis, np.newaxis]
+            theirs, bound = held_against(quantity, self.oracle(None, by), x, ours, by)
+            comparison = compare(ours, theirs, bound, 2)
+            if comparison.agrees:
+                self.ledger.checked(name, comparison)
+            else:  # this check raises the error
+                call = Call(self.tree, lambda _: plan, frame, reference, None, given[:-1])
+                self.check(quantity, call, result, True)
+            return result
+
+        return compute_and_check
+
     def _compare(
         self, quantity: Quantity, call: Call, ours: FloatArray, part: slice | IntArray
     ) -> tuple[Comparison, VerificationError | None]:
@@ -348,10 +396,21 @@ def held_against(
 
 
 def bound_of(quantity: Quantity, x: Part, by: Witness = PINOCCHIO) -> Bound:
-    """Return the bound between urdfkin's and the oracle's results."""
+    """Return the bound between urdfkin's and the oracle's results; it broadcasts against the results.
+
+    Lengths of paths without sliding joints are the same in every configuration. On a fixed base, the bound of
+    a quantity that depends on lengths alone is therefore computed for one configuration, once.
+    """
     v, a = (*x.rates, None, None)[:2]
-    size = by.size(magnitudes(x.plan, x.q, v, a, x.state))
-    return quantity.bound(x.plan, size, x.reference)
+    constant = v is None and x.state is STILL_STATE and x.plan.turns_only and len(x.q) > 0
+    key = "bound", quantity.name, x.reference, by.name
+    bound: Bound | None = x.plan.made.get(key) if constant else None
+    if bound is None:
+        q = x.q[:1] if constant else x.q
+        bound = quantity.bound(x.plan, by.size(magnitudes(x.plan, q, v, a, x.state)), x.reference)
+        if constant:
+            x.plan.made[key] = bound
+    return bound
 
 
 def urdfkins(quantity: Quantity, x: Part) -> FloatArray:

@@ -12,7 +12,9 @@
   const AXIS_COLOURS = [0xd83a3a, 0x2f9e44, 0x3563e0];
   const Z = new THREE.Vector3(0, 0, 1), Y = new THREE.Vector3(0, 1, 0);
 
+  let printing = false;
   const isDark = () => {
+    if (printing) return false;
     const chosen = document.documentElement.dataset.theme;
     return chosen ? chosen === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
   };
@@ -464,18 +466,29 @@
     }
   }
 
-  // A view starts when it first comes into sight.
-  const watcher = new IntersectionObserver((entries) => {
-    for (const { target, isIntersecting } of entries) {
-      if (!isIntersecting) continue;
-      watcher.unobserve(target);
-      if (renderer()) target.view = new View(target);
-      else {
-        target.querySelector(".fallback").hidden = false;
-        target.querySelectorAll("canvas, .hint, .panel").forEach((part) => { part.hidden = true; });
-      }
+  // A view starts when it first comes into sight, or when the page is printed.
+  const start = (target) => {
+    watcher.unobserve(target);
+    if (renderer()) target.view = new View(target);
+    else {
+      target.querySelector(".fallback").hidden = false;
+      target.querySelectorAll("canvas, .hint, .panel").forEach((part) => { part.hidden = true; });
     }
+  };
+  const watcher = new IntersectionObserver((entries) => {
+    for (const { target, isIntersecting } of entries) if (isIntersecting) start(target);
   }, { rootMargin: "200px" });
+  // Paper has light colours in every theme. The drawing must be complete when the event returns.
+  const redraw = (onPaper) => {
+    printing = onPaper;
+    for (const target of document.querySelectorAll("[data-view]")) {
+      if (onPaper && !target.view && target.checkVisibility()) start(target);
+      target.view?.theme();
+      if (onPaper) target.view?.render();
+    }
+  };
+  addEventListener("beforeprint", () => redraw(true));
+  addEventListener("afterprint", () => redraw(false));
   const watch = (part) => part.querySelectorAll("[data-view]").forEach((section) => watcher.observe(section));
   watch(document);
   document.addEventListener("robotloaded", (event) => watch(event.detail));

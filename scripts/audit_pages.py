@@ -1,0 +1,439 @@
+"""Check reports, comparisons, the documentation site and the viewer in Chromium, as readers use them.
+
+Each page is opened at four widths, in a light and a dark theme. The script runs axe and looks for serious
+violations, errors in the console, sideways scrolling and requests to other hosts. It walks through the page
+with the Tab key, checks the HTML, and prints the page to a PDF. `--output` keeps pictures of all screens and
+of the printed pages.
+
+The script needs Debian's chromium and chromium-driver. axe is in the extra `test`. A newer axe and the Nu
+HTML checker, which needs Java, are optional. Debian's poppler-utils draws the printed pages.
+
+    npm install --prefix ~/.cache/urdfkin-audit axe-core vnu-jar
+    python -m scripts.audit_pages --output /tmp/audit
+    python -m scripts.audit_pages --only one same --output /tmp/audit
+"""
+
+from __future__ import annotations
+
+import argparse
+import base64
+import json
+import logging
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from importlib import util
+from itertools import product
+from pathlib import Path
+from typing import Any, cast
+from unittest.mock import patch
+
+import numpy as np
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.keys import Keys
+
+import urdfkin
+from tests.report.browser import Browser, opened
+from tests.report.documents import months_runs
+from urdfkin.comparison.result import Question
+from urdfkin.comparison.verdict import same
+from urdfkin.report.history import as_html as history_page
+from urdfkin.report.history import history
+from urdfkin.report.html import as_html
+from urdfkin.report.reading import read_document
+from urdfkin.report.same import as_html as same_page
+from urdfkin.validation.campaign import validate
+from urdfkin.validation.document import Document
+from urdfkin.verify.pinocchio import PinocchioOracle
+
+ROOT = Path(__file__).parents[1]
+#: Folder of npm's packages axe-core and vnu-jar.
+TOOLS = Path.home() / ".cache" / "urdfkin-audit" / "node_modules"
+WIDTHS = (390, 768, 1000, 1280)
+#: Violations that fail the audit. The others are printed.
+IMPACTS = ("serious", "critical")
+#: Code that unfolds everything on a page.
+UNFOLD = "document.querySelectorAll('details').forEach((part) => { part.open = true; })"
+#: Number of presses of the Tab key on a page, and of printed pages that are drawn.
+_PRESSES, _PAGES = 60, 12
+#: Errors of the HTML checker that the site's theme causes.
+FOREIGN = ("Attribute “autocomplete” is only allowed when the input type is",)
+#: A mouse: without one, the site's theme leaves out what a keyboard needs.
+_MOUSE = (
+    "--blink-settings=primaryHoverType=2,availableHoverTypes=2,primaryPointerType=4,availablePointerTypes=4"
+)
+
+_AXE = """
+const done = arguments[0];
+axe.run({ resultTypes: ["violations"] })
+  .then((found) => done(found.violations.map((v) => [
+    v.impact, v.id, v.nodes.length,
+    v.nodes.slice(0, 3).map((n) => n.target.join(" ") + " " + n.html.slice(0, 160)),
+  ])), (error) => done([["critical", "axe failed: " + error, 1, []]]));
+"""
+#: Tables that must fit every screen and do not: name, width, and width of the box around them.
+_CUT = """return [...document.querySelectorAll("#overview, .checks, #history, section > .scroll > table")]
+  .filter((t) => t.checkVisibility() && t.scrollWidth > t.parentElement.clientWidth)
+  .map((t) => [t.id || t.className, t.scrollWidth, t.parentElement.clientWidth]);"""
+#: The element with the focus: a description, and whether an outline, border or shadow shows the focus.
+_FOCUS = """
+let e = document.activeElement;
+if (!e || e === document.body) return null;
+const name = (e.ariaLabel || e.labels?.[0]?.textContent || e.textContent || e.title || "").trim();
+const style = getComputedStyle(e), box = e.getBoundingClientRect();
+const ringed = (s) => (parseFloat(s.outlineWidth) > 0 && s.outlineStyle !== "none") || s.boxShadow !== "none";
+const shown = ringed(style) || [...(e.labels ?? [])].some((l) => ringed(getComputedStyle(l)));
+return [e.tagName.toLowerCase() + " " + name.slice(0, 40), shown, box.width * box.height > 0, !!name];
+"""
+
+
+@dataclass(frozen=True)
+class Page:
+    """A page: its name, its address, the code that prepares it, and the addresses that it may request."""
+
+    name: str
+    url: str
+    prepare: str = ""
+    own: tuple[str, ...] = ("file:", "data:", "blob:", "chrome")
+    ready: str = ""
+    printed: bool = True
+    large: bool = False  # axe takes a minute on such a page, and runs on two screens only
+
+
+@dataclass
+class Faults:
+    """The faults of one page, each with its screen."""
+
+    page: str
+    lines: list[str] = field(default_factory=list)
+
+    def add(self, where: str, what: str) -> None:
+        """Note a fault once."""
+        line = f"{self.page}, {where}: {what}"
+        if line not in self.lines:
+            self.lines.append(line)
+
+
+def axe_script() -> str | None:
+    """Return the source of axe, from npm or from the extra `test`; None if it is missing."""
+    if (path := TOOLS / "axe-core" / "axe.min.js").is_file():
+        return path.read_text("utf-8")
+    found = util.find_spec("axe_core_python")
+    return (Path(str(found.origin)).parent / "axe.min.js").read_text("utf-8") if found else None
+
+
+def html_checker() -> Path | None:
+    """Return the path of the Nu HTML checker; None if it or Java is missing."""
+    path = TOOLS / "vnu-jar" / "build" / "dist" / "vnu.jar"
+    return path if path.is_file() and shutil.which("java") else None
+
+
+def disagreement() -> Document:
+    """Return the report of a real disagreement: the oracle's velocities are bent by a millionth."""
+    right = PinocchioOracle.velocities
+
+    def bent(*args: Any) -> Any:
+        return right(*args) * (1.0 + 1e-6)
+
+    with patch.object(PinocchioOracle, "velocities", bent):
+        return validate(["panda", "ur5"], samples=6).as_dict()
+
+
+def reports(folder: Path, fleet: Path | None) -> Iterator[tuple[str, Callable[[], str]]]:
+    """Yield the name of each page of a report or comparison, and the function that makes it."""
+    bad = folder / "broken.urdf"
+    bad.write_text('<robot name="broken"><link name="a"/><link name="a"/><joint name="j"/></robot>')
+    yield "good", lambda: as_html(validate(["panda", "ur5", "talos"], samples=6).as_dict())
+    yield "one", lambda: as_html(validate("panda", samples=20).as_dict())
+    yield "unreadable", lambda: as_html(validate([str(bad), "ur5"], samples=6).as_dict())
+    yield "disagreement", lambda: as_html(disagreement())
+    yield (
+        "fleet",
+        lambda: as_html(read_document(fleet) if fleet else validate(_all_robots(), samples=1).as_dict()),
+    )
+    yield "history", lambda: _history(folder)
+    for name, b, within in (
+        ("same", "ur5", None),
+        ("differs", "ur10", None),
+        ("within", "ur5_limited", 1e-3),
+    ):
+        yield f"same-{name}", lambda b=b, within=within: comparison(b, within)  # type: ignore[misc]
+
+
+def _history(folder: Path) -> str:
+    runs = folder / "runs"
+    runs.mkdir()
+    for i, report in enumerate(months_runs()):
+        (runs / f"{i}.json").write_text(json.dumps(report), encoding="utf-8")
+    (runs / "broken.json").write_text("{")
+    return history_page(history([runs]))
+
+
+def _all_robots() -> list[str]:
+    return [name for name in urdfkin.robots() if name != "ur3"]
+
+
+def comparison(b: str, within: float | None) -> str:
+    """Return the page that compares the UR5 with another robot."""
+    robots = urdfkin.load("ur5"), urdfkin.load(b)
+    return same_page(same(*robots, within=within), robots, Question(within))
+
+
+def made(folder: Path, only: list[str], fleet: Path | None = None) -> Iterator[Page]:
+    """Write the pages of reports and comparisons, and yield them."""
+    for name, make in reports(folder, fleet):
+        if only and not any(name.startswith(word) for word in only):
+            continue
+        path = folder / f"{name}.html"
+        path.write_text(make(), encoding="utf-8")
+        yield Page(name, path.as_uri(), large=name == "fleet")
+        if name in ("good", "disagreement"):
+            yield Page(f"{name}-unfolded", path.as_uri(), UNFOLD)
+
+
+def site(folder: Path) -> Iterator[Page]:
+    """Build the documentation site and yield some of its pages."""
+    from mkdocs.commands.build import build  # noqa: PLC0415  of the extra `docs`
+    from mkdocs.config import load_config  # noqa: PLC0415
+
+    logging.getLogger("mkdocs").setLevel(logging.ERROR)
+    config = load_config(str(ROOT / "mkdocs.yml"), site_dir=str(folder / "site"), strict=False)
+    config.plugins.on_startup(command="build", dirty=False)
+    build(config)
+    for name in (
+        "index",
+        "questions",
+        "reports",
+        "viewer",
+        "equations",
+        "lessons/planar-arm",
+        "cli",
+        "api/robot",
+    ):
+        yield Page(
+            f"site-{name.replace('/', '-')}", (folder / "site" / f"{name}.html").as_uri(), printed=False
+        )
+
+
+@contextmanager
+def viewer() -> Iterator[Page]:
+    """Serve the viewer with a robot without meshes."""
+    from urdfkin.view.server import new_server  # noqa: PLC0415  of the extra `view`
+    from urdfkin.view.viewer import Viewer  # noqa: PLC0415
+
+    server = new_server(port=8097)
+    try:
+        robot = urdfkin.load("planar_two_link")
+        Viewer(server, robot, np.array([0.4, 0.8]))
+        host = f"127.0.0.1:{server.get_port()}"
+        own = (f"http://{host}", f"ws://{host}", "data:", "blob:", "chrome")
+        ready = (  # a telephone's screen folds the controls
+            "return !!document.querySelector('canvas')"
+            " && (!!document.getElementById('fold') || document.body.innerText.includes('verified'))"
+        )
+        yield Page("viewer", server.address, own=own, ready=ready, printed=False)
+    finally:
+        server.stop()
+
+
+def load(browser: Browser, page: Page) -> None:
+    """Open a page and wait until it is drawn."""
+    browser.chrome.get(page.url)
+    if page.ready:
+        browser.wait(page.ready)
+    if page.prepare:
+        browser.js(page.prepare)
+    browser.settle()
+
+
+def scroll_through(browser: Browser) -> None:
+    """Bring each view into sight, so that it is drawn, and return to the top."""
+    for k in range(browser.js("return document.querySelectorAll('canvas').length")):
+        browser.js("document.querySelectorAll('canvas')[arguments[0]].scrollIntoView()", k)
+        browser.settle()
+    browser.js("scrollTo(0, 0)")
+    browser.settle()
+
+
+def look(
+    browser: Browser, page: Page, width: int, dark: bool, axe: str | None, output: Path | None = None
+) -> list[str]:
+    """Return the faults of a page on one screen."""
+    where, faults = f"{width} {'dark' if dark else 'light'}", Faults(page.name)
+    browser.become(width, 844 if width < 600 else 1000, dark=dark)
+    browser.requests()
+    browser.errors()
+    load(browser, page)
+    if (wide := browser.js("return document.documentElement.scrollWidth")) > width:
+        faults.add(where, f"{wide} pixels wide")
+    for url in browser.requests():
+        if not url.startswith(page.own):
+            faults.add(where, f"asks for {url}")
+    for line in browser.errors():
+        faults.add(where, f"console: {line}")
+    if axe is not None:
+        browser.js(axe)
+        for impact, rule, count, nodes in browser.chrome.execute_async_script(_AXE):
+            (faults.add if impact in IMPACTS else _note)(
+                where, f"{impact} {rule}, {count} times: {'; '.join(nodes)}"
+            )
+    for name, inner, room in browser.js(_CUT):
+        faults.add(where, f"table {name}: {inner} pixels wide in {room}")
+    if output is not None:
+        scroll_through(browser)
+        _photograph(browser, output / f"{page.name}-{where.replace(' ', '-')}.png", width)
+    return faults.lines
+
+
+def _note(where: str, what: str) -> None:
+    print(f"  note {where}: {what[:300]}", flush=True)
+
+
+def _photograph(browser: Browser, path: Path, width: int, most: int = 6000) -> None:
+    """Save a picture of the page, at most `most` pixels high."""
+    height = min(most, browser.js("return document.documentElement.scrollHeight"))
+    shot = browser.chrome.execute_cdp_cmd(
+        "Page.captureScreenshot",
+        {
+            "captureBeyondViewport": True,
+            "clip": {"x": 0, "y": 0, "width": width, "height": height, "scale": 1},
+        },
+    )
+    path.write_bytes(base64.b64decode(shot["data"]))
+
+
+def walk(browser: Browser, page: Page) -> list[str]:
+    """Walk through a page with the Tab key; return the faults: no focus in sight, no name, a trap."""
+    faults, seen = Faults(page.name), list[str]()
+    browser.become(1280, 1000)
+    load(browser, page)
+    for _ in range(_PRESSES):
+        ActionChains(browser.chrome).send_keys(Keys.TAB).perform()
+        stop = browser.js(_FOCUS)
+        if stop is None:  # the end of the page
+            break
+        what, shown, sized, named = stop
+        seen.append(what)
+        if not shown and sized and not _border_changes(browser):
+            faults.add("keyboard", f"no visible focus on {what}")
+        if not named:
+            faults.add("keyboard", f"no name of {what}")
+        if len(seen) > 5 and len(set(seen[-5:])) == 1 and not seen[-1].startswith(("input", "button")):
+            faults.add("keyboard", f"the focus stays on {what}")
+            break
+    if not seen and browser.js("return document.querySelectorAll('a, button, input, [tabindex]').length"):
+        faults.add("keyboard", "the Tab key reaches nothing")
+    return faults.lines
+
+
+def _border_changes(browser: Browser) -> bool:
+    """Return whether the focus changes the border of its element, which may take a moment."""
+    return bool(
+        browser.chrome.execute_async_script(
+            "const done = arguments[0], e = document.activeElement;"
+            "const border = () => getComputedStyle(e).borderColor;"
+            "setTimeout(() => { const focused = border(); e.blur(); setTimeout(() => {"
+            " const changed = border() !== focused; e.focus(); done(changed); }, 300); }, 300);"
+        )
+    )
+
+
+def html_errors(page: Page, jar: Path) -> list[str]:
+    """Return what the Nu HTML checker says of a file."""
+    path = page.url.removeprefix("file://")
+    done = subprocess.run(
+        ["java", "-Xss4m", "-jar", str(jar), "--format", "json", "--errors-only", path],
+        capture_output=True, text=True, check=False, timeout=120,
+    )  # fmt: skip
+    messages = json.loads(done.stderr or "{}").get("messages", [])
+    return [
+        f"{page.name}, HTML: line {m.get('lastLine')}: {m['message']}: {m.get('extract', '')[:120]!r}"
+        for m in messages
+        if not m["message"].startswith(FOREIGN)
+    ]
+
+
+def as_pdf(browser: Browser, page: Page) -> bytes:
+    """Return the page as it is printed on A4."""
+    browser.become(1280, 1000)
+    load(browser, page)
+    printed = browser.chrome.execute_cdp_cmd(
+        "Page.printToPDF", {"printBackground": True, "paperWidth": 8.27, "paperHeight": 11.69}
+    )
+    return base64.b64decode(cast(str, printed["data"]))
+
+
+def audit(browser: Browser, page: Page, output: Path | None, axe: str | None, jar: Path | None) -> list[str]:
+    """Return all faults of a page."""
+    lines = list[str]()
+    for width, dark in product(WIDTHS, (False, True)):
+        tried = axe if not page.large or (width, dark) in ((WIDTHS[0], False), (WIDTHS[-1], True)) else None
+        lines += look(browser, page, width, dark, tried, output)
+    lines += walk(browser, page)
+    if jar is not None and page.url.startswith("file:") and not page.prepare:
+        lines += html_errors(page, jar)
+    if output is not None and page.printed:
+        pdf = output / f"{page.name}.pdf"
+        pdf.write_bytes(as_pdf(browser, page))
+        if shutil.which("pdftoppm"):
+            command = [
+                "pdftoppm",
+                "-r",
+                "60",
+                "-png",
+                "-l",
+                str(_PAGES),
+                str(pdf),
+                str(output / f"{page.name}-print"),
+            ]
+            subprocess.run(command, check=True, timeout=120)
+    return lines
+
+
+def main() -> None:
+    """Audit all pages, print their faults, and exit with 1 if there is one."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--only", nargs="*", default=[], help="beginnings of names: good, same, site, viewer")
+    parser.add_argument("--output", type=Path, help="folder for pictures and printed pages")
+    parser.add_argument(
+        "--fleet", type=Path, help="report of many robots; by default all robots are validated"
+    )
+    given = parser.parse_args()
+    axe, jar, only = axe_script(), html_checker(), given.only
+    if given.output is not None:
+        given.output.mkdir(parents=True, exist_ok=True)
+    print(f"axe: {axe.splitlines()[0] if axe else 'missing'}; HTML checker: {jar or 'missing'}")
+    faults = list[str]()
+
+    def visit(browser: Browser, page: Page) -> None:
+        found = audit(browser, page, given.output, axe, jar)
+        faults.extend(found)
+        print(f"{page.name}: {len(found)} faults", *found, sep="\n  ", flush=True)
+
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        opened(Path(folder) / "profile", flags=(_MOUSE,)) as browser,
+    ):
+        for page in made(Path(folder), only, given.fleet):
+            visit(browser, page)
+        if not only or any(word.startswith("site") for word in only):
+            for page in site(Path(folder)):
+                if not only or any(page.name.startswith(word) for word in only):
+                    visit(browser, page)
+    if not only or "viewer" in only:
+        with (
+            tempfile.TemporaryDirectory() as folder,
+            opened(Path(folder) / "profile", flags=(_MOUSE,), draws=False) as browser,
+            viewer() as page,
+        ):
+            visit(browser, page)
+    print(f"{len(faults)} faults")
+    sys.exit(bool(faults))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,137 @@
+"""Pages as axe, the keyboard and paper find them; `scripts/audit_pages.py` tries more pages and screens."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from scripts import audit_pages
+from scripts.audit_pages import Page, as_pdf, axe_script, html_checker, html_errors, look, walk
+from tests.report.browser import Browser, opened
+from tests.report.documents import arms, failing, hostile, months_runs
+from urdfkin.report.history import as_html as history_page
+from urdfkin.report.history import history
+from urdfkin.report.html import as_html
+
+pytestmark = [pytest.mark.long, pytest.mark.browser]
+
+NAMES = ("arms", "failing", "hostile", "history", "same")
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Page]:
+    folder = tmp_path_factory.mktemp("pages")
+    texts = {"arms": as_html(arms()), "failing": as_html(failing()), "hostile": as_html(hostile())}
+    (folder / "runs").mkdir()
+    for i, report in enumerate([*months_runs(), hostile()]):
+        (folder / "runs" / f"{i}.json").write_text(json.dumps(report))
+    texts["history"] = history_page(history([folder / "runs"]))
+    texts["same"] = audit_pages.comparison("ur5_limited", 1e-3)
+    for name, text in texts.items():
+        (folder / f"{name}.html").write_text(text, encoding="utf-8")
+    return {name: Page(name, (folder / f"{name}.html").as_uri(), audit_pages.UNFOLD) for name in texts}
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    with opened(tmp_path_factory.mktemp("profile")) as browser:
+        yield browser
+
+
+@pytest.mark.parametrize(("width", "dark"), [(390, False), (768, True)], ids=["390-light", "768-dark"])
+@pytest.mark.parametrize("name", NAMES)
+def test_no_serious_violation_no_error_no_sideways_scrolling_and_no_request(
+    name: str, width: int, dark: bool, pages: dict[str, Page], desk: Browser
+) -> None:
+    axe = axe_script()
+    if axe is None:
+        pytest.skip("axe is not installed: pip install axe-core-python")
+    assert look(desk, pages[name], width, dark, axe) == []
+
+
+def test_the_audit_finds_what_is_wrong(tmp_path: Path, desk: Browser) -> None:
+    bad = tmp_path / "bad.html"
+    bad.write_text(
+        "<!doctype html><html><title>t</title><style>*:focus{outline:0}</style><p style='width:900px;"
+        "color:#ccc'>pale</p><button></button><a href='#'>a</a><script>missing()</script>"
+    )
+    page = Page("bad", bad.as_uri())
+    faults = look(desk, page, 390, False, axe_script())
+    assert any("900" in line or "pixels wide" in line for line in faults)
+    assert any("missing is not defined" in line for line in faults)
+    if axe_script() is not None:
+        assert any("color-contrast" in line for line in faults)
+        assert any("button-name" in line for line in faults)
+    found = walk(desk, page)
+    assert "bad, keyboard: no visible focus on a a" in found
+    assert any("no name of button" in line for line in found)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_tab_key_reaches_controls_with_a_name_and_a_visible_focus(
+    name: str, pages: dict[str, Page], desk: Browser
+) -> None:
+    assert walk(desk, pages[name]) == []
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_html_has_no_error(name: str, pages: dict[str, Page]) -> None:
+    jar = html_checker()
+    if jar is None:
+        pytest.skip("the Nu HTML checker or Java is not installed: see scripts/audit_pages.py")
+    assert html_errors(pages[name], jar) == []
+
+
+def test_paper_has_every_drawing_in_the_colours_of_paper(pages: dict[str, Page], desk: Browser) -> None:
+    desk.become(1280, 400, dark=True)
+    desk.open(Path(pages["arms"].url.removeprefix("file://")))
+    desk.js(
+        "document.querySelectorAll('details.robot').forEach((one) => { one.open = true; }); scrollTo(0, 0)"
+    )
+    drawn = "return [...document.querySelectorAll('canvas')].map((one) => !!one.dataset.drawn)"
+    assert not all(desk.js(drawn)), "a robot far below is not drawn for the screen"
+    desk.js("dispatchEvent(new Event('beforeprint'))")
+    assert desk.js(drawn) == [True, True]
+    paper = desk.js("return document.querySelector('[data-view]').view.materials.turn.color.getHex()")
+    desk.js("dispatchEvent(new Event('afterprint'))")
+    screen = desk.js("return document.querySelector('[data-view]').view.materials.turn.color.getHex()")
+    assert (paper, screen) == (0x2F6FD0, 0x6EA3EE)
+
+
+def test_on_paper_the_reason_is_not_the_smallest_text(pages: dict[str, Page], desk: Browser) -> None:
+    desk.become()
+    desk.open(Path(pages["failing"].url.removeprefix("file://")))
+    desk.chrome.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    try:
+        sizes = desk.js(
+            "document.querySelectorAll('details.robot').forEach((one) => { one.open = true; });"
+            "return ['.reason', '.checks td', '.failures code', '.aside'].map((name) =>"
+            " parseFloat(getComputedStyle(document.querySelector(name)).fontSize))"
+        )
+    finally:
+        desk.chrome.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
+    assert sizes[0] == max(sizes)
+    assert min(sizes) >= 7.0
+
+
+@pytest.mark.skipif(shutil.which("pdftotext") is None, reason="poppler-utils are not installed")
+def test_printed_command_lines_take_at_most_half_a_page(
+    pages: dict[str, Page], desk: Browser, tmp_path: Path
+) -> None:
+    (tmp_path / "a.pdf").write_bytes(as_pdf(desk, pages["arms"]))
+    text = subprocess.run(
+        ["pdftotext", "-layout", str(tmp_path / "a.pdf"), "-"],
+        check=True,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    ).stdout
+    assert "Worst cases" in text
+    assert len(re.findall(r"urdfkin \w+ (?:panda|ur5) --frame", text)) == 0
+    assert "has the command that computes each case again" in " ".join(text.split())

@@ -1,0 +1,502 @@
+"""History of robots in several validation reports: verdicts, results, findings and changes from run to run.
+
+Runs are ordered by their start. Robots are matched by their source, and renamed files by the robot's name, as
+in `compare`. Each report is read twice, so that only one at a time is in memory: once for its start, and once
+for its results. A report that cannot be used is listed with the reason; the others are shown.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypedDict, cast
+
+from urdfkin.errors import InputError, UrdfkinError
+from urdfkin.errors.display import Strong, Table, TextDocument
+from urdfkin.report.compare import Change, ChangeEntry, by_source, compare, renamed_files
+from urdfkin.report.html import as_is, asset, environment, when
+from urdfkin.report.reading import checked, stored_document
+from urdfkin.report.words import VERDICTS, counted, percent, share_of, units, worst
+from urdfkin.system.documents import Count, Header, Layout, Sha256, parse_json, plain, says
+from urdfkin.system.files import MOST, is_folder, read_bytes, shortened
+from urdfkin.validation.document import VALIDATION, Document, Robot, Units
+from urdfkin.validation.outcome import OUTCOMES
+from urdfkin.verify.oracles import versions
+
+#: Largest number of reports, and of files that a folder may have.
+MOST_RUNS, MOST_FILES = 1000, 20_000
+#: Number of latest runs that a terminal marks for each robot; the same for the charts of the page.
+MARKED, CHARTED = 20, 60
+#: Number of latest changes that are shown without --all, and for each robot on the page.
+SHOWN = 20
+_LISTED = 500
+#: A mark for each verdict.
+MARKS = {"verified": "✓", "disagrees": "✗", "not verified": "!", "bad input": "✗", "": "·"}
+#: Lower end of the chart of the largest shares of a bound, as a power of ten.
+_LOWEST = -3.0
+
+
+class Run(TypedDict):
+    """A validation."""
+
+    file: Annotated[str, says("The report: a file, or the folder of a store.")]
+    started: Annotated[str, says("Start time, ISO 8601, UTC.")]
+    verdict: Annotated[str, says("The verdict of the run.")]
+    reason: Annotated[str | None, says("Why the run has not passed; null if it has.")]
+    samples: Annotated[Count, says("Number of random configurations for each robot.")]
+    seed: Annotated[int, says("Seed of the random samples.")]
+    robots: Annotated[Count, says("Number of robots.")]
+    results: Annotated[Count, says("Number of compared results.")]
+    failed: Annotated[Count, says("Number of results outside their bound.")]
+    share_of_bound: Units
+    versions: Annotated[dict[str, str], says("Versions of urdfkin, its libraries and the oracles.")]
+    changes: Annotated[
+        list[ChangeEntry], says("Changes since the run before, as `urdfkin report compare` lists them.")
+    ]
+
+
+class Point(TypedDict):
+    """A robot in one run."""
+
+    run: Annotated[Count, says("Index of the run.")]
+    source: Annotated[str, says("The robot's source in this run.")]
+    verdict: Annotated[Literal["verified", "disagrees", "not verified", "bad input"], says("The verdict.")]
+    reason: Annotated[str | None, says("Why the robot is not verified; null if it is.")]
+    sha256: Annotated[Sha256 | None, says("Digest of the robot's text; null if it could not be read.")]
+    samples: Annotated[Count, says("Number of compared configurations.")]
+    results: Annotated[Count, says("Number of compared results.")]
+    failed: Annotated[Count, says("Number of results outside their bound.")]
+    worst: Units
+    share_of_bound: Annotated[
+        float | None, says("The largest ratio of a disagreement to its bound; null as for a disagreement.")
+    ]
+    errors: Annotated[Count, says("Number of errors in the file.")]
+    warnings: Annotated[Count, says("Number of warnings in the file.")]
+    notes: Annotated[Count, says("Number of notes on the file.")]
+
+
+class RobotHistory(TypedDict):
+    """A robot in all runs that have it."""
+
+    robot: Annotated[str, says("The robot's latest source.")]
+    points: Annotated[list[Point], says("The runs of this robot, the oldest first.")]
+
+
+class Unused(TypedDict):
+    """A file that is not part of the history."""
+
+    file: Annotated[str, says("The file.")]
+    reason: Annotated[str, says("Why the file is not used.")]
+
+
+class HistoryDocument(Header):
+    """The output of `urdfkin report history --format json`; verdict and `sha256` are of the latest run."""
+
+    runs: Annotated[list[Run], says("The runs, the oldest first.")]
+    robots: Annotated[list[RobotHistory], says("The robots; worse verdicts first.")]
+    unusable: Annotated[list[Unused], says("Files that cannot be used, each with the reason.")]
+    repeated: Annotated[list[Unused], says("Files with the same run as another file.")]
+
+
+#: The layout of the document.
+HISTORY = Layout(
+    "urdfkin-history/1",
+    HistoryDocument,
+    tuple(OUTCOMES.values()),
+    "urdfkin report history DIR --format json",
+)
+
+
+#: The changes of each source, with their runs.
+Told = dict[str | None, list[tuple[int, ChangeEntry]]]
+
+
+@dataclass(slots=True)
+class History:
+    """The runs and robots of several reports.
+
+    Attributes:
+        runs: The runs, the oldest first.
+        robots: The points of each robot, under its latest source; worse verdicts first.
+        unusable: Files that cannot be used, with the reason.
+        repeated: Files with the same run as another file, with its name.
+    """
+
+    runs: list[Run] = field(default_factory=list)
+    robots: dict[str, list[Point]] = field(default_factory=dict)
+    unusable: list[Unused] = field(default_factory=list)
+    repeated: list[Unused] = field(default_factory=list)
+
+    @property
+    def exit_code(self) -> int:
+        """0 if every file was used, else 2."""
+        return 2 if self.unusable else 0
+
+    def as_dict(self, command: str | None = None) -> HistoryDocument:
+        """Return plain data for JSON; `command` made it."""
+        last = len(self.runs) - 1
+        latest = [points[-1]["sha256"] for points in self.robots.values() if points[-1]["run"] == last]
+        document = {
+            "schema": HISTORY.name,
+            "versions": versions(),
+            "sha256": latest,
+            "verdict": self.runs[-1]["verdict"],
+            "command": command,
+            "runs": self.runs,
+            "robots": [{"robot": robot, "points": points} for robot, points in self.robots.items()],
+            "unusable": self.unusable,
+            "repeated": self.repeated,
+        }
+        return cast("HistoryDocument", plain(document))
+
+
+def history(paths: Sequence[Path]) -> History:
+    """Read reports and return their history.
+
+    Args:
+        paths: JSON files of `urdfkin validate --json`, stores, and folders with such files and stores.
+
+    Returns:
+        The runs, the oldest first, and the points of each robot.
+
+    Raises:
+        InputError: No report can be used, or there are too many.
+    """
+    found = History()
+    before: Document | None = None
+    for file, report in _in_order(list(_files(paths)), found):
+        found.runs.append(_run(file, report, before))
+        _add(found, before, report)
+        before = report
+    if not found.runs:
+        some = "; ".join(f"{one['file']}: {one['reason']}" for one in found.unusable[:3])
+        raise InputError(
+            "no report to show",
+            where=", ".join(shortened(path) for path in paths[:3]),
+            found=some or "no .json file and no store",
+            remedy=f"write one with: {VALIDATION.made_by}",
+        )
+    found.robots = dict(sorted(found.robots.items(), key=lambda one: _rank(found, one[1])))
+    return found
+
+
+def _rank(found: History, points: Sequence[Point]) -> tuple[bool, int]:
+    """Return the sort key of a robot: those of the latest run first, worse verdicts first."""
+    return points[-1]["run"] != len(found.runs) - 1, VERDICTS.index(points[-1]["verdict"])
+
+
+def _files(paths: Sequence[Path]) -> Iterator[Path]:
+    """Yield each report: a file or a store. A folder has files with the suffix .json, at any depth."""
+    count = 0
+    for path in paths:
+        inside = _in_folder(path) if is_folder(path) and not _is_store(path) else iter([path])
+        for file in inside:
+            count += 1
+            if count > MOST_RUNS:
+                raise InputError(
+                    f"more than {MOST_RUNS:,} reports",
+                    where=shortened(path),
+                    remedy="name fewer files, or a folder with fewer files",
+                )
+            yield file
+
+
+def _is_store(path: Path) -> bool:
+    return (path / "manifest.json").is_file()
+
+
+def _in_folder(folder: Path) -> Iterator[Path]:
+    """Yield the reports in a folder, in the order of their names. Links to folders are not followed."""
+    seen = 0
+    for place, folders, names in os.walk(folder):
+        here = Path(place)
+        if "manifest.json" in names:
+            folders.clear()
+            yield here
+            continue
+        folders.sort()
+        seen += len(names)
+        if seen > MOST_FILES:
+            raise InputError(
+                f"more than {MOST_FILES:,} files", where=shortened(folder), remedy="name the reports' folder"
+            )
+        yield from (here / name for name in sorted(names) if name.endswith(".json"))
+
+
+def _in_order(files: Sequence[Path], found: History) -> Iterator[tuple[str, Document]]:
+    """Yield each report in the order of the starts. Note files that cannot be used, and repeated runs."""
+    starts = list[tuple[float, str, Path]]()
+    for path in files:
+        try:
+            starts.append((*_start(path), path))
+        except UrdfkinError as error:
+            found.unusable.append(_unused(path, error))
+    seen = dict[str, str]()
+    for _, _, path in sorted(starts):
+        try:
+            document = _read(path)
+        except UrdfkinError as error:
+            found.unusable.append(_unused(path, error))
+            continue
+        run = hashlib.sha256(
+            repr([document[key] for key in ("started", "command", "seconds", "sha256")]).encode(
+                errors="replace"
+            )
+        ).hexdigest()
+        if run in seen:
+            found.repeated.append({"file": str(path), "reason": f"the same run as {seen[run]}"})
+            continue
+        seen[run] = str(path)
+        yield str(path), document
+
+
+def _unused(path: Path, error: UrdfkinError) -> Unused:
+    return {"file": str(path), "reason": str(error).removeprefix(f"{path}: ")}
+
+
+def _start(path: Path) -> tuple[float, str]:
+    """Return the start of a run in seconds, infinity if it is not a date, and its text."""
+    data = _read(path) if is_folder(path) else parse_json(read_bytes(path, MOST), str(path))
+    text = str(data.get("started", "")) if isinstance(data, dict) else ""
+    try:
+        moment = datetime.fromisoformat(text)
+        return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp(), text
+    except (ValueError, OverflowError):
+        return math.inf, text
+
+
+def _read(path: Path) -> Document:
+    if is_folder(path):
+        return stored_document(path)
+    return checked(parse_json(read_bytes(path, MOST), str(path)), str(path))
+
+
+def _run(file: str, document: Document, before: Document | None) -> Run:
+    robots = document["robots"]
+    return {
+        "file": file,
+        "started": document["started"],
+        "verdict": document["verdict"],
+        "reason": document["reason"],
+        "samples": document["samples"],
+        "seed": document["seed"],
+        "robots": len(robots),
+        "results": sum(robot["results"] for robot in robots),
+        "failed": sum(robot["failed"] for robot in robots),
+        "share_of_bound": worst(map(share_of, robots)),
+        "versions": document["versions"],
+        "changes": cast("list[ChangeEntry]", plain(compare(before, document).changes)) if before else [],
+    }
+
+
+def _add(found: History, before: Document | None, document: Document) -> None:
+    """Add the robots of the latest run. A renamed file continues the history of the robot with this name."""
+    robots = by_source(document)
+    for old, new in renamed_files(by_source(before) if before else {}, robots).items():
+        found.robots[new] = found.robots.pop(old)
+    for source, robot in robots.items():
+        found.robots.setdefault(source, []).append(_point(len(found.runs) - 1, source, robot))
+
+
+def _point(run: int, source: str, robot: Robot) -> Point:
+    counts = Counter[str]()
+    for finding in robot["findings"]:
+        counts[finding["severity"]] += 1 + len(finding["also"])
+    return {
+        "run": run,
+        "source": source,
+        "verdict": robot["verdict"],
+        "reason": robot["reason"],
+        "sha256": robot["model"]["sha256"] if robot["model"] else None,
+        "samples": robot["samples"],
+        "results": robot["results"],
+        "failed": robot["failed"],
+        "worst": worst(check["worst"] for check in robot["checks"]),
+        "share_of_bound": share_of(robot),
+        "errors": counts["error"],
+        "warnings": counts["warning"],
+        "notes": counts["note"],
+    }
+
+
+def document(found: History, *, all_: bool = False) -> TextDocument:
+    """Return the history for a terminal: runs, robots, and the latest changes.
+
+    Args:
+        found: The history.
+        all_: Whether to show all runs and changes, not only the latest.
+    """
+    some = None if all_ else SHOWN
+    first = 0 if all_ else max(0, len(found.runs) - SHOWN)
+    runs = [
+        [
+            f"{k}", _date(run), run["verdict"], f"{run['robots']:,}", f"{run['results']:,}",
+            f"{run['failed']:,}", _share(run),
+            *(run["versions"].get(name, "?") for name in ("urdfkin", "pin")),
+        ]
+        for k, run in enumerate(found.runs, 1)
+        if k > first
+    ]  # fmt: skip
+    heads = ["run", "started", "verdict", "robots", "results", "outside", "of bound", "urdfkin", "pin"]
+    parts: list[str | Table] = [Table(heads, runs, left=(1, 2))]
+    told_of = _by_robot(found)
+    rows = [
+        [
+            robot, marks(found, points), points[-1]["verdict"],
+            units(points[-1]["worst"], compared=points[-1]["results"] > 0),
+            _share(points[-1]), f"{points[-1]['errors']}", f"{points[-1]['warnings']}",
+            f"{len(_of(told_of, points))}",
+        ]
+        for robot, points in found.robots.items()
+    ]  # fmt: skip
+    heads = ["robot", "runs", "latest", "worst", "of bound", "errors", "warnings", "changes"]
+    parts += ["", Table(heads, rows, left=(0, 1, 2))]
+    told = [
+        (Strong(words, "bold red") if change["regression"] else words)
+        for run, change in changes(found)[:some]
+        for words in [f"run {run + 1}, {words_of(change)}"]
+    ]
+    more = len(changes(found)) - len(told)
+    parts += ["", "changes, the latest first:", *told] if told else ["", "no changes between the runs"]
+    parts += [f"... and {more:,} more: --all shows them"] if more else []
+    parts += [Strong(f"not used: {one['file']}: {one['reason']}", "bold yellow") for one in found.unusable]
+    parts += [f"not counted: {one['file']}: {one['reason']}" for one in found.repeated]
+    good = found.runs[-1]["verdict"] == "verified"
+    return TextDocument("", [*parts, Strong(headline(found), f"bold {'green' if good else 'red'}")])
+
+
+def headline(found: History) -> str:
+    """Return the latest verdict and the number of equal verdicts before it, in one line.
+
+    >>> headline(History([{"verdict": v} for v in ("disagrees", "verified", "verified")]))
+    '3 runs; latest verdict: verified, as in the run before'
+    """
+    verdicts = [run["verdict"] for run in found.runs]
+    same = next((k for k, one in enumerate(reversed(verdicts)) if one != verdicts[-1]), len(verdicts))
+    if len(verdicts) == 1:
+        return f"1 run: {verdicts[0]}"
+    if same == 1:
+        return f"{counted(len(verdicts), 'run')}; latest verdict: {verdicts[-1]}, before: {verdicts[-2]}"
+    before = "the run before" if same == 2 else f"the {same - 1:,} runs before"
+    return f"{counted(len(verdicts), 'run')}; latest verdict: {verdicts[-1]}, as in {before}"
+
+
+def marks(found: History, points: Sequence[Point]) -> str:
+    """Return a mark for each of the latest runs: `✓`, `✗`, `!`, and `·` where the robot is missing."""
+    verdicts = {point["run"]: point["verdict"] for point in points}
+    last = len(found.runs)
+    return "".join(MARKS[verdicts.get(run, "")] for run in range(max(0, last - MARKED), last))
+
+
+def changes(found: History) -> list[tuple[int, ChangeEntry]]:
+    """Return all changes with their run, the latest first, regressions first within a run."""
+    told = [(k, change) for k, run in enumerate(found.runs) for change in run["changes"]]
+    return sorted(told, key=lambda one: (-one[0], not one[1]["regression"]))
+
+
+def _by_robot(found: History) -> Told:
+    """Return the changes of each source, the latest first."""
+    grouped: Told = {}
+    for run, change in changes(found):
+        grouped.setdefault(change["robot"], []).append((run, change))
+    return grouped
+
+
+def _of(told: Told, points: Sequence[Point]) -> list[tuple[int, ChangeEntry]]:
+    """Return the changes of a robot under all its sources."""
+    return [
+        one for source in dict.fromkeys(point["source"] for point in points) for one in told.get(source, [])
+    ]
+
+
+def words_of(change: ChangeEntry) -> str:
+    """Return a change in one line."""
+    words = str(Change(**change))
+    return f"REGRESSION {words}" if change["regression"] else words
+
+
+def _share(one: Run | Point) -> str:
+    """Return the largest share of a bound as text; empty if nothing was compared."""
+    return percent(one["share_of_bound"]) if one["results"] else ""
+
+
+def _date(run: Run) -> str:
+    return run["started"][:16].replace("T", " ")
+
+
+def as_html(found: History, command: str | None = None) -> str:
+    """Return a page with charts and the history of each robot. The template escapes all names."""
+    told = _by_robot(found)
+    return (
+        environment()
+        .get_template("history.html.j2")
+        .render(
+            headline=headline(found),
+            runs=found.runs,
+            last=found.runs[-1],
+            dates=[_date(run) for run in found.runs],
+            when=when(found.runs[-1]["started"]),
+            charted=range(max(0, len(found.runs) - CHARTED), len(found.runs)),
+            stacks=_stacks(found),
+            height=_height,
+            robots=[_robot(found, robot, points, told) for robot, points in found.robots.items()],
+            changes=changes(found)[:SHOWN],
+            total=len(changes(found)),
+            unusable=found.unusable,
+            repeated=found.repeated,
+            marks=MARKS,
+            listed=_LISTED,
+            units=units,
+            share=_share,
+            command=command,
+            versions=versions(),
+            style=as_is(asset("report.css")),
+        )
+    )
+
+
+def _stacks(found: History) -> list[dict[str, Counter[str]]]:
+    """Return for each run the number of robots by verdict, and the number of findings by severity."""
+    stacks: list[dict[str, Counter[str]]] = [
+        {"verdicts": Counter(), "findings": Counter()} for _ in found.runs
+    ]
+    for points in found.robots.values():
+        for point in points:
+            stack = stacks[point["run"]]
+            stack["verdicts"][point["verdict"]] += 1
+            stack["findings"].update({"errors": point["errors"], "warnings": point["warnings"]})
+    return stacks
+
+
+def _height(share: Units) -> float:
+    """Return the height of a bar on the logarithmic axis from a thousandth of the bound to the bound.
+
+    >>> [_height(x) for x in (0.0, 0.001, 1.0, 7.0, None)]
+    [2.0, 2.0, 100.0, 100.0, 100.0]
+    """
+    if share is None or share >= 1.0:
+        return 100.0
+    return max(2.0, 100.0 * (1.0 - math.log10(share) / _LOWEST)) if share else 2.0
+
+
+def _robot(found: History, robot: str, points: Sequence[Point], told: Told) -> dict[str, Any]:
+    verdicts = {point["run"]: point["verdict"] for point in points}
+    last = len(found.runs)
+    shown = range(max(0, last - MARKED), last)
+    changed = _of(told, points)
+    return {
+        "name": robot,
+        "points": points[: -_LISTED - 1 : -1],
+        "last": points[-1],
+        "verdicts": [verdicts.get(run, "") for run in shown],
+        "good": sum(verdicts.get(run) == "verified" for run in shown),
+        "changes": changed[:_LISTED],
+        "total": len(changed),
+        "is_current": points[-1]["run"] == last - 1,
+    }
