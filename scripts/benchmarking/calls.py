@@ -24,10 +24,11 @@ class Calls:
     Attributes:
         who: Name of the contender.
         names: Variables of the lines besides `q`, `v` and `a`.
-        lines: The calls; the last line is an expression, the result.
-        store: The lines for a batch, which write `out[k]`; None: the lines, with the last one's value
-            stored.
-        order: For each of the library's coordinates, the index in urdfkin; None: the same order.
+        lines: The calls; the last line is an expression whose value is the result.
+        store: The lines for a batch, which write their result to `out[k]`. None: `lines` are used, and the
+            value of the last line is stored in `out[k]`.
+        order: For each coordinate of the library, its index among urdfkin's coordinates. None: the order of
+            the coordinates is the same.
         shape: Shape of one configuration's result in a batch; None: urdfkin's shape.
         read: Converts a batch's raw results to urdfkin's conventions.
         read_one: Converts the last line's value to an array like a row of the raw results.
@@ -80,14 +81,14 @@ class Calls:
 
 
 def _rows(inputs: Any) -> Any:
-    """Yield (q, v, a) for each configuration; without v and a, q takes their place."""
+    """Yield (q, v, a) for each configuration. If the inputs lack v and a, yield (q, q, q)."""
     return zip(*(inputs if len(inputs) == 3 else [inputs[0]] * 3), strict=True)
 
 
 def _function(
     names: Mapping[str, Any], arguments: str, head: str, body: tuple[str, ...]
 ) -> Callable[..., Any]:
-    """Make a function with `names` as local variables; its body is `head` with `body` inside."""
+    """Make a function with `names` as local variables. Its code is `head`, and inside this block `body`."""
     here = {"rows": _rows, **names}
     parameters = ", ".join((arguments, *(f"{name}={name}" for name in here)))
     source = "\n".join([f"def function({parameters}):", f"    {head}", *(f"        {line}" for line in body)])

@@ -2,10 +2,10 @@
 
 The textbook's equations run once on CasADi's symbols. The resulting expressions contain the robot's
 constants, without products with 0 and 1. CasADi writes them as straight-line C, and the system's compiler
-compiles it. A number is a vector of as many doubles as a register has (`generated.c`). The time includes
-sine, cosine and the transposition of the arrays, which are the same for all contenders. The code does not
-check its inputs, so a non-finite number or an angle of a million turns gives nonsense. It also lacks
-urdfkin's correction of the last digit of sine and cosine.
+compiles it. Each number of the C code is a vector register of doubles, with one double for each of several
+configurations (`generated.c`). The time includes sine, cosine and the transposition of the arrays, which are
+the same for all contenders. The code does not check its inputs, so a non-finite number or an angle of a
+million turns gives nonsense. It also lacks urdfkin's correction of the last digit of sine and cosine.
 """
 
 from __future__ import annotations
@@ -42,10 +42,10 @@ def columns(
 
     Args:
         plan: The compiled tree of one frame.
-        x: A coordinate for each joint, of any kind of number.
-        sines: Their sines.
-        cosines: Their cosines.
-        eq: The equations for that kind of number.
+        x: The coordinate of each joint. It may be any kind of number, such as a float or a symbol.
+        sines: The sine of each coordinate.
+        cosines: The cosine of each coordinate.
+        eq: The textbook's equations, implemented for the same kind of number.
     """
     R, p, passed = np.eye(3).tolist(), [0.0] * 3, []
     for i, motion in enumerate(_motions(plan)):
@@ -99,7 +99,7 @@ def _motions(plan: CompiledTree) -> list[Motion]:
 
 
 def _pose(row: FloatArray) -> tuple[list[list[float]], list[float]]:
-    """Return R and p of a row of a plan."""
+    """Return the constant rotation R and translation p in a row of a plan."""
     return row[:9].reshape(3, 3).tolist(), row[9:12].tolist()
 
 
@@ -154,7 +154,9 @@ def _listed(numbers: Sequence[float]) -> str:
 
 
 def _straight_line(plan: CompiledTree, quantity: str) -> str:
-    """Return CasADi's C code for one configuration: a function of (x, sines, cosines, v, a) of the joints."""
+    """Return CasADi's C code of a function for one configuration, with the arguments (x, sines, cosines, v,
+    a).
+    """
     import casadi  # noqa: PLC0415  installed or not
 
     names = [casadi.SX.sym(name, len(plan.steps)) for name in ("x", "sine", "cosine", "v", "a")]
@@ -174,7 +176,7 @@ def _straight_line(plan: CompiledTree, quantity: str) -> str:
     whole = re.search(r"static int casadi_f0\(.*?\n}", generator.dump(), re.DOTALL)
     if whole is None:
         raise ValueError("CasADi wrote no function")
-    # CasADi writes code for one double, and for arguments that may be missing.
+    # CasADi writes code for single doubles, and code that tests whether an argument is missing. Replace both.
     text = re.sub(r"(arg\[\d+\])\? (\1\[\d+\]) : 0", r"\2", whole[0])
     text = text.replace("if (res[0]!=0) ", "")
     return re.sub(r"(a\d+)=(-?[\d.][\d.e+-]*);", r"\1=in_all_lanes(\2);", text)

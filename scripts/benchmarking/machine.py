@@ -1,7 +1,7 @@
 """Describe the machine, and measure the memory of a batch and the time of a first use in new processes.
 
-The module runs in a new process, in which nothing is compiled or loaded yet. Linux reports the largest
-memory size of the process since its last reset.
+This module runs itself in a new process, in which no kernel is compiled and no library is loaded yet. Linux
+reports the largest memory size of the process since its last reset.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ from urdfkin.compiled.preload import only
 from urdfkin.robot import Robot
 
 ROOT = Path(__file__).parents[2]
-#: Keys of the time of a first use: with an empty kernel cache, and with the compiled kernels on disk.
+#: Keys of the two times of a first use. For the first time, the kernel cache is empty. For the second one,
+#: the compiled kernels are on disk.
 EMPTY, KEPT = "empty_ms", "kept_ms"
 #: Quantity whose first use compiles a kernel -> number of its inputs among q, v, a.
 USES = {
@@ -61,9 +62,9 @@ def peak_over_output(robot: str, frame: str, quantity: str, n: int, *, out: bool
 
 
 def first_uses(robot: str, frame: str, uses: Sequence[str]) -> Iterator[dict[str, Any]]:
-    """Yield the processor time of the first use of each quantity, and of all of them in one process.
+    """Yield the processor time of the first use of each quantity, and of all quantities in one process.
 
-    It is measured with an empty cache, and in another process with the kernels on disk.
+    Each time is measured twice: with an empty kernel cache, and in another process with the kernels on disk.
     """
     together = " + ".join(uses) if len(uses) > 1 else None
     for what in (*uses, *filter(None, [together])):

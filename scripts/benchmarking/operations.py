@@ -17,8 +17,8 @@ from urdfkin.compiled.plan import CompiledTree
 from urdfkin.compiled.program import KEPT_ROWS, WIDTH, Head, Op, program_of
 from urdfkin.kinematics.arithmetic import bound
 
-#: Reduction 10, z and 1 - z/2 with their rounding errors 8, two polynomials 20, last steps 13
-#: (`compiled.python_numbers`).
+#: Operations to compute a sine and a cosine (`compiled.python_numbers`). The reduction of the angle needs 10.
+#: z and 1 - z/2 with their rounding errors need 8. The two polynomials need 20, and the last steps 13.
 _SINE_COSINE = 51
 
 
@@ -27,9 +27,10 @@ class Number:
     """A number that stores its operands.
 
     Attributes:
-        known: 0 or 1 if the value is known beforehand. nothing: Whether the number is not requested;
-        results computed from it are free and not requested either. made_of: The operands; empty for an
-        input.
+        known: 0 or 1 if the number is this constant; None otherwise.
+        nothing: Whether the number is not needed. Operations with this number cost nothing, and their
+            results are not needed either.
+        made_of: The operands; empty for an input.
     """
 
     known: int | None = None
@@ -65,7 +66,9 @@ class Number:
 
 
 def count(results: Any) -> int:
-    """Return the number of operations for these results; shared operations count once."""
+    """Return the number of operations that compute these results. An operation that several results share
+    counts once.
+    """
     waiting, seen = [results], set[Number]()
     while waiting:
         value = waiting.pop()
