@@ -154,8 +154,9 @@ def _listed(numbers: Sequence[float]) -> str:
 
 
 def _straight_line(plan: CompiledTree, quantity: str) -> str:
-    """Return CasADi's C code of a function for one configuration, with the arguments (x, sines, cosines, v,
-    a).
+    """Return CasADi's C code of a function for one configuration.
+
+    The arguments of the function are (x, sines, cosines, v, a).
     """
     import casadi  # noqa: PLC0415  installed or not
 

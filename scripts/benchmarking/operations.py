@@ -66,8 +66,9 @@ class Number:
 
 
 def count(results: Any) -> int:
-    """Return the number of operations that compute these results. An operation that several results share
-    counts once.
+    """Return the number of operations that compute these results.
+
+    An operation that several results share counts once.
     """
     waiting, seen = [results], set[Number]()
     while waiting:

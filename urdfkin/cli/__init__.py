@@ -123,7 +123,8 @@ def commands() -> dict[str, tuple[str, str]]:
     return {name: entry for entries in groups().values() for name, entry in entries.items()}
 
 
-#: Other words for a command -> the command. If the value is no command, it is a text that urdfkin suggests.
+#: A word that users may type for a command -> the right command. A value that is not a command's name is a
+#: text to suggest.
 _SYNONYMS = {
     **dict.fromkeys(("fk", "forward", "forward-kinematics", "pose", "transform", "tf"), "placement"),
     **dict.fromkeys(("relative-placement", "relative-pose"), "placement --relative-to FRAME"),
@@ -152,7 +153,7 @@ _SYNONYMS = {
     **dict.fromkeys(("equal", "equivalent"), "same"),
     **dict.fromkeys(("list", "catalogue", "catalog"), "robots"),
 }
-#: Words for subjects that urdfkin does not have -> the nearest commands.
+#: A word for a subject that urdfkin does not support -> the commands with the most similar purpose.
 _ABSENT = {
     **dict.fromkeys(
         ("ik", "inverse", "inverse-kinematics", "solve"),
@@ -168,7 +169,10 @@ _ABSENT = {
 
 
 def _unknown(name: str) -> UrdfkinError:
-    """Return the error for an unknown command; it suggests commands for common other words."""
+    """Return the error for an unknown command.
+
+    If the word is a common name of an existing command, the error suggests this command.
+    """
     word = name.lower().replace("_", "-")
     if word in commands():
         return UnknownNameError("command", name, [word])
@@ -257,9 +261,9 @@ def main() -> None:
     """
     streams.prepare()
     guard()
-    # The matrices are small, so one OpenBLAS thread is fastest. OpenBLAS reads this variable on import.
+    # For small matrices, one thread of OpenBLAS is fastest. OpenBLAS reads this variable when it is imported.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    if os.environ.get("_URDFKIN_COMPLETE"):  # shell completion fails silently
+    if os.environ.get("_URDFKIN_COMPLETE"):  # print no error during shell completion
         sys.stderr = io.StringIO()
     # The line below a result already states that it was not verified, and why.
     warnings.filterwarnings("ignore", message="not verified")

@@ -22,21 +22,22 @@ if TYPE_CHECKING:
     from urdfkin.validation.store import Store
 
 
-#: Seconds between two lines of a log, and between two lines of JSON.
+#: Seconds between two progress lines in a log, and between two progress lines of JSON.
 _LINES, _JSON = 10.0, 0.5
 
 
 class Pace:
     """Speed in chunks per second and remaining time, measured with a monotonic clock.
 
-    The measurement starts at the last call before the first computed chunk. Earlier compiling is not counted.
+    The measurement starts at the last call of `of` before the first chunk is computed, so that the time for
+    compiling kernels is not counted.
     """
 
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
         self._now, self._begin = now, now()
 
     def of(self, state: CampaignProgress) -> tuple[float | None, float | None]:
-        """Return chunks per second and seconds left; None before the first chunk."""
+        """Return the chunks per second and the remaining seconds; None before the first chunk is computed."""
         seconds, fresh = self._now() - self._begin, state.chunks_done - state.chunks_kept
         if fresh <= 0:
             self._begin = self._now()
@@ -152,7 +153,7 @@ def _bar(pace: Pace) -> Iterator[Progress]:
 
 
 EXAMPLE = "urdfkin report status nightly"
-#: Maximum number of failed robots that are listed, and of chunks that are read for their times.
+#: Maximum number of failed robots in the list, and maximum number of chunks whose computing times are read.
 _NAMED, _READ = 20, 200
 
 _FOLDER = click.Path(path_type=Path, file_okay=False)

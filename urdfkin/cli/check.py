@@ -60,7 +60,7 @@ class Outcome:
     Attributes:
         files: Names of the files that were read, as given.
         findings: Findings to print.
-        silenced: Findings that a comment suppresses, each with its reason.
+        silenced: Findings that comments suppress, each with the reason in its comment.
         excerpts: For each finding, the line of the file with a caret below.
         unreadable: One error for each file that could not be read.
         unchanged: Number of files that are unchanged since the version of --changed-since.
@@ -386,7 +386,7 @@ class Run:
     """One check of many files.
 
     Attributes:
-        look: Examines one file.
+        look: A function that checks one file.
         choice: Selects the findings to report.
         strict: Whether warnings become errors.
         fold: Whether many findings of one kind become one.
@@ -425,7 +425,7 @@ class Run:
                     if file not in (
                         word,
                         f"./{word}",
-                    ):  # found in a folder that the user named
+                    ):  # the file was found in a folder that the user named
                         demand_regular(Path(file))
                     self._check(file)
                 except (SourceError, UnknownNameError, XacroError) as error:

@@ -22,7 +22,8 @@ from urdfkin.urdf.catalogue import catalogue
 if TYPE_CHECKING:
     Items = list[CompletionItem[str]]
 
-#: Names without quotes, blanks and characters that a shell expands; no colon, which separates words in bash.
+#: Pattern of the names that completion offers. They have no quotes, blanks or characters that a shell
+#: expands, and no colon, because bash separates words at colons.
 _HARMLESS = re.compile(r"(?=\w)[\w./+-]+")
 #: Largest file that is read for its names, in bytes.
 _MOST = 10_000_000

@@ -34,7 +34,7 @@ class Stop:
     signal: int | None = None
 
     def exit_code(self, otherwise: int) -> int:
-        """Return 128 + the signal's number, as shells do; a disagreement keeps exit code 1."""
+        """Return 128 + the number of the signal, as shells do. If a disagreement was found, return 1."""
         return otherwise if self.signal is None or otherwise == 1 else 128 + self.signal
 
 

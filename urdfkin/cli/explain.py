@@ -23,12 +23,18 @@ _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def answers() -> dict[str, str]:
-    """Return each question's section, without link targets, by the anchor of its heading."""
+    """Return the section of each question by the anchor of its heading.
+
+    The links in a section have lost their targets.
+    """
     return {anchor(text.partition("\n")[0]): _LINK.sub(r"\1", text).rstrip() for text in _sections()[1:]}
 
 
 def answer_to(topic: str) -> str | None:
-    """Return the section of an anchor, or the only section with these words in its anchor; None otherwise."""
+    """Return the section of the questions page for a topic, or None.
+
+    The topic is the anchor of a heading, or some words that only one anchor contains.
+    """
     known, words = answers(), set(topic.lower().replace("-", " ").split())
     found = [name for name in known if words and words <= set(name.split("-"))]
     return known.get("-".join(topic.lower().split())) or (known[found[0]] if len(found) == 1 else None)

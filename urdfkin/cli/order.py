@@ -67,7 +67,11 @@ def _table(robot: Robot) -> Answer:
 
 
 def _cells(robot: Robot, conversion: Conversion) -> tuple[str, ...]:
-    """Return the cell of each moving joint: its index in q, or both as q/v; "-" if it has no column."""
+    """Return the cell of each moving joint.
+
+    The cell is the index in q; if the index in v differs, it is both indices as q/v. It is "-" if the joint
+    has no coordinate.
+    """
     indices = conversion.q_and_v_indices
 
     def span(at: list[int]) -> str:

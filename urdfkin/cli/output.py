@@ -1,4 +1,4 @@
-"""The answer of a command: one result, printed as a table or written in any format.
+"""Print the result of a command as a table, or write it in any format.
 
 A file is written completely or not at all.
 """
@@ -94,7 +94,10 @@ class Answer:
         return document.written(form), True
 
     def put(self, form: str, forms: Sequence[str], output: Path | None = None) -> None:
-        """Print the result in the first of `forms`, or write it in any other to standard output or a file."""
+        """Print the result if the chosen format is the first of `forms`.
+
+        In any other format, write it to standard output or to a file.
+        """
         if form == forms[0] and output is None and form not in self.data:
             self.show(console())
             return
@@ -158,7 +161,10 @@ def format_option(
 
 @contextmanager
 def compiling() -> Iterator[None]:
-    """Print a line when a kernel is compiled, which happens once on a machine, and the time it took."""
+    """Print a line when a kernel is compiled, and then the time that this took.
+
+    A kernel is compiled only once on a machine.
+    """
     from urdfkin.compiled.kept import listen_to_compile_events  # noqa: PLC0415  keeps --help fast
 
     hints = [", once; 'urdfkin warm' compiles all kernels"]
@@ -237,7 +243,7 @@ def exit_code(certificate: Certificate) -> int:
 
 
 def check_of_path(check: object | None) -> tuple[str, int]:
-    """Return the last line and the exit code of a command about a path.
+    """Return the last output line and the exit code of a command about a path between two frames.
 
     Args:
         check: The result of the check, or None if nothing was checked.

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 def _path_command(
     name: str, example: str, *options: Any, answers: Any
 ) -> Callable[[Callable[..., Answer]], click.Command]:
-    """Make a command with the options of a path; `answers` is a result of `answering`."""
+    """Make a command with the options of a path. `answers` is a decorator that `answering` returns."""
 
     def decorate(function: Callable[..., Answer]) -> click.Command:
         own = together(robot_argument, path_options, *options, verify_option, answers)
@@ -129,7 +129,10 @@ def _kind_of_joint(joint: Any) -> str:
 
 
 def _vector(numbers: FloatArray) -> str:
-    """Return the numbers with six digits; rounding errors of a metre appear as 0."""
+    """Return the numbers as text with six digits.
+
+    Numbers as small as the rounding errors of a length of a metre are shown as 0.
+    """
     return " ".join(six_digits(x) for x in numbers.tolist())
 
 

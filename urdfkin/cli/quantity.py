@@ -1,6 +1,7 @@
 """Commands that compute a quantity of a frame, such as `urdfkin jacobian`, `placement` and `imu`.
 
-Each row of the table of quantities gives one command. All share their options, their input and their output.
+Each row of the table of quantities defines one command. All these commands have the same options, and read
+and write their data in the same way.
 """
 
 from __future__ import annotations
@@ -237,7 +238,8 @@ def _data(x: Inputs, quantity: Quantity, reference: str | None, result: FloatArr
 def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[object]]:
     if quantity.columns and not x.along:
         rates = [csv_cell(name) for name in x.rate_names]
-        # A Hessian's line is for one column of the Jacobian; its columns are for the joint velocities.
+        # In the table of a Hessian, a line is for one column of the Jacobian, and a column of the table is
+        # for one joint velocity.
         keys = [[row] for row in quantity.labels]
         for _ in range(2, quantity.axes):
             keys = [[*key, rate] for key in keys for rate in rates]
@@ -259,7 +261,10 @@ _TIME = ("sample", "t")
 
 
 def _times(x: Inputs) -> Iterable[object]:
-    """Return the first cell of each sample's row: its time, or its index if there are no times."""
+    """Return the first cell of each sample's row.
+
+    It is the time of the sample, or the index of the sample if there are no times.
+    """
     return range(len(x.q)) if x.t is None else map(repr, x.t.tolist())
 
 
@@ -279,7 +284,10 @@ def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
 
 
 def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Table:
-    """Return a row for each joint velocity; for a Hessian, one for each non-zero pair of them."""
+    """Return a row for each joint velocity.
+
+    For a Hessian, return a row for each pair of joint velocities whose numbers are not all zero.
+    """
     import numpy as np  # noqa: PLC0415  keeps --help fast
 
     if quantity.axes == len(("row", "rate")):
@@ -403,7 +411,10 @@ def placement_command(relative_to: str | None, written: str, verify: bool, **_: 
 
 
 def _numbers(x: Inputs, T: FloatArray, written: str, *, verify: bool) -> FloatArray:
-    """Return the (n, 6) or (n, 7) position and orientation; Pinocchio checks them if it checked the poses."""
+    """Return the position and orientation of each pose as (n, 6) or (n, 7) numbers.
+
+    If Pinocchio has checked the poses, it checks these numbers too.
+    """
     import numpy as np  # noqa: PLC0415  keeps --help fast
 
     from urdfkin.kinematics.rotation import quaternion_of, rpy_of  # noqa: PLC0415
@@ -420,7 +431,7 @@ def _numbers(x: Inputs, T: FloatArray, written: str, *, verify: bool) -> FloatAr
 
 
 def _again(x: Inputs, k: int, written: str) -> str:
-    """Return the command that computes sample `k` again."""
+    """Return the command that computes the pose of sample `k` again."""
     line = replay_line(x.robot.origin, "placement", x.frame, None, {"q": x.q[k].tolist()})
     given = click.get_current_context().params
     for name in ("relative_to", "base_placement"):
@@ -607,7 +618,7 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
 
 
 def _between(names: list[str], found: SingularValues, k: int) -> Iterator[tuple[str, list[float]]]:
-    """Yield the name of each number of a sample, with its value, lower bound and upper bound."""
+    """Yield each number of a sample: its name, its value, its lower bound and its upper bound."""
     for i, name in enumerate(names):
         yield name, [float(side[k, i]) for side in found.values]
     for name, between in (("condition", found.condition), ("manipulability", found.manipulability)):

@@ -82,7 +82,7 @@ def info_command(robot: str) -> Answer:
 
 
 def _fitted(out: Console, document: TextDocument) -> TextDocument:
-    """Put each link and its joint into one column if the table does not fit the terminal."""
+    """If the table is wider than the terminal, show each link and its joint in one column."""
     from urdfkin.report.listing import fits  # noqa: PLC0415
 
     parts = list(document.parts)
@@ -95,7 +95,7 @@ def _fitted(out: Console, document: TextDocument) -> TextDocument:
 
 
 def _rows(document: TextDocument, links: Sequence[str]) -> Iterator[list[str]]:
-    """Yield the table's rows, without the drawn lines from links to their children."""
+    """Yield the rows of the table. The lines that connect a link with its children are not in these rows."""
     for part in document.parts:
         if isinstance(part, Table):
             yield list(part.heads)

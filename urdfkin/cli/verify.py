@@ -133,7 +133,7 @@ def verify_command(
 
 
 def _document(checks: Sequence[FunctionCheck]) -> TextDocument:
-    """Return one check as it is, or all of them below each other."""
+    """Return the document of a single check, or one document with the results of several checks."""
     sheets = [check._sheet() for check in checks]
     if len(sheets) == 1:
         return sheets[0]
@@ -204,7 +204,8 @@ def _module(path: str) -> ModuleType:
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules.setdefault(file.stem, module)
-    sys.path.append(str(file.parent))  # last, so that a file beside it replaces no installed module
+    # The folder is the last one on the path, so that no file in it hides an installed module.
+    sys.path.append(str(file.parent))
     try:
         spec.loader.exec_module(module)
     except UrdfkinError:

@@ -28,8 +28,8 @@ class Table:
     Attributes:
         heads: Titles of the columns.
         rows: Cells of each row. Numbers are displayed with six digits.
-        left: Left-aligned columns, either as a number (so many columns, from the first) or as column indices.
-            Leading blanks in these columns are kept.
+        left: The left-aligned columns. A number n stands for the first n columns; a list contains the indices
+            of the columns. Leading blanks in these columns are kept.
         names: Indices of columns with names. Markdown displays names as code.
     """
 

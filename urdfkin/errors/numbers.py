@@ -81,8 +81,8 @@ class Measured(NamedTuple):
     Attributes:
         value: The number, in radians or metres if a unit is given, otherwise as written.
         unit: "rad" or "m"; None without a unit. A multiple of pi without a unit is in radians.
-        per: Power of seconds in the denominator of the unit: 0 for a position, 1 for a velocity, 2 for an
-            acceleration.
+        per: Exponent of the seconds in the denominator of the unit: 0 for a position, 1 for a velocity such
+            as rad/s, 2 for an acceleration such as rad/s^2.
     """
 
     value: float
@@ -130,7 +130,7 @@ def _product(factors: str) -> float | None:
 
 
 def in_radians(degrees: float) -> float:
-    """Convert degrees to radians; a multiple of 15 degrees gives bit for bit the multiple of pi/12.
+    """Convert degrees to radians. The result for k * 15 degrees equals the double k * pi / 12.
 
     >>> in_radians(90.0) == math.pi / 2
     True

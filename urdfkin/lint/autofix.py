@@ -34,10 +34,12 @@ from urdfkin.urdf.findings import Finding, Severity, apply
 from urdfkin.urdf.records import AXIAL, FURTHER_LIMITS, JointRecord, RobotRecord
 from urdfkin.urdf.sources import Text
 
-#: Largest number of passes over a file. Each code needs one pass, and overlapping fixes need further ones.
+#: Largest number of passes over a file. Each code with a fix needs one pass. If fixes overlap, further passes
+#: are needed.
 PASSES = 100
 
-#: Bound (rad) on the change of a unit vector's direction when its numbers are rounded. It is twice 2**-53.
+#: Bound (rad) on the rotation of a unit vector when each of its three numbers is rounded to a double. It is
+#: twice 2**-53.
 TILT = Fraction(1, 2**52)
 
 
@@ -94,8 +96,8 @@ def mend(
 def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> Iterator[str]:
     """Yield the reasons against a fix."""
     code = fixable[0].code
-    # Skip kinds with more findings than the limit of complete ones. When some of those are fixed, others take
-    # their place in the list.
+    # Skip kinds of findings that exceed the limit of completely stored findings. If some of their stored
+    # findings are fixed, further findings are stored instead, and look like new ones.
     many = {finding.code for finding in before.findings if finding.also}
     old, new = (
         Counter((f.code, f.element, f.name) for f in seen.findings if f.code not in many)
@@ -147,7 +149,8 @@ def _difference(a: JointRecord, b: JointRecord, turns: float) -> str | None:
     return next((what for what, same in equal.items() if not same), None)
 
 
-#: Factor that allows for the rounding of `Fix.turns`, which is a sum of doubles.
+#: Factor on the bound `Fix.turns`. It allows for the rounding errors of that bound, which is a sum of
+#: doubles.
 _SLACK = 1 + Fraction(1, 2**50)
 
 

@@ -27,7 +27,7 @@ def as_sarif(findings: Sequence[Finding], version: str, silenced: Sequence[tuple
     Args:
         findings: The reported findings.
         version: The version of urdfkin.
-        silenced: The findings that comments silence, each with its reason; SARIF results "suppressed in
+        silenced: The findings that comments silence, each with its reason. SARIF marks them as "suppressed in
             source".
     """
     index = {code: number for number, code in enumerate(RULES)}

@@ -59,7 +59,7 @@ class Baseline:
     Attributes:
         counts: Key -> number of known findings that no reported finding has matched yet.
         root: The folder that file names are relative to.
-        met: The number of findings that matched a known one.
+        met: The number of reported findings that matched a known finding.
     """
 
     counts: Counter[Key]
@@ -292,7 +292,7 @@ class Choice:
         codes: The selected codes.
         notes: Whether notes are reported.
         settings: The settings, which contain the codes that are ignored in certain files.
-        baseline: The known findings, or None. It counts its matches.
+        baseline: The known findings, or None. The baseline object counts the matched findings.
     """
 
     codes: frozenset[str]
@@ -312,13 +312,16 @@ class Choice:
 
         def is_reported(finding: Finding) -> bool:
             selected = finding.code in codes and (self.notes or finding.severity is not Severity.NOTE)
-            # sum, not any: both baselines must count the match
+            # sum instead of any, because each of the two baselines must count the match
             return selected and not sum(baseline.knows(finding) for baseline in known)
 
         return is_reported
 
     def again(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
-        """Return the function of `of` with copies of the baselines, so that a file can be checked again."""
+        """Return the same function as `of`, but with copies of the baselines.
+
+        Checking a file a second time then changes no count of matches.
+        """
         copies = [
             None if known is None else replace(known, counts=Counter(known.counts))
             for known in (self.baseline, before)
@@ -327,7 +330,9 @@ class Choice:
 
 
 def known_before(text: Text, version: Version, look: Callable[[Text], Examined]) -> Baseline | None:
-    """Return the findings of an older version of a file; None if all its findings are the same.
+    """Return the findings of an older version of a file.
+
+    None: the file and the files it uses have not changed, so its findings are the same.
 
     If a file with the name of a mesh was deleted since then, the finding that the mesh is missing counts as
     new.

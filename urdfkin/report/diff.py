@@ -79,7 +79,7 @@ def markdown_of(found: Changes, limit: int = LIMIT) -> str:
 
 
 def as_data(found: Changes) -> dict[str, Any]:
-    """Return the changes as JSON data; null for a missing value, and for a distance without bound."""
+    """Return the changes as JSON data. A missing value and an unbounded distance are null."""
 
     def far(interval: Any) -> dict[str, Any] | None:
         if interval is None:

@@ -53,7 +53,8 @@ _FAILURES_OPEN = 20
 #: With more robots than this, histograms are drawn only for robots that are not verified. A histogram
 #: takes a second.
 _DRAWN = 100
-#: Maximum length of all details, characters. Beyond it each robot's details are in their own file.
+#: Maximum length in characters of the details of all robots together. If they are longer, each robot's
+#: details are in a separate file.
 MOST = 5_000_000
 
 
@@ -187,7 +188,10 @@ def _totals(document: Document) -> dict[str, Any]:
 
 
 def _model_verdict(document: Document) -> dict[str, Any]:
-    """Return the banner's answer on the files: colour, title, counts, and the first robot to read."""
+    """Return the banner about problems in the robots' files.
+
+    The banner has a colour, a title, the counts of findings, and the robot to look at first.
+    """
     severities = ("error", "warning", "note")
     found = [
         Counter[str](finding["severity"] for finding in robot["findings"]) for robot in document["robots"]

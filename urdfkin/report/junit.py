@@ -1,7 +1,7 @@
 """JUnit XML: a test suite for each robot, with a test case for each quantity and reference frame.
 
-The layout is that of Jenkins (junit-10.xsd), which GitLab, GitHub actions and others read. Some of them
-ignore the attributes of a failure, so the text of the failure is complete.
+The layout is that of Jenkins (junit-10.xsd), which GitLab, GitHub actions and others read. Some of these
+programs ignore the attributes of a failure. The text of the failure therefore contains all information.
 """
 
 from __future__ import annotations

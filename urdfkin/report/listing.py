@@ -41,9 +41,9 @@ def print_named(
 def print_table(out: Console, table: Table) -> None:
     """Print a table with numbers at six digits. The names in the first column are never folded.
 
-    Numbers below the rounding error of the table's largest number are shown as 0; JSON has full precision. On
-    a narrow terminal a long name is on its own line, above the other cells of its row. There, a name that
-    repeats the name above it is left out.
+    Numbers below the rounding error of the table's largest number are shown as 0; JSON output has full
+    precision. On a narrow terminal a long name is on its own line, above the other cells of its row. If the
+    previous row has the same name, this line is left out.
     """
     from rich.cells import cell_len  # noqa: PLC0415
 
@@ -76,7 +76,10 @@ def print_table(out: Console, table: Table) -> None:
 
 
 def fits(out: Console, table: Table) -> bool:
-    """Whether a table fits the terminal, with one space after each cell and one between two columns."""
+    """Whether a table fits the width of the terminal.
+
+    Two columns are separated by two spaces, and one space follows the last column.
+    """
     return sum(width + 2 for width in _cells(table)[2]) - 1 <= out.width
 
 

@@ -61,7 +61,10 @@ def as_markdown(document: Document) -> str:
 
 
 def _three_sides(robots: list[Robot]) -> list[str]:
-    """Return the table with a second oracle: one row for each quantity, all robots together."""
+    """Return the table of a comparison with a second oracle.
+
+    It has one row for each quantity, over all robots.
+    """
     if (title := witness_title(robots)) is None:
         return []
     heads = ["quantity", *map(text, witness_heads(title))]

@@ -32,7 +32,8 @@ if TYPE_CHECKING:
 
 _READABLE = DisplayUnits(digits=6)
 
-#: Upper edges of the heat map's colour steps, as ratios to the bound. Above the last, a result is outside.
+#: Upper edges of the heat map's colour steps, as ratios of a disagreement to its bound. A result above the
+#: last edge is outside its bound.
 HEAT_STEPS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 
@@ -135,7 +136,10 @@ def _limits(limit: Limit | None, kind: str) -> dict[str, str]:
 
 
 def heat_map(robot: Robot, model: Model) -> tuple[list[str], list[tuple[str, list[Cell]]]]:
-    """Return the column heads, and the name and cells of each moving joint (worst reference frame)."""
+    """Return the column heads, and the name and cells of each moving joint.
+
+    A cell shows the worst of all reference frames.
+    """
     quantities_of = columns([robot])
     frame = {name: i for i, name in enumerate(robot["frames"])}
     moving = {name: i for i, name in enumerate(robot["joints"])}
@@ -176,7 +180,8 @@ def _cell(checks: Sequence[Check], where: dict[str, list[int]]) -> Cell:
 def _share(check: Check, subject: int) -> float:
     """Return an upper bound on the ratio of a subject's worst disagreement to its bound.
 
-    It uses the tightest bound, and is at most the largest ratio of the check.
+    The disagreement is divided by the tightest bound of all results. The ratio is therefore an upper bound.
+    It is limited to the largest ratio of the whole check.
     """
     value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["share_of_bound"]
     if not value:  # a disagreement of 0 lies within every bound
@@ -187,7 +192,10 @@ def _share(check: Check, subject: int) -> float:
 
 
 def chain_rows(chain: Chain, convention: str) -> list[list[str]]:
-    """Return a table's rows as cells: joint, a, alpha, (beta,) d, theta, with q at the joint's parameter."""
+    """Return a table's rows as cells: joint, a, alpha, d, theta, and beta if a row has one.
+
+    The cell of the joint's variable also contains q.
+    """
     table = chain["standard"] if convention == "standard" else chain["modified"]
     return [_dh_cells(row, has_beta(chain)) for row in table["rows"]]
 
@@ -234,7 +242,10 @@ def angle(value: float) -> str:
 
 
 def judged_rows(judgement: Judgement) -> list[dict[str, Any]]:
-    """Return the rows of the accuracy study: the errors of both libraries, and the more accurate one."""
+    """Return the rows of the accuracy study.
+
+    A row has the errors of urdfkin and of Pinocchio, and the more accurate of the two.
+    """
     return [
         {
             "quantity": quantity_name(line["quantity"]),

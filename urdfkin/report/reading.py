@@ -1,8 +1,8 @@
 """Reader of report documents. It checks the layout and the consistency of all entries.
 
 A report is evidence, and may have been edited or truncated. Entries that follow from other entries are
-computed again and compared: the outcome, verdicts, sums, ratios and percentiles. The robot must be a tree of
-links and joints with consistent indices of coordinates.
+computed again and compared: the outcome, verdicts, sums, ratios and percentiles. The links and joints of a
+robot must form a tree, and the indices of the joints in q and v must be consistent.
 """
 
 from __future__ import annotations
@@ -254,7 +254,11 @@ def _check(check: Check, subjects: list[str], robot: Robot, document: Document) 
 
 
 def _share(check: Check) -> Iterator[str]:
-    """Yield contradictions of the ratio: it lies between worst / widest bound and worst / tightest bound."""
+    """Yield contradictions about the largest ratio of a disagreement to its bound.
+
+    The ratio must lie between the worst disagreement divided by the widest bound and the worst disagreement
+    divided by the tightest bound.
+    """
     share, largest = _as_number(check["share_of_bound"]), _as_number(check["worst"])
     low, high = _as_number(check["bound"][0]), _as_number(check["bound"][1])
     if (share > 1.0) != (check["failed"] > 0) or check["failed"] > check["results"]:

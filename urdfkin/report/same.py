@@ -26,14 +26,15 @@ from urdfkin.robot import Robot
 
 #: Number of lines that are shown for each kind of difference without --all.
 SHOWN = 12
-#: First line where models differ and joints were not matched by name.
+#: First line of the reasons if the models differ and their joints were not matched by name.
 GUESSED = "joints are matched by their axes, because their names differ; use --map to match other joints"
 HEADS = ("frame", "at least", "at most", "angle at most")
 #: Attributes of an interval: the attained and the proven angle.
 TURNED = ("radians_seen", "radians")
 #: The default question: are both robots equivalent?
 EQUIVALENT = Question()
-#: A bound up to this factor times the rounding counts as rounding, because sums add rounding errors.
+#: If a bound is at most this factor times the rounding error of one number, it counts as rounding. The factor
+#: is needed because a sum adds the rounding errors of its terms.
 DUST = 1.001
 #: Heading of the list of joints whose mimic joints leave their limits.
 NARROWED = "limits of mimic joints, which the bounds of the distance ignore"
@@ -78,7 +79,10 @@ def _both(metres: float, radians: float) -> str:
 
 
 def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
-    """Return the largest distance and angle of all frames in words; empty if both are rounding."""
+    """Return the largest distance and angle of all frames in words.
+
+    Return an empty text if distance and angle are within rounding.
+    """
     lower, upper = (max((getattr(one, end) for one in frames), default=0.0) for end in ("lower", "upper"))
     seen, radians = (max((getattr(one, end) for one in frames), default=0.0) for end in TURNED)
     parts: list[tuple[Callable[[float], str], float, float]] = []
@@ -95,7 +99,10 @@ def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
 
 
 def _off(frame: Interval, rounding: tuple[float, float]) -> str:
-    """Return the distance and angle of one frame in words; empty if both are rounding."""
+    """Return the distance and angle of one frame in words.
+
+    Return an empty text if distance and angle are within rounding.
+    """
     parts = [up_to(length, frame.lower, frame.upper)] if frame.upper > DUST * rounding[0] else []
     parts += [up_to(angle, frame.radians_seen, frame.radians)] if frame.radians > DUST * rounding[1] else []
     return " and ".join(parts)
@@ -119,7 +126,10 @@ def rows(frames: Sequence[Interval]) -> list[list[str]]:
 
 
 def as_written(found: Sameness) -> str:
-    """Return how far a frame is off as written, in words; empty if that is rounding."""
+    """Return in words how far a frame is off if the models are compared without any changes of B.
+
+    Return an empty text if the distance is within rounding.
+    """
     frame = found.as_written
     off = "" if frame is None else _off(frame, found.rounding)
     return f"without changes of B, {frame.frame} is {off} off" if frame is not None and off else ""
@@ -198,7 +208,10 @@ def as_document(found: Sameness) -> TextDocument:
 
 
 def attained(frame: Interval) -> str:
-    """Return how far a frame is off at its configuration, in words; empty if it is not off."""
+    """Return in words how far a frame is off at its worst configuration.
+
+    Return an empty text if it is not off.
+    """
     parts = [length(frame.lower)] if frame.lower else []
     parts += [angle(frame.radians_seen)] if frame.radians_seen and not frame.lower else []
     return " and ".join(parts)
@@ -244,9 +257,11 @@ def markdown_of(found: Sameness, question: Question = EQUIVALENT) -> str:
     return "\n".join([*lines, text(str(found.checked)), ""])
 
 
-#: Half the side of a picture in units of the SVG, and the share of the picture that the robots fill.
+#: Half the side length of a picture in units of the SVG, and the fraction of the picture that the robots
+#: fill.
 HALF, FILLED = 150.0, 0.9
-#: Largest length of the scale bar as a share of the picture's side, and its distance from the lower edge.
+#: Largest length of the scale bar, and its distance from the lower edge. The unit of both numbers is the side
+#: length of the picture.
 SCALE, FOOT = 0.3, 6.0
 #: Length of a frame's axes in the close view, as a share of the distance shown.
 AXIS = 0.35
@@ -324,7 +339,8 @@ def pictures(
         written: Whether to draw B as written, not with the changes that make it equivalent to A.
 
     Returns:
-        For each view its title, scale bar and lines (x, y, x, y) of A, of B and between them.
+        For each view: its title, its scale bar, and three groups of lines (x, y, x, y). The groups are the
+        lines of A, the lines of B, and the lines that connect A with B.
     """
     a, b = robots
     q_a = np.array(worst.q_a) if worst else a.neutral()
@@ -364,9 +380,13 @@ def _axes(T: FloatArray, size: float) -> FloatArray:
 def _draw(
     title: str, turn: float, tip: float, lines: tuple[FloatArray, FloatArray], gap: FloatArray | None = None
 ) -> dict[str, Any]:
-    """Return one view: lines projected along a direction and scaled to the picture."""
+    """Return one view.
+
+    Its lines are projected along the direction of view and scaled to the size of the picture.
+    """
     c, s, up, down = np.cos(turn), np.sin(turn), np.cos(tip), np.sin(tip)
-    seen = np.array([[-s, c, 0.0], [down * c, down * s, -up]])  # the directions right and down on the page
+    # The rows are the vectors in space that point right and down on the page.
+    seen = np.array([[-s, c, 0.0], [down * c, down * s, -up]])
     flat = [x @ seen.T for x in (*lines, np.zeros((0, 2, 3)) if gap is None else gap)]
     points = np.concatenate([x.reshape(-1, 2) for x in flat])
     low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(2), np.ones(2))

@@ -1,6 +1,7 @@
-"""Report on a terminal: two tables at 80 columns, one wide table from 100 columns, and the failures.
+"""Report on a terminal: tables and the failures.
 
-The text is complete without colour.
+A terminal of 80 columns shows two tables, a terminal of at least 100 columns one wide table. Colours only
+repeat information of the text.
 """
 
 from __future__ import annotations
@@ -107,7 +108,7 @@ def _print_robots(robots: Sequence[Robot], out: Console) -> None:
 
 
 def _print_quantities(robots: Sequence[Robot], out: Console) -> None:
-    """Print one row for each quantity, all robots together."""
+    """Print one row for each quantity, over all robots."""
     rows = []
     for name in quantities(robots):
         checks = [check for robot in robots for check in of_quantity(robot, name)]
@@ -122,7 +123,7 @@ def _print_quantities(robots: Sequence[Robot], out: Console) -> None:
 
 
 def _three_sides(robots: Sequence[Robot], title: str) -> Table:
-    """Return one row for each quantity, all robots and reference frames together."""
+    """Return one row for each quantity, over all robots and reference frames."""
     rows = ([quantity_name(name), *cells] for name, cells in witness_rows(robots, title))
     heads = [head.replace(", ", ",\n") for head in witness_heads(title)]
     return Table(["quantity", *heads], list(rows), left=(0, 5))
@@ -156,7 +157,10 @@ def _print_checks(robot: Robot, out: Console) -> None:
 
 
 def _judged(judgement: Judgement) -> Table:
-    """Return the errors of both libraries, a row for each quantity and reference frame."""
+    """Return the errors of urdfkin and Pinocchio in the accuracy study.
+
+    The table has a row for each quantity and reference frame.
+    """
     heads = [
         "quantity, reference",
         "numbers",

@@ -28,7 +28,10 @@ def check_name(check: Check) -> str:
 
 
 def second_reader_words(robot: Robot) -> str:
-    """Return the result of the comparison with the second reader's tree; empty if there is none."""
+    """Return in words whether the tree of yourdfpy, the second reader, agrees with ours.
+
+    Return an empty text if there was no comparison.
+    """
     reading = robot.get("second_reader")
     if reading is None:
         return ""
@@ -53,7 +56,10 @@ def units(value: Units, *, compared: bool = True) -> str:
 
 
 def percent(share: Units) -> str:
-    """Format a ratio to a bound, as a percentage below 10 and as a factor above."""
+    """Format the ratio of a disagreement to its bound.
+
+    A ratio below 10 is shown as a percentage, a larger one as a factor.
+    """
     if share is None:
         return "inf"
     return f"{share:.1%}" if share < 10.0 else f"{share:.2g} x"
@@ -70,7 +76,10 @@ def worst(values: Iterable[Units]) -> Units:
 
 
 def quantities(robots: Sequence[Robot]) -> list[str]:
-    """Return the compared quantities of all robots: known ones first, in their order."""
+    """Return the compared quantities of all robots.
+
+    Quantities that this version knows come first, in their usual order.
+    """
     found = {check["quantity"] for robot in robots for check in robot["checks"]}
     return [q for q in QUANTITIES if q in found] + sorted(found - set(QUANTITIES))
 
@@ -109,13 +118,17 @@ def worst_of(robot: Robot, names: Sequence[str]) -> str:
 
 
 def nearer(line: Judged) -> Literal["urdfkin", "Pinocchio", "equal"]:
-    """Return the library with the smaller typical error; `equal` if both errors are the same double."""
+    """Return the library with the smaller typical error, or `equal` if the two errors are the same double."""
     ours, theirs = line["urdfkin"]["typical"], line["pinocchio"]["typical"]
     return "equal" if ours == theirs else "urdfkin" if ours < theirs else "Pinocchio"
 
 
 def nearer_counts(lines: Sequence[Judged]) -> str:
-    """Return how often urdfkin's typical error is smaller, equal and larger."""
+    """Return three counts of rows of the accuracy study.
+
+    They are the numbers of rows in which urdfkin's typical error is smaller than Pinocchio's, equal to it,
+    and larger.
+    """
     counts = Counter(nearer(line) for line in lines)
     return (
         f"urdfkin is more accurate in {counts['urdfkin']:,} of {counted(len(lines), 'line')}, equal in "
@@ -124,7 +137,10 @@ def nearer_counts(lines: Sequence[Judged]) -> str:
 
 
 def judged_on(judgement: Judgement) -> str:
-    """Return the samples of an accuracy result, whether the base moved, and `nearer_counts`, as text."""
+    """Return a text about an accuracy result.
+
+    It states the number of samples, whether the base moved, and the counts of `nearer_counts`.
+    """
     moving = " on a moving base" if judgement.get("moving_base") else ""
     return f"{counted(judgement['samples'], 'sample')}{moving}; {nearer_counts(judgement['lines'])}"
 
@@ -150,7 +166,10 @@ def witness_rows(robots: Sequence[Robot], title: str) -> Iterator[tuple[str, lis
 
 
 def witness_cells(checks: Sequence[Check], title: str) -> list[str]:
-    """Return the cells under `witness_heads` for several checks: the largest ratio to each pair's bound."""
+    """Return the cells under `witness_heads` for several checks.
+
+    The cell of a pair of libraries is the largest ratio of their disagreement to its bound.
+    """
     found = [(check, check["witness"]) for check in checks if "witness" in check]
     return [
         f"{sum(check['results'] for check, _ in found):,}",

@@ -34,7 +34,8 @@ from urdfkin.system.files import MOST_DATA, read_bytes, read_if_there
 _CHECKSUM_VERSION = "sealed with its name"
 _A_MONTH = 30 * 24 * 3600.0
 _USED = ".used"
-#: User ids that may own the parent folders: root, and 65534, the id of the host's root inside a container.
+#: User ids that may own the parent folders: 0 (root) and 65534. Inside a container, the root user of the host
+#: has the id 65534.
 _TRUSTED = (0, 65534)
 
 
@@ -86,7 +87,7 @@ _warned: set[str] = set()
 
 
 def _unsafe_reason(folder: Path) -> str | None:
-    """Return why another user could have written to a folder; None if no other user could.
+    """Return the reason why another user could have written to a folder; None if this is impossible.
 
     A user who can write to a parent folder can replace the folder, unless the parent has the sticky bit, as
     /tmp has.

@@ -47,7 +47,11 @@ Sha256 = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 
 
 class Header(TypedDict):
-    """The first entries of every certificate and report: its layout, its verdict and the basis of both."""
+    """The first entries of every certificate and report.
+
+    They state the layout of the document, its verdict, and the versions and texts that the verdict depends
+    on.
+    """
 
     schema: Annotated[str, says("Name and version of the layout of this document.")]
     versions: Annotated[
@@ -185,7 +189,10 @@ def _unknown_entry(data: Any, document: Any, place: str = "$") -> tuple[str, str
 
 
 def as_data(value: Any) -> Any:
-    """Return a result as objects, lists and numbers, which `typed` converts back. Infinity is kept."""
+    """Return a result as objects, lists and numbers, from which `typed` restores the result.
+
+    Infinite numbers stay infinite.
+    """
     return msgspec.to_builtins(value, enc_hook=lambda x: str(x) if isinstance(x, str) else x.tolist())
 
 

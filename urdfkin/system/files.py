@@ -82,7 +82,10 @@ def read_bytes(path: Path, most: int = MOST, *, pipes: bool = False) -> bytes:
 
 
 def read_start(path: Path, count: int, *, pipes: bool = False) -> bytes:
-    """Return the first `count` bytes of a file or fewer; arguments and errors as for `read_bytes`."""
+    """Return the first `count` bytes of a file, or the whole file if it is shorter.
+
+    Arguments and errors are those of `read_bytes`.
+    """
     try:
         # Without O_NONBLOCK, opening a pipe blocks until a writer opens it.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOCTTY)
@@ -128,7 +131,10 @@ def _check_regular(path: Path, kind: int) -> None:
 
 
 def read_if_there(path: Path, most: int = MOST) -> bytes | None:
-    """Return the content of a file, None if it does not exist; other errors as for `read_bytes`."""
+    """Return the content of a file, or None if the file does not exist.
+
+    All other errors are those of `read_bytes`.
+    """
     try:
         return read_bytes(path, most)
     except SourceError as error:
@@ -160,7 +166,7 @@ def read_standard_input(most: int = MOST) -> bytes:
 
 
 def read_start_of_standard_input(count: int) -> bytes:
-    """Return the first `count` bytes of standard input or fewer.
+    """Return the first `count` bytes of standard input, or all of it if it is shorter.
 
     Raises:
         SourceError: standard input is closed, or cannot be read.

@@ -1,4 +1,4 @@
-"""Files of an older version of a git repository.
+"""Read files of an older version of a git repository.
 
 The module uses only git commands that read git objects. Commands that read the working tree (`diff`,
 `status`) would run programs, and the settings of an untrusted repository could name these programs.

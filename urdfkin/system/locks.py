@@ -11,7 +11,9 @@ import threading
 
 
 def lock_over_forks() -> threading.RLock:
-    """Return a lock that a fork waits for. After the fork it is unlocked in the parent and the child.
+    """Return a lock.
+
+    A fork waits until the lock is free. After the fork, the lock is unlocked in the parent and in the child.
 
     Use this function for locks of modules only. A lock of an object would stay registered after the object is
     deleted, until the process ends.

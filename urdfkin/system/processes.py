@@ -26,7 +26,8 @@ from urdfkin.system.locks import lock_over_forks
 
 #: Environment variables that a Python interpreter may need to start.
 _NEEDED = ("LD_LIBRARY_PATH",)
-#: Linear algebra uses one thread, because each thread needs address space and a confined process has little.
+#: Settings that limit linear algebra to one thread. Each thread needs address space, and a confined process
+#: has little of it.
 _ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1"}
 
 

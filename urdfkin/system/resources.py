@@ -13,7 +13,10 @@ from urdfkin.errors import SourceError
 
 @cache
 def robots_dir() -> Path:
-    """Return the folder `robots`: inside the installed package, or beside it in a checkout."""
+    """Return the folder `robots`.
+
+    It is inside the installed package; in a checkout it is beside the package.
+    """
     here = Path(__file__).resolve().parents[1]
     for folder in (here / "robots", here.parent / "robots"):
         if (folder / "catalogue.toml").is_file():
@@ -22,7 +25,7 @@ def robots_dir() -> Path:
 
 
 def questions_page() -> Path:
-    """Return docs/questions.md: inside the installed package, or in `docs` of a checkout."""
+    """Return the path of questions.md. It is inside the installed package; in a checkout it is in `docs`."""
     here = Path(__file__).resolve().parents[1]
     for file in (here / "questions.md", here.parent / "docs" / "questions.md"):
         if file.is_file():

@@ -1,8 +1,8 @@
 """Robots and packages by name: the catalogue, robot_descriptions, and `package://name/...` without ROS.
 
 The catalogue has the robots of example-robot-data and urdfkin's own. robot_descriptions is a Python package
-that clones the repository of a robot into its own cache at the first use. urdfkin imports only those of its
-modules that it lists as descriptions.
+that clones the repository of a robot into its own cache at the first use. Of the modules of
+robot_descriptions, urdfkin imports only those in the package's own list of descriptions.
 
 The search for a package uses the first of these folders that exists:
 
@@ -43,7 +43,8 @@ class Entry:
         limbs: (base frame, tip frame) of each arm, leg or finger; the first pair is the default.
         mimic: Whether the mimic rules of the URDF are valid and can be used.
         reason: The reason, if `mimic` is False.
-        poses: Named poses: joint values (rad, m) by joint name; the other joints are at 0.
+        poses: Named poses. Each pose has joint values (rad, m) by joint name; joints that it does not name
+            are at 0.
         own: True for a robot of urdfkin, False for a robot of example-robot-data.
     """
 

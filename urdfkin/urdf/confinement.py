@@ -1,9 +1,10 @@
 """Confine the current process, so that it can only compute and read allowed files.
 
-The kernel's limits bound memory, time, files and processes. Python raises an audit event for each opened
-file, new process, socket and import. An audit hook refuses every event that is not allowed. The process can
-remove neither the limits nor the hook. This is a second defence behind `expressions`. A program with full
-control of the interpreter may evade the hook, but not the limits.
+The kernel limits the memory and time of the process, forbids it to write files, and forbids it to start
+processes. Python raises an audit event for each opened file, new process, socket and import. An audit hook
+refuses every event that is not allowed. The process can remove neither the limits nor the hook. This
+confinement is a second defence. The first one is `expressions`, which does not let Python run the expressions
+of a file. A program with full control of the interpreter may evade the hook, but not the limits.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from typing import Any
 
 from urdfkin.urdf.expressions import RefusedError
 
-#: Memory limit in bytes. The interpreter and its libraries need a tenth of it.
+#: Memory limit in bytes. The interpreter and its libraries need a tenth of this limit.
 MEMORY = 2 * 1024**3
 
 #: Audit events that are allowed without a check. `_READING` events are allowed for allowed files only.
@@ -71,7 +72,10 @@ class Ground:
 
 
 def _package_of(path: str) -> list[str]:
-    """Return the folder of the package that contains a file, as a list of one or none."""
+    """Return a list with the folder of the package that contains a file.
+
+    The list is empty if no package contains it.
+    """
     return [str(folder) for folder in Path(path).parents if _exists(folder / "package.xml")][:1]
 
 
@@ -111,7 +115,9 @@ def limit(seconds: int) -> None:
 
 
 def confine(holds: Callable[[str], bool]) -> None:
-    """Allow this process only to read certain files, from now on; refuse every other audit event.
+    """From now on, allow this process only to read certain files.
+
+    Every other audit event is refused.
 
     Args:
         holds: A function that returns whether a file or folder may be read.

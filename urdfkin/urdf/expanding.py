@@ -22,8 +22,8 @@ from urdfkin.urdf.xacro import arguments_of
 #: Functions of xacro that give an expression access to more than values.
 _NEVER = ("type", "vars")
 
-#: An expression that xacro's own function would evaluate. If xacro evaluates it after the replacement of that
-#: function, the replacement had no effect.
+#: An expression that xacro's own evaluation accepts and ours refuses. If xacro still evaluates it after the
+#: replacement of its function, the replacement had no effect.
 _PROBE = "${(lambda: 1)()}"
 
 _TOO_MUCH = f"it takes more than {MEMORY / 1024**3:g} GiB of memory"
@@ -50,7 +50,10 @@ def serve() -> None:
 def _expand(
     path: Path, arguments: dict[str, str], search: Mapping[str, str], ground: Ground
 ) -> dict[str, Any]:
-    """Return the URDF and the declared arguments; None if these are not known or no argument is given."""
+    """Return the URDF, and the names of the arguments that the file declares.
+
+    The names are None if they are not known, or if the user passed no argument.
+    """
     import xacrodoc  # noqa: PLC0415  only here
 
     _replace_evaluation(path, search, ground)
@@ -80,7 +83,7 @@ def _replace_evaluation(path: Path, search: Mapping[str, str], ground: Ground) -
     def value_of(expression: str, names: Mapping[str, Any], local: object = None) -> object:
         try:
             return evaluate(expression, names, functions)
-        except MemoryError:  # its own message is empty
+        except MemoryError:  # a MemoryError has no message of its own
             raise RefusedError(_TOO_MUCH) from None
 
     def value_of_arguments(expression: str, context: Mapping[str, Any]) -> str:
@@ -103,7 +106,7 @@ def _replace_evaluation(path: Path, search: Mapping[str, str], ground: Ground) -
 
 
 def _tables(symbols: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """Yield the tables of names that a file can use: the global one and those of the namespaces."""
+    """Yield the tables of names that a file can use: the global table, and the table of each namespace."""
     yield dict(symbols)
     yield from (value for value in symbols.values() if isinstance(value, dict))
 

@@ -63,10 +63,10 @@ def evaluate(expression: str, names: Mapping[str, Any], functions: Collection[ob
     Args:
         expression: The text of the expression.
         names: The values of the names in it.
-        functions: The functions that it may call, besides the allowed methods.
+        functions: The functions that the expression may call. It may also call the allowed methods.
 
     Raises:
-        RefusedError: it contains more than values, operators and allowed calls.
+        RefusedError: the expression contains more than values, operators and allowed calls.
         SyntaxError: the text is not an expression.
 
     >>> evaluate("2 * a[1] + max(a)", {"a": [1, 2], "max": max}, [max])
@@ -189,7 +189,7 @@ class _Evaluation:
 
 
 class _Scope(Mapping[str, Any]):
-    """The names of a loop, then those of the scope around it.
+    """A lookup of names: first the names of a loop, then the names of the scope around the loop.
 
     The outer names are not copied, because reading a name of xacro may evaluate an expression.
     """

@@ -1,7 +1,8 @@
 """Findings: problems in a URDF, with a stable code, their position, the found text and a remedy.
 
-The parser and the rules of `urdfkin.lint` add findings to the `Reporter` of a file. The reporter finds the
-position of each finding in the bytes, and applies the comments that silence findings. A finding is plain
+The parser and the rules of `urdfkin.lint` add findings to the `Reporter` of a file. The reporter computes the
+position of each finding in the bytes of the file, and applies the comments that silence findings. A finding
+is plain
 data: it can be printed, compared, converted to JSON or SARIF and sent to another process. A byte order mark
 does not count in positions.
 
@@ -48,7 +49,7 @@ def quoted(text: str, limit: int = QUOTED) -> str:
     return '"' + shortened(text, limit).replace('"', '\\"') + '"'
 
 
-#: Number of characters of a line in an excerpt, and the number of these before the marked text.
+#: Number of characters of a line in an excerpt, and the number of these characters before the marked text.
 SHOWN, BEFORE = 100, 60
 
 _TAB = "    "
@@ -66,7 +67,9 @@ class Excerpts:
         self.number, self.text = 0, ""
 
     def of(self, finding: Finding) -> str | None:
-        """Return two lines, the file's line and one with carets; None for a finding about the whole file.
+        """Return two lines: the line of the file, and a line with carets below it.
+
+        Return None for a finding about the whole file.
 
         >>> from urdfkin.urdf.findings import Severity
         >>> finding = Finding("URDF503", Severity.NOTE, "", column=7, width=11)
@@ -103,7 +106,7 @@ def _cells(text: str) -> int:
     )
 
 
-#: Bound on the change (rad) of an angle of up to one revolution when it is rounded to a double.
+#: Bound (rad) on the rounding error of an angle of up to one revolution that is rounded to a double.
 ROUNDING = 2.0**-50
 
 
@@ -160,7 +163,7 @@ class Severity(Enum):
 
 
 class PinocchioReading(Enum):
-    """Pinocchio's behaviour for legal content, where it differs from the specification."""
+    """Pinocchio's behaviour for legal content of a URDF, if this behaviour differs from the specification."""
 
     REFUSES = "refuses"
     DIFFERS = "differs"
@@ -224,7 +227,7 @@ class Finding:
 
     @property
     def count(self) -> int:
-        """The number of findings, those in `also` included.
+        """The number of findings that this object stands for: itself and those in `also`.
 
         >>> import urdfkin
         >>> finding = urdfkin.check('<robot name="r"><link name="a"/><link name="a"/></robot>')[0]
@@ -235,7 +238,7 @@ class Finding:
 
     @property
     def _others(self) -> str:
-        """The number of further findings and their lines."""
+        """A text with the number of findings in `also` and their lines."""
         others = tuple(sorted(set(self.also) - {self.line}))
         if len(others) == len(self.also):
             return f"also on {_lines(others)}"
@@ -309,7 +312,7 @@ class UrdfError(UrdfkinError, ValueError):
     URDF402
     """
 
-    #: Number of errors that the message lists. It only counts further errors.
+    #: Number of errors that the message lists. For further errors it only states their number.
     SHOWN = 5
 
     def __init__(self, findings: Iterable[Finding]) -> None:
@@ -462,18 +465,19 @@ class Silences:
         return silence.reason
 
 
-#: Limits of the search for suggestions: misspelt names per file, known names compared with each, and `work`
-#: of `nearest`.
+#: Limits of the search for suggestions: the number of misspelt names per file, the number of known names that
+#: are compared with each misspelt name, and the argument `work` of `nearest`.
 SEARCHES, CANDIDATES, WORK = 20, 5_000, 250_000
 
-#: From this number on, warnings or notes of one kind are combined into one. The second number is for the
-#: codes URDF7xx, which concern content that kinematics does not use.
+#: If a file has at least this number of warnings or notes of one kind, they are combined into one finding.
+#: The second number is for the codes URDF7xx, which concern content that kinematics does not use.
 FOLDED, FOLDED_EXTRAS = 4, 2
 
 #: Number of errors of one kind that are not combined.
 ERRORS_SHOWN = 100
 
-#: Largest number of findings of one kind that are stored completely. Of further ones only the line is stored.
+#: Largest number of findings of one kind that are stored completely. Of each further finding, only its line
+#: is stored.
 WRITTEN_OUT = 10_000
 
 
@@ -543,8 +547,8 @@ class Reporter:
             remedy: The remedy.
             owner: The tag for the message, if `at` is a link or joint in the wrong place. The default is the
                 tag of the link or joint that contains `at`.
-            severity: Severity instead of the rule's.
-            position: (line, column) if there is no element.
+            severity: Severity of the finding; None: the severity of the rule.
+            position: (line, column) of the finding; used if there is no element.
             weight: If findings of one kind are combined, the one with the greatest weight is reported.
             fix: A function that makes the automatic fix, called on demand; None: there is no automatic fix.
         """
@@ -744,7 +748,7 @@ def _place_in_file(finding: Finding) -> tuple[int, int, int, str, str]:
 
 
 def _combine(kind: _Kind, *, fold: bool) -> list[Finding]:
-    """Return the findings of a kind. A combined finding lists the lines of the others."""
+    """Return the findings of a kind, many of them combined into one, which lists the lines of the others."""
     kind.found.sort(key=lambda pair: _place_in_file(pair[0]))
     found = [finding for finding, _ in kind.found]
     into_one = fold and kind.severity is not Severity.ERROR

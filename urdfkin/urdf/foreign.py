@@ -153,8 +153,9 @@ def _text(root: Any) -> str:
 
 
 _ROOT = "universe"
-#: Class names of joints that rotate about (R, or RUB without limits) or slide along (P) an axis of their own
-#: frame. The class names of all other joints are in `_KINDS`.
+#: Pattern for the class names of joints whose axis is the x, y or z axis of their own frame. R stands for a
+#: revolute joint, RUB for a revolute joint without limits, and P for a prismatic joint. `_KINDS` contains the
+#: class names of all other joints.
 _ALIGNED = re.compile(r"JointModel(R|RUB|P)([XYZ])")
 _KINDS = {
     "R": JointKind.REVOLUTE,
@@ -176,8 +177,8 @@ class Modelled:
 
     Attributes:
         tree: The kinematic tree.
-        joints: Link -> index in the model of the joint that coincides with the link.
-        frames: Link -> index in the model of the link's frame, for every other link.
+        joints: For each link that coincides with a joint of the model: the index of this joint.
+        frames: For every other link: the index of its frame in the model.
     """
 
     tree: KinematicTree
@@ -202,7 +203,7 @@ def tree_of_model(source: Any) -> Modelled:
 
 
 class _ModelReader:
-    """Convert one model; the attributes are the intermediate results."""
+    """Convert one model. The attributes of this object are intermediate results."""
 
     def __init__(self, model: Any) -> None:
         self.model = model

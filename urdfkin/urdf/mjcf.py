@@ -66,8 +66,8 @@ class Mjcf:
         tree: The links and joints.
         model: MuJoCo's compiled model with all bodies.
         fused: The compiled model with fused static bodies if the file sets `fusestatic`; otherwise None.
-        frames: For each link: "body" or "site", and its index in MuJoCo's model.
-        coordinates: For each moving joint, mimic joints included: its index in MuJoCo's qpos.
+        frames: For each link: "body" or "site", and the index of this body or site in MuJoCo's model.
+        coordinates: For each moving joint, including mimic joints: its index in MuJoCo's qpos.
         rules: The equalities that are mimic rules. Each has its index in the model and the name of the mimic
             joint.
         apart: Indices in the model of the other active equalities between joints. The tree does not represent
@@ -127,7 +127,10 @@ class Mjcf:
         return (kind, index) if index >= 0 else None
 
     def lengths(self, q: FloatArray) -> FloatArray:
-        """Return the sum (n, frames), in m, of the lengths from the world to each frame, for error bounds."""
+        """Return an upper bound (n, frames), in m, of each frame's distance from the world's origin.
+
+        It is the sum of the lengths along the path from the world to the frame. Error bounds use it.
+        """
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))
         for i in range(1, m.nbody):
@@ -142,7 +145,10 @@ class Mjcf:
         return self._of_frames(at_body, np.linalg.norm(m.site_pos, axis=1))
 
     def reference_angles(self, q: FloatArray) -> FloatArray:
-        """Return the sum (n, frames), in rad, of |q| + |ref| over a path's hinges with a reference value."""
+        """Return a sum of angles (n, frames), in rad, for error bounds.
+
+        For each frame, |q| + |ref| is added over all hinges with a reference value on the path to the frame.
+        """
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))
         for i in range(1, m.nbody):
@@ -153,7 +159,7 @@ class Mjcf:
         return self._of_frames(at_body, np.zeros(m.nsite))
 
     def _joints_of(self, body: int) -> Iterator[tuple[int, str, int]]:
-        """Yield the joints of a body: index, kind, index in qpos."""
+        """Yield the joints of a body. Each has an index in the model, a kind, and an index in qpos."""
         m, kinds = self.model, library().mjtJoint
         words = {int(kinds.mjJNT_FREE): "free", int(kinds.mjJNT_SLIDE): "slide"}
         first = int(m.body_jntadr[body])
@@ -161,7 +167,7 @@ class Mjcf:
             yield j, words.get(int(m.jnt_type[j]), "hinge"), int(m.jnt_qposadr[j])
 
     def _of_frames(self, at_body: FloatArray, own: FloatArray) -> FloatArray:
-        """Return the value of each frame (n, frames): that of its body, plus `own` for a site.
+        """Return a value for each frame (n, frames): the value of its body, and for a site also `own`.
 
         `at_body` has the values of the bodies (n, bodies).
         """
@@ -191,7 +197,7 @@ class Mjcf:
         return out
 
     def rule_sizes(self, q: FloatArray) -> FloatArray:
-        """Return the size (n, equalities) of the terms of each mimic rule, for error bounds.
+        """Return the size (n, equalities) of the terms in each mimic rule, for error bounds.
 
         The size of y = y0 + c0 + c1 (x - x0) is |y0| + |c0| + |c1| (size of x + |x0|). This size is
         multiplied by the number of rules in the chain plus one.
@@ -404,7 +410,8 @@ def _strip(mujoco: Any, spec: Any) -> None:
     for site in spec.sites:
         site.material = ""
     for joint in spec.joints:
-        joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE  # it would use inertias that are not the file's
+        # the alignment would use inertias that differ from those of the file
+        joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
     for body in spec.bodies[1:]:
         body.explicitinertial, body.mass, body.ipos = True, 1.0, (0.0, 0.0, 0.0)
         body.inertia, body.iquat, body.fullinertia = (1.0,) * 3, (1.0, 0.0, 0.0, 0.0), (np.nan,) * 6

@@ -194,7 +194,8 @@ NAME_TOO_LONG = Rule("URDF117", "name-too-long", ERROR)
 INSTRUCTION = Rule("URDF118", "processing-instruction", WARNING, REFUSES)
 MARKUP_TOO_LONG = Rule("URDF119", "markup-too-long", ERROR)
 
-#: Largest nesting that older versions of libxml2, and the programs built on them, accept.
+#: Largest number of nested elements that older versions of libxml2 accept. Programs that use such a version
+#: accept no more.
 COMMON_DEPTH = 256
 _COMMON = ("older readers built on libxml2 refuse", COMMON_DEPTH)
 
@@ -433,12 +434,15 @@ class _Builder:
         )
 
     def _entity_name(self) -> str | None:
-        """Return the first entity after the position of an error that XML itself does not define."""
+        """Return the first entity after the position of an error.
+
+        The entities that XML defines itself do not count.
+        """
         found = _ENTITY.finditer(self.report.data, self.parser.ErrorByteIndex)
         return next((match[1].decode() for match in found if match[1] not in _PREDEFINED), None)
 
     def _around(self) -> str | None:
-        """Return the text at the position of an error, up to the end of its line."""
+        """Return the text from the position of an error to the end of the line."""
         start = self.parser.ErrorByteIndex
         line = (self.report.data[start : start + 120].splitlines() or [b""])[0]
         text = line.decode("utf-8", "replace")[:30]
@@ -498,7 +502,7 @@ class NumberReader:
     bad_vector: Rule = BAD_VECTOR
 
     def scalar(self, element: Element, attribute: str, default: float | None = None) -> float | None:
-        """Return one number; `default` if the attribute is missing, None if it cannot be read."""
+        """Return one number; `default` if the attribute is missing, None if its value is not a number."""
         written = element.attributes.get(attribute)
         if written is None:
             return default
@@ -801,7 +805,8 @@ class JointReader:
             element: The element.
             attribute: The name of the attribute.
             example: An example for the remedy.
-            number: Whether the attribute is a number. `NumberReader` reports an empty number.
+            number: Whether the attribute is a number. Then an empty value is not reported here, because
+                `NumberReader` reports it.
         """
         value = element.attributes.get(attribute)
         if value is None or not (value or number):
@@ -928,7 +933,10 @@ class JointReader:
             joint.mimic = MimicRecord(mimic, leader, multiplier, offset)
 
     def _others(self, joint: JointRecord) -> None:
-        """Check the elements that kinematics does not use, but for which urdfdom refuses a file."""
+        """Check elements of a joint that kinematics does not use.
+
+        If they are invalid, urdfdom refuses the file.
+        """
         dynamics = joint.element.first("dynamics")
         if dynamics is not None:
             if not {"damping", "friction"} & dynamics.attributes.keys():
@@ -959,7 +967,8 @@ def nearest_tag(word: str, known: frozenset[str]) -> str | None:
     return _nearest_tag(word, known) if len(word) <= _LONGEST_WORD else None
 
 
-#: Longer words are not similar to any word of URDF.
+#: Largest length of a word that is compared with the words of URDF. A longer word is not similar to any of
+#: them.
 _LONGEST_WORD = 32
 
 

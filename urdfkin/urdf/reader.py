@@ -111,7 +111,8 @@ def _unit(axis: FloatArray, joint: str) -> FloatArray:
 def _limit(limit: LimitRecord | None, kind: JointKind) -> Limit | None:
     if limit is None or kind.nv == 0:
         return None
-    # A missing bound is zero, as in urdfdom. The specification ignores the bounds of a continuous joint.
+    # A missing position limit is zero, as in urdfdom. By the specification, the position limits of a
+    # continuous joint have no effect.
     return Limit(
         lower=(limit.lower or 0.0) if kind.bounded else -math.inf,
         upper=(limit.upper or 0.0) if kind.bounded else math.inf,
@@ -124,8 +125,8 @@ def _rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
     """Return the mimic rule of each mimic joint, in terms of a joint that is not a mimic joint.
 
     A chain of rules is composed into one: y = m2 (m1 x + b1) + b2. The composition begins at the joint that
-    is not a mimic joint. Each joint is visited once. The order of operations is the oracle's, so both sides
-    round equally.
+    is not a mimic joint. Each joint is visited once. The operations have the same order as in the oracle, so
+    that urdfkin and the oracle have equal rounding errors.
     """
     named = {joint.name: joint for joint in joints}
     resolved: dict[str, Mimic] = {}

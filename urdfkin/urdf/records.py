@@ -17,7 +17,7 @@ ORACLE_DEPTH = 498
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """The limits of one check.
+    """The limits on the size of a file and its parts in one check.
 
     Attributes:
         bytes: Size of the file.
@@ -26,8 +26,8 @@ class Limits:
         attributes: Number of attributes of one element.
         name: Characters in the name of an element, an attribute, a link or a joint.
         number: Characters in one number.
-        markup: Bytes of one tag, comment or processing instruction; accurate within 10 %. libxml2 has the
-            same limit.
+        markup: Bytes of one tag, comment or processing instruction; the size is measured to within 10 %.
+            libxml2 has the same limit.
     """
 
     bytes: int = 100_000_000
@@ -103,7 +103,7 @@ class Element:
 
     @property
     def owner(self) -> str:
-        """The tag of the holder: `joint` for every element inside a joint."""
+        """The tag of the holder. For example, it is `joint` for every element inside a joint."""
         return self.holder.tag
 
     @property

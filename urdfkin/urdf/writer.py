@@ -129,7 +129,7 @@ _INDENTATION = re.compile(rb"((?:\r\n|\r|\n)?[ \t]*+)\Z")
 
 
 def with_attributes(data: bytes, at: Element, values: Mapping[str, str]) -> Iterator[Edit]:
-    """Yield the edits that set attributes of an element; new attributes are added after the existing ones."""
+    """Yield the edits that set attributes of an element. New attributes follow the existing ones."""
     name_end = at.offset + 1 + len(at.tag.encode())
     tag = START_TAG.match(data, at.offset)
     end = tag.end() if tag else name_end
@@ -147,6 +147,9 @@ def with_attributes(data: bytes, at: Element, values: Mapping[str, str]) -> Iter
 
 
 def before(data: bytes, at: Element, element: str) -> Edit:
-    """Return the edit that inserts a new element before another one, on its own line if the other has one."""
+    """Return the edit that inserts a new element before another element.
+
+    If the other element begins a line, the new element gets a line of its own.
+    """
     indentation = _INDENTATION.search(data[max(0, at.offset - 1000) : at.offset])
     return Edit(at.offset, at.offset, element + (indentation[1].decode() if indentation else ""))

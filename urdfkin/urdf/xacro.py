@@ -30,7 +30,7 @@ from urdfkin.urdf.catalogue import VARIABLES
 from urdfkin.urdf.confinement import Ground
 from urdfkin.urdf.expressions import RefusedError
 
-#: Limits of the search for declared arguments: bytes of a file, and number of files.
+#: Limits of the search for declared arguments: the size of one file in bytes, and the number of files.
 MOST_ARGUMENTS, MOST_FILES = 10_000_000, 200
 
 #: A function that returns the folder of a package, or raises LookupError.
@@ -46,7 +46,7 @@ def check_arguments(path: Path, given: Iterable[str], known: Collection[str] | N
 
     Args:
         path: The file.
-        given: Names of arguments.
+        given: Names of the arguments that the user passed.
         known: The names that `arguments_of` returned. None: every argument is accepted.
 
     Raises:
@@ -125,7 +125,7 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
 
     Args:
         path: The file.
-        arguments: Values for its `<xacro:arg>`.
+        arguments: Values for the arguments that the file declares by `<xacro:arg>`.
         patience: Time limit in seconds.
 
     Raises:

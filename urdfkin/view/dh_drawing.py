@@ -105,11 +105,14 @@ class _Canvas:
         self.axes.plot(*(self.projection @ point)[:, None], zorder=5, **style)
 
     def label(self, point: FloatArray, along: FloatArray, text: str, color: str) -> None:
-        """Add a label at a point; `write_labels` writes it."""
+        """Store a label for a point. `write_labels` draws the stored labels."""
         self.labels.append((self.projection @ point, self.projection @ along, text, color))
 
     def write_labels(self) -> None:
-        """Write the labels: merge those of the same colour and place, and move the others apart."""
+        """Draw the labels.
+
+        Labels of the same colour at the same place are merged; other overlapping labels are moved apart.
+        """
         merged: list[tuple[FloatArray, FloatArray, list[str], str]] = []
         for place, along, text, color in self.labels:
             for other, _, texts, other_color in merged:
@@ -130,14 +133,15 @@ class _Canvas:
             words = {"color": color, "ha": "center", "va": "center", "zorder": 6}
             self.axes.text(
                 *spot, ", ".join(texts), parse_math=color in (_X, _Z), **words
-            )  # our own text, not names
+            )  # these texts are urdfkin's own, so they need no escaping
 
 
 def _corners(table: DHTable, frames: FloatArray) -> FloatArray:
     """Return (n, 3): for each row, the point between its offset d and its length a."""
     corners = np.empty((len(table.rows), 3))
     for i, row in enumerate(table.rows):
-        if table.convention is Convention.STANDARD:  # along z, then along the common normal
+        # in this convention, the offset d comes first, then the length a
+        if table.convention is Convention.STANDARD:
             x, z = frames[i + 1, :3, 0], frames[i + 1, :3, 2]
             normal = math.cos(row.beta) * x + math.sin(row.beta) * z
             corners[i] = frames[i + 1, :3, 3] - row.a * normal

@@ -40,7 +40,7 @@ FORMATS = ("svg", "png", "pdf")
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK = COLOURS = (
     "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000",
 )  # fmt: skip
-#: Colour of a number that is wrong or outside its limits; it always comes with a cross.
+#: Colour of a number that is wrong or outside its limits; a cross always marks such a number as well.
 BAD = "#B00020"
 
 _STYLE: dict[Any, Any] = {

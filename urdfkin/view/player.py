@@ -1,7 +1,8 @@
 """Play a trajectory in the viewer, and save pictures and motions.
 
-The viewer shows samples of the trajectory and interpolates nothing, so each number on the screen is one that
-was checked. A saved motion is a GIF: it plays in browsers, slides and chats without a further program.
+The viewer shows samples of the trajectory and interpolates nothing, so the screen only shows numbers that
+Pinocchio has checked. A saved motion is a GIF: it plays in browsers, slides and chats without a further
+program.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from urdfkin.robot import Robot
 from urdfkin.view.plot import foot
 
 _SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
-#: Most updates per second while playing; frames per second and most frames of a saved motion, and its size.
+#: Largest number of updates per second while playing. For a saved motion: its frames per second, its largest
+#: number of frames, and its size in pixels.
 _RATE, _FRAME_RATE, _MOST_FRAMES, _SIZE = 20.0, 12.5, 250, (640, 480)
 
 

@@ -37,7 +37,8 @@ STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), "-")
 
 
 _LINEAR, _ANGULAR = slice(0, 3), slice(3, 6)
-#: Largest number of names in a legend; more lines are not distinguishable. Colour of the other lines.
+#: Largest number of names in a legend, because more lines are not distinguishable, and the colour of the
+#: lines without a name.
 _MOST_NAMES, _UNNAMED = 14, "#9AA7B5"
 
 
@@ -47,7 +48,10 @@ def _lines(axes: Axes, t: FloatArray, rows: FloatArray, names: Sequence[str]) ->
 
 
 def _look(k: int) -> dict[str, Any]:
-    """Return colour and dashes of a line; the pairs of the first 49 lines differ."""
+    """Return the colour and the dashes of line k.
+
+    The first 49 lines have different combinations of colour and dashes.
+    """
     return {"color": COLOURS[k % 7], "linestyle": STYLES[(k + 2 * (k // 7)) % 7]}
 
 
@@ -58,7 +62,10 @@ def position(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
 
 
 def orientation(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """Draw the rotation since the start: axis times angle, in world axes, rad."""
+    """Draw the frame's rotation since the start, rad.
+
+    It is drawn as the rotation vector, axis times angle, in world axes.
+    """
     R = x.placement[:, :3, :3]
     _lines(axes, t, log_rotation(R @ R[0].T), ("x", "y", "z"))
     axes.set_ylabel("rotation [rad]")
@@ -99,7 +106,10 @@ def parts(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
 
 
 def singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit: str) -> None:
-    """Draw the singular values of the Jacobian's linear or angular rows, not of all: units differ."""
+    """Draw the singular values of the Jacobian's linear rows or of its angular rows.
+
+    The two kinds of rows have different units, so they are not combined.
+    """
     values = x.singular_values_of(rows)
     largest = values.max(initial=1.0)
     shown = np.where(values > EPS * largest, values, np.nan)
@@ -135,7 +145,8 @@ def disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
         outside = check.share > 1.0
         if outside.any():
             axes.plot(t[outside], check.units[outside], "x", color=BAD, label="outside the bound")
-    # Bounds are about a hundred times the usual disagreement. Below 1 (one rounding), the scale is linear.
+    # Bounds are about a hundred times the usual disagreement, so the axis is logarithmic. Below 1, the size
+    # of one rounding, the axis is linear.
     axes.set_yscale("symlog", linthresh=1.0)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_ylim(bottom=0.0)
@@ -164,7 +175,10 @@ COORDINATES = tuple(_PER)
 
 
 def coordinate_panels(robot: Robot, trajectory: Trajectory, what: str) -> list[Panel]:
-    """Return the panels of q, v or a over time, one for each unit, with the limits of the moving joints."""
+    """Return panels of q, v or a over time, with the limits of the moving joints.
+
+    There is one panel for each unit.
+    """
     units = np.array(configuration.units(robot.tree, what))
     return [
         partial(_coordinates, robot, trajectory, what, unit, np.flatnonzero(units == unit).astype(np.int64))
@@ -183,10 +197,10 @@ def _coordinates(
     x: FrameMotion,
     t: FloatArray,
 ) -> None:
-    """Draw the coordinates that change, or all if none does.
+    """Draw the coordinates that change. If no coordinate changes, draw all of them.
 
-    Thin lines are the limits. A cross marks a sample outside its limits. If there are too many
-    lines for a legend, only those that leave their limits are coloured and named.
+    Thin lines are the limits. A cross marks a sample outside its limits. If there are too many lines for a
+    legend, only lines outside their limits are coloured and named.
     """
     del x
     values: FloatArray = getattr(trajectory, what)
@@ -216,9 +230,9 @@ def _coordinates(
 
 
 def _outside(robot: Robot, what: str, i: int, values: FloatArray) -> np.ndarray:
-    """Return whether each sample is outside the limits by more than one unit in the last place.
+    """Return whether each sample is outside the limits by more than one unit in the last place of a double.
 
-    Such a deviation is no violation, since limits are printed in decimal.
+    A smaller deviation may come from the decimal notation of the limits, so it does not count.
     """
     lower, upper = _limits(robot, what, i)
     return np.asarray((values < np.nextafter(lower, -np.inf)) | (values > np.nextafter(upper, np.inf)))
@@ -235,9 +249,10 @@ def _limits(robot: Robot, what: str, i: int) -> tuple[float, float]:
 _PAGE = (7.6, 10.4)
 #: Height of a panel, and of title and footer together, in inches.
 _HEIGHT, _WORDS = 2.1, 0.9
-#: Letters of a footer and of a legend that fit into an inch, and the width of a line's marker in letters.
+#: Number of letters per inch in the footer, number of letters per inch in a legend, and width of a legend's
+#: line marker in letters.
 _LETTERS, _LETTERS_OF_LEGEND, _HANDLE = 16, 22, 8
-#: Limit of the check when v and a were not computed exactly from q.
+#: Sentence for the footer of a figure if v and a were not computed exactly from q.
 _RATES_UNCHECKED = (
     "Pinocchio checks the formulas at these q, v and a, not whether v and a are the derivatives of q"
 )

@@ -35,7 +35,10 @@ def _read(file: Path) -> Any:
     import trimesh  # noqa: PLC0415  the import takes half a second
 
     class SameFolder(trimesh.resolvers.FilePathResolver):
-        """Finds materials and textures: regular files in the mesh's folder or below it."""
+        """Find the files of materials and textures.
+
+        Only regular files in the mesh's folder or below it are accepted.
+        """
 
         def get(self, name: str) -> bytes:
             folder = Path(self.parent).resolve()
@@ -70,7 +73,10 @@ def mesh(shape: Shape) -> Any | None:
 
 
 def corners(shape: Shape) -> FloatArray:
-    """Return (8, 3): the corners of a box around a shape, in the link's axes; a mesh must be readable."""
+    """Return the corners (8, 3) of a box around a shape, in the link's frame.
+
+    The file of a mesh must be readable.
+    """
     signs = np.array(list(product((-1.0, 1.0), repeat=3)))
     if shape.kind == "mesh":
         lower, upper = mesh(shape).bounds  # type: ignore[union-attr]
@@ -133,7 +139,7 @@ def shapes(robot: Robot) -> list[Shape]:
 
 
 def _file_of(robot: Robot) -> Path | None:
-    """Return the file of a robot, whose folder is searched for meshes, or None."""
+    """Return the file of a robot, or None. Meshes are searched in the folder of this file."""
     entry = catalogue().get(robot.source)
     path = entry.path if entry is not None else Path(robot.source)
     try:

@@ -90,7 +90,7 @@ class RequestFilter:
     key: str
 
     def refusal(self, path: str, hosts: list[str], origins: list[str], *, connects: bool) -> str | None:
-        """Return the reason to refuse a request, or None for an allowed request.
+        """Return the reason why a request is refused, or None if the request is allowed.
 
         Args:
             path: The requested path.
@@ -117,8 +117,8 @@ class RequestFilter:
     def _is_known(self, host: str) -> bool:
         """Return whether a Host header may name this server.
 
-        An IP address cannot be redirected by DNS; a foreign host name can. The port is not checked, because
-        it differs when it is forwarded.
+        An attacker can let a host name of his own resolve to this machine, but not an IP address. The port in
+        the header is not checked, because it differs if the port is forwarded.
         """
         found = _HOST.fullmatch(host)
         if found is None:
@@ -173,9 +173,11 @@ def policy(nonce: str, host: str) -> str:
 
 LOOPBACK = "127.0.0.1"
 
-#: The only message type that the server accepts: a changed control. Connections handle camera messages.
+#: The only message type that the server itself accepts from a page: a control has changed. Messages about the
+#: camera are handled by each connection.
 _ACCEPTED = ("GuiUpdateMessage",)
-#: Replacements that add the nonce to viser's page: its first script, and the script that this one creates.
+#: Replacements in the text of viser's page. They add the nonce to the first script, and to the script that
+#: the first script creates.
 _SCRIPTS = (
     ("<script data-p=", '<script nonce="{nonce}" data-p='),
     ('e.type="module";', 'e.type="module";e.nonce="{nonce}";'),

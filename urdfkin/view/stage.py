@@ -1,8 +1,8 @@
 """Draw a robot in viser's scene, with arrows, the velocity ellipsoid and Denavit-Hartenberg frames.
 
 - The columns of the Jacobian are the frame's velocities for unit joint velocities (7.85).
-- The frame velocities for joint velocities of length one fill an ellipsoid. Its axes are the left singular
-  vectors, its half-lengths the singular values.
+- If the vector of joint velocities has length one, the frame velocity ends on an ellipsoid. The axes of the
+  ellipsoid are the left singular vectors of the Jacobian, and its half-lengths are the singular values.
 - The acceleration is the sum of its transverse, centripetal, Coriolis and sliding parts (7.125, 7.130).
 """
 
@@ -23,7 +23,7 @@ from urdfkin.motion.frame_motion import FrameMotion
 from urdfkin.robot import Robot
 from urdfkin.view.scene import GREY, Shape, corners, mesh, shapes
 
-#: The colour of each part of the acceleration, 0 to 255, and of their sum.
+#: The colour of each part of the acceleration and of their sum, as red, green and blue from 0 to 255.
 PART_COLOURS = {
     "transverse": (0, 114, 178),
     "centripetal": (213, 94, 0),
@@ -134,7 +134,8 @@ def scalar_first(R: FloatArray) -> FloatArray:
 
 #: Maximum seconds until a page that opens has its final layout.
 _OPENING = 15.0
-#: Direction from the robot to the camera, share of the view that the robot fills, and viser's field of view.
+#: Direction from the robot to the camera, fraction of the view that the robot fills, and viser's vertical
+#: field of view in rad.
 _FROM, _FILLED, _FOV = np.array([1.1, -1.3, 0.6]), 0.85, np.deg2rad(75.0)
 
 
@@ -157,7 +158,7 @@ def camera(points: FloatArray, *, aspect: float, fov: float) -> tuple[FloatArray
 
 
 _BONE, _TURN, _SLIDE = (142, 153, 168), (0, 114, 178), (230, 159, 0)
-#: Display modes of the shapes, and names that can be shown beside the frames.
+#: Display modes of the shapes, and the kinds of names that can be shown beside the frames.
 SOLID, SEE_THROUGH = "solid", "see-through"
 SHAPES = (SOLID, SEE_THROUGH, "hidden")
 NAMES = ("none", "links", "joints")
@@ -301,7 +302,10 @@ class Stage:
             self._look(client)
 
     def _welcome(self, client: Any) -> None:
-        """Set the camera of a new client, and again when the panel has reduced the width of the view."""
+        """Set the camera of a new client.
+
+        Set it once more when the page's panel has reduced the width of the view.
+        """
         begin, aspects = time.monotonic(), [0.0]
 
         def fit(_: Any) -> None:
@@ -407,7 +411,10 @@ class Stage:
 
 
 def _segments(table: DHTable, q: FloatArray, frames: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the start, the corner between the two segments, and the end of each row, (rows, 3) each."""
+    """Return three points for each row of the table, as three arrays (rows, 3).
+
+    They are the start of the row's two segments, the corner between them, and their end.
+    """
     starts, ends = frames[:-1, :3, 3], frames[1:, :3, 3]
     if str(table.convention) == "standard":
         # d along the previous z axis, then a along the new x axis.

@@ -25,7 +25,7 @@ NEGLIGIBLE = 1e-3
 #: Moments of inertia per kg (m^2) below this count as rounding errors. A body of 0.03 mm has such moments.
 ROUNDING = 1e-9
 
-#: Relative rounding error of moments of inertia, because exporters write few digits.
+#: Allowed relative rounding error of moments of inertia. It is large, because exporters write few digits.
 _WRITTEN = 1e-6
 
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")

@@ -392,7 +392,7 @@ UNDECLARED_PREFIX = Rule("URDF214", "undeclared-prefix", WARNING)
 #: Prefixes that XML declares itself.
 _PREDECLARED = ("xml", "xmlns")
 
-#: Prefixes that other rules report (URDF202, URDF112).
+#: Prefixes that the rules URDF202 and URDF112 report; the check of undeclared prefixes skips them.
 _REPORTED = ("xacro:", "xi:include")
 
 
@@ -465,7 +465,8 @@ def check_names(report: Reporter, robot: RobotRecord, root_joint: str | None) ->
     Args:
         report: The reporter, which receives the findings.
         robot: The records of the robot.
-        root_joint: Set if the robot gets a joint `root_joint` below a link `universe`.
+        root_joint: Not None if the robot gets an additional joint `root_joint` whose parent is a link
+            `universe`.
     """
     links = list(robot.links.items())
     joints = [(joint.name, joint.element) for joint in robot.joints if joint.name]
@@ -542,7 +543,7 @@ def _check_lookalikes(report: Reporter, named: list[tuple[str, Element]]) -> Non
     seen: dict[str, str] = {}
     for name, element in named:
         if name.isascii() or len(name) > LONGEST:
-            continue  # a long name is already reported, and slow to normalise
+            continue  # the name is already reported as too long; comparing it would be slow
         key = unicodedata.normalize("NFKC", name)
         first = seen.setdefault(key, name)
         if first != name:

@@ -170,8 +170,8 @@ _ONE = 1e-12
 #: Relative tolerance within which the axis of a planar joint counts as the z axis.
 _LEAN = 1e-9
 
-#: Relative tolerance within which Pinocchio replaces an axis by a coordinate axis. It is that of Eigen's
-#: isApprox, which compares squares of lengths.
+#: If an axis differs from a coordinate axis by less than this relative tolerance, Pinocchio uses the
+#: coordinate axis. It is the default tolerance of Eigen's isApprox, which compares squares of lengths.
 _SNAPPED = 1e-12
 
 #: A tilt (rad) below this is not reported. It is within the rounding that `verify.bounds` allows for an axis.
@@ -225,7 +225,7 @@ def _check_axis(report: Reporter, joint: JointRecord) -> None:
 
 
 def unit_vector(vector: Sequence[float]) -> tuple[float, ...]:
-    """Divide a vector by its length, with one rounding per number (at most 2**-53 rad of direction).
+    """Divide a vector by its length. Each number is rounded once, by at most 2**-53.
 
     >>> unit_vector((0.0, -3.0, 4.0))
     (0.0, -0.6, 0.8)
@@ -252,7 +252,7 @@ def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], 
 
 
 def tilts(robot: RobotRecord) -> dict[str, float]:
-    """Return the angle (rad) between the axis in Pinocchio and in the file, for joints with URDF514."""
+    """Return the angle (rad) between Pinocchio's axis and the file's axis, for each joint with URDF514."""
     snapped = ((joint.name, _snap(joint.axis)) for joint in robot.joints if joint.kind in AXIAL)
     return {name: result[1] for name, result in snapped if result is not None}
 
@@ -385,7 +385,7 @@ def check_mimic(report: Reporter, robot: RobotRecord, *, enabled: bool) -> None:
     Args:
         report: The reporter, which receives the findings.
         robot: The records of the robot.
-        enabled: Whether the mimic rules are used. If not, every finding is a note.
+        enabled: Whether the mimic rules are used. False: every finding is a note.
     """
     checker = _MimicChecker(report, robot.by_name, enabled)
     for joint in robot.joints:
@@ -578,18 +578,18 @@ FAR = 100.0
 #: If the sum of all lengths of a robot is smaller than this (m), the robot was probably scaled twice.
 TINY = 1e-4
 
-#: An angle in radians that is a whole number and at least `MANY` was probably meant in degrees. If it is at
-#: least `ENDLESS`, it is some exporters' notation for "no limit".
+#: If an angle is a whole number and at least `MANY`, it is probably in degrees, not in radians. Some
+#: exporters write an angle of at least `ENDLESS` for "no limit".
 MANY, ENDLESS = 30.0, 1000.0
 
-#: A rounded multiple of pi is a warning if the rounding moves a tip by more than this (m).
+#: If the rounding of a multiple of pi moves a tip by more than this (m), the finding is a warning.
 NOTICEABLE = 1e-3
 
 #: If an angle differs from a multiple of pi by less than this (rad), it is not reported.
 ANGLE_ROUNDING = 1e-10
 
-#: Multiples of pi, each with the smallest number of decimals that a number needs to be recognized as this
-#: multiple.
+#: Multiples of pi. Each has the smallest number of decimals that a written number must have to be recognized
+#: as this multiple.
 _MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
