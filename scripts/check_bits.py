@@ -47,7 +47,8 @@ LENGTHS = (1, 2, 7, 8, 9, 100)
 THREADS = (None, 1, 2, 3)
 #: Number of stored configurations, and of stored frames.
 KEPT, FRAMES = 9, 6
-#: Index of the configuration that Python's numbers compute; and the two ways.
+#: Index of the configuration that is computed with Python's numbers, and the names of the two ways to compute
+#: it.
 INTERPRETED = 3
 WAYS: tuple[Way, ...] = ("interpreted", "compiled")
 
@@ -192,7 +193,10 @@ def digest(now: Arrays) -> str:
 
 
 def share(what: str, now: Arrays, stored: Arrays) -> float:
-    """Return the difference from the stored result as a fraction of the stored bound; 0 for equal bits."""
+    """Return the difference from the stored result as a fraction of the stored bound.
+
+    It is 0 if all bits are equal.
+    """
     if same(now[what], stored[what]):
         return 0.0
     apart = np.abs(now[what] - stored[what])
@@ -225,7 +229,10 @@ _DIGITS = (15, None)
 
 
 def enclosures(subject: Subject) -> dict[str, Any]:
-    """Return the ends (2, ...) of all intervals of one sample, at 15 digits and at the default."""
+    """Return the lower and upper ends (2, ...) of all intervals of one sample.
+
+    The intervals are computed once with 15 digits and once with the default number of digits.
+    """
     q, v, a = (batch[0] for batch in subject.inputs)
     found = {f"{subject.name}/{name}": batch[:1] for name, batch in zip("qva", subject.inputs, strict=True)}
     found[f"{subject.name}/frames"] = np.array(subject.frames)
@@ -246,7 +253,10 @@ def enclosures(subject: Subject) -> dict[str, Any]:
 
 
 def nested(name: str, now: Arrays, stored: Arrays) -> tuple[str, float]:
-    """Compare intervals with stored ones; return a line and the number of those that are outside."""
+    """Compare intervals with stored intervals.
+
+    Return a line of text, and the number of intervals that are not inside the stored interval.
+    """
     words, wrong = [], 0
     for digits in _DIGITS:
         names = [what for what in now if what.startswith(f"{name}/") and f"/{digits}/" in what]

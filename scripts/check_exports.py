@@ -63,7 +63,10 @@ def shares(written: Code, folder: Path) -> Iterator[tuple[str, float]]:
 
 
 def subjects(tips: bool) -> Iterator[tuple[str, Robot, str]]:
-    """Yield robots and frames, the tips first, so that a stopped run has checked every robot."""
+    """Yield robots and frames.
+
+    The tips come first, so that a run that is stopped later has checked each robot at least once.
+    """
     robots = {name: urdfkin.load(name) for name in examples()}
     for name, robot in robots.items():
         yield name, robot, robot.tip_frame
@@ -74,7 +77,10 @@ def subjects(tips: bool) -> Iterator[tuple[str, Robot, str]]:
 
 
 def found_of(robot: Robot, frame: str) -> dict[str, Any]:
-    """Return the result of a leaf: the largest errors as fractions of the bound, and whether it passes."""
+    """Return the result of a leaf frame.
+
+    It has the largest errors as fractions of their bound, and states whether all errors are within it.
+    """
     wanted = QUANTITIES if robot.nv else ("placement",)
     with tempfile.TemporaryDirectory() as folder:
         written = code(robot, frame, wanted)

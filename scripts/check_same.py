@@ -58,7 +58,10 @@ def pair(name: str, what: str) -> dict[str, Any] | None:
 
 
 def _farthest(found: Sameness) -> Interval | None:
-    """Return the interval of the farthest frame that is not a different tool; None without a bound."""
+    """Return the interval of the farthest frame.
+
+    Frames that are only different tools do not count. None: the interval has no upper end.
+    """
     frames = [frame for frame in found.frames if frame.frame_b not in _tools(found) and frame.q_a]
     worst = max(frames, key=lambda frame: (frame.upper, frame.lower), default=None)
     stands = np.array_equal(found.base, np.eye(4))
@@ -83,7 +86,10 @@ def _enclosed(found: Sameness, a: Robot, b: Robot, worst: Interval) -> dict[str,
 
 
 def _places_agree(found: Sameness, a: Robot, b: Robot) -> bool:
-    """Return whether all links of both robots coincide at random configurations, and at those mapped to B."""
+    """Return whether each link has the same placement in both robots.
+
+    A is at random configurations, and B at the corresponding ones.
+    """
     q, base = a.sample(5, 1), f"link:{found.base_links[1]}"
     links = [pair for pair in found.links if pair[1] not in _tools(found)]
     T_a = a.placement(q, [f"link:{ours}" for ours, _ in links])

@@ -21,7 +21,7 @@ from urdfkin.compiled.preload import only
 ROOT = Path(urdfkin.__file__).parent
 ROBOTS = Path(__file__).parents[1] / "robots"
 
-#: The files that are read without arguments.
+#: The two robots that the script reads if it is started without arguments.
 A, B = ROBOTS / "elbow.urdf", ROBOTS / "planar_two_link.urdf"
 
 
@@ -54,7 +54,10 @@ def files_of_load(source: Path) -> list[str]:
 
 
 def files_of_same(first: Path, second: Path) -> list[str]:
-    """Return the files through which `same` runs; the recursion runs as a kernel, and does not count."""
+    """Return the files through which `same` runs.
+
+    The forward recursion runs as a compiled kernel, and its files do not count.
+    """
     same = urdfkin.same
     with only("compiled"):
         return files_run(lambda: same(first, second))

@@ -54,7 +54,7 @@ def usage() -> dict[str, float]:
 
 
 def measure(n: int) -> list[dict[str, float]]:
-    """Return the memory, descriptors and objects after each part of N robots."""
+    """Return the memory, the open descriptors and the number of objects after each part of the n robots."""
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         found = []

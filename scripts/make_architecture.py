@@ -36,7 +36,7 @@ class Package(NamedTuple):
     contents: str = ""
 
 
-#: In order: a package imports only packages before it.
+#: The packages in order. A package imports only packages that come before it in this list.
 PACKAGES = [Package(**package) for package in PLAN["package"]]
 
 
@@ -115,7 +115,7 @@ def _reexported(package: str) -> frozenset[str]:
 
 
 def upwards() -> list[str]:
-    """List the imports of a later package by an earlier one."""
+    """List the forbidden imports, in which a package imports a package that comes later in the order."""
     rank = {package.name: number for number, package in enumerate(PACKAGES)}
     return sorted(
         f"{module} imports {other}"
@@ -160,7 +160,7 @@ _ROW, _LEFT, _TOP, _CELL = 30, 118, 88, 24
 
 
 def picture() -> str:
-    """Draw the packages in order, with a dot in a package's row for each package that it imports."""
+    """Draw the packages in order. The row of a package has a dot for each package that it imports."""
     place = {package.name: number for number, package in enumerate(PACKAGES)}
     width, height = _LEFT + _CELL * len(PACKAGES) + 470, _TOP + _ROW * len(PACKAGES) + 12
     lines = [

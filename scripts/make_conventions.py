@@ -64,7 +64,7 @@ ARM = _robot(
     _joint("b", "revolute", "l1", "l2", _axis("0 1 0")),
     _joint("a", "revolute", "l2", "l3", _axis("0.6 0 0.8")),
 )
-#: Two limbs on one base, and a third limb on the first one, to find the order of coordinates.
+#: A robot to find the order of coordinates: two limbs are on one base, and a third limb is on the first limb.
 LIMBS = _robot(
     _joint("z", "revolute", "base", "l1"),
     _joint("a", "revolute", "base", "l2"),
@@ -301,7 +301,10 @@ class MeasuredMotion:
         return R, ps[0], first(ps), axial(R_rate @ R.T), second(ps), axial(second(Rs) @ R.T)
 
     def velocity_readings(self) -> dict[str, FloatArray]:
-        """Return candidate velocities: two orders, three combinations of axes and point."""
+        """Return candidate velocities.
+
+        They have two orders of the linear and angular parts, and three combinations of axes and point.
+        """
         R, p, v, w, _, _ = self.motion()
         points = {
             "of the frame's origin, in world axes": (v, w),
@@ -571,7 +574,7 @@ def _table(names: tuple[str, ...]) -> str:
 
 
 def _cells(how: Convention) -> dict[str, str]:
-    """Return the cell of each row for a convention."""
+    """Return the cells of a convention, one for each row of the table."""
     order = "no known rule" if how.order == "given" else how.order.replace("file", "place in the file")
     order = {"name": "by name", "place in the file": "that of the file"}.get(order, order)
     parts = ["x, y, z", f"q{', q'.join(how.quaternion)}"]

@@ -14,7 +14,7 @@ from urdfkin.verify.exact.enclosure import Enclosure, Enclosures
 from urdfkin.verify.pinocchio_module import version
 
 PAGE = Path(__file__).parents[1] / "docs" / "enclosures.md"
-#: Arms, a hand with mimic joints, humanoids, a quadruped, a hobby arm.
+#: The robots on the page: arms, a hand with mimic joints, humanoids, a quadruped, and a hobby arm.
 ROBOTS = ("panda", "ur5", "xarm7", "allegro_left_hand", "talos", "icub", "anymal", "so100")
 SAMPLES = 5
 LENGTHS = (3, 10, 30, 100)
@@ -141,12 +141,18 @@ def _parts(proof: Enclosures) -> tuple[Enclosure, ...]:
 
 
 def _larger_end(part: Enclosure) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    """Return an array like the enclosure, filled with the largest magnitude of all its intervals' ends."""
+    """Return an array with the shape of the enclosure.
+
+    Each element is the largest absolute value of the ends of all intervals.
+    """
     return np.full_like(part.lower, np.maximum(np.abs(part.lower), np.abs(part.upper)).max(initial=1e-300))
 
 
 def _inside(parts: list[Enclosure], side: str) -> str:
-    """Return the share of a library's numbers that lie in their intervals, without intervals of width 0."""
+    """Return the fraction of a library's numbers that lie in their proven intervals.
+
+    Intervals of width 0 do not count.
+    """
     found = [part.contains(getattr(part, side))[part.width > 0.0] for part in parts]
     return f"{np.concatenate(found).mean():.0%}"
 

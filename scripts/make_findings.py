@@ -27,7 +27,7 @@ FAMILIES = {
     "7": "Inertials, geometry and materials",
 }
 
-#: Code -> the meaning of the warning for the robots of the catalogue.
+#: Code of a finding -> the consequences of this warning for the robots of the catalogue that have it.
 REMARKS = {
     "URDF207": "URDF has no origin in a link; every reader ignores this pose.",
     "URDF405": "A slash in a name is legal; urdfkin does not use names as paths.",

@@ -127,7 +127,10 @@ def draw_frame(axes: Any, R: FloatArray, size: float, names: str) -> None:
 
 
 def turning(first: int, second: int) -> Callable[[float], FloatArray]:
-    """Return w(t) of a quarter turn per second, about one axis of frame 0 and then about another."""
+    """Return the angular velocity w(t) of two turns, first about one axis of frame 0 and then about another.
+
+    Each is a quarter turn in one second.
+    """
     return lambda t: np.pi / 2 * np.eye(3)[first if t < 1.0 else second]
 
 
@@ -153,7 +156,7 @@ def integral_of_w(figure: Any) -> None:
 
 
 def euler_singularity(figure: Any) -> None:
-    """Draw the condition number of Omega over the middle angle, for ZYZ and roll-pitch-yaw."""
+    """Plot the condition number of Omega against the middle angle, for ZYZ and roll-pitch-yaw."""
     axes = figure.subplots()
     middle = np.linspace(0.0, np.pi, 1801)[1:-1]
     for name, color, dashes, label in (
@@ -179,7 +182,7 @@ def euler_singularity(figure: Any) -> None:
 
 
 def convergence(figure: Any) -> None:
-    """Draw the error of quaternion integration over the step."""
+    """Plot the error of the integrated quaternion against the step size."""
 
     def angles(t: float) -> FloatArray:
         return np.array([0.3 * t, 1.0 + 0.4 * np.sin(2.0 * t), t * t])

@@ -64,7 +64,7 @@ def own() -> int:
 
 
 def installed_extras(core: dict[str, int]) -> dict[str, tuple[int, int]]:
-    """Return for each installed extra the number and the bytes of the packages that it adds."""
+    """Return, for each installed extra, the number of packages that it adds, and their size in bytes."""
     sizes = {}
     for extra in EXTRAS:
         try:

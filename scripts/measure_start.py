@@ -4,8 +4,9 @@
     python scripts/measure_start.py --rounds 3
 
 Each row is a new process. Its time is compared with that of `import numpy, pinocchio` in the same round. The
-medians of both make the ratio, so other work on the machine matters little. Bytecode is warm, as after an
-installation. A fresh cache is an empty folder for kernels.
+ratio is that of the two medians over all rounds. Other work on the machine slows both, so it hardly changes
+the ratio. The bytecode of all modules already exists, as after an installation. A fresh cache is an empty
+folder for compiled kernels.
 """
 
 from __future__ import annotations
@@ -39,8 +40,9 @@ class Row:
     Attributes:
         what: Its name on the page.
         words: Arguments of the interpreter; ROBOT stands for a URDF that is not in the catalogue.
-        most: Largest time, in multiples of that of `import numpy, pinocchio`; None: no bar.
-        fresh: Whether its cache is empty.
+        most: The bar: largest allowed time, in multiples of the time of `import numpy, pinocchio`. None:
+            there is no bar.
+        fresh: Whether the process starts with an empty kernel cache.
     """
 
     what: str
@@ -94,7 +96,10 @@ def seconds(words: Sequence[str], cache: str | None) -> float:
 
 
 def measured(rounds: int, folder: Path) -> list[Row]:
-    """Return the rows with their times; a round that is not counted writes the bytecode."""
+    """Return the rows with their measured times.
+
+    An additional first round writes the bytecode and is not counted.
+    """
     found, robot = rows(), folder / "MY.urdf"
     robot.write_bytes((ROOT / "robots" / "elbow.urdf").read_bytes())
     for k in range(rounds + 1):

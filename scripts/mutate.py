@@ -115,8 +115,8 @@ def judge_named(slip: Named, *, timeout: float) -> Outcome:
     return Outcome(mutant, word, by, round(time.perf_counter() - begin, 1))
 
 
-#: Forks a process with the foreign libraries already imported for each run of tests; importing them takes
-#: longer than most tests.
+#: A server that forks a process for each run of tests. The server has already imported the foreign libraries,
+#: because importing them takes longer than most tests.
 _READY = multiprocessing.get_context("forkserver")
 _READY.set_forkserver_preload(["numba", "pinocchio", "pytest"])
 

@@ -33,7 +33,10 @@ def positions(ours: Sequence[str], theirs: Sequence[str]) -> list[int]:
 
 
 def spread(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
-    """Return (n, 6, nv) with the columns of `J` (n, 6, m) at `columns`, zeros elsewhere."""
+    """Return `J` (n, 6, m) as an array (n, 6, nv).
+
+    Its columns are at the indices `columns`; all other columns are zero.
+    """
     full = np.zeros((*J.shape[:-1], nv))
     full[..., list(columns)] = J
     return full
@@ -205,14 +208,17 @@ def toolbox(subject: Subject, quantity: str) -> Iterator[Calls]:
 
 # -- batches at once -------------------------------------------------------------------------------------
 
-#: Number of configurations of a call to PyTorch Kinematics; more are slower per configuration.
+#: Number of configurations in one call of PyTorch Kinematics. Larger calls take more time per configuration.
 _MOST = 20_000
 #: Tolerance for PyTorch Kinematics, which reads the angles of a URDF in single precision.
 _SINGLE = 1e-6
 
 
 def torch(subject: Subject, quantity: str) -> Iterator[Work]:
-    """Yield the works of PyTorch Kinematics, plain and with `torch.compile`; it has no accelerations."""
+    """Yield the work of PyTorch Kinematics, once plain and once with `torch.compile`.
+
+    The library computes no accelerations.
+    """
     import pytorch_kinematics as pk  # noqa: PLC0415
     import torch  # noqa: PLC0415
 

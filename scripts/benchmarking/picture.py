@@ -1,4 +1,8 @@
-"""Plot the measurements: the time of all contenders for one configuration, and the growth of urdfkin's."""
+"""Plot the measurements of the benchmark.
+
+The picture shows the time of each contender for one configuration, and the growth of urdfkin's time with the
+number of joints and with the size of a batch.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +13,8 @@ from typing import Any
 
 from urdfkin.view.figure import BLUE, GREEN, VERMILION, new_figure, save, style
 
-#: The start of a contender's name -> its colour, its hatch and its name in the key; the last is for others.
+#: The start of a contender's name -> its colour, its hatch and its name in the legend. The last entry is for
+#: all other contenders.
 KINDS = {
     "urdfkin": (BLUE, "", "urdfkin"),
     "Pinocchio": (VERMILION, "////", "Pinocchio"),
@@ -58,7 +63,10 @@ def _chosen(rows: Sequence[Entry], section: str, quantity: str) -> list[Entry]:
 
 
 def _bars(axes: Any, rows: Sequence[Entry], quantity: str) -> None:
-    """Draw the fastest on top, on a logarithmic scale: the slowest takes two hundred times as long."""
+    """Draw a bar for each contender, the fastest on top.
+
+    The scale is logarithmic, because the slowest contender takes two hundred times as long as the fastest.
+    """
     ordered = sorted(rows, key=lambda row: -float(row["median_ns"]))
     costs = [row["median_ns"] for row in ordered]
     names = [row["who"] for row in ordered]

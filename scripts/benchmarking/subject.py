@@ -1,4 +1,4 @@
-"""A subject of the benchmark: one robot, one frame and the configurations, the same for all contenders."""
+"""A subject of the benchmark: one robot, one frame, and the configurations that all contenders compute."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ class Subject:
         return tuple(x[:n] for x in ((self.q,) if quantity == "jacobian" else (self.q, self.v, self.a)))
 
 
-# -- what every library reads ----------------------------------------------------------------------------
+# -- the URDF that every library reads -------------------------------------------------------------------
 
 _INERTIA = {"ixx": "1", "iyy": "1", "izz": "1", "ixy": "0", "ixz": "0", "iyz": "0"}
 #: Elements of a joint that are preserved.

@@ -1,8 +1,9 @@
 """Measure the time of the parts of a batch and of a single call, by leaving each part out.
 
-The forward recursion is a program of a few instructions (`urdfkin.compiled.program`). To measure a part,
-its instructions are left out; the time of the part is the difference. The parts of a single call are
-measured with an empty Python function, a rejected call, and so on.
+The forward recursion is a program of a few instructions (`urdfkin.compiled.program`). To measure a part, the
+program runs with the instructions of this part and without them. The difference of the two times is the time
+of the part. The parts of a single call are measured with calls that stop early, such as a call of an empty
+Python function and a call with rejected arguments.
 """
 
 from __future__ import annotations
@@ -155,7 +156,11 @@ def _times(works: list[Work], rounds: int) -> dict[str, FloatArray]:
 def _entry(
     kind: str, subject: Subject, quantity: str, parts: Mapping[str, FloatArray], total: FloatArray
 ) -> dict[str, Any]:
-    """Return medians over the rounds; differences are within a round, so that load affects both terms."""
+    """Return the medians over all rounds.
+
+    Two times are subtracted only within a round, so that other load of the machine affects both times
+    equally.
+    """
     medians = {part: round(float(np.median(taken)), 2) for part, taken in parts.items()}
     ns = round(float(np.median(total)), 2)
     return {"kind": kind, "robot": subject.name, "quantity": quantity, "ns": ns, "parts": medians}

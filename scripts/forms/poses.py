@@ -1,6 +1,9 @@
 """Compute the poses of a table exported as Python, in an interpreter that has the needed library.
 
-    python scripts/forms/poses.py JOBS RESULTS     # JSON: a list of {form, text, q}; a list of poses for each
+    python scripts/forms/poses.py JOBS RESULTS
+
+The file JOBS has a JSON list of {form, text, q}. The script writes a JSON file RESULTS with a list of poses for
+each entry of JOBS.
 
 It does not import urdfkin, since the Robotics Toolbox may have its own environment.
 """

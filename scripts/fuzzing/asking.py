@@ -32,7 +32,8 @@ def ask(robot: Robot, seed: int) -> Iterator[tuple[str, FloatArray]]:
 
     Raises:
         MismatchError: two computations differ.
-        UrdfkinError: an error of a call, except for singular representations and paths without a table.
+        UrdfkinError: a call raises an error. Errors about singular representations and about paths without a
+            table are expected and not raised.
     """
     generator = np.random.default_rng(seed)
     q, v, a = _inputs(robot, seed)
@@ -95,7 +96,11 @@ def _together(
     v: FloatArray,
     a: FloatArray,
 ) -> Iterator[tuple[str, FloatArray]]:
-    """Yield each quantity of all frames in a batch, of one frame in that batch, and of one configuration."""
+    """Yield each quantity, computed in three ways.
+
+    The three ways are all frames in a batch of configurations, one frame in the same batch, and a single
+    configuration of the batch.
+    """
     results = dict[str, FloatArray]()
     if reference is Reference.LOCAL_WORLD_ALIGNED:
         results["placement"] = robot.placement(q, frames, base=base)

@@ -23,7 +23,7 @@ _SIZES = {"URDF526", "URDF603", "URDF606"}
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """The outcome, one of `GOOD` or the name of a failure, and the details."""
+    """The outcome of a test and its details. The outcome is one of `GOOD`, or the name of a failure."""
 
     word: str
     details: str = ""
@@ -93,7 +93,10 @@ def _computed(robot: Robot, findings: list[Finding], warned: list[warnings.Warni
 
 
 def _unverified(robot: Robot, findings: list[Finding], warned: list[warnings.WarningMessage]) -> Outcome:
-    """Return the outcome of unverified results: did urdfkin report a reason for them or not?"""
+    """Return the outcome if some results are not verified.
+
+    It is good if urdfkin reported the reason, and otherwise a failure.
+    """
     marked = [finding for finding in findings if finding.oracle is not None]
     if marked:
         return Outcome("not verified, with a finding that states the reason", marked[0].code)

@@ -19,7 +19,7 @@ from urdfkin.robot import Robot
 
 FAMILIES = ("mjcf-free", "mjcf-equalities", "mjcf-classes")
 _CLASSES = ("outer", "inner", "other")
-#: Allowed relative difference of two placements, or of the two sides of an equality.
+#: Allowed relative difference of urdfkin's and MuJoCo's placements, or of the two sides of an equality.
 _APART = 1e-12
 
 mujoco.set_mju_user_warning(
@@ -185,7 +185,10 @@ def compiled(data: bytes) -> mujoco.MjModel | None:
 
 
 def difference(robot: Robot, model: mujoco.MjModel, seed: int) -> str | None:
-    """Return a difference of a body, a site or a joint coupling from MuJoCo; None if there is none."""
+    """Return a message about a body, a site or a joint coupling that differs from MuJoCo's.
+
+    Return None if nothing differs.
+    """
     data = mujoco.MjData(model)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     warned = " ".join(finding.message for finding in robot.findings if finding.code == "MJCF101")

@@ -9,7 +9,10 @@ _TURNS = (0.0, math.pi, -math.pi, math.pi / 2, 1.5708, 3.14159, 1e-9)
 
 
 def written(rng: random.Random, x: float) -> str:
-    """Return a number in a random notation, exact or nearly exact."""
+    """Return a number as text in a random notation.
+
+    The text stands for the number itself or for one very close to it.
+    """
     plain = repr(x)
     if rng.random() < 0.85:
         return plain
@@ -66,7 +69,7 @@ def odd_axis(rng: random.Random) -> list[float]:
 
 
 def odd_quaternion(rng: random.Random) -> list[float]:
-    """Return an axis of any length, also zero, with no, a tiny or any rotation."""
+    """Return a quaternion of any length, which may be zero. Its rotation is none, tiny or arbitrary."""
     numbers = rng.choice(
         (
             [0.0, 0.0, 0.0, 1.0],
@@ -80,7 +83,10 @@ def odd_quaternion(rng: random.Random) -> list[float]:
 
 
 def odd_size(rng: random.Random) -> float:
-    """Return a length for a direction vector: mostly about 1, sometimes near the limits of a double."""
+    """Return the length of a direction vector.
+
+    It is mostly about 1, and sometimes close to the smallest or largest double.
+    """
     exponent = rng.choice((0.0, 0.0, rng.uniform(-1e-9, 1e-9), rng.uniform(-6, 6), rng.uniform(-170, 170)))
     return math.pow(10.0, rng.uniform(-320, 300) if rng.random() < 0.05 else exponent)
 

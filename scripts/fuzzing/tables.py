@@ -34,7 +34,7 @@ PIECES = (
     "1e155",
     "(i-1)",
 )
-#: One in this many changes is anywhere in the table. The other changes are in the headings.
+#: On average, one of this number of changes is anywhere in the table. The other changes are in the headings.
 _ANYWHERE = 3
 
 

@@ -1,4 +1,6 @@
-"""Functions of a size in bytes that return a URDF of about that size, each with one kind of growing content.
+"""Make large URDFs.
+
+Each function takes a size in bytes, and returns a URDF of about this size with one kind of repeated content.
 
 A faulty exporter or an attacker could write such files. Most are rejected. The time and memory of
 the rejection must be proportional to the size of the file.
@@ -21,7 +23,7 @@ def _robot(inside: str) -> bytes:
 
 
 def _filled(size: int, piece: Callable[[int], str]) -> str:
-    """Return `piece(0)`, `piece(1)`, ... up to a size."""
+    """Return the concatenation of `piece(0)`, `piece(1)`, and so on, up to a size in bytes."""
     count = max(size // len(piece(10**6)), 2)
     return "".join(map(piece, range(count)))
 

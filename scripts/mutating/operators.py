@@ -189,7 +189,7 @@ def _other(value: bool | int | float) -> bool | int | float:
 
 
 def _of_text(node: ast.BinOp | ast.AugAssign) -> bool:
-    """Return whether the operator joins texts or types."""
+    """Return whether the operator joins texts or types, as in `"a" + b` or `int | None`."""
     parts = [node.value] if isinstance(node, ast.AugAssign) else [node.left, node.right]
     return any(
         isinstance(part, ast.JoinedStr)

@@ -46,7 +46,7 @@ def _below(path: Path) -> str:
 def near_tests(path: Path) -> list[str]:
     """Return the tests near a module, nearest first: those that mention it, and those of its package.
 
-    A part without its own tests is tested by all the others, through a robot.
+    A part of the package without tests of its own is tested through robots, by the tests of all other parts.
     """
     package, _, name = module_of(path).rpartition(".")
     named = re.compile(

@@ -11,7 +11,7 @@ import threading
 
 
 def lock_over_forks() -> threading.RLock:
-    """Return a lock.
+    """Return a lock that a child process never inherits in a locked state.
 
     A fork waits until the lock is free. After the fork, the lock is unlocked in the parent and in the child.
 

@@ -2,9 +2,8 @@
 
 The parser and the rules of `urdfkin.lint` add findings to the `Reporter` of a file. The reporter computes the
 position of each finding in the bytes of the file, and applies the comments that silence findings. A finding
-is plain
-data: it can be printed, compared, converted to JSON or SARIF and sent to another process. A byte order mark
-does not count in positions.
+is plain data: it can be printed, compared, converted to JSON or SARIF and sent to another process. A byte
+order mark does not count in positions.
 
 A comment in a URDF names the codes that it silences, and gives a reason.
 

@@ -1,7 +1,8 @@
 """Results of the accuracy study in a campaign's store, so that an interrupted study can be resumed.
 
-The file `judge.json` holds the settings. The result of each robot is a file in the folder of the chunks. Its
-name is the sha256 of everything that its numbers depend on, and it has the same checksum format as a chunk.
+The file `judge.json` holds the settings. The result of each robot is a file in the folder of the chunks. The
+name of the file is the sha256 of everything that the numbers in it depend on. The file has a checksum in the
+same format as a chunk's file.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from urdfkin.verify.oracles import version
 
 @dataclass(frozen=True, slots=True)
 class NotJudged:
-    """Reason why a robot has no accuracy result."""
+    """The reason why a robot has no accuracy result."""
 
     reason: str
 
@@ -35,7 +36,7 @@ class Asked:
     Attributes:
         samples: Number of configurations of each robot.
         seed: Seed of the random samples.
-        moving_base: Whether the root links have a random motion.
+        moving_base: Whether the root link of each robot has a random motion.
     """
 
     samples: int
@@ -62,7 +63,7 @@ class AccuracyResult:
 
     @classmethod
     def merge(cls, store: Store, others: Sequence[Store]) -> None:
-        """Copy the results that other stores of the same campaign have and this one does not.
+        """Copy results from other stores of the same campaign that are missing in this store.
 
         Raises:
             InputError: The stores have different settings of the study.
@@ -109,7 +110,7 @@ class AccuracyResult:
         self._store.keep_part(key, JUDGED, packed(key, {"judge": found}))
 
     def stamp(self, robot: int) -> str:
-        """Return the sha256 of the robot's text that was compared."""
+        """Return the sha256 of the robot's text. It identifies the text to which a result belongs."""
         return self._store.manifest.robots[robot][1]
 
     def _copy_missing(self, other: AccuracyResult) -> None:

@@ -37,8 +37,8 @@ class Failure:
         reason: The reason as text.
         portrait: Summary of the robot, as far as it could be read.
         error: The traceback of an unexpected error; None otherwise.
-        passing: Whether the process or the cluster caused the failure, not the robot. Such a failure is not
-            stored; the chunk is computed again.
+        passing: Whether the process or the cluster caused the failure, and not the robot. Such a failure is
+            not stored, so that a resumed run computes the chunk again.
     """
 
     verdict: Verdict
@@ -83,7 +83,7 @@ def format_traceback(error: Exception) -> str:
 
 
 def _portrait(subject: RobotInput) -> RobotSummary:
-    """Return the summary of a robot if it can be read, with unchecked tables."""
+    """Return the summary of a robot if it can be read. The tables in this summary are not checked."""
     try:
         return RobotSummary.of(subject.read(), None)
     except Exception:
@@ -127,7 +127,8 @@ def read(key: str, content: bytes) -> Answer:
 def packed(key: str, body: dict[str, Any]) -> bytes:
     """Return results as the bytes of a file, with their key and a checksum.
 
-    JSON keeps a double exactly (shortest round-trip decimals), and infinity as Python's own word.
+    JSON contains each double with enough decimals to read back the same double. It contains infinity as
+    Python's word `Infinity`.
     """
     data = zlib.compress(json.dumps(as_data({"key": key} | body), separators=(",", ":")).encode(), 1)
     return _MAGIC + hashlib.sha256(data).digest() + data
@@ -137,7 +138,7 @@ def unpacked(key: str, content: bytes) -> dict[str, Any]:
     """Return the data in the bytes of a file.
 
     Raises:
-        DamagedError: The bytes are not what was written under this key.
+        DamagedError: The bytes differ from those that `packed` returned for this key.
     """
     checksum, data = content[len(_MAGIC) :][:_DIGEST], content[len(_MAGIC) + _DIGEST :]
     if not content.startswith(_MAGIC):

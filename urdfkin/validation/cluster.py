@@ -30,15 +30,15 @@ from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.verify.oracles import version
 
-#: Maximum number of chunks in flight: the first number for each thread of the workers, plus the second
-#: number. So no thread waits for a chunk.
+#: Maximum number of chunks in flight (sent and not yet answered). It is the first number times the number of
+#: the workers' threads, plus the second number. It is large enough that no thread waits for a chunk.
 _FOR_EACH, _MORE = 2, 4
-#: Maximum number of times a chunk is sent when Dask loses its worker. A robot cannot kill Dask's worker,
-#: only the process beside it.
+#: Maximum number of times a chunk is sent when Dask loses its worker. A robot can crash only the process in
+#: which its chunks run, not Dask's worker.
 _TRIES = 20
 #: Seconds between two counts of the workers.
 _COUNT = 1.0
-#: Packages that must have the same version on the scheduler, if they are installed there.
+#: Packages that must have the same version on the scheduler as here, if the scheduler has them.
 _COMPARED = ("urdfkin", "pin")
 _NOBODY = RobotInput(b"", Origin(""))
 
@@ -101,7 +101,7 @@ def _client(scheduler: str) -> Iterator[Client]:
 
 
 class _Portless:
-    """Part of a cluster without web pages. All users of the machine could open such pages."""
+    """A part of a Dask cluster that serves no web pages, because all users of the machine could open them."""
 
     def start_http_server(self, *_: object, **__: object) -> None:
         """Start no server (overrides Dask's method)."""
@@ -152,7 +152,10 @@ def _without_ports(number: int) -> Iterator[SpecCluster]:
 
 
 def _demand_same(client: Client) -> None:
-    """Raise ClusterError if a worker or the scheduler has other versions. Called before anything is sent."""
+    """Raise ClusterError if a worker or the scheduler has other versions than this process.
+
+    Call this before anything is sent to them.
+    """
     for worker, found in client.run(remote.computes, on_error="return").items():
         if isinstance(found, BaseException):
             raise ClusterError(
@@ -260,14 +263,17 @@ class Cluster:
         return future
 
     def _forget(self, robot: int) -> None:
-        """Release a robot that has no chunk in flight. If it is needed later, it is sent again."""
+        """Release the text of a robot that has no chunk in flight.
+
+        If the robot is needed later, its text is sent again.
+        """
         self._in_use[robot] -= 1
         if not self._in_use[robot]:
             del self._in_use[robot]
             self._robots.pop(robot, None)
 
     def _found(self, future: Future[Any], flight: _Flight) -> Answer | None:
-        """Return the answer; None if the chunk must be sent again."""
+        """Return the answer of a finished chunk; None if the chunk must be sent again."""
         if future.status == "finished":
             try:
                 result = future.result()

@@ -78,7 +78,10 @@ class ResultCollector:
             self._progress(self.standing(self._subjects[0].label if self._subjects else ""))
 
     def enter(self, task: Task, found: Answer, *, kept: bool = False) -> None:
-        """Add an answer. With `kept` it comes from an earlier run and does not count as work of this run."""
+        """Add an answer.
+
+        `kept` is True for an answer from an earlier run, which does not count as work of this run.
+        """
         robot = self._robots[task.robot]
         was_over, had_failed, before = robot.over, robot.has_failed, robot.done
         robot.enter(task.chunk.index, found)
@@ -90,7 +93,7 @@ class ResultCollector:
             self._progress(self.standing(self._subjects[task.robot].label))
 
     def standing(self, label: str = "") -> CampaignProgress:
-        """Return the progress. `label` names the current robot."""
+        """Return the progress so far. `label` is the name of the current robot."""
         return CampaignProgress(
             robots_done=self._robots_done,
             robots=sum(bool(robot.part) for robot in self._robots),
@@ -168,7 +171,8 @@ class _Robot:
         return self.done == len(self.part)
 
     def report(self, subject: RobotInput, wanted: int) -> RobotReport:
-        # Results after the failed chunk are left out: which ones exist depends on the timing of the workers.
+        # Leave out results of chunks after the failed chunk, because it depends on the timing of the workers
+        # whether these chunks were computed.
         last = min(self.failures, default=self.part.stop)
         failure = self.failures.get(last)
         results = [result for run, result in self._runs if run.start < last]

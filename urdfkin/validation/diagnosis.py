@@ -1,8 +1,9 @@
 """Explain a wrong result of a user's function by a usual mistake.
 
-Each mistake predicts the function's results from urdfkin's: other rows, another reference frame, another
-frame, other units, joints in another order. A mistake is named if it explains all but a thousandth of the
-difference at every configuration. Mistakes with the same prediction are all named.
+Each mistake predicts the results of a function with this mistake from urdfkin's results. Examples are
+exchanged rows, another reference frame, another frame, other units, and joints in another order. A mistake is
+named if it explains all but a thousandth of the difference at every configuration. Mistakes with the same
+prediction are all named.
 """
 
 from __future__ import annotations
@@ -30,25 +31,27 @@ EXPLAINED = 1e-3
 _MOST = 3
 #: Number of configurations at which exchanges of two joints are tried.
 _FEW = 4
-#: Fraction of the largest scale that replaces a smaller one: numbers that must be 0 have the scale 0.
+#: Smallest scale of a number, as a fraction of the largest scale. It is needed because a number that must be
+#: 0 has the scale 0.
 _LEAST = 1e-9
 _HALVES = [3, 4, 5, 0, 1, 2]
 _G = 9.81
 
-#: Inputs of the function; they become those with which urdfkin computes what a mistaken function does.
+#: Inputs of a function: q, q and v, or q, v and a. A mistake is simulated by changing them: urdfkin then
+#: computes the results that a mistaken function would return.
 Inputs = tuple[FloatArray, ...]
 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """A function's results, urdfkin's, and urdfkin's at other inputs.
+    """The data for a diagnosis: the function's results and urdfkin's results.
 
     Attributes:
         inputs: q, or q and v, or q, v and a, in the function's convention.
         found: The function's results (n, ...).
         expected: urdfkin's results.
-        scale: The scale of their bound.
-        compute: Function (inputs, frame, reference) for urdfkin's results.
+        scale: The scale of the rounding bound of each expected number.
+        compute: A function (inputs, frame, reference) that returns urdfkin's results.
     """
 
     inputs: Inputs
@@ -58,7 +61,10 @@ class Diagnosis:
     compute: Callable[..., FloatArray]
 
     def remainder(self, predicted: FloatArray, n: int | None = None) -> float:
-        """Return the part of the difference that a prediction for the first n results leaves: 0 is none."""
+        """Return the fraction of the difference that a prediction for the first n results does not explain.
+
+        0: the prediction explains the whole difference.
+        """
         scale = np.maximum(self.scale[:n], _LEAST * self.scale[:n].max(initial=_LEAST))
         with np.errstate(all="ignore"):
             whole = float((np.abs(self.found[:n] - self.expected[:n]) / scale).max())
@@ -66,7 +72,7 @@ class Diagnosis:
             return left / whole if np.isfinite(left) and whole > 0.0 else np.inf
 
     def is_expected(self, predicted: FloatArray) -> bool:
-        """Return whether a mistake changes nothing for these inputs."""
+        """Return whether the prediction of a mistake equals the expected results for these inputs."""
         size = np.maximum(self.scale, _LEAST * self.scale.max(initial=_LEAST))
         return bool((np.abs(predicted - self.expected) <= _LEAST * size).all())
 
@@ -78,8 +84,8 @@ class Diagnosis:
 def diagnose(mistakes: Mistakes, case: Diagnosis) -> list[str]:
     """Return sentences about the mistakes that explain the results, at most three; none if no mistake does.
 
-    A mistake together with exchanged halves of a six-vector is named only if no single mistake explains the
-    results.
+    A combination of a mistake with exchanged halves of the six-vectors is named only if no single mistake
+    explains the results.
     """
     single, double = list[tuple[float, str]](), list[tuple[float, str]]()
     swaps = mistakes.exchanged_halves
@@ -126,13 +132,16 @@ class Mistakes:
 
     @property
     def exchanged_halves(self) -> str:
-        """Words for exchanged halves of a six-vector; empty for a quantity without halves."""
+        """A sentence about exchanged linear and angular halves of a six-vector.
+
+        It is empty for a quantity without such halves.
+        """
         first = "linear" if self._angular_first else "angular"
         return f"the {first} rows come first" if self.row.shape[0] == 6 else ""
 
     @property
     def expected_halves(self) -> str:
-        """The halves in their right order."""
+        """The names of the two halves in their right order."""
         tool = "urdfkin" if self.conversion is None else self.conversion.convention.name
         return f"{tool} has the {'angular' if self._angular_first else 'linear'} rows first"
 
@@ -141,7 +150,7 @@ class Mistakes:
         return self.conversion is not None and self.conversion.angular_first
 
     def all(self, case: Diagnosis) -> Iterator[Mistake]:
-        """Yield all mistakes, the plainest first."""
+        """Yield all mistakes, the simplest ones first."""
         yield from self._of_references(case)
         if self.row.name == "acceleration":
             yield from self._of_accelerations(case)
@@ -195,7 +204,7 @@ class Mistakes:
         yield "the term J a is missing", partial(case.compute, (q, v, zero))
 
     def _velocity(self, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Return the velocity in the function's rows and reference frame."""
+        """Return the frame's velocity with the row order and the reference frame of the function."""
         q, v = self._ours((q, v))
         assert self.reference is not None
         found = self.robot.velocity(q, v, self.frame, self.reference, verify=False)
@@ -262,7 +271,10 @@ class Mistakes:
         return [(q, v) for _, q, v, turns in self._axes() if turns]
 
     def _axes(self) -> list[tuple[str, int, int, bool]]:
-        """Return name, index in q, index in v, and whether it turns, of each joint with one coordinate."""
+        """Return the data of each joint with one coordinate.
+
+        They are its name, its index in q, its index in v, and whether its coordinate is an angle.
+        """
         tree = self.robot.tree
         found = []
         indices = None if self.conversion is None else self.conversion.q_and_v_indices
@@ -278,7 +290,10 @@ class Mistakes:
 
     @staticmethod
     def _scaled(inputs: Inputs, at: Sequence[tuple[int, int]], factor: float, count: int) -> Inputs:
-        """Return the inputs with the numbers of some joints scaled, in q only or in all inputs."""
+        """Return the inputs with the values of some joints multiplied by a factor.
+
+        The factor applies to q only, or to q, v and a.
+        """
         found = [x.copy() for x in inputs]
         for k, x in enumerate(found[:count]):
             x[:, [pair[min(k, 1)] for pair in at]] *= factor
@@ -326,7 +341,10 @@ class Mistakes:
         yield f"the mimic joints ({listed}) do not move", partial(result, "")
 
     def _of_joints(self, case: Diagnosis) -> Iterator[Mistake]:
-        """Yield signs and exchanges of joints; a coordinate change also changes the columns of a Jacobian."""
+        """Yield the mistakes about single joints: a reversed sign, or two exchanged joints.
+
+        For a Jacobian, the columns change with the coordinates.
+        """
         axes = self._axes()
         for name, q, v, _ in axes:
             words = f"the joint {name!r} has the opposite sign"
@@ -376,7 +394,7 @@ class Mistakes:
         return tuple(found)
 
     def _of_orders(self, case: Diagnosis) -> Iterator[Mistake]:
-        """Yield the joint orders of other tools that are permutations."""
+        """Yield the joint orders of other tools, if they are permutations of urdfkin's order."""
         if self.conversion is not None:
             return
         from urdfkin.conventions import BUILT_IN  # noqa: PLC0415  few functions need it
@@ -399,7 +417,7 @@ class Mistakes:
             )
 
     def _of_frames(self, case: Diagnosis) -> Iterator[Mistake]:
-        """Yield the results of all other links' frames."""
+        """Yield a mistake for each other link: the function computes the frame of that link."""
         names = [f"link:{name}" for name in self.robot.link_names if name != self.frame]
         if self.row.against is not None or not names:
             return
@@ -413,7 +431,10 @@ class Mistakes:
 
 
 def _columns(mistakes: Mistakes, case: Diagnosis) -> Iterator[tuple[float, str]]:
-    """Yield mistakes of single columns of a Jacobian; the columns without one may be wrong otherwise."""
+    """Yield mistakes that explain single columns of a Jacobian.
+
+    The other columns may be right, or wrong for another reason.
+    """
     if case.expected.shape[1:2] != (6,) or case.expected.ndim != 3:
         return
     names = (mistakes.conversion or mistakes.robot).rate_names

@@ -1,8 +1,9 @@
 """Engines that run chunks, and the queue that distributes chunks among workers.
 
-An engine runs tasks and enters each answer once, in any order. Answers are stored by robot and chunk and
-added in that order, so no result depends on the engine. An engine may skip the remaining chunks of a robot
-that has failed, and nothing else. Tasks are created lazily, so that a million of them take no memory.
+An engine runs tasks and passes each answer to a callback once, in any order. The collector sorts the answers
+by robot and chunk before it adds them, so no result depends on the engine. If a robot has failed, an engine
+may skip its remaining chunks. It must run all other chunks. Tasks are created lazily, so that a million of
+them take no memory.
 
 The engines here run in this process, or on an executor with the interface of `concurrent.futures`.
 `urdfkin.validation.worker_processes` has an engine of local processes.
@@ -31,7 +32,8 @@ class Row:
 
     Attributes:
         robot: Index of the robot; -1 before the first task was taken.
-        index: Index of the latest chunk that was taken. The lower it is, the more chunks are left.
+        index: Index of the latest chunk that was taken. The lower this index is, the more chunks of the robot
+            are left.
     """
 
     def __init__(self, tasks: Iterable[Task]) -> None:
@@ -92,7 +94,7 @@ class WorkQueue:
         self._waiting = chain([row], self._waiting)
 
     def end(self, robot: int) -> None:
-        """Return no more tasks of a robot."""
+        """From now on, return no more tasks of a robot."""
         self._ended.add(robot)
 
     def withdraw(self, robot: int) -> list[Task]:
@@ -122,11 +124,12 @@ Enter = Callable[[Task, Answer], None]
 class Engine(Protocol):
     """Interface of an engine.
 
-    An exception from `run` ends the validation. Entered answers stay in the report.
+    An exception from `run` ends the validation. Answers that were passed to the callback before the exception
+    stay in the report.
     """
 
     def run(self, work: Work, enter: Enter) -> None:
-        """Run the tasks and enter their answers."""
+        """Run the tasks and pass each answer to `enter`."""
 
 
 class SerialEngine:

@@ -1,13 +1,13 @@
 """Error statistics of a validation, which add up over chunks, processes and machines.
 
 A `Tally` counts the results of one quantity in one reference frame. Addition of tallies is associative and
-commutative. (Of two equal worst cases the sum keeps the one with the earlier sample.) So the sum does not
-depend on the division of the work.
+commutative. If two tallies have equally bad worst cases, their sum keeps the case with the earlier sample.
+The sum therefore does not depend on the division of the samples into chunks.
 
-With a second oracle, `ThreeSides` compares three results: urdfkin's, Pinocchio's and the second oracle's. Two
-results agree when their difference lies within the bound of that pair. For Pinocchio and the second oracle,
-that bound is the sum of the two others. If one pair agrees and the third result agrees with neither, the
-third one is the outlier.
+With a second oracle, `ThreeSides` compares three results: urdfkin's, Pinocchio's and the second oracle's.
+Each pair of libraries has a bound. Two results agree if their difference lies within the bound of their pair.
+The bound for Pinocchio and the second oracle is the sum of the bounds of the other two pairs. If two results
+agree and the third one agrees with neither of them, the third one is the outlier.
 """
 
 from __future__ import annotations
@@ -57,9 +57,10 @@ class ThreeSides:
         by: Name of the second oracle.
         urdfkin: urdfkin compared with the second oracle.
         pinocchio: Pinocchio compared with the second oracle.
-        alone: For each of `SIDES`, the number of results in which only it differs from the two others.
-        undecided: Number of results without a majority: no two agree, or one agrees with two that do not
-            agree with each other.
+        alone: For each library of `SIDES`, the number of results in which this library differs from the two
+            others and these two agree.
+        undecided: Number of results without a majority. Either no two of the three results agree, or one
+            result agrees with two results that do not agree with each other.
     """
 
     by: str
@@ -125,14 +126,18 @@ def three_sides(
 
 
 def _shares(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[FloatArray, FloatArray]:
-    """Return (n, frames) disagreements divided by their bound, and in eps * scale."""
+    """Return two arrays (n, frames) of disagreements.
+
+    In the first array the disagreements are divided by their bound. In the second one they are in eps *
+    scale.
+    """
     units = worst_of_each(one, other, bound.scale, 2)
     share: FloatArray = np.nan_to_num(units / result_k(bound, units.shape), nan=np.inf)
     return share, units
 
 
 def _together(first: Bound, second: Bound) -> Bound:
-    """Return the sum of two bounds k * eps * scale, with the k of the second bound."""
+    """Return the sum of two bounds k * eps * scale, written with the k of the second bound."""
     size = first.k * first.scale + second.k * second.scale
     with np.errstate(invalid="ignore", over="ignore"):
         return Bound(size / second.k, second.k)
@@ -168,12 +173,12 @@ class Tally:
         failed: Number of results outside their bound.
         worst: The largest disagreement, in eps * scale.
         share: The largest ratio of a disagreement to its bound.
-        histogram: (82,) number of results in each bin: below the first of `HISTOGRAM_EDGES`, between each two
-            adjacent edges, above the last.
+        histogram: (82,) number of results in each bin. The first bin is below the first of `HISTOGRAM_EDGES`,
+            the last bin is above the last edge, and the others are between adjacent edges.
         by_frame: The largest disagreement of each frame, in the robot's order.
         case: The sample with the largest ratio.
-        bounds: The tightest and the widest bound, in eps * scale. A bound grows with the number of joints
-            before the frame.
+        bounds: The smallest and the largest bound of all results, in eps * scale. The bound for a frame grows
+            with the number of joints on the path to the frame.
         three_sides: The comparison with a second oracle; None without one.
     """
 
@@ -204,19 +209,22 @@ class Tally:
         )
 
     def beside(self, other: Tally) -> Tally:
-        """Return one tally for the frames of this tally and of another one of the same samples."""
+        """Return one tally for all frames of this tally and of another tally.
+
+        The two tallies must have the same samples.
+        """
         joined = replace(self, by_frame=()) + replace(other, by_frame=())
         return replace(joined, by_frame=self.by_frame + other.by_frame)
 
     def percentile(self, percent: float) -> float:
-        """Return a percentile of the disagreement, to the width of a histogram bin (26 %)."""
+        """Return a percentile of the disagreements, accurate to the width of a histogram bin (26 %)."""
         return percentile(self.histogram, HISTOGRAM_EDGES, self.worst, percent)
 
 
 def percentile(
     histogram: Sequence[int], edges: Sequence[float] | FloatArray, worst: float, percent: float
 ) -> float:
-    """Return a percentile of a histogram, to the width of a bin."""
+    """Return a percentile of the values in a histogram, accurate to the width of a bin."""
     counts = np.cumsum(histogram)
     if not counts[-1]:
         return 0.0

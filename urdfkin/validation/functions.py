@@ -1,8 +1,9 @@
 """Check a function of a user against urdfkin, the oracle and the derived bound.
 
 The function computes a row of the table of quantities from q, from q and v, or from q, v and a. It is called
-at random configurations, at the zero configuration and at the joint limits. urdfkin's results at these
-configurations are compared with the oracle's first, so that a disagreement is the function's.
+at random configurations, at the zero configuration and at the joint limits. First, urdfkin's results at these
+configurations are compared with the oracle's results. If they agree, the function is the cause of any later
+disagreement.
 """
 
 from __future__ import annotations
@@ -38,12 +39,12 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.verify.call import Call
 
-#: Number of configurations that are computed at a time, and that a diagnosis uses.
+#: Number of configurations that are computed together, and number of configurations that a diagnosis uses.
 _AT_A_TIME = 256
 _DIAGNOSED = 48
-#: Number of exceptions and wrong results that are kept with their message.
+#: Largest number of exceptions and wrong shapes that are stored with their message.
 _KEPT = 5
-#: A relative precision, and its name in a diagnosis.
+#: If all relative differences are below this, a diagnosis names rounding to single precision.
 _SINGLE = 1e-5
 
 
@@ -110,13 +111,14 @@ class FunctionCheck(Displayable):
         factor: The bound is multiplied by this factor.
         eps_scale: Largest difference in multiples of eps * scale.
         share: Largest ratio of a difference to the bound times `factor`; at most 1 if all results agree.
-        oracle_share: The same ratio for the difference from the oracle; None without an oracle.
+        oracle_share: Largest ratio of a difference between the function and the oracle to the bound times
+            `factor`; None without an oracle.
         rows: Largest ratio in each row of the result, by name.
         columns: Largest ratio in each column of the result, by joint velocity; empty for other quantities.
         worst: The worst result; None if no result was compared.
         errors: Number of exceptions and wrong shapes.
-        first_errors: The first of them.
-        diagnoses: Explanations of a disagreement, each of which explains all results.
+        first_errors: The first of these exceptions and wrong shapes.
+        diagnoses: Explanations of a disagreement. Each explanation alone explains all results.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
@@ -228,7 +230,7 @@ class FunctionCheck(Displayable):
 
 
 class _Recorder:
-    """The verifier of a robot that also keeps the call and the result that it checks."""
+    """A verifier for a robot that also stores the call that it checks, and the result of this call."""
 
     def __init__(self, verifier: Verifier) -> None:
         self._verifier = verifier
@@ -256,7 +258,7 @@ def verify_function(
     batch: bool = False,
     **options: Any,
 ) -> FunctionCheck:
-    """Compare a function of yours with urdfkin's results, the oracle's, and the derived bound.
+    """Compare the results of your function with those of urdfkin and of the oracle, within the derived bound.
 
     The function receives q (nq,), and v and a (nv,) if the quantity needs them, in rad, m and seconds. The
     values are random within the limits; the zero configuration and the joint limits come first. In every
@@ -342,10 +344,10 @@ class _Compared:
         first: Index of the first configuration.
         inputs: The function's inputs, one row for each configuration.
         good: Indices of the configurations with a result of the right shape.
-        found: The function's results (n, ...) of these.
-        expected: urdfkin's results of these.
-        scale: The scale of the bound of these.
-        k: The k of the bound of these (n,).
+        found: The function's results (n, ...) at the configurations in `good`.
+        expected: urdfkin's results at the configurations in `good`.
+        scale: The scale of the bound of these results.
+        k: The k of the bound of these results, (n,).
     """
 
     first: int
@@ -500,7 +502,10 @@ class _Run:
         return self.conversion.result(self.how.row.name, ours, result, jacobian)
 
     def _converted_scale(self, ours: Sequence[FloatArray], scale: FloatArray) -> FloatArray:
-        """Return the scale of a converted result: each of its numbers is a sum of our numbers."""
+        """Return the scale of a result in the function's convention.
+
+        Each number of the converted result is a sum of numbers in urdfkin's convention.
+        """
         conversion, name = self.conversion, self.how.row.name
         assert conversion is not None
         if name == "placement":
@@ -523,9 +528,9 @@ class _Run:
     def _rounding_of_the_conversion(self, q: FloatArray) -> float:
         """Return the roundings of a conversion that is more than a permutation, in multiples of eps * scale.
 
-        The function receives a rounded angle. It differs by up to 2 eps |q| from urdfkin's,
-        which rotates each factor of a term by so much. The matrix of a base velocity has at most 16
-        roundings.
+        The function receives an angle that the conversion has rounded. It differs from urdfkin's angle by up
+        to 2 eps |q|. The joint's rotation matrix, which is a factor of each term, is therefore rotated by up
+        to this angle. The matrix that converts a base velocity has at most 16 roundings.
         """
         conversion, row = self.conversion, self.how.row
         assert conversion is not None
@@ -658,7 +663,10 @@ class _Total:
             self.oracle_share = max(self.oracle_share, float(part.shares(part.theirs).max()))
 
     def for_diagnosis(self) -> tuple[tuple[FloatArray, ...], FloatArray, FloatArray, FloatArray]:
-        """Return inputs, the function's results, urdfkin's and the scale of some configurations."""
+        """Return the data of some configurations for a diagnosis.
+
+        They are the inputs, the function's results, urdfkin's results, and the scale.
+        """
         assert self.kept is not None
         good = np.array(self.kept.good[:_DIAGNOSED])
         n = len(good)
@@ -674,7 +682,10 @@ def _call(
     total: _Total,
     configurations: int,
 ) -> FloatArray | None:
-    """Return a copy of the function's result; None, with a record, after an exception or a wrong shape."""
+    """Return a copy of the function's result.
+
+    After an exception or a wrong shape, add it to `total` and return None.
+    """
     try:
         found = np.array(function(*inputs), dtype=np.float64)
     except Exception as error:  # a fault of the user's code is a result of the check

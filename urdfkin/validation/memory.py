@@ -16,10 +16,10 @@ from urdfkin.verify.pinocchio import OracleError
 
 #: Fraction of the free memory that a validation uses.
 SHARE = 0.5
-#: Memory of Pinocchio (measured with 4.1.0): bytes of its workspace for each nv^3, and total bytes for each
-#: link.
+#: Memory of Pinocchio, measured with version 4.1.0. The size of its workspace is the first number of bytes
+#: times nv^3. The second number is the total number of bytes for each link.
 _FOR_CUBE, _FOR_LINK = 64, 24_000
-#: Number of arrays of a block's size that exist at a time.
+#: Number of arrays that exist at the same time and have the size of a block of samples.
 _ARRAYS = 12
 _PROC = Path("/proc")
 _GROUPS = Path("/sys/fs/cgroup")
@@ -66,7 +66,11 @@ def _gigabytes(size: int) -> str:
 
 
 def _free() -> Iterator[int]:
-    """Yield the free bytes of the machine, of each control group of this process, and below its own limit."""
+    """Yield several numbers of free bytes.
+
+    They are the free bytes of the machine, of each control group of this process, and below the process's own
+    limit.
+    """
     for line in _lines(_PROC / "meminfo"):
         if line.startswith("MemAvailable:"):
             yield int(line.split()[1]) * 1024
@@ -97,7 +101,10 @@ def _group(mount: Path, group: str, limit: str, usage: str) -> Iterator[int]:
 
 
 def _cached(place: Path) -> int:
-    """Return the bytes of the inactive file cache, which count as used but are freed on demand."""
+    """Return the bytes of the inactive file cache of a control group.
+
+    The kernel counts these bytes as used, but frees them on demand.
+    """
     counts = dict(line.split(maxsplit=1) for line in _lines(place / "memory.stat"))
     return int(counts.get("total_inactive_file") or counts.get("inactive_file") or 0)
 

@@ -20,7 +20,8 @@ class Verdict(StrEnum):
     VERIFIED = "verified"
 
 
-#: Exit codes: a disagreement; a robot that cannot be read; a robot that Pinocchio did not check.
+#: Exit codes of a run with a disagreement, with a robot that cannot be read, and with a robot that Pinocchio
+#: did not check.
 DISAGREEMENT, INPUT, UNCHECKED = 1, 2, 3
 #: Exit code of an interrupted run: 128 + SIGINT, as in shells.
 INTERRUPTED = 130

@@ -9,8 +9,9 @@ Each request is one line on the program's standard input:
 
     {"result": [[...], ...]}    or    {"error": "a text"}
 
-The program runs with the rights of the user who starts it. A program that hangs, ends or answers with
-anything else raises `ProgramError` for that configuration; it is started again for the next one.
+The program runs with the rights of the user who starts it. If the program hangs, ends or answers with
+anything else, the call for this configuration raises `ProgramError`. The program is started again for the
+next configuration.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from urdfkin.errors import InputError, SourceError
 from urdfkin.errors.escape import json_text
 from urdfkin.model.tree import FloatArray
 
-#: Largest answer, and largest part of standard error in a message, in bytes.
+#: Largest size of an answer in bytes, and largest number of bytes of standard error that a message quotes.
 _MOST = 64 * 2**20
 _TAIL = 300
 #: Number of failures in a row after which the program is not started again.
@@ -182,7 +183,10 @@ class Program:
         return bytes(line)
 
     def _ended(self) -> str:
-        """Return words about a program that closed its standard output: its status and last words."""
+        """Return a message about a program that closed its standard output.
+
+        The message has the exit status of the program and the end of its standard error.
+        """
         assert self._process is not None
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(1.0)

@@ -20,7 +20,8 @@ from urdfkin.validation.worker_processes import WorkerProcess
 if TYPE_CHECKING:
     from urdfkin.validation.chunk import Chunk
 
-#: The pickle of an answer; or the cause of the crashes; or the versions on this machine.
+#: The result of a chunk on a worker: the pickle of its answer, the cause of its crashes, or the versions on
+#: the worker's machine.
 Found = (
     tuple[Literal["answer"], bytes]
     | tuple[Literal["died"], str]
@@ -68,7 +69,7 @@ def end_idle() -> None:
 
 
 class _DiedError(Exception):
-    """The process that ran the chunk crashed. The message states the cause."""
+    """The process that ran a chunk crashed. The message of this exception states the cause."""
 
 
 class _Parcel:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-#: Packages that only display results. They may change between two runs of a campaign.
+#: Packages of urdfkin that only display results. Their code may change between two runs of a campaign.
 _SHOWING = ("cli", "motion", "report", "view")
 #: Libraries that compute results or read robots.
 LIBRARIES = ("urdfkin", "pin", "numpy", "numba", "llvmlite", "yourdfpy", "mujoco")
@@ -193,7 +193,8 @@ class ValidationReport(Displayable):
         started: Start time, ISO 8601, UTC.
         seconds: Wall time.
         interrupted: Whether the run ended early. Finished results are included.
-        made_by: Versions of urdfkin and the oracles, if they are not the installed ones; else None.
+        made_by: Versions of urdfkin and the oracles that computed the report; None if these are the installed
+            versions.
         judgements: Results of the accuracy study, if requested: one for each compared robot; None where the
             study failed.
     """
@@ -260,7 +261,7 @@ class ValidationReport(Displayable):
         return self.outcome.exit_code
 
     def as_dict(self) -> Document:
-        """Return the JSON document. Infinity in a disagreement stands for NaN; it becomes None."""
+        """Return the JSON document. An infinite disagreement, which also stands for NaN, becomes None."""
         judgements = iter(self.judgements)  # only compared robots have an accuracy result
         document = {
             "schema": VALIDATION.name,

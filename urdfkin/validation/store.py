@@ -116,7 +116,7 @@ class Store:
         self._write(self._place(key, kind), data)
 
     def forget_failures(self) -> None:
-        """Delete the failures, so that those robots are computed again."""
+        """Delete the stored failures, so that the robots that failed are computed again."""
         for place in self._files(_FAILED):
             place.unlink(missing_ok=True)
 
@@ -143,7 +143,10 @@ class Store:
         return found
 
     def take(self, other: Store) -> int:
-        """Copy the missing chunks from another store of the same campaign; return their number."""
+        """Copy the chunks that are missing here from another store of the same campaign.
+
+        Return the number of copied chunks.
+        """
         other.check_names()
         taken = 0
         for robot in range(len(self.manifest.robots)):
@@ -231,8 +234,10 @@ def opened(
         folder: The folder.
         manifest: Definition of the campaign.
         tell: Callback for each damaged file.
-        shard: Lock this part only; other processes may work on other parts.
-        retry_failed: Delete the failures. Those robots may have other texts now.
+        shard: The part of the campaign to lock; other processes may work on other parts. None: lock the whole
+            store.
+        retry_failed: Whether to delete the stored failures. The texts of the robots that failed may have
+            changed since.
 
     Raises:
         SourceError: The store cannot be made or written.
@@ -273,7 +278,10 @@ def opened(
 
 
 def _is_ours(path: Path) -> bool:
-    """Whether another shard that starts at the same time may have made this file before the manifest."""
+    """Whether another shard, which starts at the same time, may have made this file.
+
+    The other shard may have made it before it writes the manifest.
+    """
     return path.name in (_WRITING, _CHUNKS) or path.name.startswith(_LOCK)
 
 

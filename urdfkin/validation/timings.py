@@ -54,7 +54,7 @@ class Clock:
             setattr(self, part, getattr(self, part) + (time.perf_counter() - begin))
 
     def close(self, seconds: float) -> None:
-        """Set `compare` to the remainder of the total seconds."""
+        """Set `compare` to the rest of the total time in seconds, after all other parts."""
         self.compare = max(0.0, seconds - self.read - self.urdfkin - self.pinocchio - self.second)
 
     def as_dict(self) -> dict[str, Any]:

@@ -31,7 +31,7 @@ from urdfkin.validation.engines import DIED, DIED_TWICE, Enter, Row, Task, Work,
 
 #: The module with the function `serve` that a process runs.
 WORKER = "urdfkin.validation.worker_processes"
-#: Maximum seconds between the end of a worker's pipe and the end of its process.
+#: Maximum time in seconds from the end of a worker's pipe until its process ends.
 _GRACE = 5.0
 
 
@@ -46,7 +46,7 @@ class WorkerProcess:
             self.connection.close()
             raise
         finally:
-            theirs.close()  # so that the pipe ends with the process
+            theirs.close()  # the worker now has the only copy, so that the pipe ends with its process
 
     @property
     def alive(self) -> bool:
@@ -68,10 +68,12 @@ class WorkerProcess:
 
 
 def _interpreter(pipe: int) -> subprocess.Popen[bytes]:
-    """Start an interpreter with the packages of this one, without the current folder and the main module.
+    """Start an interpreter that imports the same packages as this one.
 
-    It has its own process group, so that Ctrl-C in the terminal interrupts only this process. This process
-    saves the finished results.
+    It does not import from the current folder, and does not import the main module of this process.
+
+    The new interpreter has its own process group. Ctrl-C in the terminal therefore interrupts only the parent
+    process, which then saves the finished results.
     """
     command = own_python(f"from {WORKER} import serve; serve({pipe}, {os.getpid()})")
     return subprocess.Popen(command, stdin=subprocess.DEVNULL, pass_fds=[pipe], process_group=0)
@@ -110,7 +112,10 @@ def serve(pipe: int, parent: int) -> None:
 
 
 def _receive(connection: Connection, chunks: SimpleQueue[Chunk]) -> None:
-    """Receive chunks while another one runs, so that the end of the parent is detected at once."""
+    """Receive chunks while an earlier chunk is computed.
+
+    The end of the parent is therefore detected at once.
+    """
     try:
         while True:
             chunks.put(connection.recv())
@@ -167,7 +172,7 @@ class _Crew:
         self.to_retry: dict[int, list[Task]] = {}
 
     def work(self) -> None:
-        """Run until no task is left. The workers are ended in every case."""
+        """Run until no task is left. The worker processes always end, even after an exception."""
         try:
             while True:
                 self._assign_tasks()
