@@ -392,7 +392,7 @@ def _six_vectors() -> list[Row]:
 
 
 def _about(asked: MeasuredMotion) -> dict[str, FloatArray]:
-    """Return candidate velocities at other points."""
+    """Return candidate velocities of further points of the body."""
     _, p, v, w, _, _ = asked.motion()
     com = asked.mj_data.subtree_com[asked.mj_model.body_rootid[asked.body]]
     return {

@@ -23,7 +23,7 @@ class Calls:
 
     Attributes:
         who: Name of the contender.
-        names: Variables of the lines besides `q`, `v` and `a`.
+        names: Variables that the lines use, besides `q`, `v` and `a`.
         lines: The calls; the last line is an expression whose value is the result.
         store: The lines for a batch, which write their result to `out[k]`. None: `lines` are used, and the
             value of the last line is stored in `out[k]`.
@@ -46,7 +46,7 @@ class Calls:
     remark: str = ""
 
     def batch(self, subject: Subject, quantity: str) -> Work:
-        """Return the work of all configurations in a loop, with results in a reused array."""
+        """Return the work of a batch: a loop over all configurations, which writes into a reused array."""
         inputs = [self._ordered(x) for x in subject.inputs(quantity, subject.loop)]
         out = np.empty((subject.loop, *(self.shape or subject.width(quantity))))
         loop = self.loop()
@@ -59,12 +59,18 @@ class Calls:
         )
 
     def loop(self) -> Callable[..., None]:
-        """Return a function of `out` and of batches of q, or of q, v and a."""
+        """Return a function with the loop.
+
+        Its arguments are `out` and the batch of q, or the batches of q, v and a.
+        """
         body = self.store or (*self.lines[:-1], f"out[k] = {self.lines[-1]}")
         return _function(self.names, "out, *inputs", "for k, (q, v, a) in enumerate(rows(inputs)):", body)
 
     def single(self, subject: Subject, quantity: str) -> Work:
-        """Return the work of single calls without stored results; input rows are prepared beforehand."""
+        """Return the work of single calls.
+
+        Their results are not stored, and the rows of the inputs are prepared beforehand.
+        """
         inputs = [list(self._ordered(x)) for x in subject.inputs(quantity, subject.loop)]
         rows = list(_rows(inputs))
         repeat = _function(self.names, "rows_", "for q, v, a in rows_:", self.lines)

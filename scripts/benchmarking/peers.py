@@ -46,7 +46,11 @@ def spread(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
 
 
 def dynibo(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """Yield the calls of dynibo (Rust): rows [angular; linear], joints breadth first, matrices by column."""
+    """Yield the calls of dynibo, a library in Rust.
+
+    Its rows are [angular; linear], its joints are sorted breadth first, and its matrices are stored column by
+    column.
+    """
     import dynibo  # noqa: PLC0415
 
     robot = dynibo.Robot.from_urdf(str(subject.file))
@@ -92,7 +96,11 @@ def _link(joint: ET.Element, tag: str) -> str:
 
 
 def mujoco(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """Yield the calls of MuJoCo; accelerations are classical, [angular; linear]; welded links stay."""
+    """Yield the calls of MuJoCo.
+
+    Its accelerations are classical, with rows [angular; linear]. MuJoCo is told not to merge links that are
+    fixed to each other.
+    """
     import mujoco  # noqa: PLC0415
 
     flags = {"fusestatic": "false", "discardvisual": "true"}
@@ -137,7 +145,10 @@ def _mujoco_lines(quantity: str, rows: str, result: str) -> tuple[str, ...]:
 
 
 def drake(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """Yield the calls of Drake: rows [angular; linear]; an acceleration is J a plus the velocity terms."""
+    """Yield the calls of Drake.
+
+    Its rows are [angular; linear]. An acceleration is J a plus the terms that depend on the velocities only.
+    """
     from pydrake.multibody.parsing import Parser  # noqa: PLC0415
     from pydrake.multibody.plant import MultibodyPlant  # noqa: PLC0415
     from pydrake.multibody.tree import JacobianWrtVariable  # noqa: PLC0415
@@ -174,7 +185,7 @@ def drake(subject: Subject, quantity: str) -> Iterator[Calls]:
 
 
 def toolbox(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """Yield the calls of the Robotics Toolbox: `jacob0`; an acceleration is J a + Jdot v."""
+    """Yield the calls of the Robotics Toolbox: `jacob0` for a Jacobian, J a + Jdot v for an acceleration."""
     import roboticstoolbox as rtb  # noqa: PLC0415
 
     with warnings.catch_warnings():

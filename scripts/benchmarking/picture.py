@@ -57,7 +57,10 @@ def _light(svg: bytes) -> bytes:
 
 
 def _chosen(rows: Sequence[Entry], section: str, quantity: str) -> list[Entry]:
-    """Return a section's rows of one quantity; if the robots differ, only those of the first one."""
+    """Return the rows of a section for one quantity.
+
+    If they are for several robots, return only those of the first robot.
+    """
     found = [row for row in rows if row["section"] == section and row["quantity"] == quantity]
     return [row for row in found if section == "joints" or row["robot"] == found[0]["robot"]]
 

@@ -2,8 +2,8 @@
 
     python scripts/forms/poses.py JOBS RESULTS
 
-The file JOBS has a JSON list of {form, text, q}. The script writes a JSON file RESULTS with a list of poses for
-each entry of JOBS.
+The file JOBS has a JSON list of {form, text, q}. The script writes a JSON file RESULTS with a list of poses
+for each entry of JOBS.
 
 It does not import urdfkin, since the Robotics Toolbox may have its own environment.
 """

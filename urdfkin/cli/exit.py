@@ -28,7 +28,7 @@ class Stop:
     """Record of the signal that stopped the command.
 
     Attributes:
-        signal: Its number, or None.
+        signal: The number of the signal; None if no signal stopped the command.
     """
 
     signal: int | None = None

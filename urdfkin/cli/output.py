@@ -61,7 +61,8 @@ class Answer:
         document: Returns what a person reads, for the formats of `TEXTS`.
         data: For each other format, a function that returns its data: a mapping for JSON, rows for CSV, an
             array for npy, text for all others. An entry for a format of `TEXTS` replaces the document.
-        check: The last line, about the check; empty where nothing is to be checked.
+        check: The last line of the output, which states the result of the check. It is empty if the command
+            has nothing to check.
         code: The exit code.
         fitted: Returns the document for a terminal, if it depends on the width; None: `document`.
     """
@@ -121,7 +122,10 @@ _WRITERS: dict[str, Callable[[Any], bytes | str]] = {
 
 
 def answering(*names: str, suffixes: Mapping[str, tuple[str, ...]] | None = None) -> Callable[[Any], Any]:
-    """Make a command's function of one that returns an `Answer`: add --format and --output, write and exit.
+    """Return a decorator for a function that returns an `Answer`.
+
+    The decorated function has the options --format and --output. It writes the answer and exits with its
+    code.
 
     Args:
         names: The formats. By default those of `TEXTS`, and JSON and CSV.
@@ -195,7 +199,7 @@ def _columns() -> int:
 
 
 def hand_out(data: bytes | str, output: Path | None) -> None:
-    """Write to a file or, unchanged, to standard output."""
+    """Write data to a file, or unchanged to standard output."""
     if output is not None:
         write_file(output, data.encode() if isinstance(data, str) else data)
     elif isinstance(data, str):

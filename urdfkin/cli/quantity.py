@@ -71,7 +71,11 @@ _SHOWN = 5
 
 
 def computing_options(inputs: str, *own: Any, last: tuple[Any, ...] = ()) -> Callable[[_F], _F]:
-    """Combine the options: robot and frame, `own`, values, base, seed, checks, `last`, format and output."""
+    """Return a decorator that adds the options of a quantity to a command.
+
+    The order of the options is: robot, frame, the options in `own`, convention, values of q, v and a,
+    trajectory, base, seed, checks, the options in `last`, format and output.
+    """
     return together(
         *(robot_argument, frame_option, *own, convention_option, *(_VALUES[letter] for letter in inputs)),
         *(_trajectory, base_options(inputs), seed_option, verify_option, oracle_option, *last),

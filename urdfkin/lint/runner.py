@@ -53,8 +53,8 @@ def check(
 
     Returns:
         The findings that no comment silences, as a list that displays as a table in notebooks. It is empty if
-        the file has no problem. At most 10,000 findings of a kind are complete; `also` of the last one
-        contains the lines of the others.
+        the file has no problem. At most 10,000 findings of a kind are complete; the attribute `also` of the
+        last complete finding contains the lines of the others.
 
     Raises:
         SourceError: the file cannot be read.

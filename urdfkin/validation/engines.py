@@ -68,7 +68,10 @@ class WorkQueue:
         self._ended = set[int]()
 
     def first(self) -> tuple[Task, Row] | None:
-        """Return a task for a worker without a robot, and the row of this task. None: no task is left."""
+        """Return a task for a worker that has no robot yet, and the row of this task.
+
+        Return None if no task is left.
+        """
         for row in self._waiting:
             self._begun.append(row)
             if (task := self.next(row)) is not None:
@@ -109,7 +112,7 @@ IN_FLIGHT = 512
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A chunk, with the index of its robot in the run."""
+    """A chunk of samples, with the index of its robot among the robots of the run."""
 
     robot: int
     chunk: Chunk

@@ -149,7 +149,7 @@ def _own_name() -> str:
 
 
 def policy(nonce: str, host: str) -> str:
-    """Return the page's Content-Security-Policy.
+    """Return the Content-Security-Policy header of the viewer's page.
 
     Scripts need the nonce, which is random for each page, so names in a URDF cannot inject a script. The page
     can connect only to this server; viser's client would otherwise connect to any server in `?websocket=`.
@@ -251,7 +251,10 @@ def _require_address(host: str) -> None:
 
 
 def _answer(requests: RequestFilter, page: Callable[[str], bytes]) -> Callable[[Any, Any], Any]:
-    """Return websockets' callback for requests; the callback returns a response, or None to connect."""
+    """Return the callback with which the library websockets answers requests.
+
+    The callback returns a response, or None to accept a WebSocket connection.
+    """
     from websockets.datastructures import Headers  # noqa: PLC0415  with viser
     from websockets.http11 import Response  # noqa: PLC0415
 

@@ -378,7 +378,10 @@ class Stage:
         )
 
     def table(self, table: DHTable | None, q: FloatArray, T_world_base: FloatArray) -> None:
-        """Draw a table's frames, offsets d and lengths a at the table's coordinates; None removes them."""
+        """Draw the frames, offsets d and lengths a of a Denavit-Hartenberg table at its coordinates q.
+
+        None removes them.
+        """
         for handle in self._dh:
             handle.remove()
         self._dh = []

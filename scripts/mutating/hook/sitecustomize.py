@@ -1,4 +1,6 @@
-"""Import one module of the package with a mutant; each process of a mutant's test loads this from PYTHONPATH.
+"""Import one module of the package with a mutant.
+
+This file is in a folder on PYTHONPATH, so that each Python process of a test run loads it at its start.
 
 `URDFKIN_MUTANT` is the module's name and the mutant's number, `urdfkin.validation.error_stats:17`. It can
 also be the name alone; then `URDFKIN_MUTANT_TEXTS` has the text and its replacement, as JSON.
