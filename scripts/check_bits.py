@@ -224,7 +224,7 @@ def compared(name: str, now: Arrays, stored: Arrays) -> tuple[str, float]:
 # -- enclosures ------------------------------------------------------------------------------------------
 
 
-#: Digits of enclosures: those of a double, and the default.
+#: Numbers of digits of enclosures: 15, the digits of a double, and the default number.
 _DIGITS = (15, None)
 
 

@@ -29,7 +29,7 @@ _NAMED = re.compile(r"(urdfkin(?:\.\w+)+)(?::[\w.]+)?")
 
 
 class Package(NamedTuple):
-    """A package of `urdfkin`, or a module beside the packages."""
+    """A package of `urdfkin`, or a module of `urdfkin` that is in no package."""
 
     name: str
     purpose: str

@@ -1,7 +1,7 @@
 """Measure a report of thousands of robots: writing it, opening it in Chromium, searching, expanding a robot.
 
-The robots are copies of those of a real validation, with other names. The script prints medians over new
-browser profiles. It needs Debian's chromium and chromium-driver.
+The robots in the report are copies of the robots of a real validation, with other names. The script prints
+medians over new browser profiles. It needs Debian's chromium and chromium-driver.
 
     python scripts/measure_page.py --robots 2000
 """

@@ -20,7 +20,7 @@ from urdfkin.urdf.mjcf import is_mjcf
 
 
 def said_of(path: Path) -> str:
-    """Return the result for one file and that of Pinocchio's MJCF reader, or the reading error."""
+    """Return urdfkin's result and that of Pinocchio's MJCF reader for one file, or the reading error."""
     try:
         robot = urdfkin.load(path)
         robot.placement(robot.sample(2), robot.link_frames)

@@ -26,6 +26,6 @@ class Case:
 
     @property
     def words(self) -> str:
-        """Return the line for the note beside a stored file."""
+        """Return the line of text that is stored as a note with a failing file."""
         options = f"root_joint={self.root_joint!r}, mimic={self.mimic!r}"
         return f"{self.what}; load(..., {options})"

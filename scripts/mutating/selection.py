@@ -44,7 +44,7 @@ def _below(path: Path) -> str:
 
 
 def near_tests(path: Path) -> list[str]:
-    """Return the tests near a module, nearest first: those that mention it, and those of its package.
+    """Return the tests near a module: first the tests that mention the module, then the tests of its package.
 
     A part of the package without tests of its own is tested through robots, by the tests of all other parts.
     """

@@ -73,7 +73,10 @@ def as_choice(value: str | None, default: str, name: str) -> str:
 
 
 def as_names(value: Any, name: str) -> tuple[str, ...]:
-    """Return `value` as a tuple. Whether its entries are names is checked later, when they are looked up."""
+    """Return `value` as a tuple of names.
+
+    The entries are checked later, when they are looked up in the robot.
+    """
     if isinstance(value, str):
         raise InputError(
             f"{name} must be a list of names", found=safe_repr(value), remedy=f"write [{safe_repr(value)}]"
@@ -95,5 +98,5 @@ def safe_repr(value: object) -> str:
     """Return the repr of a value for a message, at most 60 characters; it never raises."""
     try:
         return repr(value)[:60]
-    except Exception:  # a repr may raise anything; the repr of an int with 5,000 digits raises ValueError
+    except Exception:  # a repr may raise any exception: that of an int with 5,000 digits raises ValueError
         return f"an object of type {type(value).__name__}"

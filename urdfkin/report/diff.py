@@ -15,7 +15,10 @@ HEADS = ("element", "what", "old", "new", "alone")
 
 
 def headline(found: Changes) -> str:
-    """Return one line: the number of changes, and how far all of them together move a frame."""
+    """Return one line about all changes.
+
+    It has the number of changes, and the distance by which all changes together move a frame.
+    """
     if not found:
         return "nothing changed"
     head = counted(len(found.changes), "change")

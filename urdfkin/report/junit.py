@@ -1,7 +1,8 @@
 """JUnit XML: a test suite for each robot, with a test case for each quantity and reference frame.
 
-The layout is that of Jenkins (junit-10.xsd), which GitLab, GitHub actions and others read. Some of these
-programs ignore the attributes of a failure. The text of the failure therefore contains all information.
+The layout conforms to the schema of Jenkins, junit-10.xsd. GitLab, GitHub actions and other programs read
+this layout. Some of these programs ignore the attributes of a failure. The text of the failure therefore
+contains all information.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ GUESSED = "joints are matched by their axes, because their names differ; use --m
 HEADS = ("frame", "at least", "at most", "angle at most")
 #: Attributes of an interval: the attained and the proven angle.
 TURNED = ("radians_seen", "radians")
-#: The default question: are both robots equivalent?
+#: The default question: are the two robots equivalent?
 EQUIVALENT = Question()
 #: If a bound is at most this factor times the rounding error of one number, it counts as rounding. The factor
 #: is needed because a sum adds the rounding errors of its terms.

@@ -144,7 +144,10 @@ def read_if_there(path: Path, most: int = MOST) -> bytes | None:
 
 
 def read_text(path: Path, most: int = MOST, *, pipes: bool = False) -> str:
-    """Return the content of a UTF-8 file, with or without a byte order mark; errors as for `read_bytes`."""
+    """Return the text of a UTF-8 file, which may begin with a byte order mark.
+
+    Errors are those of `read_bytes`.
+    """
     try:
         return read_bytes(path, most, pipes=pipes).decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -75,7 +75,7 @@ class Entry:
 
 @cache
 def catalogue() -> Mapping[str, Entry]:
-    """Return all entries by name: those of example-robot-data, then urdfkin's own."""
+    """Return all entries by name: first the robots of example-robot-data, then urdfkin's own robots."""
     return {**_read("catalogue.toml", own=False), **_read("own.toml", own=True)}
 
 
@@ -157,7 +157,7 @@ def find_package(
 
     Args:
         name: The package.
-        beside: The file that refers to the package; the folders above it are searched.
+        beside: The file that refers to the package. The search includes the folders above this file.
         environ: The environment variables.
         accepts: A filter: returns whether a candidate folder is acceptable.
     """

@@ -747,7 +747,7 @@ def _place_in_file(finding: Finding) -> tuple[int, int, int, str, str]:
 
 
 def _combine(kind: _Kind, *, fold: bool) -> list[Finding]:
-    """Return the findings of a kind, many of them combined into one, which lists the lines of the others."""
+    """Return the findings of a kind. Many findings are combined into one, which lists the lines of all."""
     kind.found.sort(key=lambda pair: _place_in_file(pair[0]))
     found = [finding for finding, _ in kind.found]
     into_one = fold and kind.severity is not Severity.ERROR

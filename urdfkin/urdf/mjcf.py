@@ -70,8 +70,8 @@ class Mjcf:
         coordinates: For each moving joint, including mimic joints: its index in MuJoCo's qpos.
         rules: The equalities that are mimic rules. Each has its index in the model and the name of the mimic
             joint.
-        apart: Indices in the model of the other active equalities between joints. The tree does not represent
-            them.
+        apart: Indices in the model of all active equalities between joints that are not mimic rules of the
+            tree.
         listed: The parts of the file that the tree does not represent.
         whole: Whether `model` contains the shapes and inertias of the file.
         aligns: Whether MuJoCo aligns the frame of a free body with its inertial frame.

@@ -1,4 +1,4 @@
-"""Answer of a chunk: its result or the reason of its failure, and the file format of both.
+"""The answer of a chunk, which is a result or the reason of a failure, and the file format of answers.
 
 Every exception that a robot raises becomes an answer. An answer is plain data, because some exceptions cannot
 be sent between processes.

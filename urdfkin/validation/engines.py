@@ -149,7 +149,7 @@ class SerialEngine:
 
 
 class ExecutorEngine:
-    """Engine that runs chunks on an executor, a bounded number of them at a time."""
+    """Engine that runs chunks on an executor. The number of chunks in the executor's queue is bounded."""
 
     def __init__(self, executor: Executor) -> None:
         self._executor = executor

@@ -272,7 +272,8 @@ def verify_function(
             "jacobian rate", "hessian", "acceleration", "relative placement", "analytical jacobian" or "imu".
         frame: Name of a link or joint; None: the robot's only tip.
         reference: Reference frame of the result.
-        convention: Convention of inputs and results, as for `Robot.convention`; None: urdfkin's.
+        convention: Convention of the function's inputs and results, one that `Robot.convention` accepts.
+            None: urdfkin's convention.
         samples: Number of random configurations.
         seed: Seed of the random configurations.
         factor: Multiplies the bound, for a function that rounds more than the textbook's recursion. The

@@ -1,6 +1,7 @@
 """Verdict of each robot, and outcome of a validation run with its reason.
 
-Only this module decides whether a run has passed. New reports and reports from a file both use it.
+Only this module decides whether a run has passed. New reports and reports that are read from a file use this
+module.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ class Outcome:
 
     @property
     def verdict(self) -> str:
-        """The verdict of the run: that of its worst robot, or "interrupted"."""
+        """The verdict of the run: the verdict of the worst robot, or "interrupted"."""
         return OUTCOMES[self.exit_code]
 
     @property

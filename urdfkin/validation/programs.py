@@ -151,7 +151,7 @@ class Program:
                 stream.close()
 
     def _ask(self, request: bytes) -> bytes:
-        """Write a request, and return the line of the answer, both within the timeout."""
+        """Write a request and return the line of the answer. The timeout covers writing and reading."""
         process = self._process
         assert process is not None
         assert process.stdin is not None

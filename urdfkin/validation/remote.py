@@ -1,9 +1,11 @@
-"""Functions that run on the machines of a cluster: each chunk runs in a process beside Dask's worker.
+"""Functions that run on the machines of a cluster.
 
-Dask's worker imports no computing code, so a robot cannot crash it; only the process beside it can crash. A
-chunk that crashes its process is tried a second time in a new process. If that process crashes too, the crash
-is the answer. Chunks and answers are transferred as bytes. The text of a robot is sent once for all its
-chunks.
+A chunk runs in a separate process, not in the process of Dask's worker.
+
+Dask's worker imports no computing code, so a robot cannot crash the worker. It can only crash the separate
+process. A chunk that crashes its process is tried a second time in a new process. If that process crashes
+too, the crash is the answer. Chunks and answers are transferred as bytes. The text of a robot is sent once
+for all its chunks.
 """
 
 from __future__ import annotations

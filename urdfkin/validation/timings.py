@@ -17,7 +17,7 @@ class Clock:
     """Seconds of each part of a validation. `compare` is the remainder of the total.
 
     Attributes:
-        read: Reading the file and building both models.
+        read: Reading the file and building the models of urdfkin and Pinocchio.
         urdfkin: Computation with urdfkin.
         pinocchio: Computation with Pinocchio.
         second: Computation with a second oracle.

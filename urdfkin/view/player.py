@@ -130,7 +130,7 @@ class Player:
             now, last = min(float(t[-1]), now + (this - last) * float(self.speed.value)), this
 
     def _save(self, client: Any) -> None:
-        """Draw the samples one after the other in the browser, and send it the file."""
+        """Draw the samples one after the other in the browser, and send the GIF file to the browser."""
         if client is None:
             return
         self.pause()

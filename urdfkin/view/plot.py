@@ -170,7 +170,7 @@ PANELS: dict[str, Panel] = {
 
 #: Suffix of the unit of a coordinate in the panels of q, v and a.
 _PER = {"q": "", "v": "/s", "a": "/s²"}
-#: Names of the panels of coordinates; each of them has one plot for each unit.
+#: Names of the panels of coordinates. Each panel has one plot for each unit.
 COORDINATES = tuple(_PER)
 
 

@@ -343,7 +343,10 @@ def _meshes(root: Element) -> Iterator[Element]:
 
 
 def _is_missing_file(filename: str, beside: Path | None) -> bool:
-    """Return whether the address is a path (relative to the URDF) that does not exist."""
+    """Return whether the address of a mesh is a file path that does not exist.
+
+    A path is relative to the URDF.
+    """
     local = filename and ("://" not in filename or filename.startswith("file://"))
     if beside is None or not local:
         return False
