@@ -225,7 +225,7 @@ def _check_axis(report: Reporter, joint: JointRecord) -> None:
 
 
 def unit_vector(vector: Sequence[float]) -> tuple[float, ...]:
-    """Divide a vector by its length. Each number is rounded once, by at most 2**-53.
+    """Divide a vector by its length. Rounding rotates the result by at most 2**-53 rad.
 
     >>> unit_vector((0.0, -3.0, 4.0))
     (0.0, -0.6, 0.8)
