@@ -9,6 +9,7 @@ disagreement.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
@@ -19,7 +20,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from urdfkin.conventions import Convention
-from urdfkin.errors import InputError
+from urdfkin.errors import DegreesWarning, InputError
 from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.errors.validators import as_bool, real_number, safe_repr, whole_number
 from urdfkin.kinematics.roundings import EPS
@@ -435,8 +436,10 @@ class _Run:
     ) -> FloatArray:
         """Return urdfkin's results for inputs in the function's convention, without a check."""
         ours = self._ours(inputs)
-        found = self._method(self.robot, ours, frame or self.how.frame, reference, verify=False)
-        return self._converted(ours, found, frame, reference)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DegreesWarning)  # a diagnosis tries q in degrees
+            found = self._method(self.robot, ours, frame or self.how.frame, reference, verify=False)
+            return self._converted(ours, found, frame, reference)
 
     def _compared(self, first: int, drawn: tuple[FloatArray, ...], total: _Total, checked: bool) -> _Compared:
         row = self.how.row
