@@ -2,9 +2,9 @@
 
 **Identifiability.** A change of parameters cannot be identified if it has no effect on the measurements. Such
 a change is in the null space of the stacked Jacobian. The rank of this Jacobian is the number of identifiable
-parameters. For the rank, a singular value counts if its lower bound is above 0.
+parameters. This rank is the number of singular values with a lower bound above 0.
 `urdfkin.verify.singular_values` computes this bound by Weyl's inequality from the errors of the columns and
-of the decomposition. There is no tolerance to choose.
+of the decomposition. You do not have to choose a tolerance.
 
 The frame of a revolute joint can be shifted along the joint's axis and rotated about it, if the next frame
 compensates this change. The frame of a prismatic joint can be shifted anywhere and rotated about the joint's
@@ -12,32 +12,37 @@ direction. So 4 of the 6 parameters of each revolute joint are identifiable, 2 o
 of the tip (Everett, Driels and Mooring, 1987). From positions alone, 3 parameters fewer are identifiable,
 because the tool's orientation is not measured.
 
-The other parameters are fixed. Orthogonal elimination chooses them joint by joint, from base to tip. It
-compares the columns of the Jacobian. Among the columns that are nearly as independent as the most independent
-one, it keeps the first in the model's order of preference. As a result, no fitted parameter becomes large to
-compensate for a fixed one. Without this choice, four parameters of nearly parallel axes would become hundreds
-of metres that cancel.
+The parameters that are not fitted are fixed. Orthogonal elimination chooses the fixed parameters joint by
+joint, from base to tip. Each parameter has a column in the Jacobian. The elimination finds the column that
+depends least on the columns already kept. Other columns may be nearly as independent as this column. From all
+these columns, the elimination keeps the one that comes first in the model's order of preference. As a result,
+no fitted parameter becomes large to compensate for a fixed parameter. Without this choice, four parameters of
+nearly parallel axes would become hundreds of metres long and cancel each other.
 
-**Fit.** Damped Gauss-Newton (`urdfkin.kinematics.least_squares`) minimizes the tip's errors, each divided by
-its noise. At the minimum, let J be the weighted Jacobian and r the weighted residuals. Then
+**Fit.** Damped Gauss-Newton (`urdfkin.kinematics.least_squares`) minimizes the errors of the tip's poses.
+Each error is divided by the standard deviation of its noise. At the minimum, let J be the weighted Jacobian
+and r the weighted residuals. Then
 
     C = (J^T J)^-1       is the covariance of the parameters,
     H = J C J^T          is the hat matrix; 1 - H_ii is the redundancy of measurement i.
 
 Noise that you do not state is estimated from the residuals, separately for positions and rotations. The
-variance of each is the sum of the squared residuals divided by the sum of their redundancies. This estimate
-is repeated until it is constant (Foerstner's variance components).
+variance of the positions is the sum of their squared residuals divided by the sum of their redundancies. The
+variance of the rotations is computed in the same way. This estimate is repeated until it is constant
+(Foerstner's variance components).
 
 A pose is an **outlier** if r_i^T (1 - H_ii)^-1 r_i is too large. For a correct pose this number is chi^2
-distributed, with 3 or 6 degrees of freedom. Of a hundred data sets without an outlier, one exceeds the limit.
-One outlier can hide another. Therefore only the largest outlier is removed, and the other poses are fitted
-again, until no outlier is left.
+distributed, with 3 degrees of freedom for a position and 6 for a full pose. The limit is chosen so that only
+one of a hundred data sets without outliers exceeds it. One outlier can hide another. Therefore each step
+removes only the largest outlier and fits the other poses again. The steps end when no outlier is left.
 
 **Start values.** Base and tool are computed from the poses before the fit. With the robot's poses T_i, the
 measured poses M_i, the base B and the tool X, M_i = B T_i X. The equations R_B^T R_Mi = R_i R_X are linear in
 the two unknown rotations. Together these rotations form the null vector of the equations (Shah, 2013). The
-positions are linear in the unknown translations x and b: p_Mi = R_B (R_i x + p_i) + b. From positions alone,
-base and target are computed alternately, because each is a linear problem if the other is known.
+measured positions p_Mi = R_B (R_i x + p_i) + b are linear in the unknown translations x and b. If only
+positions are measured, the base and the position of the target on the tip are unknown. The base is a linear
+problem if the target is known, and the target is a linear problem if the base is known. The module therefore
+computes base and target alternately.
 """
 
 from __future__ import annotations
@@ -58,22 +63,23 @@ from urdfkin.kinematics.roundings import NOT_ZERO
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singular_values import singular_values
 
-#: A column counts as nearly as independent as the most independent one if it has at least this share of its
-#: size.
+#: A column of the Jacobian counts as nearly as independent as the most independent column if its remaining
+#: length is at least this fraction of that column's remaining length.
 _AS_GOOD = 0.5
-#: Number of parameters that a reason names, and the smallest share of a fixed parameter's column for which a
-#: parameter is named.
+#: The reason why a parameter is fixed names other parameters that have the same effect. `_NAMED` is the
+#: largest number of these names. A parameter is named only if it produces at least the fraction `_SHARE` of
+#: the fixed parameter's effect.
 _NAMED, _SHARE = 3, 1e-6
 
 
 @dataclass(frozen=True)
 class Identification:
-    """The identifiable and the fixed parameters.
+    """The parameters that the measurements identify, and the parameters that stay fixed.
 
     Attributes:
-        kept: Indices of the fitted parameters, a minimal set.
+        kept: Indices of the fitted parameters. None of them can be left out.
         still: Indices of the fixed parameters, each with the reason.
-        numbers: How many numbers were measured.
+        numbers: Total number of measured coordinates. A position has 3, and a full pose has 6.
     """
 
     kept: tuple[int, ...]
@@ -87,7 +93,9 @@ class Identification:
 
 
 def stacked(model: Model, values: FloatArray, *, complete: bool, at: FloatArray | None = None) -> FloatArray:
-    """Return the Jacobian (rows, p) of all measured numbers, in metres; angles are multiplied by `way.size`.
+    """Return the Jacobian (rows, p) of all measured coordinates, in metres.
+
+    The rows of angles are multiplied by the length `way.size`, so that they are in metres too.
 
     Args:
         model: The model.
@@ -159,13 +167,15 @@ def _reason(model: Model, J: FloatArray, error: FloatArray, kept: Sequence[int],
     return f"same effect as {', '.join(names)}{more}{' together' if len(order) > 1 else ''}"
 
 
-#: A redundancy below this number counts as no redundancy.
+#: A total redundancy below this number counts as no redundancy.
 _ONE_OR_MORE = 0.5
-#: The fit fully absorbs a direction with less than this share of a pose's largest redundancy.
+#: A pose has several redundancies, one for each direction of its error. The fit fully absorbs an error in a
+#: direction with less than this fraction of the pose's largest redundancy.
 _FOLLOWED = 1e-9
-#: Largest number of noise estimates, and the relative change below which the estimates end.
+#: Largest number of repetitions of the noise estimate, and the relative change of the noise at which the
+#: repetitions end.
 _ESTIMATES, _STAYS = 20, 1e-3
-#: Probability that a data set without outliers is reported with one.
+#: Probability that an outlier is reported for a data set that has no outliers.
 WRONGLY = 0.01
 #: A parameter that changed by less than this number of standard deviations is not written.
 SIGMAS = 2.0
@@ -180,7 +190,7 @@ class Measured:
     Attributes:
         values: (s, n) joint values of the path, rad or m.
         p: (s, 3) positions in the base, m.
-        R: (s, 3, 3) orientations; None where positions alone were measured.
+        R: (s, 3, 3) orientations in the base; None if only positions were measured.
     """
 
     values: FloatArray
@@ -202,11 +212,11 @@ class Measured:
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Standard deviations of the measured numbers.
+    """Standard deviations of the measured positions and orientations.
 
     Attributes:
-        metres: Standard deviation of a coordinate of a position.
-        radians: Standard deviation of a rotation about an axis.
+        metres: Standard deviation of each coordinate of a position (m).
+        radians: Standard deviation of the rotation about each axis (rad).
     """
 
     metres: float
@@ -224,10 +234,10 @@ class Fit:
     Attributes:
         at: (p,) values of all parameters.
         errors: (s, 6) or (s, 3) residuals: measured minus computed, in the base, m and rad.
-        noise: The noise from which the weights are computed.
-        covariance: (k, k) covariance of the fitted parameters, in the units of the parameters; inf without
-            redundancy.
-        left: (s, 6) or (s, 3) redundancy of each number, 1 - H_ii.
+        noise: The standard deviations by which the residuals are divided.
+        covariance: (k, k) covariance of the fitted parameters, in the units of the parameters. It is infinite
+            if the redundancy is 0.
+        left: (s, 6) or (s, 3) redundancy 1 - H_ii of each measured coordinate.
         odd: (s,) chi^2 statistic of each pose.
     """
 
@@ -240,7 +250,7 @@ class Fit:
 
     @property
     def freedom(self) -> float:
-        """The redundancy: number of measured numbers minus number of fitted parameters."""
+        """The total redundancy: the number of measured coordinates minus the number of fitted parameters."""
         return float(self.left.sum())
 
     @property
@@ -250,7 +260,7 @@ class Fit:
 
     @property
     def ratio(self) -> float:
-        """The ratio of the residual noise to the stated noise: 1 within about 1/sqrt(2 freedom)."""
+        """The ratio of the noise in the residuals to the stated noise; about 1, within 1/sqrt(2 freedom)."""
         if not self.is_judged:
             return math.nan
         whitened = self.errors / self.noise.of(self.errors.shape[1] == 6)
@@ -262,13 +272,16 @@ class Fit:
         return 1.0 / math.sqrt(2.0 * max(self.freedom, _ONE_OR_MORE))
 
     def rms(self) -> tuple[float, float | None]:
-        """Return the rms error of positions (length of the vector, m) and of orientations (rad)."""
+        """Return the root mean square of the position errors (m) and of the orientation errors (rad)."""
         position, turn = (np.sqrt((x**2).sum(axis=1).mean()) for x in np.hsplit(self.errors, [3]))
         return float(position), float(turn) if self.errors.shape[1] == 6 else None
 
 
 def errors(model: Model, measured: Measured, at: FloatArray) -> FloatArray:
-    """Return the residuals (s, 6) or (s, 3), measured minus computed: [position; rotation] in the base."""
+    """Return the residuals, measured minus computed: (s, 6) for poses or (s, 3) for positions.
+
+    Each row contains the position error and, for poses, then the rotation error, in the base, in m and rad.
+    """
     T = model.way.poses(measured.values, at)
     away = measured.p - T[:, :3, 3]
     if measured.R is None:
@@ -285,7 +298,7 @@ def best_fit(
         model: The model.
         measured: The measurements.
         kept: Indices of the parameters to fit.
-        noise: The known noise; None: estimate it.
+        noise: The known noise. If it is None, the noise is estimated from the residuals.
         at: (p,) start values.
     """
     weights = noise or Noise(1.0, 1.0 / model.way.size)
@@ -308,7 +321,11 @@ def best_fit(
 
 
 def _estimate_noise(found: Fit, model: Model, measured: Measured) -> Noise:
-    """Estimate the noise from the residuals; it is at least rounding, since residuals are divided by it."""
+    """Estimate the noise from the residuals.
+
+    The residuals are divided by the noise. The estimate is therefore never below rounding error, so that no
+    residual is divided by zero.
+    """
     rounding = model.way.rounding(measured.values)
 
     def of(part: slice, least: float, former: float) -> float:
@@ -325,7 +342,7 @@ def _estimate_noise(found: Fit, model: Model, measured: Measured) -> Noise:
 def _whitened(
     model: Model, measured: Measured, kept: Sequence[int], noise: Noise, at: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return residuals (rows,) and columns (rows, k) of the Jacobian, divided by the noise."""
+    """Return the residuals (rows,) and the fitted parameters' Jacobian (rows, k), divided by the noise."""
     scale = noise.of(measured.complete)
     _, columns = model.way.columns(measured.values, at)
     J = columns[:, : len(scale), list(kept)] / scale[:, np.newaxis]
@@ -390,13 +407,14 @@ def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]
     """Select the parameters that moved by more than `SIGMAS` standard deviations, by backward elimination.
 
     The function resets the least significant parameter to its old value. It then changes the other parameters
-    by their covariance with this one. The elimination ends when all remaining parameters are significant. If
-    only a combination of two parameters is known, one of the two remains.
+    according to their covariance with the reset parameter. The elimination ends when all remaining parameters
+    are significant. If the measurements determine only a combination of two parameters, one of the two
+    remains selected.
 
     Args:
         moved: (k,) change of each parameter.
         covariance: (k, k) covariance of the changes; inf where it is unknown.
-        fixed: (k,) whether a parameter is selected in any case.
+        fixed: (k,) whether a parameter is always selected, even if its change is not significant.
 
     >>> significant(np.array([3.0, 1.0]), np.eye(2), [False, False]).tolist()
     [True, False]
@@ -406,8 +424,9 @@ def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]
         return ~free
     x, C = moved.copy(), covariance.copy()
     while (rest := np.flatnonzero(stays & free)).size:
-        # C contains differences of variances, so rounding may make a small variance 0 or negative. Such a
-        # change is known far more precisely than the noise, and counts as significant.
+        # The variances in C are differences of larger numbers, so rounding may make a small variance 0 or
+        # negative. A parameter with such a variance is known very precisely, and its change counts as
+        # significant.
         sizes = np.abs(x[rest]) / np.sqrt(np.maximum(C[rest, rest], NOT_ZERO))
         k = rest[int(np.argmin(sizes))]
         if sizes.min() > SIGMAS:
@@ -420,21 +439,27 @@ def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]
 
 
 def quantile(share: float, freedom: int) -> float:
-    """Return the quantile of chi^2 to a few per cent, also in the tail (Wilson and Hilferty, 1931)."""
+    """Return the quantile of the chi^2 distribution, by the approximation of Wilson and Hilferty (1931).
+
+    The relative error is a few per cent, even for probabilities close to 1.
+    """
     step = 2.0 / (9.0 * freedom)
     return freedom * (1.0 - step + NormalDist().inv_cdf(share) * math.sqrt(step)) ** 3
 
 
-#: Largest number of alternations between base and target, and the relative change of the target below which
-#: they end.
+#: Largest number of times that base and target are computed alternately, and the relative change of the
+#: target at which this computation ends.
 _TURNS, _FIXED_END = 200, 1e-9
-#: Largest ratio of the spread of the measured positions to the spread of the tip's positions. Positions in
-#: millimetres have a ratio of 1000.
+#: Largest allowed ratio of the spread of the measured positions to the spread of the robot's tip positions.
+#: If the measured positions are in millimetres by mistake, this ratio is about 1000.
 _FARTHER = 100.0
 
 
 def starting(model: Model, measured: Measured) -> FloatArray:
-    """Return the model's parameters (p,); base and tool are computed from the poses."""
+    """Return start values (p,) of all parameters.
+
+    Base and tool are computed from the measured poses. The other parameters have the model's values.
+    """
     at = model.way.start.copy()
     places = {parameter.where for parameter in model.way.parameters if parameter.end}
     if not places:
@@ -469,7 +494,7 @@ def _from_poses(
 
 
 def _from_positions(T: FloatArray, p: FloatArray, base: bool, tool: bool) -> tuple[FloatArray, FloatArray]:
-    """Compute base and target from positions alone."""
+    """Compute the base, and the position of the measured target on the tip, from positions alone."""
     B, X = np.eye(4), np.eye(4)
     for _ in range(_TURNS if base and tool else 1):
         if base:
@@ -483,7 +508,7 @@ def _from_positions(T: FloatArray, p: FloatArray, base: bool, tool: bool) -> tup
 
 
 def _rotations(R: FloatArray, M: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Solve R_B^T M_i = R_i R_X for R_B and R_X, as M_i^T R_B - R_X^T R_i^T = 0 with the matrices as rows."""
+    """Solve R_B^T M_i = R_i R_X for R_B and R_X, written as M_i^T R_B - R_X^T R_i^T = 0."""
     unit = np.eye(3)
     left = np.einsum("sab,cd->sacbd", M.swapaxes(-1, -2), unit).reshape(-1, 9)
     right = np.einsum("ab,scd->sacbd", unit, R).reshape(-1, 9)

@@ -1,15 +1,15 @@
 """Apply the factory calibration of a Universal Robots arm, from the YAML file of its ROS driver.
 
-The controller stores Denavit-Hartenberg parameters. Two axes of the arm deviate by a milliradian from
-parallel. One d is therefore hundreds of metres, and the next d compensates it. The driver's tool
-`ur_calibration` shifts the link frames along their axes, so that these large offsets disappear. The tool
-writes the pose of each joint relative to the previous one: x, y, z, roll, pitch, yaw.
+The controller stores Denavit-Hartenberg parameters. Two axes of the arm are parallel except for about a
+milliradian. The d of one row is therefore hundreds of metres, and the d of the next row compensates it. The
+driver's program `ur_calibration` shifts the link frames along their axes, so that these large offsets
+disappear. The program writes the pose of each joint relative to the previous one: x, y, z, roll, pitch, yaw.
 
 The order of the rotations is ambiguous. The driver computes the angles from R = Rx(roll) Ry(pitch) Rz(yaw)
-(Eigen's `eulerAngles(0, 1, 2)`). The ROS description copies them into a URDF, where they mean
-Rz(yaw) Ry(pitch) Rx(roll). If one angle is a quarter turn and another is small, the two rotations differ by
-the small angle, 1e-5 to 1e-4 rad. The order "driver" agrees with the robot's controller. The order "urdf"
-agrees with the ROS description of the same file.
+(Eigen's `eulerAngles(0, 1, 2)`). The ROS description copies these angles into a URDF, where they mean Rz(yaw)
+Ry(pitch) Rx(roll). If one angle is a quarter turn and another angle is small, the two rotations differ by the
+small angle. It is 1e-5 to 1e-4 rad. The order "driver" agrees with the robot's controller. The order "urdf"
+agrees with the URDF that the ROS description makes from the same file.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from urdfkin.system.files import read_text
 from urdfkin.urdf.sources import Source
 from urdfkin.verify.certificate import Certificate
 
-#: The links of the file in the order of the arm, and the parent joint of each.
+#: The links in the calibration file in the order of the arm, and the parent joint of each link.
 LINKS = {
     "shoulder": "shoulder_pan_joint",
     "upper_arm": "shoulder_lift_joint",
@@ -46,21 +46,23 @@ LINKS = {
     "wrist_2": "wrist_2_joint",
     "wrist_3": "wrist_3_joint",
 }
-#: SciPy's names of the two orders; lowercase letters are rotations about fixed axes.
+#: SciPy's names of the two orders; lowercase letters stand for rotations about fixed axes, uppercase letters
+#: for rotations about moving axes.
 ORDERS = {"driver": "XYZ", "urdf": "xyz"}
 _SIX = ("x", "y", "z", "roll", "pitch", "yaw")
-#: Number of configurations for the fit, and for its check.
+#: Number of configurations for the fit of the origins. The check of the fit uses the same number.
 _FITTED = 40
-#: Seeds of the configurations for the fit, and for its check.
+#: Seeds of the random configurations for the fit of the origins, and for the check of this fit.
 _FITTED_SEED, _CHECKED_SEED = 2, 3
-#: Largest allowed residual, metres and radians. It is the rounding of a file with nine digits.
+#: Largest allowed residual of the fit, in metres and in radians. The rounding of numbers with nine digits in
+#: the file causes residuals of this size.
 _LEFT = 1e-8
 #: Number of configurations on which two calibrations are compared.
 _COMPARED = 1000
 
 
 def read_calibration(path: Path, order: str = "driver") -> dict[str, FloatArray]:
-    """Read the origins (4, 4) by joint name, without a prefix.
+    """Read the (4, 4) origin of each joint, by the joint's name without a prefix.
 
     Args:
         path: The driver's YAML, or a `default_kinematics.yaml` of its robot description.
@@ -119,9 +121,9 @@ def calibrated_tree(origins: Mapping[str, FloatArray]) -> KinematicTree:
 def universal_robots(robot: Robot | Source, path: Path, order: str = "driver") -> Rewritten:
     """Apply a calibration file to the URDF of a Universal Robots arm.
 
-    In the current ROS description all six joints turn about z, and their origins become those of the file. In
-    another URDF, such as the older description, the origins are fitted. The fitted arm then moves like the
-    calibrated arm, from `base` to `tool0`.
+    In the current ROS description all six joints turn about z. The joint origins are then replaced by those
+    of the calibration file. In another URDF, such as the older description, the joint origins are fitted. The
+    fitted arm then has the same poses of `tool0` in `base` as the calibrated arm.
 
     Args:
         robot: The arm.
@@ -146,7 +148,7 @@ def universal_robots(robot: Robot | Source, path: Path, order: str = "driver") -
 
 
 def _fit_origins(robot: Robot, calibrated: FrameChain, tip: str, base: str) -> Rewritten:
-    """Fit the robot's origins to poses of the calibrated arm, which have no noise."""
+    """Fit the robot's joint origins to computed poses of the calibrated arm; these poses have no noise."""
     own = robot.chain(tip, base).coupling
     if len(own.names) != len(calibrated.joint_names):
         raise InputError(
@@ -191,7 +193,7 @@ def _is_the_descriptions(robot: Robot, prefix: str) -> bool:
 
 
 def _verify_written(result: Rewritten, calibrated: FrameChain, prefix: str) -> Certificate:
-    """Compare the poses of the written text, which Pinocchio checks, with those of the calibration file."""
+    """Compare the poses of the new URDF with those of the calibration file; Pinocchio checks the new URDF."""
     written = result.loaded
     q = written.sample(_FITTED, seed=_CHECKED_SEED)
     T = written.placement(q, [f"{prefix}base", f"{prefix}tool0"])
@@ -208,7 +210,7 @@ def _verify_written(result: Rewritten, calibrated: FrameChain, prefix: str) -> C
 
 
 def distance(one: Mapping[str, FloatArray], other: Mapping[str, FloatArray]) -> tuple[float, float]:
-    """Return the largest distance and angle (m, rad) between the tools of two calibrations, on samples."""
+    """Return the largest distance (m) and angle (rad) on samples between `tool0` of two calibrations."""
     paths = [chain(calibrated_tree(origins), "tool0", "base") for origins in (one, other)]
     q = values_within([(-np.pi, np.pi)] * len(LINKS), _COMPARED)
     T, S = (path.placement(q) for path in paths)

@@ -1,4 +1,4 @@
-"""Write the result of `same` as a certificate, and recheck a certificate without a search."""
+"""Write the result of `urdfkin same` as a certificate, and recheck a certificate without a search."""
 
 from __future__ import annotations
 
@@ -22,19 +22,20 @@ from urdfkin.robot import Robot
 from urdfkin.system.documents import Count, Header, Layout, Matrix, Size, of_length, plain, says
 from urdfkin.verify.oracles import versions
 
-#: Largest number of boxes at a time in the proof of a claimed bound.
+#: Largest number of boxes of configurations that exist at the same time in the proof of a claimed bound.
 MOST_AGAIN = 2**22
-#: Relative tolerance for numbers of a document made on another machine, and absolute tolerance (m or rad) for
-#: zero.
+#: Tolerances for numbers in a certificate that was made on another machine: the relative tolerance, and the
+#: absolute tolerance (m or rad) for numbers near zero.
 _RELATIVE, _ZERO = 1e-9, 1e-15
-#: Tolerance of a bound that is proven again, in eps of the bound. Sums round differently on other machines.
+#: Relative tolerance of a bound that is proven again, in multiples of the machine epsilon. The tolerance is
+#: needed because sums round differently on other machines.
 _LAST_BITS = 64.0
-#: Parts of the document that follow from the alignment of the models.
+#: Entries of the certificate that follow from the alignment of the two models.
 DERIVED = ("up_to", "remarks", "joints", "orders", "links", "base", "base_links", "rounding")
 
 
 class Model(TypedDict):
-    """One of the two models."""
+    """Name and source of one of the two compared models."""
 
     name: Annotated[str, says("The robot's name.")]
     source: Annotated[
@@ -50,12 +51,12 @@ class Rule(TypedDict):
     offset: Annotated[float, says("Offset that is added to the product, rad or m.")]
 
 
-#: Value of a parameter in one model.
+#: Value of a parameter in one of the two models.
 Value = str | float | list[str | float | None] | Rule | None
 
 
 class DifferenceEntry(TypedDict):
-    """A difference of the models at one place."""
+    """A difference of the two models at one joint or link."""
 
     place: Annotated[str, says("Name of the joint or link of A that differs.")]
     what: Annotated[str, says("Name of the parameter that differs: axis, place, mimic rule, limits, ...")]
@@ -77,7 +78,7 @@ class DifferenceEntry(TypedDict):
 
 
 class Conversion(TypedDict):
-    """The pose of a planar or floating joint in B: before * (pose in A) * behind."""
+    """The conversion of a planar or floating joint's pose from A to B: before * (pose in A) * behind."""
 
     before: Annotated[Matrix, says("Matrix M (4, 4), multiplied from the left.")]
     behind: Annotated[Matrix, says("Matrix N (4, 4), multiplied from the right.")]
@@ -87,7 +88,7 @@ class Conversion(TypedDict):
 
 
 class JointEntry(TypedDict):
-    """A joint of A and its joint of B."""
+    """A joint of A and the matching joint of B."""
 
     a: Annotated[str, says("Name of the joint in A.")]
     b: Annotated[str, says("Name of the joint in B.")]
@@ -102,7 +103,7 @@ class JointEntry(TypedDict):
 
 
 class ToolEntry(TypedDict):
-    """A matched frame that counts as another tool."""
+    """A pair of matched links that are mounted differently, so that they count as different tools."""
 
     a: Annotated[str, says("Link of A.")]
     b: Annotated[str, says("Link of B.")]
@@ -110,14 +111,14 @@ class ToolEntry(TypedDict):
 
 
 class Rounding(TypedDict):
-    """Distance of frames that counts as rounding."""
+    """Largest distance and angle between matching frames that count as rounding."""
 
     metres: Size
     radians: Size
 
 
 class FrameEntry(TypedDict):
-    """The interval that contains the largest distance of a frame."""
+    """The interval that contains the largest distance between a frame of A and the matching frame of B."""
 
     frame: Annotated[str, says("Link of A.")]
     frame_b: Annotated[str, says("Link of B.")]
@@ -205,9 +206,9 @@ SAME = Layout(
 
 
 def certificate(found: Sameness, command: str | None = None) -> Certificate:
-    """Return the document with map, verdict, differences and the interval of each frame.
+    """Return the certificate: the joint map, the verdict, the differences and the interval of each frame.
 
-    A bound that does not exist is null.
+    The value is null where there is no bound.
     """
     a, b = ({"name": name, "source": source} for name, source in zip(found.names, found.sources, strict=True))
     document = {
@@ -224,7 +225,7 @@ def certificate(found: Sameness, command: str | None = None) -> Certificate:
     return cast("Certificate", plain(document))
 
 
-#: Entries of the document that copy the attribute of `Sameness` with the same name.
+#: Entries of the certificate that are copies of the attributes of `Sameness` with the same names.
 _TAKEN_OVER = (
     "up_to", "differences", "remarks", "joints", "links", "tools", "orders", "base", "base_links", "frames",
     "as_written", "checked",
@@ -232,7 +233,7 @@ _TAKEN_OVER = (
 
 
 def words_of(entry: DifferenceEntry) -> str:
-    """Return a difference in one line."""
+    """Return a difference of two models as one line of text."""
     a, b = (
         Mimic(**x) if isinstance(x, dict) else tuple(x) if isinstance(x, list) else x
         for x in (entry["a"], entry["b"])
@@ -245,10 +246,11 @@ def recheck(document: Certificate, a: Robot, b: Robot) -> list[str]:
     """Return the statements of a certificate that are wrong for two models; empty if all are right.
 
     The recheck aligns the models as the certificate states, so it needs no search. First it checks that this
-    alignment is allowed: the transforms are rigid motions, the joints exist, and the axes allow the stated
-    orders. Then it compares all statements that follow from the alignment, including the remarks. urdfkin and
-    Pinocchio both compute each lower bound at the configuration of that bound. Each upper bound is proven
-    again.
+    alignment is allowed. The transforms must be rigid motions, the joints must exist, and the axes must allow
+    the stated orders of joints. Then the recheck derives all statements that follow from the alignment,
+    including the remarks, and compares them with those of the certificate. A lower bound is a distance at a
+    configuration in the certificate. urdfkin and Pinocchio both compute this distance again. Each upper bound
+    is proven again.
 
     Args:
         document: The result of `certificate`, or of `SAME.read`.
@@ -256,8 +258,8 @@ def recheck(document: Certificate, a: Robot, b: Robot) -> list[str]:
         b: The second model.
 
     Raises:
-        InputError: the certificate is about other model texts, or names a joint or link that a model does not
-            have.
+        InputError: the certificate was made for models with other texts, or names a joint or link that a
+            model does not have.
     """
     for k, robot in enumerate((a, b)):
         if (claimed := document["sha256"][k : k + 1]) != [robot.sha256]:
@@ -301,7 +303,7 @@ def _errors(document: Certificate, comparator: Comparator) -> Iterator[str]:
 
 
 def _statement_errors(document: Certificate, comparator: Comparator, said: Sameness) -> Iterator[str]:
-    """Yield the wrong statements about names, verdict, differences and other entries that need no proof."""
+    """Yield the wrong statements in entries that need no proof: names, verdict, differences and others."""
     models = document["a"], document["b"]
     for which, model, robot in zip("AB", models, comparator.robots, strict=True):
         if model["name"] != robot.name:
@@ -336,7 +338,7 @@ def _statement_errors(document: Certificate, comparator: Comparator, said: Samen
     )
 
 
-#: The data of an empty confirmation, for a result that Pinocchio did not check.
+#: The confirmation entry of a certificate that Pinocchio did not check.
 _NOTHING = plain(Confirmation())
 
 
@@ -345,7 +347,7 @@ def _place(one: DifferenceEntry) -> tuple[str, str]:
 
 
 def _same_difference(claimed: DifferenceEntry, said: DifferenceEntry, rounding: tuple[float, float]) -> bool:
-    """Return whether two differences have equal values, and equal sizes within rounding."""
+    """Return whether two differences have equal values, and sizes that are equal within rounding."""
     return (
         all(_equal(claimed[part], said[part]) for part in ("a", "b", "detail"))
         and math.isclose(claimed["metres"], said["metres"], rel_tol=_RELATIVE, abs_tol=rounding[0])
@@ -356,7 +358,10 @@ def _same_difference(claimed: DifferenceEntry, said: DifferenceEntry, rounding: 
 def _confirmation_errors(
     claimed: Confirmed, comparator: Comparator, found: Alignment, variables: Variables
 ) -> Iterator[str]:
-    """Yield the wrong statements about Pinocchio's confirmation; a skipped check makes no statement."""
+    """Yield the wrong statements about Pinocchio's confirmation.
+
+    A certificate without this confirmation makes no statement about it.
+    """
     if claimed["reason"].startswith(REASONS) and claimed == {**_NOTHING, "reason": claimed["reason"]}:
         return
     if claimed["reason"] or claimed["configurations"] != CONFIRMED or not claimed["by"]:
@@ -372,7 +377,11 @@ def _confirmation_errors(
 
 
 def _gauge(document: Certificate) -> Gauge:
-    """Return the gauge that the document states: base, senses, zeros, conversions and orders."""
+    """Return the gauge in a certificate.
+
+    The gauge contains the choices that align B with A: the base's pose, the joints' senses and zeros, the
+    conversions of planar and floating joints, and the orders of joints.
+    """
     joints, base = document["joints"], document["base_links"]
     return Gauge(
         (base[0], base[1]),
@@ -388,7 +397,7 @@ def _gauge(document: Certificate) -> Gauge:
 
 
 def _not_a_gauge(document: Certificate, gauge: Gauge, comparator: Comparator) -> str | None:
-    """Return the reason why the stated gauge is not allowed; None if it is allowed."""
+    """Return the reason why the gauge in a certificate is not allowed; None if it is allowed."""
     a, b = comparator.mechanisms
     for joint in document["joints"]:
         a.tree.joint_index(joint["a"])
@@ -406,7 +415,7 @@ def _not_a_gauge(document: Certificate, gauge: Gauge, comparator: Comparator) ->
 
 
 def _equal(claimed: Any, said: Any, zero: float = _ZERO) -> bool:
-    """Return whether two parts of a document are equal; the last digits of numbers may differ."""
+    """Return whether two parts of a certificate are equal; the last digits of numbers may differ."""
     if isinstance(said, dict):
         return (
             isinstance(claimed, dict)
@@ -427,7 +436,7 @@ def _equal(claimed: Any, said: Any, zero: float = _ZERO) -> bool:
 def _as_written_errors(
     claim: FrameEntry, comparator: Comparator, found: Alignment, *, sharply: bool
 ) -> Iterator[str]:
-    """Yield the wrong statements about the farthest frame of the models as they are written."""
+    """Yield the wrong statements about the frame that is farthest apart in the models as they are written."""
     written = comparator.as_written(found)
     variables = variables_of(written, comparator.tolerance)
     names = [
@@ -450,15 +459,17 @@ def _interval_errors(
     *,
     sharply: bool,
 ) -> Iterator[str]:
-    """Yield the wrong statements about an interval: compute its lower bound, and prove its upper bounds.
+    """Yield the wrong statements about an interval.
+
+    The function computes the interval's lower bound again, and proves its upper bounds again.
 
     Args:
-        search: Both robots.
-        frame: The frame.
-        claim: The document's statement about the frame.
+        search: The search for the largest distances between the two robots.
+        frame: The pair of matching frames.
+        claim: The certificate's statement about the frame.
         rounding: Distance and angle (m, rad) that count as zero.
-        sharply: Whether to prove an upper bound by branch and bound. This is useless if another part of the
-            certificate is wrong.
+        sharply: Whether to prove an upper bound by branch and bound. This proof is slow, and it is skipped if
+            another part of the certificate is wrong.
     """
     problems = list[str]()
     if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:
@@ -476,7 +487,7 @@ def _interval_errors(
     if _within(proven[1], radians, rounding[1]):
         if problems or not sharply:
             return
-        # No claimed bound below an attained distance can be proven.
+        # An upper bound below a distance that occurs at some configuration cannot be proven.
         attained = max(claim["lower"], float(search.seen([frame])[0].max()))
         if metres < attained - 2.0 * rounding[0]:
             yield f"{place}: its upper bound is wrong: {attained:.6g} m is attained"
@@ -490,9 +501,9 @@ def _interval_errors(
 def _not_attained(
     search: Search, frame: FramePair, claim: FrameEntry, rounding: tuple[float, float]
 ) -> Iterator[str]:
-    """Yield reasons why a lower bound is wrong.
+    """Yield the reasons why the lower bound of an interval is wrong.
 
-    The configurations may be invalid, or a library may compute another distance there.
+    The interval's configurations may be invalid, or urdfkin or Pinocchio may compute another distance there.
     """
     place = f"frame {claim['frame']}"
     q_a, q_b = np.array([claim["q_a"]]), np.array([claim["q_b"]])
@@ -508,5 +519,5 @@ def _not_attained(
 
 
 def _within(proven: float, claimed: float, rounding: float) -> bool:
-    """Return whether the proven bound confirms the claimed one, except for rounding."""
+    """Return whether the proven bound is at most the claimed bound, except for rounding."""
     return proven <= claimed + rounding + _LAST_BITS * EPS * abs(claimed) if math.isfinite(claimed) else True

@@ -1,4 +1,4 @@
-"""List the changes between two versions of a robot description, and bound their effect on the frames."""
+"""List the changes between two versions of a robot description, and bound how far they move the frames."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from urdfkin.urdf.plain_xml import plain_xml
 from urdfkin.urdf.sources import Source
 from urdfkin.urdf.writer import to_urdf
 
-#: Attributes that consist of several numbers, and the names of these numbers.
+#: Attributes in a URDF that consist of several numbers, each with the names of its numbers.
 _PARTS = {"xyz": ("x", "y", "z"), "rpy": ("roll", "pitch", "yaw")}
-#: Values that a joint's attributes have if the file omits them.
+#: Default values of a joint's attributes, for attributes that the file omits.
 _DEFAULTS = {f"origin {part}": 0.0 for parts in _PARTS.values() for part in parts}
 _AXIS = {"axis x": 1.0, "axis y": 0.0, "axis z": 0.0}
 _RULE = {"mimic multiplier": 1.0, "mimic offset": 0.0}
@@ -74,14 +74,14 @@ def motion_words(frame: Interval, moves: str = "move", turns: str = "turn") -> s
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """The frame that the changes of one joint move most, and how far this frame moves."""
+    """The effect of one joint's changes: the frame that they move most, and how far this frame moves."""
 
     element: str
     interval: Interval
 
     @property
     def words(self) -> str:
-        """The effect in words, for example "moves tool0 by up to 38 mm"."""
+        """The effect as text, for example "moves tool0 by up to 38 mm"."""
         return motion_words(self.interval, "moves", "turns")
 
     def __str__(self) -> str:
@@ -94,7 +94,7 @@ class Changes:
 
     Attributes:
         sources: The two sources, as given.
-        changes: The changes: the robot's name, then joints, then links, in the order of the file.
+        changes: The changes of the robot's name, then of joints, then of links, in the order of the file.
         effects: For each joint with changes that move links, the effect of the changes of this joint alone.
         total: The frame that all changes together move most; None if no frame moves.
     """
@@ -110,7 +110,7 @@ class Changes:
 
     @property
     def effect_of(self) -> dict[str, Effect]:
-        """The effects, by the name of the element."""
+        """The effect for each changed joint, by the element's name, for example "joint elbow"."""
         return {effect.element: effect for effect in self.effects}
 
 
@@ -120,7 +120,8 @@ def diff(a: Robot | Source | DHTable, b: Robot | Source | DHTable, *, effects: b
     Args:
         a: The old version: a robot, or a source for `load`.
         b: The new version: a robot, or a source for `load`.
-        effects: Whether to bound how far the changes of each joint move the frames behind it.
+        effects: Whether to bound how far the changes of each joint move the frames between this joint and the
+            tips.
 
     Raises:
         UrdfError: a version has errors. SourceError, UnknownNameError, InputError: as for `load`.
@@ -157,7 +158,7 @@ def _changes(old: str, new: str) -> Iterator[Change]:
 
 
 def _facts(element: Element, tag: str) -> dict[str, Value]:
-    """Return the attributes of an element and of its children: the names in words, and the values."""
+    """Return the values of the attributes of an element and of its children, by readable names."""
     found = dict(_attributes(element, ""))
     found.pop("name", None)
     if tag == "joint":
@@ -190,9 +191,9 @@ def _value(text: str) -> Value:
 
 
 def _effect(old: Robot, new: Robot, element: str) -> Effect | None:
-    """Compute the effect of the changes of one joint alone.
+    """Compute how far the changes of a single joint move the frames.
 
-    The old robot is compared with a copy that has this joint of the new robot.
+    The old robot is compared with a copy of the old robot in which only this joint is the new robot's.
     """
     name = element.removeprefix("joint ")
     trees = old.tree, new.tree
@@ -209,7 +210,7 @@ def _effect(old: Robot, new: Robot, element: str) -> Effect | None:
     try:
         changed = load(to_urdf(_with_joint(trees[0], at, joint)), verify=False)
         plain = load(to_urdf(trees[0]), verify=False)
-    except InputError:  # such a model cannot be written as a URDF again, so no effect is computed
+    except InputError:  # this copy cannot be written as a URDF, so no effect is computed
         return None
     worst = same(plain, changed).worst_as_written
     return None if worst is None else Effect(element, worst)

@@ -1,4 +1,4 @@
-"""Store the result of comparing two models: verdict, differences, map of joints, and distances of frames."""
+"""Store the result of comparing two models: verdict, differences, matched joints, and distances of frames."""
 
 from __future__ import annotations
 
@@ -26,32 +26,33 @@ from urdfkin.system.lazy_import import hook
 if TYPE_CHECKING:
     from urdfkin.conventions import Convention
 
-#: Smallest number printed with a unit prefix (0.1 to four digits). From 9 times this number on, the unit
-#: without a prefix is used.
+#: `_TENTH` is the smallest number that is printed with a unit prefix: 0.1, after rounding to four digits. The
+#: unit without a prefix is used only from `_NINE` times this number on, which is 0.9.
 _TENTH, _NINE = 0.09995, 9.0
 
 
 class Verdict(Enum):
-    """Whether two models are the same, the same after the changes of `Sameness.up_to`, or different."""
+    """Verdict: the models are the same, or the same after the changes in `Sameness.up_to`, or different."""
 
     SAME = "same"
     SAME_AFTER = "same after"
     DIFFERS = "differs"
 
 
-#: Kinds of changes after which two models still count as equivalent, in the order of the headline.
+#: Kinds of changes that do not make two models different: models are equivalent if they agree after such
+#: changes. The headline of a result names the kinds in this order.
 FREE = ("base", "zeros", "senses", "free joints", "tools")
-#: Kinds of differences for which the distance of each common frame is still bounded.
+#: Kinds of differences for which the distance between each pair of matching frames can still be bounded.
 BOUNDED = frozenset({"axis", "place", "frame", "mimic rule", "fixed"})
 
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """A question about two models that has the answer yes or no.
+    """A yes-or-no question about two models: whether they are equivalent, or within a distance of each other.
 
     Attributes:
-        within: Largest allowed distance of a frame in the models as they are written, in metres and in
-            radians. None: the question is whether the models are equivalent.
+        within: Largest allowed distance between matching frames of the models as they are written, in metres
+            and in radians. If it is None, the question is whether the models are equivalent.
         strict: Whether equivalent models and models with remarks count as different.
     """
 
@@ -61,15 +62,17 @@ class Question:
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """An interval that contains the largest distance of a frame in two models within their limits.
+    """An interval that contains the largest distance between a frame of A and the matching frame of B.
+
+    The largest distance is taken over all configurations within the joint limits.
 
     Attributes:
         frame: The link of A.
         frame_b: The link of B.
-        lower: Lower bound, metres; the distance at `q_a` and `q_b`.
-        upper: Proven upper bound, metres; inf if there is no bound.
+        lower: Lower bound of the largest distance, metres. It is the distance at `q_a` and `q_b`.
+        upper: Proven upper bound of the distance, metres; inf if there is no bound.
         radians: Proven upper bound of the angle between the two orientations of the frame.
-        radians_seen: The angle between the two orientations at some configuration.
+        radians_seen: The angle between the two orientations at `q_a` and `q_b`.
         q_a: Configuration of A.
         q_b: The corresponding configuration of B.
     """
@@ -84,7 +87,8 @@ class Interval:
     q_b: tuple[float, ...]
 
 
-#: Value of a parameter: a kind or name, a number, the two ends of a range, several names, or a mimic rule.
+#: Value of a parameter: a joint type or name, a number, the two ends of a range, several names, or a mimic
+#: rule.
 Value = str | float | tuple[str | float | None, ...] | Mimic | None
 
 
@@ -95,12 +99,12 @@ class Difference:
     Attributes:
         place: The joint or link of A, for example "joint elbow".
         what: The parameter: "axis", "place", "mimic rule", "only in A", ...
-        a: Its value in A; None where the parameter has no value, such as a limit that is not there.
-        b: Its value in B; None where the parameter has no value.
-        radians: Size of the difference as an angle, 0 where it has none.
-        metres: Size of the difference as a length, 0 where it has none.
-        detail: "alone" if an axis differs but the links behind it agree; "converted" if limits of B are given
-            in the coordinate of A; otherwise empty.
+        a: The parameter's value in A. None if the parameter has no value, for example a missing limit.
+        b: The parameter's value in B. None if the parameter has no value.
+        radians: Angular part of the difference, radians; 0 if it has no angular part.
+        metres: Linear part of the difference, metres; 0 if it has no linear part.
+        detail: "alone" if a joint's axis differs although the links moved by this joint agree. "converted" if
+            the limits of B were converted to the coordinate of A. Otherwise empty.
     """
 
     place: str
@@ -113,7 +117,7 @@ class Difference:
 
     @property
     def words(self) -> str:  # noqa: PLR0911  a line for each parameter
-        """The difference in one line."""
+        """The difference as one line of text."""
         place, what, a, b = self.place, self.what, self.a, self.b
         off = [f"{length(self.metres)} off"] if self.metres else []
         match what:
@@ -167,14 +171,14 @@ def _range(ends: Value) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """A frame that counts as another tool: link `b` of B is at `pose` (4, 4) in the frame of A's link `a`."""
+    """Two matched links that count as different tools: B's link `b` has the `pose` (4, 4) in A's link `a`."""
 
     a: str
     b: str
     pose: FloatArray
 
 
-#: First words of the reasons why there is no confirmation.
+#: First words of the reasons why Pinocchio did not confirm the bounds.
 REASONS = NOT_ASKED, NOT_VERIFIED = "not asked of Pinocchio: ", "not verified by Pinocchio: "
 
 
@@ -203,10 +207,10 @@ class Confirmation:
 
 @dataclass(frozen=True, slots=True)
 class JointMap:
-    """A joint of A and its joint of B: value_b = sense * value_a + offset (rad, m).
+    """A joint of A and the matching joint of B: value_b = sense * value_a + offset (rad, m).
 
-    A planar or floating joint has the sense 1 and the offset 0. If its pose differs between A and B, it has a
-    conversion.
+    A planar or floating joint has the sense 1 and the offset 0. If the pose of such a joint differs between A
+    and B, `conversion` converts A's pose to B's.
     """
 
     a: str
@@ -227,26 +231,30 @@ class Sameness(Displayable):
         sources: The two sources, as given.
         digests: SHA-256 of the two texts.
         verdict: `Verdict.SAME`, `SAME_AFTER` the changes in `after`, or `DIFFERS`.
-        after: The changes that bring B closest to A, one line each. They are given even if the models still
-            differ after them.
-        up_to: The kinds of these changes: "base", "zeros", "senses", "free joints", "tools".
+        after: The changes that bring B closest to A, with one line of text for each change. They are listed
+            even if the models still differ after these changes.
+        up_to: The kinds of the changes in `after`: "base", "zeros", "senses", "free joints", "tools".
         differences: The differences, ordered from the base to the tips.
-        remarks: Differences that do not affect motion: limits, kinds, links of one model only.
+        remarks: Differences that do not affect motion: joint limits, joint types, and links that only one
+            model has.
         joints: The matched joints of A and B.
         links: The matched links of A and B.
         tools: The matched links that count as different tools.
-        orders: Runs of joints of B that were taken in another order, which their axes allow.
-        base: (4, 4) pose of B's root in A's root frame, in the zero configuration; the identity if the two
-            agree.
-        base_links: The link of A and the link of B relative to which poses are compared; both belong to the
-            same body.
-        rounding: (m, rad) distance of frames that counts as rounding.
-        frames: The interval of each common link, after the changes in `after`.
-        as_written: The interval of the farthest frame without these changes; None if there are no changes.
-        written: (m, rad) proven bound of all common frames without these changes; infinite if there is no
-            bound. If one model is a table, only frames with the same name in both models count.
-        narrowed: Joints with mimic joints that leave their limits, one line for each joint. The intervals
-            cover the whole range of such a joint itself.
+        orders: Groups of consecutive joints of B that are matched in another order than in B. The joints'
+            axes must allow the exchange without a change of motion.
+        base: (4, 4) pose of B's root in A's root frame, in the zero configuration. It is the identity if the
+            two roots coincide.
+        base_links: A link of A and a link of B. The poses of A are compared relative to the first link, and
+            those of B relative to the second. The two links belong to matching rigid bodies.
+        rounding: (m, rad) largest distance and angle between matching frames that count as rounding.
+        frames: The interval for each pair of matching links, after the changes in `after`.
+        as_written: The interval for the frame that is farthest apart without the changes in `after`. None if
+            there are no changes.
+        written: (m, rad) proven bound of the distance and the angle for all pairs of matching frames, without
+            the changes in `after`. It is infinite if there is no bound. If one model is a Denavit-Hartenberg
+            table, only frames with the same name in both models count.
+        narrowed: Mimicked joints that can drive a mimic joint out of the mimic joint's limits, with one line
+            of text for each mimicked joint. The intervals still cover the whole range of the mimicked joint.
         checked: Pinocchio's confirmation, or the reason why there is none.
         trees: The two robot models.
 
@@ -293,7 +301,9 @@ class Sameness(Displayable):
 
     @property
     def worst(self) -> Interval | None:
-        """The frame with the largest bound of its distance, or else of its angle; None if all are rounding.
+        """The interval with the largest bound; None if no frame differs by more than rounding.
+
+        The bounds of distances are compared first. The bounds of angles decide between equal distances.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -309,7 +319,9 @@ class Sameness(Displayable):
 
     @property
     def worst_as_written(self) -> Interval | None:
-        """The interval of the farthest frame at equal coordinates, without the changes in `after`.
+        """The interval for the frame that is farthest apart without the changes in `after`.
+
+        Both models have equal coordinates in this comparison.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -319,11 +331,11 @@ class Sameness(Displayable):
         return self.as_written or self.worst
 
     def within(self, most: float) -> bool:
-        """Return whether all common frames are proven to be within a distance (m and rad) of each other.
+        """Return whether all matching frames are proven to be within a distance (m and rad) of each other.
 
-        The models are compared as they are written: with coinciding roots and at equal coordinates. A
-        different base, zero or tool therefore counts as a difference. The result is False if a joint has
-        another kind or exists in one model only.
+        The models are compared as they are written: their roots coincide, and their coordinates are equal. A
+        different base, zero or tool therefore counts as a difference. The result is False if the types of two
+        matching joints differ, or if a joint exists in one model only.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -362,7 +374,7 @@ class Sameness(Displayable):
         """Return B's configurations (..., nq) for A's configurations (..., nq).
 
         At these configurations both models have the same poses, except for `base`. Coordinates that only B
-        has are neutral.
+        has get their values in the neutral configuration.
 
         Raises:
             InputError: q does not have A's length.
@@ -377,11 +389,13 @@ class Sameness(Displayable):
     def convention(self) -> Convention:
         """Return B's joint names, order, senses and zeros as a convention of A.
 
-        A's `robot.convention(...)` then converts q, v, a and Jacobians of A to those of B. At these
-        configurations both models have the same poses, except for `base` and `tools`.
+        A's `robot.convention(...)` then converts q, v, a and Jacobians of A to those of B. At a configuration
+        of A and the converted configuration of B, both models have the same poses, except for `base` and
+        `tools`.
 
         Raises:
-            InputError: a coordinate of one model has none in the other, or a free joint has another frame.
+            InputError: a coordinate of one model has no matching coordinate in the other model, or a planar
+                or floating joint has different frames in A and B.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur5_limited")
@@ -424,7 +438,7 @@ class Sameness(Displayable):
             joints=tuple(joints),
             rules=rules,
         )
-        Conversion(tree_a, "", found)  # a joint of A without a column is an error here
+        Conversion(tree_a, "", found)  # raises an error if B has no coordinate for a joint of A
         return found
 
 
@@ -461,7 +475,7 @@ def length(metres: float) -> str:
 
 
 def up_to(words: Callable[[float], str], lower: float, upper: float) -> str:
-    """Return an interval as text: the attained value, and the proven bound if its text is different.
+    """Return an interval as text: the lower bound, and the upper bound if its text is different.
 
     >>> up_to(length, 0.025, 0.025), up_to(angle, 0.4297, 0.4327), up_to(length, 1.0, math.inf)
     ('25 mm', '429.7 mrad (at most 432.7 mrad)', '1 m (without bound)')
@@ -493,7 +507,7 @@ def _with_prefix(value: float, unit: str) -> str:
 
 
 def demand_joint_names(tree: KinematicTree, names: list[str], which: str) -> None:
-    """Raise UnknownNameError if a name is not that of a joint, and InputError if a name occurs twice."""
+    """Raise UnknownNameError if a name is not the name of a joint, and InputError if a name occurs twice."""
     for name in names:
         tree.joint_index(name)
     if len(set(names)) < len(names):
@@ -502,13 +516,15 @@ def demand_joint_names(tree: KinematicTree, names: list[str], which: str) -> Non
 
 
 def put_right(found: Alignment, rounding: Tolerance, *, tables: bool = False) -> tuple[tuple[str, str], ...]:
-    """Correct the tools, and return the changes that turn B into A: for each, a kind of `FREE` and a line.
+    """Correct the tools of an alignment, and return the changes that turn B into A.
+
+    Each change is a pair: a kind from `FREE`, and a line of text.
 
     Args:
         found: The alignment of the models; differing tools are corrected in it.
         rounding: The tolerance within which numbers are equal.
-        tables: Whether one model is a table. The frames of a table depend on its convention, so all of them
-            count as tools.
+        tables: Whether one model is a Denavit-Hartenberg table. The frames of a table depend on its
+            convention. All its frames that differ therefore count as tools.
     """
     lines = list[tuple[str, str]]()
     tree_a, tree_b = found.a.tree, found.b.tree
@@ -540,14 +556,17 @@ def put_right(found: Alignment, rounding: Tolerance, *, tables: bool = False) ->
 
 
 def _tools_put_right(found: Alignment, rounding: Tolerance, *, tables: bool) -> Iterator[tuple[str, str]]:
-    """Treat frames without children and frames around the base as tools; yield a line for each tool."""
+    """Treat differing frames without children, and differing frames near the base, as tools.
+
+    The function yields a pair for each tool: the kind "tools" and a line of text.
+    """
     around, links = _around(found), (found.a.tree.links, found.b.tree.links)
     for k, frame in enumerate(found.frames):
         beside = (frame.a, frame.b) in around
         if frame.differs and (beside or tables or _is_tool(found, frame)):
             found.frames[k] = frame.put_right()
             if beside and rounding.holds(*apart(found.a.homes[frame.a], found.b.homes[frame.b])):
-                continue  # its pose in the root frame is unchanged, so the line about the base is enough
+                continue  # the pose in the root frame is unchanged, so the line about the base is enough
         if (tool := found.frames[k].tool) is not IDENTITY:
             moved = pose_words(tool, rounding)
             yield (
@@ -557,7 +576,7 @@ def _tools_put_right(found: Alignment, rounding: Tolerance, *, tables: bool) -> 
 
 
 def _around(found: Alignment) -> set[tuple[int, int]]:
-    """Return the common frames on the root body with a pose that only describes the mounting of the robot.
+    """Return the matching frames on the root body with a pose that only describes the robot's mounting.
 
     There are two kinds. One kind is a link between the root and the first link to which a moving joint is
     attached. The other kind is a link, such as a world or a table, that carries no moving joint and has the
@@ -579,7 +598,7 @@ def _around(found: Alignment) -> set[tuple[int, int]]:
 
 
 def _beside_the_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
-    """Return the links of the root body that lead to all moving joints, and those that lead to none.
+    """Return the links of the root body from which all moving joints descend, and those from which none does.
 
     A link of the first set has a fixed child link from which all moving joints descend. From a link of the
     second set no moving joint descends. Both sets are empty if no joint moves.
@@ -653,7 +672,11 @@ def differences(found: Alignment, variables: Variables) -> tuple[Difference, ...
 
 
 def _of_the_pair(found: Alignment, tree_a: KinematicTree, tree_b: KinematicTree, link: str) -> bool:
-    """Return whether the bodies of a common link also match; otherwise a joint is already reported."""
+    """Return whether the rigid bodies that carry a link in A and in B match.
+
+    If they do not match, one of these bodies moves by a joint that only one model has. This joint is already
+    reported as a difference.
+    """
     alone_a = {found.a.body_of[j + 1] for j in found.only_a}
     alone_b = {found.b.body_of[j + 1] for j in found.only_b}
     return (
@@ -663,7 +686,7 @@ def _of_the_pair(found: Alignment, tree_a: KinematicTree, tree_b: KinematicTree,
 
 
 def _carrier(tree: KinematicTree, link: str) -> str:
-    """Return words that name the last moving joint before a link."""
+    """Return words that name the last moving joint on the path from the base to a link."""
     path = [tree.joints[i] for i in tree.path(tree.link_index(link)) if tree.joints[i].kind.nv]
     return f"joint {path[-1].name}" if path else "the base"
 
@@ -690,7 +713,7 @@ def _of_step(found: Alignment, variables: Variables, i: int) -> list[Difference]
 
 
 def _beyond(one: Step | FramePair, rounding: Tolerance) -> tuple[float, float]:
-    """Return the tilt (rad) and the shift (m) of a joint or frame between the models; rounding becomes 0."""
+    """Return the tilt (rad) and the shift (m) of a joint or frame from A to B; rounding becomes 0."""
     return one.tilt if one.tilt > rounding.angle else 0.0, one.shift if one.shift > rounding.way else 0.0
 
 
@@ -700,7 +723,7 @@ def _of_frame(found: Alignment, frame: FramePair) -> Difference:
 
 
 def remarks(found: Alignment, variables: Variables, tolerance: Tolerance) -> tuple[Difference, ...]:
-    """Return the differences that do not affect motion: limits, kinds, and links of one model only."""
+    """Return the differences that do not affect motion: joint limits, joint types, and links of one model only."""
     some = list[Difference]()
     for step in found.steps:
         if not step.unlike:

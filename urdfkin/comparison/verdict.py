@@ -1,4 +1,4 @@
-"""Decide whether two models are the same robot: the function `same` and its steps."""
+"""Decide whether two models are the same robot. The module contains the function `same` and its steps."""
 
 from __future__ import annotations
 
@@ -49,14 +49,14 @@ from urdfkin.urdf.sources import Source
 from urdfkin.verify.oracles import PINOCCHIO
 from urdfkin.verify.sampling import checked_choice
 
-#: Configurations at which Pinocchio checks the distances.
+#: Number of configurations at which Pinocchio checks the distances between matching frames.
 CONFIRMED = 8
-#: Number of frames among which the farthest one is searched: those that are farthest apart at random
-#: configurations.
+#: The frame with the largest distance is searched only among some frames: those that are farthest apart at
+#: random configurations. This is the number of these frames.
 FARTHEST = 4
-#: Longest allowed path, metres; squares of longer lengths overflow.
+#: Longest allowed path length, metres. The squares of longer lengths would overflow.
 LONGEST = 1e150
-#: A bound needs no improvement if its ratio to the distance found is at most this number.
+#: An upper bound needs no improvement if it is at most this factor times the largest distance found.
 NEAR = 1.05
 
 
@@ -79,11 +79,12 @@ def same(
     Args:
         a: A robot, or a source for `load`.
         b: The other robot, or a source for `load`.
-        map: Names of joints of `a`, each with the name of its joint in `b`. Needed where names and axes do
-            not determine the pairs.
-        bounds: Whether to bound the largest distances; this takes most of the time where models differ.
-        boxes: Largest number of boxes of configurations at a time. Boxes give sharper bounds if the models
-            differ in many places; 0: no boxes.
+        map: For each joint name of `a`, the name of the matching joint in `b`. Give the pairs of joints that
+            names and axes do not determine.
+        bounds: Whether to bound the largest distances between frames. This takes most of the time if the
+            models differ.
+        boxes: Largest number of boxes of configurations that exist at the same time in branch and bound.
+            Boxes give sharper bounds if the models differ in many places. With 0, no boxes are used.
         within: Distance (metres and radians) that you will pass to `Sameness.within`. The boxes are then used
             to prove that all frames are within this distance.
 
@@ -140,10 +141,10 @@ class Comparator:
 
     Args:
         robots: A and B.
-        given: Names of joints of A, each with the name of its joint in B.
+        given: For each joint name of A, the name of the matching joint in B.
         bounds: Whether to bound the largest distances.
-        boxes: Largest number of boxes of configurations at a time.
-        within: Distance (metres and radians) that is proven first; None: no distance.
+        boxes: Largest number of boxes of configurations that exist at the same time.
+        within: Distance (metres and radians) that the bounds should prove; None if no distance is given.
     """
 
     def __init__(
@@ -171,7 +172,7 @@ class Comparator:
         self.tolerance: Tolerance = tolerance_of(*self.mechanisms)
 
     def judged(self) -> Sameness:
-        """Return the verdict with intervals and Pinocchio's confirmation."""
+        """Return the complete result: verdict, intervals and Pinocchio's confirmation."""
         found = align(*self.mechanisms, self.given)
         self._check_map(found)
         variables = variables_of(found, self.tolerance)
@@ -234,10 +235,13 @@ class Comparator:
         )
 
     def as_written(self, found: Alignment) -> Alignment:
-        """Return the alignment of the same joints and links without any change, with coinciding roots.
+        """Return the alignment of the models as they are written, for the joint and link pairs of `found`.
 
-        If only one model has the name of the other's root link, the two links of that name coincide instead.
-        If one model is a table, only links with equal names count, because the other frames depend on its
+        No sense, zero, tool or base is changed in this alignment, and the roots of the two models coincide.
+
+        The roots may have different names, and one model may also have a link with the name of the other
+        model's root. Then the two links of that name coincide instead. If one model is a Denavit-Hartenberg
+        table, only links with equal names count, because the poses of the other links depend on the table's
         convention.
         """
         a, b = self.mechanisms
@@ -247,7 +251,7 @@ class Comparator:
         return written
 
     def _compared_links(self, found: Alignment) -> list[tuple[int, int]]:
-        """Return the common links that are compared as written."""
+        """Return the pairs of matching links that are compared in the models as they are written."""
         tables = any(robot.origin.table for robot in self.robots)
         links = self.trees[0].links, self.trees[1].links
         pairs = ((frame.a, frame.b) for frame in found.frames)
@@ -266,13 +270,15 @@ class Comparator:
                 )
 
     def search(self, found: Alignment, variables: Variables) -> Search:
-        """Return the search for the largest distances."""
+        """Return a search for the largest distances between matching frames."""
         return Search(self.robots, found, variables)
 
     def rounding(self, found: Alignment, variables: Variables) -> tuple[float, float]:
-        """Return the distance and angle (m, rad) to which all ignored rounding can add up along the joints.
+        """Return the distance and angle (m, rad) between frames that ignored rounding differences can cause.
 
-        For a joint without limits, the range counts in which the joint is sampled.
+        Each joint can differ by a little rounding, and these differences add up along the path.
+
+        For a joint without limits, the sum uses the range in which the joint is sampled.
         """
         ways = [
             max(abs(end) for end in ends)
@@ -311,7 +317,7 @@ class Comparator:
     def _most(
         self, written: Alignment, variables: Variables, farthest: Interval | None
     ) -> tuple[float, float]:
-        """Return the bound (m, rad) of all frames; sharpen it only if this is needed to prove `within`."""
+        """Return one bound (m, rad) for all frames; sharpen it only if the proof of `within` needs this."""
         metres, radians = self.rounding(written, variables)
         uppers = self._uppers(written, variables)
         target = 0.0 if self.within is None else self.within - metres
@@ -334,7 +340,10 @@ class Comparator:
     def _sharpen(
         self, uppers: list[tuple[float, float]], frames: Sequence[FramePair], search: Search, target: float
     ) -> None:
-        """Prove with boxes that no frame is off by more than a target (m), in descending order of bounds."""
+        """Prove with boxes that no two matching frames are farther apart than a target (m).
+
+        The frames with the largest bounds come first.
+        """
         for _ in uppers:
             widest = max(range(len(uppers)), key=lambda k: uppers[k])
             if uppers[widest][0] <= target:
@@ -345,7 +354,7 @@ class Comparator:
                 break
 
     def _farthest(self, found: Alignment, variables: Variables) -> Interval | None:
-        """Return the interval of the frame with the largest distance found by the search."""
+        """Return the interval for the frame with the largest distance that the search finds."""
         if not found.frames:
             return None
         metres, radians = self.rounding(found, variables)
@@ -381,7 +390,10 @@ class Comparator:
         return Interval(*names, lower, *upper, turned, tuple(q_a[0].tolist()), tuple(q_b[0].tolist()))
 
     def _confirm(self, found: Alignment, variables: Variables, frames: tuple[Interval, ...]) -> Confirmation:
-        """Check the bounds with Pinocchio at some configurations; Pinocchio reads both texts itself."""
+        """Check the bounds with Pinocchio at some configurations.
+
+        Pinocchio reads the texts of both models itself.
+        """
         if not all(checked_choice(robot.verifier.policy) for robot in self.robots):
             return Confirmation(reason=f"{NOT_ASKED}loaded with verify=False")
         for robot in self.robots:
@@ -399,7 +411,7 @@ class Comparator:
         return Confirmation(PINOCCHIO.words, CONFIRMED, float(off.max(initial=0.0)))
 
     def pinocchio_distances(self, found: Alignment, variables: Variables) -> FloatArray:
-        """Return each frame's largest distance (m) that Pinocchio finds at `CONFIRMED` configurations."""
+        """Return the largest distance (m) of each frame that Pinocchio computes at `CONFIRMED` configurations."""
         search = self.search(found, variables)
         q_a, q_b = search.configurations(search.random(CONFIRMED), moved=True)
         return np.asarray(search.at(q_a, q_b, found.frames, pinocchios).max(axis=0, initial=0.0))
@@ -411,7 +423,10 @@ def _largest(bounds: Sequence[tuple[float, float]]) -> tuple[float, float]:
 
 
 def _fixed_here(tree: KinematicTree, other: KinematicTree) -> set[int]:
-    """Return the fixed joints of a tree that move in the other tree, matched by joint or child link name."""
+    """Return the fixed joints of a tree that are moving joints in the other tree.
+
+    Joints are matched by the joint's name or by the name of the child link.
+    """
     moving = {joint.name for joint in other.joints if joint.kind.nv}
     ours = {joint.name for joint in tree.joints if joint.kind.nv}
     children = {
@@ -425,9 +440,10 @@ def _fixed_here(tree: KinematicTree, other: KinematicTree) -> set[int]:
 
 
 def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
-    """Return the pose (4, 4) of B's root in A's root frame, as written.
+    """Return the pose (4, 4) of B's root in A's root frame for models that are compared as they are written.
 
-    If only one model has the name of the other's root link, the two links of that name coincide.
+    The roots may have different names, and one model may also have a link with the name of the other model's
+    root. Then the two links of that name coincide. Otherwise the two roots coincide.
     """
     if (root := a.tree.links[0]) in b.tree.links and not b.body_of[link := b.tree.link_index(root)]:
         return inverse(b.homes[link])

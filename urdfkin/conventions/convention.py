@@ -1,6 +1,7 @@
-"""A convention as data: the built-in ones and those of a user's TOML file.
+"""Conventions as data: the built-in conventions, and a user's own convention from a TOML file.
 
-A user's file may begin from a built-in convention and change some of its joints:
+In this package, a tool is another program or library for robots. A user's file may start from a built-in
+convention and change some of its joints:
 
     like = "urdf"                     # the default
     joints = ["shoulder", "elbow"]    # the order, optional
@@ -12,7 +13,8 @@ A user's file may begin from a built-in convention and change some of its joints
     zero = 12.5                       # the tool's value where the URDF's joint is at 0, in the tool's unit
     unit = 4096                       # units of one turn; or "rad", "deg", "turn", "m", "mm"
 
-The value in the tool is `sign * value * factor + zero`.
+The joint value in the tool is `sign * value * factor + zero`, where `value` is the URDF's joint value in rad
+or m.
 """
 
 from __future__ import annotations
@@ -32,7 +34,7 @@ from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.errors.validators import is_real, safe_repr
 from urdfkin.system.files import exists, read_text, shortened
 
-#: Factors from rad or m to a unit.
+#: Factors that convert rad or m to each unit.
 _UNITS = {"rad": 1.0, "deg": 180.0 / math.pi, "turn": 0.5 / math.pi, "m": 1.0, "mm": 1000.0}
 _ANGLES, _LENGTHS = ("rad", "deg", "turn"), ("m", "mm")
 _CHOICES: dict[str, tuple[Any, ...]] = {
@@ -64,13 +66,14 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class JointRule:
-    """A joint's value in a tool: `factor * value + zero`, in the tool's unit.
+    """The rule that converts a joint's value to another program's: `factor * value + zero`, in its unit.
 
     Attributes:
-        name: Its name in the tool; None: the name in the URDF.
+        name: The joint's name in the tool. None means the name in the URDF.
         sign: 1 or -1.
         zero: The tool's value where the URDF's joint is at 0.
-        unit: "rad", "deg", "turn", "m", "mm", or the units of one turn; None: the convention's unit.
+        unit: "rad", "deg", "turn", "m", "mm", or the number of units in one turn. None means the convention's
+            unit.
     """
 
     name: str | None = None
@@ -80,14 +83,14 @@ class JointRule:
 
     @property
     def factor(self) -> float | None:
-        """Sign times units per rad or m; None: the convention's unit."""
+        """The sign times the number of units in one rad or m; None if the joint uses the convention's unit."""
         if self.unit is None:
             return None
         return self.sign * (_UNITS[self.unit] if isinstance(self.unit, str) else self.unit / math.tau)
 
     @property
     def of(self) -> str:
-        """Whether the unit is one of an "angle" or of a "length"; "" for the convention's unit."""
+        """What the unit measures: "angle" or "length"; "" if the joint uses the convention's unit."""
         if self.unit is None:
             return ""
         return "length" if self.unit in _LENGTHS else "angle"
@@ -95,9 +98,10 @@ class JointRule:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Convention:
-    """The layout of q, v, a, Jacobians and six-vectors in a tool.
+    """The layout of q, v, a, Jacobians and six-vectors in another program.
 
-    The default values are urdfkin's own convention. `conventions.toml` explains each attribute.
+    The default values of the attributes are urdfkin's own convention. `conventions.toml` explains each
+    attribute.
 
     >>> find_convention("mujoco").quaternion, find_convention("drake").base_q
     ('wxyz', 'quaternion first')
@@ -127,7 +131,7 @@ class Convention:
 
     @property
     def angle_factor(self) -> float:
-        """Units of the convention in one radian."""
+        """Number of the convention's angle units in one radian."""
         return _UNITS[self.angle]
 
 
@@ -152,7 +156,7 @@ def find_convention(name: str | Path | Convention) -> Convention:
 
     Raises:
         UnknownNameError: there is no such convention, and no such file.
-        InputError: the file has an unknown key, an invalid value, or two columns of one name.
+        InputError: the file has an unknown key, an invalid value, or two columns with the same name.
         SourceError: the file cannot be read.
     """
     if isinstance(name, Convention):
@@ -173,7 +177,8 @@ def read_convention(text: str, where: str, name: str) -> Convention:
     """Return the convention of a TOML text.
 
     Raises:
-        InputError: invalid TOML, an unknown key, an invalid value, or two columns of one name.
+        InputError: the text is invalid TOML, or has an unknown key, an invalid value, or two columns with the
+            same name.
         UnknownNameError: `like` names no built-in convention.
     """
     try:
@@ -231,7 +236,7 @@ def _number(value: object, word: str, where: str) -> float:
 
 
 def _rule(rule: dict[str, Any], where: str) -> JointRule:
-    """Return the rule of a joint from its table."""
+    """Return a joint's rule from the joint's table in the TOML file."""
     for key in rule:
         if key not in ("name", "sign", "zero", "unit"):
             raise UnknownNameError("key", key, ("name", "sign", "zero", "unit"), where=where)
@@ -254,7 +259,7 @@ def _rule(rule: dict[str, Any], where: str) -> JointRule:
 
 
 def as_toml(how: Convention) -> str:
-    """Return the text of a file with this convention; `read_convention` returns it again.
+    """Return a convention as TOML text, from which `read_convention` makes the same convention again.
 
     >>> print(as_toml(Convention(name="mine", order="given", joints=("b", "a"))), end="")
     like = "urdfkin"
@@ -280,7 +285,10 @@ def as_toml(how: Convention) -> str:
 
 
 def _quoted(text: str) -> str:
-    """Return a text as a basic string of TOML, which has the escapes of JSON; DEL needs one as well."""
+    """Return a text as a quoted string of TOML.
+
+    Such a string uses the escapes of JSON. In TOML the character DEL must also be escaped.
+    """
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
@@ -288,12 +296,13 @@ def _quoted(text: str) -> str:
 
 _IDENTIFIER = re.compile("[A-Za-z_][A-Za-z0-9_]*")
 _DIGITS = string.digits + string.ascii_uppercase + string.ascii_lowercase
-#: Digits from this one on continue a number of a transcoded name.
+#: A transcoded name ends with numbers in base 62. A digit of at least this value is followed by another digit
+#: of the same number.
 _CONTINUES = 31
 
 
 def spelled(name: str, how: str) -> str:
-    """Return a name as a tool writes it; `how` is a choice of `Convention.names`.
+    """Return a name as another program writes it; `how` is a value of `Convention.names`.
 
     >>> [spelled("1", how) for how in ("urdf", "usd", "identifier", "isaacsim")]
     ['1', 'tn__1_', '_', 'a_1']
@@ -310,7 +319,7 @@ def spelled(name: str, how: str) -> str:
 
 
 def identifier(name: str) -> str:
-    """Return a name as OpenUSD's `TfMakeValidIdentifier` makes it: "_" for each byte that is not allowed.
+    """Return a name as OpenUSD's `TfMakeValidIdentifier` does: each byte that is not allowed becomes "_".
 
     >>> identifier("1"), identifier("arm-2")
     ('_', 'arm_2')
@@ -320,12 +329,15 @@ def identifier(name: str) -> str:
 
 
 def transcoded(name: str) -> str:
-    """Return a name as `usdex.core.getValidPrimName` of OpenUSD Exchange makes it; each name has its own.
+    """Return a name as the function `usdex.core.getValidPrimName` of OpenUSD Exchange does.
+
+    Different names give different results.
 
     The result begins with "tn__", followed by the characters that are allowed and "_". After that comes a
-    number with digits of base 62 for each other character, in the order of code points. The number is the
-    difference to the previous code point, times the number of places, plus the place (Bootstring).
-    Source: github.com/PixarAnimationStudios/OpenUSD-proposals, proposals/transcoding_invalid_identifiers.
+    number with digits of base 62 for each other character, in the order of code points. The number encodes
+    the character and its position in the name: the difference of its code point from the previous code point,
+    times the number of possible positions, plus the position (Bootstring encoding). Source:
+    github.com/PixarAnimationStudios/OpenUSD-proposals, proposals/transcoding_invalid_identifiers.
 
     >>> transcoded("1"), transcoded("arm-2"), transcoded("arm_2")
     ('tn__1_', 'tn__arm2_g6', 'arm_2')

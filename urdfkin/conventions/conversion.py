@@ -1,9 +1,10 @@
-"""Convert q, v, a, Jacobians and six-vectors of one robot to the convention of a tool, and back.
+"""Convert q, v, a, Jacobians and six-vectors of one robot to another program's convention, and back.
 
-With M of `Conversion.matrix`, joint velocities convert as v_tool = M(q) v, accelerations as
-a_tool = M a + M' v, and Jacobians as J_tool = S J M^-1. S exchanges the linear and the angular rows if the
-tool has the angular ones first. M is constant unless the tool and urdfkin use different axes for the velocity
-of a floating or planar joint.
+In this module, a tool is another program or library for robots. With the matrix M of `Conversion.matrix`,
+joint velocities convert as v_tool = M(q) v, accelerations as a_tool = M a + M' v, and Jacobians as J_tool = S
+J M^-1. M' is the time derivative of M. S exchanges the linear and the angular rows if the tool has the
+angular rows first. M is constant unless the tool and urdfkin use different axes for the velocity of a
+floating or planar joint.
 """
 
 from __future__ import annotations
@@ -25,16 +26,18 @@ from urdfkin.model.configuration_like import CoordinateLayout, Given
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 from urdfkin.urdf.plain_xml import plain_xml
 
-#: Largest difference (rad or m) between a mimic joint's value and its rule.
+#: Largest allowed difference (rad or m) between a mimic joint's given value and the value from its mimic
+#: rule.
 _MIMIC_TOLERANCE = 1e-9
 _SWAPPED = [3, 4, 5, 0, 1, 2]
 
 
 @dataclass(frozen=True, slots=True)
 class _Column:
-    """A number of q in the tool: `factor * value + zero`, of the number `at` of our q.
+    """One number of q in the tool: `factor * value + zero`, where `value` is urdfkin's q at the index `at`.
 
-    `part` is "cos" or "sin" for a continuous joint with two numbers. `copy` marks a mimic joint.
+    `part` is "cos" or "sin" for a continuous joint that the tool stores as two numbers. `copy` is True for a
+    mimic joint.
     """
 
     name: str
@@ -48,7 +51,7 @@ class _Column:
 
 @dataclass(frozen=True, slots=True)
 class _Block:
-    """A planar or floating joint for which the tool uses a velocity in other axes or of another point."""
+    """A planar or floating joint with a velocity that the tool defines in another frame or at another point."""
 
     joint: Joint
     q: int
@@ -58,17 +61,18 @@ class _Block:
 
 
 class Conversion:
-    """The convention of one robot: names and conversions; `robot.convention("mujoco")` returns it.
+    """Names and conversions of one robot in a convention; `robot.convention("mujoco")` returns them.
 
     Args:
         tree: The robot.
-        urdf: Its text, for the order of the file and for centres of mass.
+        urdf: The URDF text of the robot. It defines the order of joints in the file, and the centres of mass.
         convention: The convention.
-        joints: Order of the joints, for a convention without an order of its own, or in place of it.
+        joints: Order of the joints. It replaces the convention's own order, and is required if the convention
+            has none.
 
     Raises:
-        InputError: a joint is missing or appears twice, two columns have the same name, or the tool lacks
-            an order.
+        InputError: a joint is missing or appears twice, two columns have the same name, or no order of joints
+            is given for a convention without an order.
         UnknownNameError: the robot has no such joint.
 
     >>> import urdfkin
@@ -152,7 +156,10 @@ class Conversion:
         return self.tree.joint_index(joint)
 
     def _follows(self, i: int) -> bool:
-        """Whether the value of a joint determines its coordinate; that of a mimic joint may be constant."""
+        """Whether the value of a joint determines a coordinate of q.
+
+        This is False for a mimic joint with a constant value.
+        """
         rule = self.tree.joints[i].mimic
         return rule is None or rule.multiplier != 0.0
 
@@ -164,7 +171,7 @@ class Conversion:
         tag = "link" if order.endswith("link") else "joint"
         written = {e.get("name", ""): k for k, e in enumerate(plain_xml(self._urdf).iterfind(tag))}
         names = tree.links[1:] if tag == "link" else [joint.name for joint in tree.joints]
-        place = [written.get(name, -1) for name in names]  # a root joint is not in the file and comes first
+        place = [written.get(name, -1) for name in names]  # the added root joint is not in the file and comes first
         if order == "name":
             return sorted(every, key=lambda i: (place[i] >= 0, tree.joints[i].name))
         if order == "file":
@@ -185,9 +192,9 @@ class Conversion:
     def _breadth_first(
         self, children: Mapping[int, list[int]], keys: Sequence[Any], *, merged: bool
     ) -> list[int]:
-        """Return the joints by depth, siblings by their keys.
+        """Return the joints in order of their depth in the tree; siblings are in the order of their keys.
 
-        If `merged`, links that a fixed joint connects are one link.
+        If `merged` is True, links that are connected by fixed joints count as one link.
         """
 
         def below(link: int) -> list[int]:
@@ -206,7 +213,7 @@ class Conversion:
         return order
 
     def _add(self, i: int) -> str:
-        """Add the columns of a joint; return its name in the tool."""
+        """Add the columns of a joint, and return the joint's name in the tool."""
         how, joint = self.convention, self.tree.joints[i]
         rule = how.rules.get(joint.name, JointRule())
         name = rule.name or spelled(joint.name, how.names)
@@ -292,7 +299,7 @@ class Conversion:
             self._blocks.append(_Block(joint, q, v, slice(first, first + 3), np.zeros(3)))
 
     def _centre_of_mass(self, link: str) -> FloatArray:
-        """Return the centre of mass (3,) of a link in its frame, from the text."""
+        """Return the centre of mass (3,) of a link in the link's frame, from the URDF text."""
         for element in plain_xml(self._urdf).iterfind("link"):
             if element.get("name") == link and (origin := element.find("inertial/origin")) is not None:
                 return np.array([float(x) for x in origin.get("xyz", "0 0 0").split()])
@@ -307,7 +314,8 @@ class Conversion:
         self._plain_q = bool((self._q_factor == 1.0).all() and not self._q_zero.any())
         self._plain_q &= not any(c.part for c in columns)
         self._same_q = self._plain_q and np.array_equal(self._q_index, np.arange(self.tree.nq))
-        # For each number of our q, find the tool's column: that of a mimic joint only if there is no other.
+        # For each number of urdfkin's q, find the column of the tool that contains it. A mimic joint's column
+        # is used only if no other column contains the number.
         self._q_source = [
             min((k for k, c in enumerate(columns) if c.at == at and c.factor), key=lambda k: columns[k].copy)
             for at in range(self.tree.nq)
