@@ -53,7 +53,7 @@ class Question:
     Attributes:
         within: Largest allowed distance between matching frames of the models as they are written, in metres
             and in radians. If it is None, the question is whether the models are equivalent.
-        strict: Whether equivalent models and models with remarks count as different.
+        strict: Whether models that are only equivalent, or that have remarks, count as different.
     """
 
     within: float | None = None
@@ -360,7 +360,7 @@ class Sameness(Displayable):
         """Return 0 if the models are equivalent, or within the given distance; else 1.
 
         Args:
-            strict: Whether equivalent models and models with remarks count as different.
+            strict: Whether models that are only equivalent, or that have remarks, count as different.
             within: Largest allowed distance of a frame as written, in metres and in radians.
 
         >>> import urdfkin
@@ -723,7 +723,7 @@ def _of_frame(found: Alignment, frame: FramePair) -> Difference:
 
 
 def remarks(found: Alignment, variables: Variables, tolerance: Tolerance) -> tuple[Difference, ...]:
-    """Return the differences that do not affect motion: joint limits, joint types, and links of one model only."""
+    """Return the differences without effect on motion: joint limits, joint types, links of one model only."""
     some = list[Difference]()
     for step in found.steps:
         if not step.unlike:

@@ -411,7 +411,7 @@ class Comparator:
         return Confirmation(PINOCCHIO.words, CONFIRMED, float(off.max(initial=0.0)))
 
     def pinocchio_distances(self, found: Alignment, variables: Variables) -> FloatArray:
-        """Return the largest distance (m) of each frame that Pinocchio computes at `CONFIRMED` configurations."""
+        """Return each frame's largest distance (m) from Pinocchio at `CONFIRMED` configurations."""
         search = self.search(found, variables)
         q_a, q_b = search.configurations(search.random(CONFIRMED), moved=True)
         return np.asarray(search.at(q_a, q_b, found.frames, pinocchios).max(axis=0, initial=0.0))

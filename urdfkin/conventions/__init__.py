@@ -1,4 +1,4 @@
-"""Conventions of other software: joint order, quaternions, row order, frame of base velocities, units, zeros."""
+"""Conventions of other programs: joint order, quaternions, row order, base velocities, units and zeros."""
 
 from urdfkin.conventions.convention import BUILT_IN, Convention, JointRule, as_toml, find_convention
 from urdfkin.conventions.conversion import Conversion, Reordering, reordering

@@ -51,7 +51,7 @@ class _Column:
 
 @dataclass(frozen=True, slots=True)
 class _Block:
-    """A planar or floating joint with a velocity that the tool defines in another frame or at another point."""
+    """A planar or floating joint with another velocity in the tool: in another frame, or of another point."""
 
     joint: Joint
     q: int
@@ -171,7 +171,7 @@ class Conversion:
         tag = "link" if order.endswith("link") else "joint"
         written = {e.get("name", ""): k for k, e in enumerate(plain_xml(self._urdf).iterfind(tag))}
         names = tree.links[1:] if tag == "link" else [joint.name for joint in tree.joints]
-        place = [written.get(name, -1) for name in names]  # the added root joint is not in the file and comes first
+        place = [written.get(name, -1) for name in names]  # the file has no root joint, which comes first
         if order == "name":
             return sorted(every, key=lambda i: (place[i] >= 0, tree.joints[i].name))
         if order == "file":
@@ -336,21 +336,21 @@ class Conversion:
 
     @property
     def has_pairs(self) -> bool:
-        """Whether q has the cosine and sine of an angle."""
+        """Whether the tool's q contains the cosine and the sine of an angle."""
         return any(column.part for column in self._columns)
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
-        """A name for each number of the tool's q."""
+        """Names of the numbers of the tool's q."""
         return tuple(column.name for column in self._columns)
 
     @property
     def rate_names(self) -> tuple[str, ...]:
-        """A name for each number of the tool's v and a, and for each column of its Jacobian."""
+        """Names of the numbers of the tool's v and a, which are also the names of its Jacobian's columns."""
         return tuple(self._v_names)
 
     def layout(self, what: str) -> CoordinateLayout:
-        """Return the names and units of "q", "v" or "a" in the tool, to parse values by name."""
+        """Return the names and units of the tool's "q", "v" or "a", which are needed to parse values by name."""
         if what != "q":
             rest = {"neutral": np.zeros(self.nv)}
             return CoordinateLayout(what, self.rate_names, tuple(self._v_units), poses=lambda: rest)
@@ -363,7 +363,7 @@ class Conversion:
 
     @property
     def permutation(self) -> NDArray[np.intp] | None:
-        """Indices with `q_tool = q[..., permutation]`; None if the conversion is no mere permutation.
+        """Indices with `q_tool = q[..., permutation]`; None if the conversion is more than a change of order.
 
         >>> import urdfkin
         >>> urdfkin.load("a1").convention("mujoco").permutation.tolist()
@@ -378,7 +378,10 @@ class Conversion:
 
     @property
     def rate_permutation(self) -> NDArray[np.intp] | None:
-        """Indices with `v_tool = v[..., rate_permutation]`; None if the conversion is no mere permutation."""
+        """Indices with `v_tool = v[..., rate_permutation]`.
+
+        The value is None if the conversion is more than a change of order.
+        """
         return self._v_at.copy() if self._plain_v else None
 
     @cached_property
@@ -402,15 +405,15 @@ class Conversion:
     def to(
         self, q: Given, v: Given | None = None, a: Given | None = None
     ) -> FloatArray | tuple[FloatArray, ...]:
-        """Convert q, (q, v) or (q, v, a) of this robot to the tool's.
+        """Convert q, (q, v) or (q, v, a) from urdfkin's convention to the tool's.
 
         Args:
-            q: (..., nq) rad, m; the array itself is returned if nothing differs.
+            q: (..., nq) rad, m. The same array is returned if the tool has the same q.
             v: (..., nv); for a floating base, its conversion depends on q.
             a: (..., nv); its conversion depends on q and v.
 
         Returns:
-            (..., nq) of the tool, or a tuple with v and a.
+            The tool's q (..., tool's nq), or a tuple of the tool's q and v, or of its q, v and a.
 
         Raises:
             InputError: a wrong length, or a number that is not finite.
@@ -437,10 +440,11 @@ class Conversion:
     def from_(
         self, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None
     ) -> FloatArray | tuple[FloatArray, ...]:
-        """Convert the tool's q, (q, v) or (q, v, a) to this robot's, the inverse of `to`.
+        """Convert q, (q, v) or (q, v, a) from the tool's convention to urdfkin's; the inverse of `to`.
 
         Raises:
-            InputError: a wrong length, a number that is not finite, or a mimic joint that breaks its rule.
+            InputError: a wrong length, a number that is not finite, or a mimic joint's value that differs
+                from its mimic rule.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -525,7 +529,7 @@ class Conversion:
                 )
 
     def _to_rates(self, q: FloatArray, x: FloatArray, v: FloatArray | None = None) -> FloatArray:
-        """Return M x, or M x + M' v."""
+        """Return M x, or M x + M' v if v is given; M is `matrix` at q, and M' is its time derivative."""
         if self._same_v:
             return x
         found: FloatArray = x[..., self._v_at]
@@ -542,7 +546,7 @@ class Conversion:
         return found
 
     def _from_rates(self, q: FloatArray, x: FloatArray, v: FloatArray | None = None) -> FloatArray:
-        """Return M^-1 x, or M^-1 (x - M' v)."""
+        """Return M^-1 x, or M^-1 (x - M' v) if v is given; M is `matrix` at q, and M' its time derivative."""
         if self._same_v:
             return x
         found: FloatArray = x[..., self._v_source]
@@ -560,7 +564,9 @@ class Conversion:
     # -- matrices ------------------------------------------------------------------------------------
 
     def matrix(self, q: Given | None = None) -> FloatArray:
-        """Return M with v_tool = M v: (tool's nv, nv), or (..., tool's nv, nv) if it depends on q.
+        """Return the matrix M with v_tool = M v.
+
+        Its shape is (tool's nv, nv), or (..., tool's nv, nv) if M depends on q.
 
         Raises:
             InputError: q is missing, although M depends on it.
@@ -594,7 +600,11 @@ class Conversion:
         return found
 
     def inverse_matrix(self, q: Given | None = None) -> FloatArray:
-        """Return M^-1 with v = M^-1 v_tool; a mimic joint's column is 0, because its rule determines it."""
+        """Return the matrix M^-1 with v = M^-1 v_tool.
+
+        The column of a mimic joint is 0, because the velocity of the mimicked joint determines the velocity
+        of the mimic joint.
+        """
         if not self._blocks:
             found = np.zeros((self.tree.nv, self.nv))
             found[np.arange(self.tree.nv), self._v_source] = 1.0 / self._v_scale[self._v_source]
@@ -605,7 +615,7 @@ class Conversion:
         return found
 
     def _block(self, block: _Block, q: FloatArray) -> FloatArray:
-        """Return the part of M of a planar joint (..., 3, 3) or a floating joint (..., 6, 6)."""
+        """Return the block of `matrix` for a planar joint (..., 3, 3) or a floating joint (..., 6, 6)."""
         how, unit = self.convention, self.convention.angle_factor
         if block.joint.kind is JointKind.PLANAR:
             angle = q[..., block.q + 2]
@@ -620,7 +630,7 @@ class Conversion:
         return self._rows(A, -A @ _cross(block.point), unit * turn)
 
     def _block_rate(self, block: _Block, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Return the time derivative of `_block`, for the joint's own velocity v."""
+        """Return the time derivative of `_block` for the joint's velocity v."""
         how, unit = self.convention, self.convention.angle_factor
         if block.joint.kind is JointKind.PLANAR:
             angle, w = np.broadcast_arrays(q[..., block.q + 2], v[..., 2])
@@ -642,7 +652,9 @@ class Conversion:
     # -- results -------------------------------------------------------------------------------------
 
     def six(self, x: ArrayLike, axis: int = -1) -> FloatArray:
-        """Exchange the halves of six-vectors if the tool has the angular part first; its own inverse.
+        """Exchange the linear and angular parts of six-vectors if the tool has the angular part first.
+
+        A second call restores the original order.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").convention("drake").six([1, 2, 3, 4, 5, 6]).tolist()
@@ -654,7 +666,9 @@ class Conversion:
         return np.take(array, _SWAPPED, axis) if self.angular_first else array
 
     def jacobian(self, q: Given, J: ArrayLike) -> FloatArray:
-        """Convert a Jacobian (..., 6, nv) to the tool's rows and columns: S J M^-1.
+        """Convert a Jacobian J (..., 6, nv) to the tool's rows and columns: S J M^-1.
+
+        M is `matrix`. S exchanges the linear and the angular rows if the tool has the angular rows first.
 
         Raises:
             InputError: a column of J belongs to several joints of the tool, because one mimics the other.
@@ -662,9 +676,10 @@ class Conversion:
         return self.columns(q, self.six(J, -2))
 
     def columns(self, q: Given, J: ArrayLike) -> FloatArray:
-        """Convert the columns of a matrix (..., rows, nv) with any rows: J M^-1.
+        """Convert only the columns of a matrix J (..., rows, nv) to the tool's: J M^-1.
 
-        Its rows are derivatives of numbers that the convention does not change, such as Euler angles.
+        The rows of J are derivatives of quantities that are the same in both conventions, such as Euler
+        angles. M is `matrix`.
 
         Raises:
             InputError: a column of J belongs to several joints of the tool, because one mimics the other.
@@ -681,12 +696,19 @@ class Conversion:
         return array @ _for_frames(self.inverse_matrix(q), array.ndim)
 
     def from_jacobian(self, q: Given, J: ArrayLike) -> FloatArray:
-        """Convert the tool's Jacobian (..., 6, tool's nv) to (..., 6, nv): S J M; mimic columns are added."""
+        """Convert the tool's Jacobian J (..., 6, tool's nv) to urdfkin's (..., 6, nv): S J M.
+
+        M is `matrix`. S exchanges the linear and the angular rows if the tool has the angular rows first. The
+        column of a mimic joint is added to the mimicked joint's column.
+        """
         array = self.six(J, -2)
         return array @ _for_frames(self.matrix(q), array.ndim)
 
     def jacobian_rate(self, q: Given, v: Given, J: ArrayLike, rate: ArrayLike) -> FloatArray:
-        """Convert the time derivative of a Jacobian: S (J' M^-1 + J (M^-1)')."""
+        """Convert the time derivative J' of a Jacobian J to the tool's: S (J' M^-1 + J (M^-1)').
+
+        M is `matrix`. S exchanges the linear and the angular rows if the tool has the angular rows first.
+        """
         found = self.jacobian(q, rate)
         if not self._blocks:
             return found
@@ -696,7 +718,7 @@ class Conversion:
         return found + array @ _for_frames(change, array.ndim)
 
     def hessian(self, q: Given, J: ArrayLike, H: ArrayLike) -> FloatArray:
-        """Convert the derivatives (..., 6, nv, nv) of a Jacobian by the joint coordinates."""
+        """Convert the derivatives (..., 6, nv, nv) of a Jacobian with respect to the joint coordinates."""
         self._demand_own_columns()
         inverse, tensor, columns = self.inverse_matrix(q), self.six(H, -3), self.six(J, -2)
         W = _for_frames(inverse, columns.ndim)
@@ -717,16 +739,17 @@ class Conversion:
         result: FloatArray,
         jacobian: Callable[[], FloatArray],
     ) -> FloatArray:
-        """Convert the result of a quantity to the tool's rows and columns.
+        """Convert a computed quantity, such as a velocity or a Jacobian, to the tool's rows and columns.
 
         Args:
             quantity: Name of the quantity.
-            ours: This robot's q, or q and v, or q, v and a.
+            ours: q, or q and v, or q, v and a, in urdfkin's convention.
             result: The result (..., 6), (..., 6, nv) or (..., 6, nv, nv); a placement is returned unchanged.
-            jacobian: Returns the Jacobian (..., 6, nv), which J-dot and the Hessian need.
+            jacobian: Function that returns the Jacobian (..., 6, nv). It is called to convert the Jacobian's
+                time derivative and the Hessian.
 
         Raises:
-            InputError: conventions do not define the quantity.
+            InputError: urdfkin's conventions do not define a conversion of this quantity.
         """
         if quantity == "placement":
             return result
@@ -757,14 +780,14 @@ class Conversion:
 
 @dataclass(frozen=True, slots=True)
 class Reordering:
-    """Numbers of one tool from those of another: `x[..., index] * factor + zero`."""
+    """Formula that computes one program's numbers from another's: `x[..., index] * factor + zero`."""
 
     index: tuple[int, ...]
     factor: tuple[float, ...]
     zero: tuple[float, ...]
 
     def code(self, to: str, of: str) -> str:
-        """Return one line of Python with NumPy that assigns the numbers.
+        """Return one line of Python code that computes the variable `to` from the variable `of` with NumPy.
 
         >>> Reordering((1, 0), (1.0, 1.0), (0.0, 0.0)).code("q_b", "q_a")
         'q_b = q_a[..., [1, 0]]'
@@ -779,9 +802,10 @@ class Reordering:
 
 
 def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | None:
-    """Return the numbers of "q" or "v" of the tool `end` from those of `start`; None without a formula.
+    """Return the formula that computes "q" or "v" of the convention `end` from that of `start`, or None.
 
-    No formula exists if one of the tools stores cosine and sine, or if the axes of a base velocity differ.
+    There is no formula if one of the two conventions stores the cosine and the sine of an angle, or if the
+    two conventions express a base velocity in different frames.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("a1", verify=False)
@@ -826,7 +850,10 @@ def _inverse(B: FloatArray) -> FloatArray:
 
 
 def _with(array: FloatArray, where: slice, part: FloatArray) -> FloatArray:
-    """Return `array` with `part` in some of its last axis; the batch shapes broadcast."""
+    """Return a copy of `array` with `part` in the slice `where` of the last axis.
+
+    The other axes of `array` and `part` broadcast.
+    """
     shape = np.broadcast_shapes(array.shape[:-1], part.shape[:-1])
     if array.shape[:-1] != shape:
         array = np.broadcast_to(array, (*shape, array.shape[-1])).copy()
@@ -835,12 +862,12 @@ def _with(array: FloatArray, where: slice, part: FloatArray) -> FloatArray:
 
 
 def _for_frames(M: FloatArray, ndim: int) -> FloatArray:
-    """Return (..., k, l) matrices, with an added axis if the Jacobian has an axis for several frames."""
+    """Return matrices (..., k, l), with one more axis before the last two for a Jacobian of several frames."""
     return M[..., np.newaxis, :, :] if M.ndim > 2 and ndim == M.ndim + 1 else M
 
 
 def _cross(x: FloatArray) -> FloatArray:
-    """Return [x] (..., 3, 3) with [x] y = x x y."""
+    """Return the matrix [x] (..., 3, 3) for which [x] y is the cross product of x and y."""
     found = np.zeros((*x.shape, 3))
     found[..., 0, 1], found[..., 0, 2], found[..., 1, 2] = -x[..., 2], x[..., 1], -x[..., 0]
     found -= np.swapaxes(found.copy(), -1, -2)

@@ -1,4 +1,4 @@
-"""A robot whose methods take and return the convention of a tool."""
+"""A robot with methods that take and return numbers in the convention of another program."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ if TYPE_CHECKING:
 
 
 class ConventionRobot:
-    """A robot in the convention of a tool; `robot.with_convention("mujoco")` returns it.
+    """A robot in the convention of another program, the tool; `robot.with_convention("mujoco")` returns it.
 
-    Its methods are those of `Robot` with the same arguments. q, v and a are the tool's numbers; Jacobians
-    have its columns, and six-vectors its order of rows. The frame and `reference` mean the same as in
-    `Robot`. Each result is checked as usual, before it is converted.
+    Its methods are those of `Robot` with the same arguments. q, v and a have the tool's order and units.
+    Jacobians have the tool's columns, and six-vectors the tool's order of rows. The frame and `reference`
+    mean the same as in `Robot`. Pinocchio checks each result as usual, before the result is converted.
 
     Attributes:
         robot: The robot itself.
-        conversion: Names and conversions, the result of `robot.convention(...)`.
+        conversion: The names and conversions of the convention: the result of `robot.convention(...)`.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("a1", root_joint="floating").with_convention("drake")
@@ -53,25 +53,25 @@ class ConventionRobot:
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the joints in the tool, in its order."""
+        """Names of the joints in the tool, in the tool's order."""
         return self.conversion.joint_names
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
-        """A name for each number of q in the tool."""
+        """Names of the numbers of q in the tool."""
         return self.conversion.coordinate_names
 
     @property
     def rate_names(self) -> tuple[str, ...]:
-        """A name for each number of v and a in the tool."""
+        """Names of the numbers of v and a in the tool."""
         return self.conversion.rate_names
 
     def neutral(self) -> FloatArray:
-        """Return the zero configuration of the URDF in the tool's numbers."""
+        """Return the zero configuration of the URDF, converted to the tool's q."""
         return self.conversion.to(self.robot.neutral())
 
     def sample(self, n: int, seed: int = 0) -> FloatArray:
-        """Return random configurations (n, nq), those of `Robot.sample`."""
+        """Return random configurations (n, nq): those of `Robot.sample`, converted to the tool's q."""
         return self.conversion.to(self.robot.sample(n, seed))
 
     def certificate(self) -> Certificate:
@@ -84,23 +84,23 @@ class ConventionRobot:
         return self._call(self.robot.placement, (q,), frame, **options)[1]
 
     def relative_placement(self, q: ArrayLike, frame: Any, other: Any, **options: Any) -> FloatArray:
-        """Return the pose of a frame in another one (..., 4, 4); see `Robot.relative_placement`."""
+        """Return the pose (..., 4, 4) of `frame` in the frame `other`; see `Robot.relative_placement`."""
         return self._call(self.robot.relative_placement, (q,), frame, other, **options)[1]
 
     def velocity(
         self, q: ArrayLike, v: ArrayLike, frame: Any = None, *more: Any, **options: Any
     ) -> FloatArray:
-        """Return the velocity (..., 6) of a frame, rows as in the tool; see `Robot.velocity`."""
+        """Return the velocity (..., 6) of a frame with rows in the tool's order; see `Robot.velocity`."""
         return self.conversion.six(self._call(self.robot.velocity, (q, v), frame, *more, **options)[1])
 
     def acceleration(
         self, q: ArrayLike, v: ArrayLike, a: ArrayLike, frame: Any = None, *more: Any, **options: Any
     ) -> FloatArray:
-        """Return the classical acceleration (..., 6), rows as in the tool; see `Robot.acceleration`."""
+        """Return the classical acceleration (..., 6) with rows as in the tool; see `Robot.acceleration`."""
         return self.conversion.six(self._call(self.robot.acceleration, (q, v, a), frame, *more, **options)[1])
 
     def jacobian(self, q: ArrayLike, frame: Any = None, *more: Any, **options: Any) -> FloatArray:
-        """Return the Jacobian (..., 6, nv), rows and columns as in the tool; see `Robot.jacobian`."""
+        """Return the Jacobian (..., 6, nv) with rows and columns as in the tool; see `Robot.jacobian`."""
         ours, J = self._call(self.robot.jacobian, (q,), frame, *more, **options)
         return self.conversion.jacobian(ours[0], J)
 
@@ -118,18 +118,18 @@ class ConventionRobot:
         return self.conversion.hessian(ours[0], self.robot.jacobian(ours[0], frame, *more, **options), H)
 
     def analytical_jacobian(self, q: ArrayLike, frame: Any = None, *more: Any, **options: Any) -> FloatArray:
-        """Return the analytical Jacobian, columns as in the tool; see `Robot.analytical_jacobian`."""
+        """Return the analytical Jacobian with columns as in the tool; see `Robot.analytical_jacobian`."""
         ours, J = self._call(self.robot.analytical_jacobian, (q,), frame, *more, **options)
         return self.conversion.columns(ours[0], J)
 
     def imu(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, frame: Any = None, **options: Any) -> FloatArray:
-        """Return an IMU's readings (..., 6), the accelerometer's first in every tool; see `Robot.imu`."""
+        """Return an IMU's readings (..., 6) for any tool: accelerometer, then gyroscope; see `Robot.imu`."""
         return self._call(self.robot.imu, (q, v, a), frame, **options)[1]
 
     def _call(
         self, method: Callable[..., FloatArray], given: tuple[Any, ...], *more: Any, **options: Any
     ) -> tuple[tuple[FloatArray, ...], FloatArray]:
-        """Return our inputs and the method's result for the tool's inputs."""
+        """Return the tool's inputs in urdfkin's convention, and the result of a `Robot` method for these inputs."""
         read: list[ArrayLike] = [
             self.conversion.layout(letter).read(x) if isinstance(x, str | dict) else x
             for letter, x in zip("qva", given, strict=False)

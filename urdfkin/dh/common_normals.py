@@ -1,4 +1,4 @@
-"""Compute the common normal of two consecutive joint axes, and handle the axes that have none.
+"""Compute the common normal of two consecutive joint axes, and handle axes without a unique common normal.
 
 `step_between` factors the constant pose A between two joint frames (z along each axis):
 
@@ -8,28 +8,30 @@ The first pair of factors commutes with the motion of the first joint, and the l
 the second joint. Each pair therefore becomes part of its joint's row. The three factors in the middle are the
 step. With beta = 0 and skew axes, the seven numbers are unique up to a half turn of the x axis (Denavit and
 Hartenberg). Then a is the distance between the two joint axes. delta and delta_next lead along these axes to
-the feet of their common normal. If the axes are parallel, the feet are undetermined. If they are nearly
+the feet of their common normal. If the axes are parallel, the feet are undetermined. If the axes are nearly
 parallel, the feet are far away. docs/dh.md explains the choices for these two cases.
 
 `steps_like` takes the free choices from another table: the feet, the directions of x and the offsets. The
 pose of the tip fixes only the sum of d along a run of parallel axes, and only the sum of theta about a run of
-coinciding axes. Each row of such a run takes its d or theta from the other table, except one row. The number
-in that row only defines a joint's zero: d of a prismatic joint, theta of a revolute joint, or the part of the
-first row that the base absorbs. The URDF defines this zero, so that row takes the remaining offset.
+coinciding axes. Each row of such a run takes its d or theta from the other table, except one row. The d or
+theta of that row only defines the zero of a joint, or is a part of the first row that the base absorbs. The
+URDF defines the zeros of joints. That row therefore takes the remaining offset.
 
-A Hayati row passes an offset on to the next row, as a row of parallel axes does. The plane in which a Hayati
-row ends depends on the offset that the row receives. The zero of a row's joint is therefore computed before
-the rows that follow.
+A Hayati row passes an offset on to the next row, in the same way as a row of parallel axes. The plane in
+which a Hayati row ends depends on the offset that this row receives. The zero of a row's joint is therefore
+computed before the following rows.
 
 **Noise.** Two correct programs read the same URDF and compute slightly different constant poses between two
 joint axes. The program that wrote the file may also have rounded each angle to fifteen digits.
-`urdfkin.kinematics.roundings` takes both effects into account. Angles of fourteen or fifteen digits are
-therefore treated as round: 1.5707963267949 and 3.14159265358979 differ by 15 eps from a multiple of a right
-angle. An angle of twelve digits differs by 900 eps or more and is not treated as round. `snap` makes it round
-and states the effect.
+`urdfkin.kinematics.roundings` takes both effects into account. Angles that are written with fourteen or
+fifteen digits are therefore treated as round. For example, 1.5707963267949 and 3.14159265358979 differ by 15
+eps from a multiple of a right angle, where eps is the machine epsilon. An angle that is written with twelve
+digits differs by 900 eps or more and is not treated as round. The option `snap` makes such an angle round and
+reports the effect.
 
 A table contains zero in place of a tilt below the noise. The axes then count as parallel, so that no foot is
-far away. `left_out` adds up these tilts. A table may differ from the URDF by their sum.
+far away. `left_out` returns the sum of these tilts. The orientations of a table and of the URDF may differ by
+this sum.
 """
 
 from __future__ import annotations
@@ -47,8 +49,8 @@ from urdfkin.kinematics.roundings import ANGLE, AXES, CONSTANT, DIGITS, EPS, SUM
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, Joint
 
-#: Below this tilt (rad) two axes are nearly parallel: the position of the feet would magnify errors of the
-#: URDF 100 times.
+#: Two axes with a smaller tilt (rad) are nearly parallel. With such a small tilt, errors of the URDF would be
+#: magnified more than 100 times in the positions of the feet.
 NEARLY_PARALLEL = 1e-2
 
 #: Up to this tilt (rad) two axes count as nearly parallel if a foot of their common normal lies beyond the
@@ -65,7 +67,7 @@ class NearParallel(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """The seven numbers of the formula in the module's docstring, in metres and radians.
+    """The numbers of a step between two joint axes: phi, delta, a, alpha, beta, phi_next, delta_next (m, rad).
 
     Attributes:
         free: Whether `phi` was a free choice because the axes coincide.
@@ -81,7 +83,7 @@ class Step:
     free: bool = False
 
     def turned(self) -> Step:
-        """Return the same step with x reversed: Rz(pi) X(a, alpha, beta) Rz(-pi)."""
+        """Return the step between the same axes with the direction of x reversed."""
         alpha = math.pi if self.alpha == math.pi else -self.alpha
         return Step(
             self.phi + math.pi,
@@ -95,7 +97,7 @@ class Step:
 
 
 def lifted(A: FloatArray, carry: float) -> FloatArray:
-    """Return Tz(carry) A: the pose A, measured from the origin of the DH frame, not of the joint's frame."""
+    """Return Tz(carry) A: the pose A relative to the origin of the DH frame, not of the joint's frame."""
     raised = A.copy()
     raised[2, 3] += carry
     return raised
@@ -117,7 +119,8 @@ def step_between(
         near_parallel: Kind of row for nearly parallel axes.
         phi_free: Value of phi where the axes coincide
             and every phi is correct.
-        delta_each: Put the offset between parallel axes into `delta` of this step, not into `delta_next`.
+        delta_each: Whether to put the offset between parallel axes into `delta` of this step, instead of
+            `delta_next`.
         noise: Tilts and lengths below this noise become zero. None: the noise of the constant pose of one
             joint.
 
@@ -140,7 +143,10 @@ def _is_near(feet: Step, sine: float, reach: float) -> bool:
 
 
 def _skew(A: FloatArray, sine: float, reach: float, noise: Noise) -> Step:
-    """Return the step of two skew axes, with x along z cross z_next, and a > 0 unless the axes intersect."""
+    """Return the step of two skew axes, with x along the cross product of z and z_next.
+
+    The length a is positive, or 0 if the axes intersect.
+    """
     phi = math.atan2(A[0, 2], -A[1, 2])
     along = math.cos(phi) * A[0, 3] + math.sin(phi) * A[1, 3]
     across = math.cos(phi) * A[1, 3] - math.sin(phi) * A[0, 3]
@@ -152,7 +158,7 @@ def _skew(A: FloatArray, sine: float, reach: float, noise: Noise) -> Step:
 
 
 def _parallel(A: FloatArray, reach: float, noise: Noise, phi_free: float, delta_each: bool) -> Step:
-    """Return the step of two parallel axes along their perpendicular through this origin.
+    """Return the step of two parallel axes, along the perpendicular through the origin of this joint's frame.
 
     If the axes coincide, every phi is correct, and the step takes `phi_free`.
     """
@@ -168,7 +174,8 @@ def _parallel(A: FloatArray, reach: float, noise: Noise, phi_free: float, delta_
 def hayati_step(A: FloatArray, reach: float, noise: Noise, phi_free: float) -> Step:
     """Return the step of a Hayati row (Hayati, 1983).
 
-    x points from this origin to the intersection of the next axis with the plane normal to this axis.
+    The plane through the origin of this joint's frame, normal to this axis, intersects the next axis in a
+    point. x points from the origin to this point.
     """
     z = A[:3, 2]
     delta_next = cleaned_length(A[2, 3] / z[2], reach, noise.metres)
@@ -183,7 +190,7 @@ def hayati_step(A: FloatArray, reach: float, noise: Noise, phi_free: float) -> S
 
 
 def _remaining_rotation(A: FloatArray, phi: float, alpha: float, beta: float) -> float:
-    """Return phi_next, the remaining rotation about the next axis; well conditioned for every tilt."""
+    """Return phi_next, the remaining rotation about the next axis; the formula is accurate for every tilt."""
     turn_phi = np.array([[math.cos(phi), -math.sin(phi), 0], [math.sin(phi), math.cos(phi), 0], [0, 0, 1.0]])
     M = (turn_phi @ between_axes(0.0, alpha, beta)[:3, :3]).T @ A[:3, :3]
     return math.atan2(M[1, 0] - M[0, 1], M[0, 0] + M[1, 1])
@@ -197,9 +204,9 @@ def cleaned_length(length: float, reach: float, noise: float = 0.0) -> float:
 
     Args:
         length: Metres.
-        reach: Metres; the size of the terms that the length is computed from.
-        noise: Metres; a length below it becomes zero. It has an effect only if it exceeds the rounding of
-            `reach`.
+        reach: Metres; the size of the numbers from which the length is computed.
+        noise: Metres; a length below `noise` becomes zero. `noise` has an effect only if it exceeds the
+            rounding error of `reach`.
 
     Example:
         >>> cleaned_length(-5e-17, 1.0), cleaned_length(0.07599999999999998, 1.0), cleaned_length(-5e-12, 1.0)
@@ -212,7 +219,7 @@ def cleaned_length(length: float, reach: float, noise: float = 0.0) -> float:
 
 
 def cleaned_angle(angle: float) -> float:
-    """Return the angle in (-pi, pi]; within rounding of a multiple of pi/12, return that multiple."""
+    """Return the angle in (-pi, pi]; an angle within rounding of a multiple of pi/12 becomes that multiple."""
     angle = wrapped(angle)
     twelfth = nearest_twelfth(angle)
     return wrapped(twelfth) + 0.0 if abs(angle - twelfth) <= ANGLE * EPS else angle
@@ -220,7 +227,7 @@ def cleaned_angle(angle: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class PairLike:
-    """Two consecutive axes, and the other table's row for them.
+    """Two consecutive axes of a path, and the row of another table for the same two axes.
 
     Attributes:
         A: (4, 4) pose of the next joint's frame in this joint's frame.
@@ -243,12 +250,15 @@ class PairLike:
 
     @property
     def passes_on(self) -> bool:
-        """Whether the row does not determine a foot, so that the rest of its offset goes to the next row."""
+        """Whether the row does not determine a foot; the rest of its offset then goes to the next row."""
         return tilt_of(self.A) <= self.noise.radians or self._gets_hayati_row
 
     @property
     def _gets_hayati_row(self) -> bool:
-        """Whether the pair gets a Hayati row; if both kinds of row are possible, the other table decides."""
+        """Whether the pair of axes gets a Hayati row.
+
+        If a row of four parameters is possible too, the pair gets the same kind of row as in the other table.
+        """
         sine = tilt_of(self.A)
         leans_there = not self.row.beta and abs(math.sin(self.row.alpha)) >= NEARLY_PARALLEL
         return self.near_parallel is NearParallel.HAYATI and (
@@ -257,17 +267,19 @@ class PairLike:
 
     @property
     def foot(self) -> float:
-        """Metres along this axis from its joint's frame to the common normal."""
+        """Distance (metres) along the first axis, from the frame of its joint to the common normal."""
         return step_between(self.A, self.reach, NearParallel.STRICT, noise=self.noise).delta
 
     @property
     def cut(self) -> float | None:
-        """Metres along this axis from its joint's frame to the normal plane of the other table's Hayati row.
+        """Distance (metres) along the first axis, from its joint's frame to the plane of the Hayati row.
 
-        The result is None if no such plane is within reach. In that plane the next axis passes at the
-        distance a of the other row. The component of a along the direction of the tilt determines the plane,
-        with an error of rounding divided by the tilt. For a slight tilt, the component of a across that
-        direction determines the plane more accurately.
+        This plane is normal to the first axis, and is that of the other table's Hayati row.
+
+        The result is None if no such plane is within reach. The next axis intersects that plane at the
+        distance a of the other row from the first axis. The component of a along the direction of the tilt
+        determines the plane. The error is then the rounding error divided by the tilt. For a slight tilt, the
+        component of a across that direction determines the plane more accurately.
         """
         across, along = -math.sin(self.row.alpha) * math.cos(self.row.beta), math.sin(self.row.beta)
         sine, lean = tilt_of(self.A), math.hypot(along, across)
@@ -282,9 +294,9 @@ class PairLike:
         return cut if abs(cut) <= self.reach else None
 
     def step(self, carry: float, d: float, phi_free: float = 0.0) -> Step:
-        """Return the step of the pair, measured from the offset `carry` before the first joint.
+        """Return the step of the pair of axes, if the first row begins at the offset `carry` before the joint.
 
-        Where d is free, the step uses the argument `d`.
+        If the row does not determine d, the step uses the argument `d`.
         """
         if not self.passes_on:
             return step_between(
@@ -305,17 +317,17 @@ class PairLike:
 def steps_like(
     pairs: Sequence[PairLike], phi_in: float, carry: float, tip: float | None
 ) -> tuple[list[Step], list[float]]:
-    """Compute the steps whose free choices agree with another table.
+    """Compute the steps between the axes of a path so that all free choices agree with another table.
 
     Args:
         pairs: All pairs of consecutive axes.
         phi_in: Angle about the first axis from frame 0 to the first joint's frame (rad).
         carry: Offset along the first axis from frame 0 to the first joint's frame (metres).
-        tip: Offset that the last row must receive so that its d is the other table's (metres). None if the
-            tool or the row itself takes the remaining offset.
+        tip: Offset that the last row must receive so that its d equals the d in the other table (metres).
+            None if the tool or the last row takes the remaining offset.
 
     Returns:
-        The steps, and theta of each row.
+        The steps between consecutive axes, and theta of each row.
     """
     steps, inputs = list[Step](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):
@@ -336,7 +348,7 @@ def steps_like(
 def _offset_without_foot(pairs: Sequence[PairLike], i: int, carry: float, tip: float | None) -> float:
     """Return d of a row without a foot.
 
-    It is the other table's d, or the d with which the later rows get the d of the other table.
+    It is the d of the other table, or the d that lets the later rows have the same d as in the other table.
     """
     pair = pairs[i]
     if not pair.passes_on or not (pair.slides or (i == 0 and pair.row.d)):
@@ -348,7 +360,8 @@ def _offset_without_foot(pairs: Sequence[PairLike], i: int, carry: float, tip: f
     if end < len(pairs):
         target = None if pairs[end].slides else pairs[end].row.d - pairs[end].foot
     if target is None:
-        # A later prismatic joint or the tool takes the rest. A Hayati row before it may define d.
+        # A later prismatic joint or the tool takes the remaining offset. A Hayati row before this joint or
+        # tool may define d.
         end = max(range(i, end), key=lambda k: tilt_of(pairs[k].A))
         cut = pairs[end].cut
         if cut is None:
@@ -362,9 +375,10 @@ def _offset_without_foot(pairs: Sequence[PairLike], i: int, carry: float, tip: f
 
 
 def _phi_of_coinciding(pairs: Sequence[PairLike], steps: Sequence[Step], i: int, phi_in: float) -> float:
-    """Return phi of coinciding axes.
+    """Return phi for two coinciding axes, for which any value of phi is correct.
 
-    This phi gives this row, or the prismatic rows after it, the theta of the other table.
+    With the returned phi, this row, or the prismatic rows after this row, have the same theta as in the other
+    table.
     """
     own = pairs[i].row.theta - phi_in
     if i > 0 and pairs[i].slides:
@@ -382,9 +396,10 @@ def _phi_of_coinciding(pairs: Sequence[PairLike], steps: Sequence[Step], i: int,
 
 
 def _closer_direction(step: Step, pair: PairLike, phi_in: float = 0.0) -> Step:
-    """Return the step or its reverse.
+    """Return the step or the same step with x reversed, whichever is closer to the other table.
 
-    The cells of the result are closer to the other table's cells; for equal cells, theta decides.
+    The function compares the cells a, alpha and beta with those of the other table. If both directions of x
+    are equally close, theta decides.
     """
     row = pair.row
 
@@ -397,12 +412,13 @@ def _closer_direction(step: Step, pair: PairLike, phi_in: float = 0.0) -> Step:
 
 
 def near(theta: float, there: float) -> float:
-    """Return `theta` in (-pi, pi]; return `there` if it is the same angle within rounding."""
+    """Return `theta` in (-pi, pi]; return `there` if `theta` and `there` are equal within rounding."""
     off = math.remainder(theta - there, 2.0 * math.pi)
     return there if abs(off) <= ANGLE * EPS else cleaned_angle(theta)
 
 
-#: Largest length (metres). With longer lengths, the squares of sums overflow in common normals and bounds.
+#: Largest allowed length (metres). With longer lengths, squares of sums of lengths overflow in the
+#: computation of common normals and bounds.
 LONGEST = 1e150
 
 
@@ -443,18 +459,18 @@ def _check_length(where: str, length: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Largest angle (radians) and length (metres) of a constant pose that count as rounding."""
+    """Largest angle (radians) and largest length (metres) in a constant pose that count as rounding."""
 
     radians: float
     metres: float
 
 
 def noise_of(joints: int, length: float, reach: float) -> Noise:
-    """Return the noise of a constant pose.
+    """Return the largest angle and length of a constant pose that count as rounding.
 
     Args:
-        joints: Number of URDF joints with constants in the pose.
-        length: Sum of their offsets (metres).
+        joints: Number of URDF joints that the constant pose combines.
+        length: Sum of the offsets of these joints (metres).
         reach: Length of the whole path (metres).
 
     Example:
@@ -466,7 +482,7 @@ def noise_of(joints: int, length: float, reach: float) -> Noise:
 
 
 def noises(chain: FrameChain, reach: float) -> list[Noise]:
-    """Return the noise of each constant of a chain."""
+    """Return the noise of each constant pose of a chain."""
     return [
         noise_of(joints, float(length), reach)
         for joints, length in zip(chain.folded, chain.lengths, strict=True)
@@ -476,7 +492,8 @@ def noises(chain: FrameChain, reach: float) -> list[Noise]:
 def left_out(chain: FrameChain) -> float:
     """Return the sum of all tilts of a chain that count as rounding (rad).
 
-    The sum includes the tilts between consecutive z axes, and the tilts of x axes, for example of the tip's.
+    The sum includes the tilts between consecutive z axes, and the tilts of x axes, for example of the tip's x
+    axis.
     """
     found = 0.0
     for A, noise in zip(chain.constants, noises(chain, 0.0), strict=True):
@@ -485,5 +502,5 @@ def left_out(chain: FrameChain) -> float:
 
 
 def tilt_of(A: FloatArray) -> float:
-    """Return the sine of the angle between the two z axes of a pose."""
+    """Return the sine of the angle between the z axis of a pose and the z axis of its reference frame."""
     return math.hypot(A[0, 2], A[1, 2])

@@ -1,4 +1,4 @@
-"""The motion of one frame along a trajectory, compared with Pinocchio, for plots and viewers.
+"""Compute the motion of one frame along a trajectory, compared with Pinocchio, for plots and viewers.
 
 The equations are in sections 7.5 to 7.7 of the textbook. If urdfkin and Pinocchio disagree, the methods of
 `Robot` raise an error; this module returns the disagreement as a result.
@@ -29,10 +29,11 @@ from urdfkin.verify.verifier import held_against
 
 @dataclass(frozen=True, eq=False)
 class Check:
-    """Comparison of a quantity with Pinocchio's, for each sample.
+    """Comparison of a quantity from urdfkin with the same quantity from Pinocchio, for each sample.
 
     Attributes:
-        units: (n,) the largest difference of each sample, in units of eps * scale.
+        units: (n,) the largest difference between urdfkin and Pinocchio in each sample, in units of eps *
+            scale. eps is the machine epsilon, and scale is the size of the quantity's numbers.
         share: (n,) `units` divided by `bound`; a value above 1 is a failure.
         bound: (n,) the largest difference that rounding can cause, in units of eps * scale.
     """
@@ -54,8 +55,8 @@ class FrameMotion:
         acceleration: (n, 6) classical, m/s^2, rad/s^2.
         jacobian: (n, 6, nv).
         movable: (6, nv) entries of the Jacobian that are not 0 for every q.
-        parts: The acceleration, split by joint and term.
-        checks: Comparison with Pinocchio, by the name of the quantity; empty if Pinocchio cannot check the
+        parts: The acceleration, split into the contributions of each joint and of each term of the equation.
+        checks: Comparison with Pinocchio for each quantity, by its name. Empty if Pinocchio cannot check the
             robot.
         not_verified: The reason why Pinocchio cannot check the robot; None if it can.
 
@@ -82,7 +83,7 @@ class FrameMotion:
 
     @property
     def agrees(self) -> bool:
-        """Whether every sample is within its bound; also True if Pinocchio cannot check the robot.
+        """Whether all differences from Pinocchio are within their bounds; True if there is no comparison.
 
         >>> import urdfkin
         >>> urdfkin.frame_motion(urdfkin.load("ur5"), [np.zeros((3, 6))] * 3, "tool0").agrees
@@ -92,7 +93,9 @@ class FrameMotion:
 
     @property
     def singular_values(self) -> FloatArray:
-        """(n, min(6, nv)) singular values of the Jacobian, largest first; its rows mix metres and radians.
+        """(n, min(6, nv)) singular values of the Jacobian, largest first.
+
+        The rows of this Jacobian have different units: metres and radians.
 
         >>> import urdfkin
         >>> urdfkin.frame_motion(urdfkin.load("ur5"), [np.zeros((3, 6))] * 3, "tool0").singular_values.shape
@@ -143,7 +146,7 @@ def frame_motion(
 ) -> FrameMotion:
     """Compute the motion of a frame along a trajectory, and compare every sample with Pinocchio.
 
-    A disagreement is no error: `agrees` and `checks` of the result state it.
+    A disagreement does not raise an error. The attributes `agrees` and `checks` of the result report it.
 
     Args:
         robot: The robot.

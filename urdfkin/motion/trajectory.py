@@ -2,14 +2,15 @@
 
 A line is parameterised by s = 10 u^3 - 15 u^4 + 6 u^5 with u = t / duration. It starts and ends at rest, and
 its acceleration is continuous. If a file has no joint velocities, they are computed by central differences of
-the configurations, after the angles are unwrapped. The error of these differences falls with the square of
-the time step; that of joint accelerations from configurations falls with the time step at both ends. The
-differences with half of the samples give an estimate of it.
+the configurations, after the angles are unwrapped. The error of these joint velocities is proportional to the
+square of the time step. Joint accelerations that are computed from configurations have a larger error at both
+ends of the trajectory: it is proportional to the time step. To estimate the errors, the differences are also
+computed from every second sample, and the two results are compared.
 
 A log often wraps the angle of a wheel to [-pi, pi] or [0, 2 pi]. The jump from one end of this range to the
-other is not a motion. Its difference quotient, however, would be a huge joint velocity. The angle of a planar
-joint wraps in the same way. The quaternion of a floating joint may change its sign without a change of
-orientation.
+other is not a motion. A difference across this jump would, however, give a huge joint velocity. The angle of
+a planar joint wraps in the same way. The quaternion of a floating joint may change its sign without a change
+of orientation.
 """
 
 from __future__ import annotations
@@ -46,18 +47,19 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
 
-#: Shape of each array, by its name, without the first axis, which is the sample index.
+#: Shape of each array, by the array's name. The shape does not contain the first axis, which is the sample
+#: index.
 Shapes = Mapping[str, tuple[int, ...]]
 
 
 def read_arrays(path: Path, shapes: Shapes, required: Sequence[str]) -> dict[str, FloatArray]:
-    """Read arrays (n, ...) of finite numbers from an .npz file; n is the same for all.
+    """Read arrays (n, ...) of finite numbers from an .npz file; n is the same for all arrays.
 
     Pickled objects are rejected, so no code from the file is executed.
 
     Args:
         path: A file of `numpy.savez`.
-        shapes: The allowed arrays.
+        shapes: The names of the allowed arrays, with their shapes.
         required: Names of the required arrays.
 
     Raises:
@@ -118,23 +120,25 @@ def _check_names(path: Path, names: Sequence[str], shapes: Shapes, required: Seq
 
 #: Smallest number of samples, because a second difference needs three samples.
 _FEWEST = 3
-#: Names of the arrays for the fields of `BaseMotion`, in an .npz file.
+#: Names of the arrays in an .npz file that contain the fields of `BaseMotion`.
 _BASE = "base_placement", "base_velocity", "base_acceleration"
-#: Largest rounding of a time, relative to the smallest time step, that needs no note.
+#: Largest rounding error of a time for which the user gets no note, relative to the smallest time step.
 _TIME_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """n samples of a file, in urdfkin's convention; None for numbers that the file does not contain.
+    """The n samples in a file, converted to urdfkin's convention.
+
+    An attribute is None if the file does not contain its numbers.
 
     Attributes:
         where: Name of the file.
         q: (n, nq) configurations, as they are in the file.
         t: (n,) seconds, increasing.
         v: (n, nv) joint velocities.
-        a: (n, nv) joint accelerations; only together with v.
-        base: Motion of the root link, a batch of n.
+        a: (n, nv) joint accelerations. They are present only together with v.
+        base: Motion of the root link for all n samples.
     """
 
     where: str
@@ -155,11 +159,13 @@ class Trajectory:
         v: (n, nv) joint velocities, rad/s and m/s.
         a: (n, nv) joint accelerations, rad/s^2 and m/s^2.
         rates: Origin of v and a, as text.
-        exact: Whether v and a are the derivatives of q up to rounding; if False, their error is unknown.
-        notes: Remarks for the user about the samples, for example unwrapped angles; one line each.
-        base: Motion of the root link, a batch of n; None if it is fixed at the world's origin.
-        errors: Estimates of the largest errors of v and a if they are differences, in their units; None if
-            they are given or the samples are too few.
+        exact: Whether v and a are the exact derivatives of q, except for rounding. If False, their error is
+            unknown.
+        notes: Remarks for the user about the samples, for example about unwrapped angles. Each remark is one
+            line.
+        base: Motion of the root link for all n samples. None if the root link is fixed at the world's origin.
+        errors: Estimates of the largest error of v and of the largest error of a, if v and a were computed by
+            differences. None if v and a were given, or if there are too few samples.
 
     >>> import urdfkin
     >>> line(urdfkin.load("ur5"), "neutral", "ready", 2.0, 101)
@@ -180,7 +186,7 @@ class Trajectory:
         return f"<Trajectory: {len(self.t)} samples in {self.t[-1] - self.t[0]:.4g} s, rates {self.rates}>"
 
     def derivation(self) -> str:
-        """Return the origin of v and a with the estimates of their errors, as a line.
+        """Return one line of text with the origin of v and a, and the estimates of their errors.
 
         >>> import urdfkin
         >>> line(urdfkin.load("ur5"), "neutral", "ready", 2.0, 101).derivation()
@@ -196,15 +202,15 @@ class Trajectory:
 
 
 def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) -> Trajectory:
-    """Return a straight line in joint space from rest to rest.
+    """Return a straight line in joint space between two configurations, with zero velocity at both ends.
 
-    Planar and floating joints move along one screw.
+    Planar and floating joints move along a single screw from start to end.
 
     Args:
         robot: The robot.
         start: (nq,) rad, m.
-        end: (nq,). Continuous joints make all whole turns between start and end; planar and floating joints
-            make no whole turn.
+        end: (nq,) rad, m. A continuous joint makes all whole turns in the difference between start and end.
+            Planar and floating joints make no whole turn.
         duration: Seconds.
         samples: Number of samples, including both ends.
 
@@ -234,7 +240,7 @@ def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) 
     for joint, at, to in zip(robot.tree.joints, robot.tree.q_index, robot.tree.v_index, strict=True):
         if joint.nq == 1:
             step[to] = q_1[at] - q_0[at]
-    # Along one screw, velocity and acceleration in the moving frame are s' and s'' times the constant step.
+    # On a single screw, velocity and acceleration in the moving frame are s' and s'' times the constant step.
     q = integrate(robot.tree, q_0, s * step)
     return Trajectory(frozen(t), frozen(q), frozen(s_1 * step), frozen(s_2 * step), "of the line", exact=True)
 
@@ -255,11 +261,12 @@ def read_trajectory(
     A heading may end with a unit: `elbow [deg]`, `elbow_deg`, `v:elbow [deg/s]`, `lift_mm`, `time [ms]`.
     Without t, the samples are one second apart. Without a, a is computed by central differences of v.
     Without v and a, the angles of continuous, planar and floating joints are unwrapped, and both are computed
-    by central differences. `rates`, `errors` and `notes` of the result state this.
+    by central differences. The attributes `rates`, `errors` and `notes` of the result report these
+    computations.
 
     Args:
         robot: The robot.
-        path: The file; the suffix .npz selects the second format.
+        path: The file. A file with the suffix .npz is read as an .npz file, and any other file as CSV.
         convention: Convention of the file's names and numbers, as in `Robot.convention`; None: urdfkin's.
 
     Raises:
@@ -284,7 +291,10 @@ def read_trajectory(
 
 
 def read_samples(robot: Robot, path: Path, conversion: Conversion | None = None) -> Samples:
-    """Read the samples of a file without computing any; `read_trajectory` explains file and errors."""
+    """Read the samples of a file, and compute no missing velocities or accelerations.
+
+    `read_trajectory` describes the file and the errors.
+    """
     archive = path.suffix.lower() == ".npz"
     data = _arrays(path, conversion or robot) if archive else _table(robot, path, conversion)
     t, v, a = (data.get(name) for name in "tva")
@@ -311,7 +321,7 @@ def read_samples(robot: Robot, path: Path, conversion: Conversion | None = None)
 
 
 def with_rates(tree: KinematicTree, x: Samples) -> Trajectory:
-    """Return the trajectory of some samples; compute v and a by central differences if they are missing.
+    """Return samples as a trajectory; compute v and a by central differences if they are missing.
 
     Raises:
         InputError: there are too few samples.
@@ -328,7 +338,8 @@ def with_rates(tree: KinematicTree, x: Samples) -> Trajectory:
     if n >= 2 * _FEWEST - 1:
         half = slice(None, None, 2)
         coarse = _differences(tree, found.q[half], t[half], None if x.v is None else x.v[half])
-        # With half of the samples, an error of second order is four times as large, one of first order twice.
+        # With half of the samples, the time step doubles. An error of second order is then four times as
+        # large, and an error of first order twice as large.
         order = 1 if x.v is None else 2
         errors = _error(v[half], coarse[0], 2), _error(a[half], coarse[1], order)
     words = "by central differences" if x.v is None else "v as given, a by central differences of v"
@@ -347,7 +358,11 @@ def _differences(
 
 
 def _error(fine: FloatArray, coarse: FloatArray, order: int) -> float:
-    """Estimate the largest error of differences of some order from those with half of the samples."""
+    """Estimate the largest error of differences from all samples, `fine`.
+
+    The function compares `fine` with `coarse`, the differences from half of the samples. The error of the
+    differences is proportional to the time step to the power `order`.
+    """
     return float(np.abs(fine - coarse).max(initial=0.0)) / (2.0**order - 1.0)
 
 
@@ -384,7 +399,7 @@ def _table(robot: Robot, path: Path, conversion: Conversion | None) -> dict[str,
 
 
 def column_units(robot: Robot, letter: str, conversion: Conversion | None = None) -> dict[str, str]:
-    """Return the unit of each number of "q", "v" or "a" by its name: "rad", "m/s", or "" without a unit."""
+    """Return the unit of each number of "q", "v" or "a" by the number's name: "rad", "m/s", ... or ""."""
     layout = conversion.layout(letter) if conversion else places(robot.tree, letter)
     per = {"q": "", "v": "/s", "a": "/s^2"}[letter]
     return {
@@ -393,7 +408,7 @@ def column_units(robot: Robot, letter: str, conversion: Conversion | None = None
 
 
 def _arrays(path: Path, known: Robot | Conversion) -> dict[str, FloatArray]:
-    """Return the arrays t, q, v, a and of the base's motion that an .npz file contains."""
+    """Return the arrays t, q, v and a, and those of the base's motion, that an .npz file contains."""
     shapes = {"t": (), "q": (known.nq,), "v": (known.nv,), "a": (known.nv,)}
     base = dict(zip(_BASE, ((4, 4), (6,), (6,)), strict=True))
     data = read_arrays(path, shapes | base, ["q"])
@@ -405,7 +420,10 @@ def _arrays(path: Path, known: Robot | Conversion) -> dict[str, FloatArray]:
 
 
 def _rates(tree: KinematicTree, q: FloatArray, t: FloatArray) -> FloatArray:
-    """Return central differences (n, nv); for planar and floating joints they are in the moving frame."""
+    """Return joint velocities (n, nv) by central differences of configurations.
+
+    The velocities of planar and floating joints are in the moving frame.
+    """
     slopes = _gradient(q, t)
     v = np.empty((len(q), tree.nv))
     for joint, at, to in zip(tree.joints, tree.q_index, tree.v_index, strict=True):
@@ -459,7 +477,8 @@ def read_columns(
         required: Names of the required columns.
         optional: Names of the optional columns.
         named: Whether the first line must contain the names.
-        units: SI unit of each column whose heading may end with a unit, such as `elbow [deg]`, `elbow_deg`.
+        units: SI unit of each column that may have a unit at the end of its heading, for example `elbow
+            [deg]` or `elbow_deg`.
 
     Returns:
         An array (n,) for each column that is present, in SI units; n may be zero.
@@ -498,13 +517,13 @@ def read_columns(
     }
 
 
-#: Names of the column of time, and units of time in one second.
+#: Allowed names of the time column, and the number of each time unit in one second.
 _TIMES = ("t", "time", "timestamp")
 _PER_SECOND = {
     **dict.fromkeys(("s", "sec", "second", "seconds"), 1.0),
     "ms": 1e3, "us": 1e6, "µs": 1e6, "ns": 1e9,
 }  # fmt: skip
-#: A unit at the end of a heading: `v:elbow_deg_s`, `a:elbow_rad_per_s2`; `elbow_deg`.
+#: Patterns of a unit at the end of a heading, as in `v:elbow_deg_s`, `a:elbow_rad_per_s2` and `elbow_deg`.
 _SUFFIXES = (
     re.compile(r"(.+)_(deg|rad|mm|m)_(?:per_)?(s2?)", re.DOTALL),
     re.compile(r"(.+)_(deg|rad|mm|m|s|ms|us|ns)", re.DOTALL),
@@ -563,14 +582,17 @@ def _unit(text: str, where: str, expected: str) -> str:
 
 
 def _in_si(column: FloatArray, unit: str) -> FloatArray:
-    """Return a column in SI units; one number has the same bits as the text `30deg`."""
+    """Return a column in SI units.
+
+    The column converts 30 in degrees to the same double as the text `30deg` anywhere else in urdfkin.
+    """
     if unit == "deg":
         return np.fromiter(map(in_radians, column.tolist()), np.float64, len(column))
     return column / _PER_SECOND.get(unit, 1000.0)
 
 
 def width_of(text: str, where: str) -> int:
-    """Return the number of cells in the first line that is not skipped; 0 without such a line."""
+    """Return the number of cells in the first line that is not skipped; 0 if all lines are skipped."""
     return len(next(_rows(text, where), (0, []))[1])
 
 
@@ -604,7 +626,7 @@ def _rows(text: str, where: str) -> Iterator[tuple[int, list[str]]]:
 
 
 def _is_header(cells: Sequence[str], names: Sequence[str]) -> bool:
-    """Return whether a line contains the names of columns; a joint may have the name "1"."""
+    """Return whether a line contains the names of columns; a number can be a name too, as in a joint "1"."""
     return sorted(cells) == sorted(names) or all(parse_float(cell) is None for cell in cells)
 
 
@@ -616,7 +638,10 @@ def _check_columns(
     required: Sequence[str],
     optional: Sequence[str],
 ) -> None:
-    """Raise InputError if a column is unknown, missing or duplicate; `headings` are the names as written."""
+    """Raise InputError if a column is unknown, missing or duplicate.
+
+    `headings` are the names of the columns as they are written in the file.
+    """
     known, given = {*required, *optional}, Counter(names)
     wrong = {
         "unknown": [name for name in names if name not in known],
@@ -633,13 +658,15 @@ def _check_columns(
         )
 
 
-#: Largest span of a column of wrapped angles: one turn, plus a margin for angles rounded to two digits.
+#: Largest span of the angles in a column that counts as wrapped: one turn, plus a margin for angles rounded
+#: to two digits.
 _ONE_TURN = math.tau + 0.02
-#: A step larger than this is ambiguous, because the step in the other direction is less than twice as long.
+#: Smallest step of an angle (rad) that is ambiguous. For larger steps, the step in the other direction is
+#: less than twice as long.
 _AMBIGUOUS = math.tau / 3.0
 
-#: A whole turn of the mimicked joint shifts a mimic joint. A shift below this number (radians or metres) is
-#: rounding.
+#: If a mimicked joint makes a whole turn, its mimic joint moves. A motion of the mimic joint below this
+#: number (radians or metres) counts as rounding.
 _ROUNDING = 1e-9
 
 
@@ -661,8 +688,9 @@ class Unwrapped:
 def unwrapped(tree: KinematicTree, q: FloatArray) -> Unwrapped:
     """Unwrap the angles of continuous, planar and floating joints.
 
-    Between two samples a joint is assumed to turn in the shorter direction. Angles that span more than one
-    turn were not wrapped and stay unchanged. Revolute joints stay unchanged too, since they have limits.
+    Between two samples a joint is assumed to turn in the shorter direction. If the angles of a joint span
+    more than one turn, they were not wrapped and stay unchanged. Revolute joints have limits, and their
+    angles stay unchanged too.
 
     Args:
         tree: The robot.
@@ -682,7 +710,7 @@ def unwrapped(tree: KinematicTree, q: FloatArray) -> Unwrapped:
 
 
 def _turning(joint: Joint, own: FloatArray) -> tuple[FloatArray, list[str]]:
-    """Unwrap a continuous or a planar joint; the last coordinate is the angle."""
+    """Unwrap the angle of a continuous or planar joint, which is the joint's last coordinate."""
     angle, notes = own[:, -1], []
     new = own.copy()
     within_one_turn = bool(np.ptp(angle) <= _ONE_TURN)
@@ -706,7 +734,7 @@ def _without_jumps(angle: FloatArray) -> FloatArray:
 
 
 def _floating(joint: Joint, own: FloatArray) -> tuple[FloatArray, list[str]]:
-    """Unwrap a floating joint: give each quaternion the sign that brings it nearer to the previous one."""
+    """Give each quaternion of a floating joint the sign that makes it closer to the previous quaternion."""
     along = np.sum(own[1:, 3:] * own[:-1, 3:], axis=1)
     new = own.copy()
     new[1:, 3:] *= np.cumprod(np.where(along < 0.0, -1.0, 1.0))[:, np.newaxis]

@@ -1,9 +1,9 @@
-"""Compare a URDF with a published table: cell by cell, and in millimetres at the tip.
+"""Compare a URDF with a published table: the cells, and the error of the tip's pose.
 
 `max_tip_error_bound` proves a bound of the tip error for every configuration, by the method of `urdfkin
 same`. The path and the table become two mechanisms with the same joints. `urdfkin.model.mechanisms` matches
-the two mechanisms joint by joint, without a fit. It then bounds the effect of all differences with support
-functions, from the tip to the base.
+the two mechanisms joint by joint, without a fit. It then bounds the effect of all differences on the tip,
+from the tip to the base, with support functions.
 """
 
 from __future__ import annotations
@@ -39,22 +39,24 @@ from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
 from urdfkin.model.ranges import values_within
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree, is_bounded
 
-#: Default tolerance at the tip (metres): 1.5 times the effect of rounding one or two cells to 0.1 mm.
+#: Default tolerance for the tip's position (metres). It is 1.5 times the error if one or two cells are
+#: rounded to 0.1 mm.
 TOLERANCE = 2e-4
-#: Number of configurations of a fit, and of its check. The two use different seeds, so their configurations
-#: differ.
+#: Number of configurations for a fit, and for the check of the fit. The fit and the check use different
+#: seeds, so their configurations differ.
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
-#: If changed cells leave more than this fraction of the tip error, they do not explain the error.
+#: If more than this fraction of the tip error remains after a change of cells, these cells do not explain the
+#: error.
 _EXPLAINS = 0.5
-#: Fraction of the tip error that the correction of a single mistake may leave.
+#: Largest fraction of the tip error that may remain after the correction of a single mistake.
 _LEFT = 0.05
-#: Smallest reported change of a cell, relative to the reach: a tenth of `EXPLAINED`.
+#: Smallest change of a cell that is reported, relative to the reach. It is a tenth of `EXPLAINED`.
 _MOVED = 1e-10
 #: If the tip moves by less than this fraction of the path length, it counts as fixed, and its motion does not
 #: determine the reach.
 _FIXED_TIP = 1e-6
-#: Range of samples of a prismatic joint without limits (metres).
+#: Range in which a prismatic joint without limits is sampled (metres).
 _SLIDE = (-0.5, 0.5)
 #: For each row, half a unit of the last digit of each cell in the table's file (metres and radians).
 Digits = Sequence[Mapping[str, float]]
@@ -75,12 +77,12 @@ def compare(
             fixed to the same links.
         reference: The table in either convention, with a row for each moving joint in the path's order.
         tolerance: Tolerance at the tip (metres).
-        fit: Whether to fit base, tool, and the joints' zeros and senses; False uses the table as it is
-            written.
+        fit: Whether to fit base, tool, and the zeros and senses of the joints. With False, the table is
+            compared as it is written.
         digits: Precision of each cell in the table's file (`urdfkin.dh.rows.last_digits`).
 
     Returns:
-        The comparison, with the cells that differ, or the likely mistakes.
+        The comparison. It contains the cells that differ, or the likely mistakes.
 
     Raises:
         InputError: the joints of the table differ in number or kind from those of the path.
@@ -129,8 +131,8 @@ def compare(
 def best_fit(chain: FrameChain, reference: DHTable, enough: float) -> tuple[float, float]:
     """Return the largest tip error on samples (metres, radians) after a fast fit of base, tool and offsets.
 
-    To be fast, the fit tries only a few sign patterns, and no opposite rotations about nearly coinciding
-    axes.
+    To be fast, the fit tries only a few patterns of joint senses and x directions. It also tries no opposite
+    rotations about nearly coinciding axes.
 
     Args:
         chain: The path.
@@ -184,14 +186,14 @@ def check_joints(chain: FrameChain, reference: DHTable) -> None:
 
 
 def _target_poses(chain: FrameChain) -> tuple[TargetPoses, TargetPoses]:
-    """Return the samples of a fit, and the samples of its check."""
+    """Return the samples for a fit, and the samples for the check of the fit."""
     values, poses = _samples(chain, FIT_SAMPLES, _FIT_SEED)
     scale = _reach(chain, poses)
     return TargetPoses(values, poses, scale), TargetPoses(*_samples(chain, CHECK_SAMPLES, _CHECK_SEED), scale)
 
 
 def _samples(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray, FloatArray]:
-    """Return values of all joints (count, n) without mimic rules, and the tip's poses at these values."""
+    """Return random joint values (count, n), and the tip's poses at these values; mimic rules are ignored."""
     slides = _slides(chain)
     ranges = [slides.get(joint.name, (-math.pi, math.pi)) for joint in chain.joints]
     values = values_within(ranges, count, seed)
@@ -224,7 +226,9 @@ def _absorbed_offset(written: FloatArray, fitted: FloatArray) -> AbsorbedOffset:
 
 
 def _cell_at(reference: DHTable, i: int, cell: str) -> int:
-    """Return the index of the reference's row with a cell of standard row i; the row count if there is none.
+    """Return the index of the reference's row that contains a cell of row i of the standard table.
+
+    The result is the number of rows if no row contains the cell.
 
     In a modified table a, alpha and beta of standard row i are in the next row.
     """
@@ -238,7 +242,7 @@ def _cells_of(reference: DHTable) -> FloatArray:
 
 
 def _hidden(reference: DHTable, fitted: Model, judged: TargetPoses) -> tuple[tuple[int, str], ...]:
-    """Return the cells that base, tool and offsets can replace, except a beta of zero."""
+    """Return the cells that base, tool and joint offsets can replace; a beta of 0 is left out."""
     found = [
         (_cell_at(reference, i, CELLS[k]), CELLS[k])
         for i, k in hidden_cells(fitted, judged)
@@ -256,7 +260,7 @@ def _differences(
     digits: Digits,
     free: bool,
 ) -> tuple[CellDifference, ...]:
-    """Return the cells that changed by more than rounding, in descending order of their effect at the tip."""
+    """Return the cells that the fit changed by more than rounding, in descending order of effect on the tip."""
     twists, scale = columns(fitted, judged)[2], judged.scale
     linear = np.linalg.norm(twists.reshape(len(judged.values), 6, -1)[:, :3], axis=1).max(axis=0)
     found = []
@@ -283,7 +287,10 @@ def _instead(
     wanted: tuple[TargetPoses, TargetPoses],
     digits: Digits,
 ) -> tuple[CellDifference, ...]:
-    """Return the cells that would have to change without a fit, if these changes explain the difference."""
+    """Return the cells that must change if base, tool and offsets stay as written.
+
+    The result is empty if these changes of cells do not explain the difference.
+    """
     tried, judged = wanted
     complete = fit_cells(written, tried, _cells_of(reference), free=False)
     metres, radians = judged.apart(complete)
@@ -294,7 +301,7 @@ def _instead(
 
 
 def _fitted_table(chain: FrameChain, standard: DHTable, fitted: Model) -> DHTable:
-    """Return the fitted reference with the URDF's joints."""
+    """Return the fitted reference table, with the joint names and limits of the URDF."""
     rows = []
     for i, (row, joint) in enumerate(zip(standard.rows, chain.joints, strict=True)):
         rows.append(
@@ -317,11 +324,12 @@ def _fitted_table(chain: FrameChain, standard: DHTable, fitted: Model) -> DHTabl
 def max_tip_error_bound(
     path: FrameChain, table: DHTable, slides: Mapping[str, tuple[float, float]]
 ) -> tuple[float, float]:
-    """Return a bound of the tip error of a table (metres, radians), without rounding.
+    """Return a bound of a table's tip error (metres, radians), without the errors of rounding.
 
     Args:
         path: The path; its mimic rules are ignored.
-        table: The table. Its variables are the path's coordinates, and its rows contain the senses and zeros.
+        table: The table. Its variables are the path's joint values, and its rows contain the joint senses and
+            zeros.
         slides: Ranges of the prismatic joints (metres).
     """
     mechanisms = Mechanism(_free(path, table, slides)), Mechanism(free_tree(table))
