@@ -350,7 +350,7 @@ class Conversion:
         return tuple(self._v_names)
 
     def layout(self, what: str) -> CoordinateLayout:
-        """Return the names and units of the tool's "q", "v" or "a", which are needed to parse values by name."""
+        """Return the names and units of the tool's "q", "v" or "a", with which values are parsed by name."""
         if what != "q":
             rest = {"neutral": np.zeros(self.nv)}
             return CoordinateLayout(what, self.rate_names, tuple(self._v_units), poses=lambda: rest)
@@ -862,7 +862,7 @@ def _with(array: FloatArray, where: slice, part: FloatArray) -> FloatArray:
 
 
 def _for_frames(M: FloatArray, ndim: int) -> FloatArray:
-    """Return matrices (..., k, l), with one more axis before the last two for a Jacobian of several frames."""
+    """Return matrices (..., k, l), with an additional axis before k for a Jacobian of several frames."""
     return M[..., np.newaxis, :, :] if M.ndim > 2 and ndim == M.ndim + 1 else M
 
 

@@ -129,7 +129,7 @@ class ConventionRobot:
     def _call(
         self, method: Callable[..., FloatArray], given: tuple[Any, ...], *more: Any, **options: Any
     ) -> tuple[tuple[FloatArray, ...], FloatArray]:
-        """Return the tool's inputs in urdfkin's convention, and the result of a `Robot` method for these inputs."""
+        """Convert the tool's inputs, and return them with the result of a `Robot` method for these inputs."""
         read: list[ArrayLike] = [
             self.conversion.layout(letter).read(x) if isinstance(x, str | dict) else x
             for letter, x in zip("qva", given, strict=False)

@@ -67,7 +67,9 @@ class NearParallel(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """The numbers of a step between two joint axes: phi, delta, a, alpha, beta, phi_next, delta_next (m, rad).
+    """The seven numbers of a step between two joint axes, in metres and radians.
+
+    They are phi, delta, a, alpha, beta, phi_next and delta_next of the formula in the module's docstring.
 
     Attributes:
         free: Whether `phi` was a free choice because the axes coincide.
@@ -219,7 +221,7 @@ def cleaned_length(length: float, reach: float, noise: float = 0.0) -> float:
 
 
 def cleaned_angle(angle: float) -> float:
-    """Return the angle in (-pi, pi]; an angle within rounding of a multiple of pi/12 becomes that multiple."""
+    """Return the angle in (-pi, pi], rounded to a multiple of pi/12 if it is within rounding error of one."""
     angle = wrapped(angle)
     twelfth = nearest_twelfth(angle)
     return wrapped(twelfth) + 0.0 if abs(angle - twelfth) <= ANGLE * EPS else angle
@@ -294,7 +296,7 @@ class PairLike:
         return cut if abs(cut) <= self.reach else None
 
     def step(self, carry: float, d: float, phi_free: float = 0.0) -> Step:
-        """Return the step of the pair of axes, if the first row begins at the offset `carry` before the joint.
+        """Return the step of the pair if the first row begins at the offset `carry` before the first joint.
 
         If the row does not determine d, the step uses the argument `d`.
         """

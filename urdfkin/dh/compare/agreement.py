@@ -260,7 +260,7 @@ def _differences(
     digits: Digits,
     free: bool,
 ) -> tuple[CellDifference, ...]:
-    """Return the cells that the fit changed by more than rounding, in descending order of effect on the tip."""
+    """Return the cells that the fit changed by more than rounding; those with the largest effect first."""
     twists, scale = columns(fitted, judged)[2], judged.scale
     linear = np.linalg.norm(twists.reshape(len(judged.values), 6, -1)[:, :3], axis=1).max(axis=0)
     found = []

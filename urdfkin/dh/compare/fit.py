@@ -1,22 +1,24 @@
 """Fit a reference table to the URDF: first its free parameters, then as few cells as possible.
 
-The tip's error at each sampled configuration is a twist. A change of any number of the table also moves the
-tip by a twist: a rotation about a line or a translation along one. The Gauss-Newton method finds the changes
-that remove the error. Base, tool and joint offsets are the free parameters. They are eliminated first and
-absorb as much error as possible. Changes of cells absorb the remaining error. If several cells can absorb it
-(for example offsets along parallel axes), a reweighted least-norm solution changes as few cells as possible.
+The tip's error at each sampled configuration is a twist. A small change of any number in the table also moves
+the tip by a twist: a rotation about a line or a translation along a line. The Gauss-Newton method finds the
+changes that remove the error. Base, tool and joint offsets are the free parameters. They are fitted first and
+absorb as much error as possible. Changes of cells absorb the remaining error. Sometimes several cells can
+absorb the same error, for example offsets along parallel axes. A reweighted least-norm solution then changes
+as few cells as possible.
 
 **Free parameters.** `fit_freedoms` fits base, tool and joint offsets, with the cells unchanged. The method is
 damped least squares (`urdfkin.kinematics.least_squares`) on the tip's twists. Two joints with nearly
-coinciding axes have nearly the same effect. Opposite changes of the two offsets therefore change the error
-only slowly, by at most the distance of the axes. To make long steps in this case, the damping decreases while
-steps succeed. At the end of a descent, opposite rotations of such pairs are tried as new starts.
+coinciding axes have nearly the same effect. If one offset increases and the other decreases by the same
+angle, the tip moves by at most the angle times the distance of the axes. Such changes therefore change the
+error only slowly. To make long steps possible, the damping decreases while steps succeed. At the end of a
+descent, the fit starts again with opposite rotations of such pairs of offsets.
 
 **Signs.** `align` finds the senses and the directions of x with which a reference table fits the URDF. The
 author of a table has three choices that do not change the robot: the sense of a joint, the direction of x
-along a common normal, and the zero of theta. The first two choices are signs, and they determine the offsets
-of theta. A beam search extends sign patterns joint by joint. It keeps the patterns with the cells closest to
-the reference.
+along a common normal, and the zero of theta. The first two choices are signs, and they determine the zeros of
+theta. A beam search extends sign patterns joint by joint. It keeps the patterns that give cells closest to
+those of the reference table.
 """
 
 from __future__ import annotations
@@ -38,30 +40,33 @@ from urdfkin.model.path import Motion, Path
 from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray
 
-#: Names of the cells in the order of their transforms, and the transforms.
+#: Names of the cells in the order of their transforms in a row. `_ROW` contains these transforms.
 CELLS = ("theta", "d", "a", "alpha", "beta")
 _ROW = (Motion(2, True), Motion(2, False), Motion(0, False), Motion(0, True), Motion(1, True))
-#: Largest step: radians, and metres per metre of reach.
+#: Largest step of the fit, in radians for angles, and in metres per metre of reach for lengths.
 LONGEST_STEP = 0.5
-#: Largest number of steps, smallest relative improvement of a step, and mean error that counts as zero.
+#: Limits of the fit of cells: the largest number of steps, the smallest relative improvement after which the
+#: fit continues, and the mean error that counts as zero.
 _ROUNDS, _BETTER, _SOLVED = 40, 1e-9, 1e-14
-#: Relative sizes below which a singular value counts as zero, for free parameters and for cells.
+#: A singular value counts as zero if it is below this fraction of the largest singular value: `_FREE` for
+#: free parameters, `_CELLS` for cells.
 _FREE, _CELLS = 1e-8, 1e-9
-#: Number of iterations of the sparse solution, and the smallest weight relative to the reach.
+#: Number of iterations of the sparse solution, and the smallest weight of a cell relative to the reach.
 _SPARSER, _STAYS = 25, 1e-9
-#: Weight of the last cell relative to the first, so that the weights decide between two cells of equal
-#: effect.
+#: Weight of the last cell relative to the first cell. Because of different weights, the solution changes only
+#: one of two cells with the same effect.
 _LAST_WINS = 1.2
-#: First weight of beta, and factor on this weight in each iteration. Thus beta changes only if alpha does not
-#: suffice.
+#: Initial weight of beta, and the factor by which each iteration multiplies this weight. Small weights make
+#: changes of beta expensive, so beta changes only if a change of alpha is not enough.
 _BETA, _BETA_AGAIN = 0.3, 0.5
-#: If free parameters leave at most this fraction of a cell's effect, they can replace the cell.
+#: Free parameters can compensate for a change of some cells. If at most this fraction of the cell's effect
+#: remains, the free parameters can replace the cell.
 _HIDDEN = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """A standard table as numbers to fit.
+    """The numbers of a standard table, as arrays for a fit.
 
     Attributes:
         cells: (n, 5) theta, d, a, alpha, beta of each row.
@@ -79,7 +84,7 @@ class Model:
 
     @property
     def first(self) -> FloatArray:
-        """(4, 4) pose of the first revolute joint's frame relative to `base`, with all joints at zero."""
+        """(4, 4) pose of the first revolute joint's frame relative to frame 0, with all joints at zero."""
         turning = np.flatnonzero(self.turns)
         end = len(CELLS) * int(turning[0]) if turning.size else 0
         return Path((np.eye(4), *self._motions[:end])).poses(self.cells.ravel()[:end])
@@ -92,7 +97,7 @@ class Model:
         return Path((*self._motions[begin:], self.tool)).poses(self.cells.ravel()[begin:])
 
     def own(self, i: int) -> int:
-        """Return the index of the cell with the joint's variable in row i."""
+        """Return the index of the cell of row i that contains the joint's variable: theta or d."""
         return 0 if self.turns[i] else 1
 
     @property
@@ -100,7 +105,7 @@ class Model:
         return _ROW * len(self.cells)
 
     def path_at(self, values: FloatArray) -> tuple[Path, FloatArray]:
-        """Return the path from base to tip, and the amounts (s, 5 n) of its motions at joint values (s, n).
+        """Return the path from base to tip, and the values (s, 5 n) of its motions at joint values (s, n).
 
         Each cell of the table is one motion.
         """
@@ -117,11 +122,11 @@ class Model:
 
 @dataclass(frozen=True, slots=True)
 class TargetPoses:
-    """The target poses of a model's tip.
+    """The target poses of the tip: the poses of the URDF's tip that the table should have.
 
     Attributes:
         values: (s, n) the URDF's joint values.
-        poses: (s, 4, 4) poses of its tip at these values.
+        poses: (s, 4, 4) poses of the URDF's tip at these values.
         scale: Length that converts radians to metres.
     """
 
@@ -130,19 +135,24 @@ class TargetPoses:
     scale: float
 
     def apart(self, model: Model) -> tuple[float, float]:
-        """Return the largest tip errors of a model on the samples (metres, radians)."""
+        """Return the largest errors of a model's tip on the samples, in metres and in radians."""
         poses = model.poses(self.values)
         metres = np.linalg.norm(poses[:, :3, 3] - self.poses[:, :3, 3], axis=-1).max()
         return float(metres), float(rotation_angle(poses[:, :3, :3], self.poses[:, :3, :3]).max())
 
     def errors(self, poses: FloatArray) -> FloatArray:
-        """Return the (6 s,) twists from a model's poses to the target poses; angles are times `scale`."""
+        """Return the twists (6 s,) from a model's poses to the target poses.
+
+        The angular parts of the twists are multiplied by `scale`.
+        """
         turn = log_rotation(self.poses[:, :3, :3] @ np.swapaxes(poses[:, :3, :3], -1, -2))
         return np.concatenate([self.poses[:, :3, 3] - poses[:, :3, 3], self.scale * turn], axis=-1).ravel()
 
 
 def columns(model: Model, wanted: TargetPoses) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the tip's poses, and the twists (6 s, parameters) by free parameters and by cells.
+    """Return the tip's poses, the twists (6 s, parameters) of free parameters, and the twists of cells.
+
+    A twist is the derivative of the tip's poses with respect to a parameter.
 
     The free parameters are six numbers of the base, six of the tool, and the variable of each row. The cells
     are in the order of the array (n, 5). Angles are multiplied by the scale.
@@ -150,7 +160,8 @@ def columns(model: Model, wanted: TargetPoses) -> tuple[FloatArray, FloatArray, 
     scale = wanted.scale
     path, amounts = model.path_at(wanted.values)
     poses, twists = path.columns(amounts)
-    # Angular cells are multiplied by `scale` and are then in metres, like the angular part of a twist.
+    # Changes of angles are multiplied by `scale` and are then in metres. The same is true of the angular part
+    # of a twist.
     n, turning = len(model.cells), np.tile([motion.turns for motion in _ROW], len(model.cells))
     twists = twists * np.where(turning, 1.0 / scale, 1.0)
     twists[:, 3:] *= scale
@@ -162,7 +173,7 @@ def columns(model: Model, wanted: TargetPoses) -> tuple[FloatArray, FloatArray, 
 
 
 def _end(poses: FloatArray, at: FloatArray, scale: float) -> FloatArray:
-    """Return the (6 s, 6) twists of translations and rotations of the chain after a frame."""
+    """Return the tip's twists (6 s, 6) if everything after a frame is translated or rotated."""
     arm = poses[:, :3, 3] - at[:, :3, 3]
     out = np.zeros((len(poses), 6, 6))
     for k in range(3):
@@ -180,7 +191,7 @@ def fit_cells(model: Model, wanted: TargetPoses, cells_of: FloatArray, *, free: 
         model: The table.
         wanted: Target poses from the URDF.
         cells_of: (n, 5) mask: 1 for cells that may change, else 0.
-        free: Whether base, tool and offsets may change too.
+        free: Whether base, tool and joint offsets may change too.
     """
     start, best, best_size, scale = model, model, np.inf, wanted.scale
     for _ in range(_ROUNDS):
@@ -194,8 +205,8 @@ def fit_cells(model: Model, wanted: TargetPoses, cells_of: FloatArray, *, free: 
         cells = cells * cells_of.ravel()
         freedoms = freedoms if free else np.zeros_like(freedoms)
         change = _sparse(model, start, freedoms, cells, error, scale)
-        # For nearly coinciding axes, opposite offsets have almost no effect. The argument rcond removes these
-        # offsets.
+        # For two nearly coinciding axes, opposite changes of the two offsets have almost no effect. The
+        # argument rcond removes these changes.
         offsets = np.linalg.lstsq(freedoms, error - cells @ change, rcond=_FREE)[0]
         shorten = min(1.0, LONGEST_STEP * scale / max(float(np.abs(offsets).max()), NOT_ZERO))
         model = moved(model, np.asarray(offsets * shorten, np.float64), scale, change * shorten)
@@ -207,13 +218,14 @@ def _sparse(
 ) -> FloatArray:
     """Return the changes of cells that remove the error left by the free parameters.
 
-    The total change since `start` has as few non-zero entries as possible.
+    As few cells as possible differ from those of `start` after these changes.
     """
     Q = _span(freedoms)
     cells_left = cells - Q @ (Q.T @ cells)
     in_metres = np.array([scale, 1.0, 1.0, scale, scale])
     so_far = ((model.cells - start.cells) * in_metres).ravel()
-    # The free parameters include each row's own variable, so a cell with the same effect stays zero.
+    # The free parameters include the joint offset of each row. The change of a cell with the same effect
+    # therefore stays zero.
     target = error - Q @ (Q.T @ error) + cells_left @ so_far
     total = np.zeros(cells.shape[1])
     weights = np.linspace(1.0, _LAST_WINS, cells.shape[1])
@@ -228,12 +240,15 @@ def _sparse(
 
 
 def _span(freedoms: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of the free parameters' twists, with no column if there are none."""
+    """Return an orthonormal basis of the free parameters' twists; without twists it has no columns."""
     return np.linalg.qr(freedoms)[0] if freedoms.any() else np.zeros((len(freedoms), 0))
 
 
 def hidden_cells(model: Model, wanted: TargetPoses) -> list[tuple[int, int]]:
-    """Return (row, cell index) of the cells that free parameters can replace, up to 1e-6 of the effect."""
+    """Return (row, cell index) of the cells that free parameters can replace.
+
+    At most 1e-6 of the effect of such a cell remains.
+    """
     _, freedoms, cells = columns(model, wanted)
     Q = _span(freedoms)
     left = np.linalg.norm(cells - Q @ (Q.T @ cells), axis=0)
@@ -242,40 +257,46 @@ def hidden_cells(model: Model, wanted: TargetPoses) -> list[tuple[int, int]]:
 
 
 def moved(model: Model, free: FloatArray, scale: float, change: FloatArray | None = None) -> Model:
-    """Return the model after small changes of its free parameters and cells, all in metres."""
+    """Return the model after small changes of its free parameters and cells.
+
+    All changes are in metres: changes of angles are multiplied by `scale`.
+    """
     per_cell = np.array([1.0 / scale, 1.0, 1.0, 1.0 / scale, 1.0 / scale])
     cells = model.cells.copy() if change is None else model.cells + change.reshape(-1, 5) * per_cell
     for i, own in enumerate(free[12:]):
         k = model.own(i)
         cells[i, k] += own * per_cell[k]
     # The base is changed in the frame of the first revolute joint, and the tool in the frame of the last one.
-    # A rotation that can be moved from the base or tool to this joint is then exact, not only to first order.
+    # A rotation of the base or the tool may have the same effect as a joint offset. The two are then exactly
+    # equal, not only to first order.
     base = _apply_twist(model.base @ model.first, free[:6], scale) @ np.linalg.inv(model.first)
     tool = np.linalg.inv(model.last) @ _apply_twist(np.eye(4), free[6:12], scale) @ model.last
     return replace(model, cells=cells, base=np.asarray(base), tool=np.asarray(model.tool @ tool))
 
 
 def _apply_twist(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:
-    """Return T after a small translation and rotation, expressed in the axes of T."""
+    """Return the pose T after a small translation and rotation, which are expressed in the frame of T."""
     return T @ pose(exp_rotation(twist[3:] / scale), twist[:3])
 
 
-#: A descent ends after this many slow steps.
+#: A descent ends after this number of steps with little improvement.
 _PATIENCE = 4
-#: Mean error at which a fit ends, relative to the reach.
+#: A fit ends at this mean error, relative to the reach.
 _ROUNDING = 1e-13
-#: Numbers of sign patterns that a fast fit fits, and that its search keeps at each joint.
+#: Number of sign patterns that a fast fit tries, and number of patterns that its search keeps at each joint.
 HASTY = (3, 16)
-#: Tip error that counts as rounding, relative to the reach; the search ends there.
+#: Tip error that counts as rounding, relative to the reach. The search ends when the error is this small.
 _AT_ROUNDING = 1e-12
-#: Another sign pattern replaces the written pattern if it leaves less than this fraction of the tip error.
+#: The fit uses another sign pattern than the written one only if the tip error is then less than this
+#: fraction of the error with the written pattern.
 _TWICE_AS_GOOD = 0.5
-#: Rotations (rad) that are tried: each is added to one offset, and undone in the next offset.
+#: Rotations (rad) that are tried for two consecutive joint offsets. Each is added to the first offset and
+#: subtracted from the second.
 _TURNS = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
 
 
 def as_written(standard: DHTable) -> Model:
-    """Return the table as it is written; its variables are the URDF's coordinates."""
+    """Return the table as it is written, with the URDF's joint values as its variables."""
     return Model(
         np.array([(row.theta, row.d, row.a, row.alpha, row.beta) for row in standard.rows]),
         np.array([float(row.kind.turns) for row in standard.rows]),
@@ -294,9 +315,9 @@ def fitted_model(
     *,
     hasty: bool = False,
 ) -> Model:
-    """Return the best fit, from the table as it is written and from the likely sign patterns.
+    """Return the best of several fits, which start from the written table and from likely sign patterns.
 
-    The written signs have priority: another pattern must halve the error.
+    The signs of the written table have priority: another pattern is used only if it halves the error.
     """
 
     def size(model: Model) -> float:
@@ -307,8 +328,8 @@ def fitted_model(
         return written
     best, best_size = written, size(written)
     for start in starts(chain, standard, written, *(HASTY if hasty else ())):
-        # Least squares minimize the sum of squares, but the worst sample decides. At that sample the start
-        # may be better than the fit.
+        # Least squares minimize the sum over all samples, but models are compared by their worst sample. By
+        # this measure the start may be better than the fit.
         model = min(fit_freedoms(start, wanted, turns=not hasty), start, key=size)
         needed = 1.0 if start is written else _TWICE_AS_GOOD
         if (its_size := size(model)) < needed * best_size:
@@ -319,7 +340,7 @@ def fitted_model(
 
 
 def ends_gathered(model: Model, written: Model) -> Model:
-    """Move the first joint's offset into the base and the last joint's offset into the tool."""
+    """Move the fitted offset of the first joint into the base, and that of the last joint into the tool."""
     cells, n = model.cells.copy(), len(model.cells)
     _, _, a, alpha, beta = cells[-1]
     step = between_axes(a, alpha, beta)
@@ -337,7 +358,7 @@ def ends_gathered(model: Model, written: Model) -> Model:
 
 
 def starts(chain: FrameChain, standard: DHTable, written: Model, *effort: int) -> Iterator[Model]:
-    """Yield the starts of fits: the table as it is written, then each likely sign pattern."""
+    """Yield the models from which fits start: the table as it is written, then each likely sign pattern."""
     yield written
     for aligned in align(chain, replace(standard, base=np.eye(4), tool=np.eye(4)), *effort):
         yield _start(standard, aligned)
@@ -362,7 +383,7 @@ def fit_freedoms(model: Model, wanted: TargetPoses, *, turns: bool, ends: bool =
     Args:
         model: The start.
         wanted: Target poses from the URDF.
-        turns: Whether to try opposite rotations of consecutive offsets at the end of a descent.
+        turns: Whether to try opposite rotations of two consecutive offsets at the end of a descent.
         ends: Whether to fit only base and tool.
     """
     for _ in range(2 * len(model.cells)):
@@ -408,16 +429,18 @@ def _opposite_rotations(model: Model) -> list[Model]:
     return found
 
 
-#: Numbers of sign patterns that `align` returns, and that it keeps at each joint.
+#: Number of sign patterns that `align` returns, and number of patterns that it keeps at each joint.
 PATTERNS, BEAM = 12, 128
-#: Cost of each reversed joint (metres), so that the pattern with the URDF's senses wins among equal fits.
+#: Cost of each reversed joint (metres). Among equally good patterns, this cost selects the pattern with the
+#: URDF's senses.
 REVERSAL = 1e-9
 #: Weight of a difference in a cell next to a prismatic axis. The line of this axis is free, so such a
 #: difference decides only between otherwise equal patterns.
 _SLIDING = 1e-3
-#: Axes with a smaller distance (metres) count as coinciding, and leave x free.
+#: Parallel axes with a smaller distance (metres) count as coinciding. The direction of x is then free.
 _NO_OFFSET = 1e-5
-#: Number of decimals (metres and radians) to which patterns are compared.
+#: Patterns count as equal if their numbers (metres and radians) agree after rounding to this number of
+#: decimals.
 _ALIKE = 6
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -425,14 +448,16 @@ _HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])
 
 @dataclass(frozen=True, slots=True)
 class Alignment:
-    """A sign pattern and its frames.
+    """A pattern of joint senses, with the joint offsets, the base and the tool that belong to it.
 
     Attributes:
-        senses: +1 or -1 for each joint: the reference's variable relative to the URDF's coordinate.
+        senses: +1 or -1 for each joint. With -1, the reference's variable decreases if the URDF's joint value
+            increases.
         offsets: Offset of each joint at q = 0, to add to the reference's theta (d of a prismatic joint).
         base: (4, 4) pose of the reference's frame 0 in the URDF's base.
         tool: (4, 4) pose of the URDF's tip in the reference's last frame.
-        cost: Sum of the cells' differences, with angles times the reach (metres).
+        cost: Sum of the differences between the cells of the two tables, in metres. Differences of angles are
+            multiplied by the reach.
     """
 
     senses: tuple[int, ...]
@@ -444,7 +469,7 @@ class Alignment:
 
 @dataclass(frozen=True, slots=True)
 class _Partial:
-    """An alignment of the chain up to one joint.
+    """An alignment of the first part of the chain, up to one joint.
 
     Attributes:
         cost: Sum of the differences so far (metres).
@@ -452,10 +477,10 @@ class _Partial:
         offsets: Offsets of the joints before this one.
         phi_in: Rotation from this joint's DH frame to its URDF frame (rad).
         carry: Offset from this joint's DH frame to its URDF frame (metres).
-        base: (4, 4) contribution of the first row's offset to the base.
-        absorber: The row with a free offset (the offset of row 0 is in the base), and the sign of its effect
-            on x. There is such a row if the axes before the joint coincide, because then only the sum of
-            their angles is defined.
+        base: (4, 4) part of the base that comes from the first row's offset.
+        absorber: The row with a free offset, and the sign of this offset's effect on x. There is such a row
+            if the axes before the joint coincide. Then only the sum of their angles is defined. The offset of
+            row 0 is in the base.
     """
 
     cost: float
@@ -484,8 +509,8 @@ def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: in
             for extended in _extend(partial, chain, reference, i, sense, reach)
         ]
         partials = _without_equivalents(sorted(longer, key=lambda partial: partial.cost))[:beam]
-    # If axes nearly coincide, many directions of x are nearly equivalent. A fit can reach one direction from
-    # another.
+    # If axes nearly coincide, many directions of x are nearly equivalent. A fit that starts from one of these
+    # directions can reach the others, so one pattern for each set of senses is enough.
     by_senses: dict[tuple[int, ...], _Partial] = {}
     for partial in partials:
         by_senses.setdefault(partial.senses, partial)
@@ -498,10 +523,13 @@ def _first(sense: int) -> _Partial:
 
 
 def _without_equivalents(partials: list[_Partial]) -> list[_Partial]:
-    """Keep the first of several equivalent candidates; coinciding axes lead to many equivalent candidates."""
+    """Keep only the first of several equivalent candidates.
+
+    Coinciding axes lead to many equivalent candidates.
+    """
     found: dict[tuple[object, ...], _Partial] = {}
     for one in partials:
-        # With a free offset before the joint, both directions of x are equivalent.
+        # If a row before the joint has a free offset, both directions of x are equivalent.
         circle = math.pi if one.absorber else 2.0 * math.pi
         ahead = round(one.phi_in % circle, _ALIKE), round(one.carry, _ALIKE)
         found.setdefault((one.senses, one.absorber, *ahead), one)
@@ -509,7 +537,7 @@ def _without_equivalents(partials: list[_Partial]) -> list[_Partial]:
 
 
 def _pose(chain: FrameChain, k: int, before: int, after: int) -> FloatArray:
-    """Return the constant A_k with the z axis of a neighbouring joint reversed if its sense is -1."""
+    """Return the constant pose A_k, with the z axis reversed of each neighbouring joint that has sense -1."""
     A = chain.constants[k]
     A = _HALF_TURN @ A if before < 0 else A
     return np.array(A @ _HALF_TURN if after < 0 else A)
@@ -562,7 +590,10 @@ def _absorber(partial: _Partial, step: Step, i: int, turns: bool) -> tuple[int, 
 
 
 def _absorb(partial: _Partial, step: Step, theta: float) -> _Partial:
-    """Give a prismatic joint the table's theta, if a free offset before it can absorb the difference."""
+    """Set theta of a prismatic joint to the table's theta.
+
+    This is possible only if a free offset before the joint can absorb the difference.
+    """
     if partial.absorber is None:
         return partial
     excess = partial.phi_in + step.phi - theta
@@ -578,12 +609,13 @@ def _absorb(partial: _Partial, step: Step, theta: float) -> _Partial:
 def _steps(
     A: FloatArray, row: DHRow, delta: float, reach: float, phi_free: float, placed: bool
 ) -> Iterator[Step]:
-    """Yield the possible steps of a pair of axes, each with both directions of x.
+    """Yield the possible steps between two axes, each with both directions of x.
 
-    If the axes are nearly parallel in the URDF and in the reference, a Hayati step at the reference's d is
-    also tried. In this step x is free if the distance of the axes is nearly zero, or if an axis is prismatic
-    and has no fixed line (not `placed`). For prismatic axes, a step along the common normal is also tried,
-    because the direction of the normal does not depend on the line.
+    If the axes are nearly parallel in the URDF and in the reference table, a Hayati step at the d of the
+    reference table is also tried. In this step x is free if the distance of the axes is nearly zero. x is
+    also free if a joint is prismatic, because its axis has no fixed line; `placed` is then False. For
+    prismatic axes, a step along the common normal is also tried, because the direction of the normal does not
+    depend on the line.
     """
     steps = []
     sine = math.hypot(A[0, 2], A[1, 2])
@@ -605,7 +637,7 @@ def _steps(
 
 
 def _close_chain(best: _Partial, chain: FrameChain, reference: DHTable) -> Alignment:
-    """Return the complete alignment, with the base and tool that close the chain."""
+    """Complete an alignment with the base and the tool, so that the chain leads from base to tip."""
     n = len(reference.rows)
     last = reference.rows[-1]
     start = _pose(chain, 0, 1, best.senses[0]) @ best.base

@@ -1,9 +1,9 @@
 """Find a single mistake in a table: a wrong sign, an extra right angle, or rows in the wrong order.
 
-A fit of base, tool, zeros and senses absorbs most wrong signs, so a table with a wrong sign agrees after the
-fit. The corrected table agrees with fewer fitted parameters, usually with none. `Search` therefore tries each
-single change of the table. The likely mistakes are the changes after which the fewest parameters must be
-fitted.
+A fit of base, tool, zeros and senses absorbs most wrong signs. A table with a wrong sign therefore agrees
+with the URDF after the fit. The corrected table agrees with fewer fitted parameters, usually with none.
+`Search` therefore tries each single change of the table. The likely mistakes are the changes after which the
+fewest parameters must be fitted.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ from urdfkin.model.chain import FrameChain
 from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray
 
-#: Angles with a smaller difference (rad) are equal.
+#: Two angles with a smaller difference (rad) count as equal.
 _SAME_ANGLE = 1e-9
-#: Zeros and senses are fitted after a change only if there are at most this many changes (as in a table of
-#: nine rows).
+#: Largest number of possible changes for which zeros and senses are fitted after each change. A table of nine
+#: rows has about this number of possible changes.
 _MOST_FITS = 100
 
 
 @dataclass(frozen=True, slots=True)
 class _Change:
-    """A table after one correction; `cell` is None if the correction exchanges rows."""
+    """A table in which one possible mistake is corrected; `cell` is None if the correction exchanges rows."""
 
     kind: MistakeKind
     rows: tuple[int, ...]
@@ -46,12 +46,12 @@ class _Change:
 
 @dataclass(frozen=True, slots=True)
 class Search:
-    """A search for single mistakes in a table of a path.
+    """A search for a single mistake in the table of a path.
 
     Attributes:
         chain: The path.
-        tried: Samples of the fits.
-        judged: Samples of the checks.
+        tried: Samples of the path's tip poses, used in the fits.
+        judged: Other samples of the path's tip poses, used to check the fits.
         tolerance: Tolerance at the tip (metres).
     """
 
@@ -61,11 +61,13 @@ class Search:
     tolerance: float
 
     def mistakes(self, reference: DHTable, *, fit: bool, agrees: bool) -> tuple[Mistake, ...]:
-        """Return the changes after which the fewest parameters must be fitted; none if no change is better.
+        """Return the changes of the table after which the fewest parameters must be fitted.
 
-        A table that agrees after a fit of base, tool and zeros has different frames, or a mistake. The fit
-        cannot distinguish these two cases. A change of such a table is a likely mistake only if at most one
-        end (base or tool) must be fitted after it.
+        The result is empty if no change reduces the number of these parameters.
+
+        A table that agrees only after a fit of base, tool and zeros has other frames than the URDF, or it has
+        a mistake. The fit cannot distinguish these two cases. A change of such a table is a likely mistake
+        only if, after this change, only the base or only the tool must be fitted, or neither.
 
         Args:
             reference: The table.
@@ -94,7 +96,7 @@ class Search:
         return ()
 
     def _needs_one_thing(self, table: DHTable) -> bool:
-        """Whether a table agrees after a fit of one end, one zero or one sense."""
+        """Whether a table agrees after a fit of a single parameter: the base, the tool, one zero or one sense."""
         if self._with_one_end(table) is not None:
             return True
         model = self._with_zeros(table)
@@ -111,7 +113,10 @@ class Search:
         return model if self._agrees(model) else None
 
     def _with_one_end(self, table: DHTable) -> Model | None:
-        """Fit only the tool, or else only the base; return None if the table agrees with neither."""
+        """Fit only the tool or, if the table then does not agree, only the base.
+
+        The result is None if the table agrees after neither of these fits.
+        """
         model = _model(table)
         poses, wanted = model.poses(self.tried.values), self.tried.poses
         tool = replace(model, tool=_mean(model.tool @ np.linalg.inv(poses) @ wanted))
@@ -130,7 +135,7 @@ class Search:
         return found if self._agrees(found) else None
 
     def _with_zeros(self, table: DHTable) -> Model | None:
-        """Fit base, tool, zeros and senses; return the fit that changes the fewest of them."""
+        """Fit base, tool, zeros and senses; return the fit that changes the fewest of these parameters."""
         standard, written = to_convention(table, Convention.STANDARD), _model(table)
         models = [
             ends_gathered(fit_freedoms(start, self.tried, turns=False), written)
@@ -140,7 +145,7 @@ class Search:
         return min(agreeing, key=lambda model: self._fitted(written, model).count, default=None)
 
     def _fitted(self, written: Model, model: Model) -> Fitted:
-        """Return the free parameters that differ from the written ones by more than the fit's resolution."""
+        """Return which free parameters the fit changed by more than its resolution."""
         metres, radians = self.judged.apart(model)
         fine = resolution(metres / self.judged.scale, radians)
         own = [model.own(i) for i in range(len(model.cells))]
@@ -184,7 +189,7 @@ def _changes(reference: DHTable) -> Iterator[_Change]:
             value = math.remainder(row.alpha + turn, 2.0 * math.pi)
             if (
                 abs(math.remainder(value + row.alpha, 2.0 * math.pi)) > _SAME_ANGLE
-            ):  # otherwise the change is a change of sign, which is tried already
+            ):  # otherwise this is a change of sign, which is tried above
                 table = _with_cell(reference, i, "alpha", value)
                 yield _Change(MistakeKind.RIGHT_ANGLE, (i,), "alpha", table)
     orders = list[tuple[MistakeKind, tuple[int, ...], list[DHRow]]]()
@@ -192,7 +197,7 @@ def _changes(reference: DHTable) -> Iterator[_Change]:
         rows = list(reference.rows)
         rows[i], rows[j] = rows[j], rows[i]
         orders.append((MistakeKind.EXCHANGED, (i, j), rows))
-    if len(reference.rows) > 3:  # for three rows, the reversal is an exchange of two rows
+    if len(reference.rows) > 3:  # for three rows, the reversed order is an exchange of two rows
         backwards = list(reversed(reference.rows))
         orders.append((MistakeKind.REVERSED, tuple(range(len(backwards))), backwards))
     for kind, places, rows in orders:

@@ -21,18 +21,21 @@ from urdfkin.kinematics.roundings import EPS, of_a_fit
 
 Parts = list[str | Table | Matrix]
 
-#: If changed cells leave at most this error (metres per metre of reach, rad), they explain the whole
-#: difference. The limit is far above the rounding of a fit and far below the last digit of any data sheet.
+#: If the error that remains after changes of cells is at most this number, these cells explain the whole
+#: difference. The unit is rad for angles, and metres per metre of reach for positions. The limit is far above
+#: the rounding of a fit and far below the last digit of any data sheet.
 EXPLAINED = 1e-9
-#: Finest resolution to which fitted numbers are printed (rad, or relative to the reach).
+#: Finest resolution at which fitted numbers are printed, in rad for angles, and relative to the reach for
+#: lengths.
 _FINEST = 1e-12
-#: Factor on half a digit that allows for the rounding of decimals to doubles.
+#: Half a unit of the last digit is multiplied by this factor, to allow for the rounding of decimal numbers to
+#: doubles.
 _HALF = 1.0 + 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class CellDifference:
-    """One cell that differs from the URDF.
+    """One cell of a published table that differs from the URDF's value.
 
     Attributes:
         row: Index of the row in the reference table, from 0.
@@ -40,9 +43,10 @@ class CellDifference:
         cell: "a", "alpha", "d", "theta" or "beta".
         reference: The table's value (metres or radians).
         urdf: The URDF's value (metres or radians).
-        tip: Displacement of the tip that this difference alone causes, at the worst sample (metres).
-        last_digit: Half a unit of the last digit in the table's file (metres or radians); 0 if the value is
-            exact, or if its text is unknown.
+        tip: Displacement of the tip by this difference alone, at the sample with the largest displacement
+            (metres).
+        last_digit: Half a unit of the value's last digit in the table's file (metres or radians). 0 if the
+            value is exact, or if its text is unknown.
     """
 
     row: int
@@ -55,7 +59,7 @@ class CellDifference:
 
     @property
     def difference(self) -> float:
-        """The URDF's value minus the reference's, metres or radians."""
+        """The URDF's value minus the reference table's value, in metres or radians."""
         return self.urdf - self.reference
 
     @property
@@ -66,7 +70,7 @@ class CellDifference:
 
 @dataclass(frozen=True, slots=True)
 class AbsorbedOffset:
-    """Change of a table's base or tool by the fit, in metres and radians."""
+    """How far the fit moved a table's base or tool, in metres and radians."""
 
     metres: float
     radians: float
@@ -83,12 +87,12 @@ class MistakeKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Fitted:
-    """Count of the free parameters that a fit must change for a table to agree.
+    """Counts of the parameters that a fit must change so that a table agrees with the URDF.
 
     Attributes:
         base: Whether the base changes.
         tool: Whether the tool changes.
-        zeros: Number of joints with another zero.
+        zeros: Number of joints with a different zero.
         reversed: Number of reversed joints.
     """
 
@@ -99,7 +103,7 @@ class Fitted:
 
     @property
     def count(self) -> int:
-        """Number of changes; each end, each zero and each sense counts as one."""
+        """Number of changed parameters: base, tool, each zero and each sense count as one parameter."""
         return self.base + self.tool + self.zeros + self.reversed
 
     def __str__(self) -> str:
@@ -118,9 +122,10 @@ class Mistake:
         rows: Indices of the changed rows, from 0.
         cell: The changed cell; None if rows are exchanged.
         table: The table after the change.
-        fitted: The parameters that still need a fit.
-        metres: Position error of the tip after the change, at the worst sample.
-        radians: Orientation error of the tip after the change, at the worst sample.
+        fitted: The parameters that must still be fitted after the change.
+        metres: Position error of the tip after the change, at the sample with the largest error (metres).
+        radians: Orientation error of the tip after the change, at the sample with the largest error
+            (radians).
     """
 
     kind: MistakeKind
@@ -139,28 +144,30 @@ class Comparison:
     Attributes:
         reference: The table with the URDF's joint names and with fitted base, tool, senses and offsets. Its
             `placement` takes the URDF's coordinates.
-        reach: Reach of the robot (metres): the scale of rounding and of angles.
+        reach: Reach of the robot (metres). Rounding errors are relative to the reach, and angles are
+            multiplied by the reach to compare them with lengths.
         fitted: Whether base, tool, senses and offsets were fitted.
-        senses: Sense of each joint: the table's variable is sense * q + offset.
+        senses: Sense of each joint. The table's variable is sense * q + offset, where q is the URDF's joint
+            value.
         offsets: Offset of each joint (radians or metres).
-        base: Change of the base by the fit.
-        tool: Change of the tool by the fit.
+        base: How far the fit moved the base.
+        tool: How far the fit moved the tool.
         metres: Position error of the fitted table's tip at the worst sample.
         radians: Orientation error of the fitted table's tip at the worst sample.
         most_metres: Proven bound of the fitted table's position error at any joint values, without rounding
             (`urdfkin.dh.compare.agreement`).
-        most_radians: Proven bound of its orientation error.
+        most_radians: Proven bound of the fitted table's orientation error in the same sense.
         written_metres: Position error at the worst sample of the table as it is written.
         written_radians: Orientation error at the worst sample of the table as it is written.
         differences: The cells that differ, in descending order of their effect at the tip. If there is a
             single mistake, this is the cell of the mistake.
-        instead: The cells that would have to change without a fit. Empty if such changes do not explain the
-            difference, or if there are too many such cells.
-        hidden: (row, cell) of each cell that base, tool and offsets can replace; samples cannot determine
-            such a cell.
+        instead: The cells that would have to change without a fit. It is empty if such changes do not explain
+            the difference, or if too many cells would have to change.
+        hidden: (row, cell) of each cell that base, tool and offsets can replace. The value of such a cell
+            cannot be determined from the tip's poses.
         mistakes: Single changes of the table after which the fewest parameters must be fitted.
-        residual: Tip error that remains if the differing cells take the URDF's values (metres). It is
-            rounding if these cells explain the difference.
+        residual: Tip error (metres) that remains if the differing cells take the URDF's values. If these
+            cells explain the whole difference, only rounding errors remain.
         tolerance: Tolerance at the tip (metres).
         samples: Number of configurations in the check.
     """
@@ -188,35 +195,38 @@ class Comparison:
 
     @property
     def agrees(self) -> bool:
-        """Whether the position error and the orientation error times the reach are within `tolerance`.
+        """Whether the table agrees with the URDF on all samples.
 
-        This is tested on all samples.
+        The table agrees if the position error, and the orientation error multiplied by the reach, are within
+        `tolerance`.
         """
         return self.metres <= self.tolerance and self.radians * self.reach <= self.tolerance
 
     @property
     def passes(self) -> bool:
-        """Whether the table agrees, and has no likely mistake."""
+        """Whether the table agrees with the URDF and has no likely mistake."""
         return self.agrees and not self.mistakes
 
     @property
     def rounding(self) -> float:
-        """Error that counts as rounding, in radians and in metres per metre of reach."""
+        """Error that counts as rounding. It is in radians for angles, and in metres per metre of reach for lengths."""
         return EPS * of_a_fit(len(self.reference.rows))
 
     @property
     def exact(self) -> bool:
-        """Whether the difference is proven to be rounding in every configuration."""
+        """Whether the table is proven to differ from the URDF only by rounding, in every configuration."""
         return self.most_metres <= self.rounding * self.reach and self.most_radians <= self.rounding
 
     @property
     def as_written(self) -> bool:
-        """Whether the table as it is written, with its base, tool and zeros, agrees up to rounding."""
+        """Whether the table as it is written, with its base, tool and zeros, equals the URDF up to rounding."""
         return self.written_metres <= self.rounding * self.reach and self.written_radians <= self.rounding
 
 
 def resolution(share: float, radians: float) -> float:
-    """Return the resolution to print fitted numbers: a power of ten that is at least twice the tip error.
+    """Return the resolution of printed fitted numbers.
+
+    It is a power of ten that is at least twice the tip error.
 
     Args:
         share: Position error of the tip, metres per metre of reach.
@@ -226,7 +236,7 @@ def resolution(share: float, radians: float) -> float:
 
 
 def document(found: Comparison, units: Units) -> TextDocument:
-    """Return the verdict, the fitted parameters and the cells that differ."""
+    """Return the comparison as a text document: the verdict, the fitted parameters and the cells that differ."""
     title, *verdict = _verdict(found)
     parts: Parts = [*verdict, *(_mistakes(found, units) if found.mistakes else _cells(found, units))]
     if found.residual > EXPLAINED * found.reach and not found.mistakes:
@@ -244,7 +254,7 @@ def document(found: Comparison, units: Units) -> TextDocument:
 
 
 def _fitted(found: Comparison, units: Units) -> Parts:
-    """Return the parts of the text about fitted variables, base and tool, if the fit changed them."""
+    """Return the text about the variables, base and tool that the fit changed."""
     parts: Parts = []
     table, fine = found.reference, resolution(found.metres / found.reach, found.radians)
     moved = [
@@ -262,7 +272,7 @@ def _fitted(found: Comparison, units: Units) -> Parts:
 
 
 def _verdict(found: Comparison) -> list[str]:
-    """Return lines with the verdict, with and without the fit."""
+    """Return lines of text with the verdict about the fitted table and about the written table."""
     table = found.reference
     path = f"{table.robot}, {table.base_frame} to {table.tip_frame}"
     agrees = "agrees only" if found.mistakes else "agrees exactly" if found.exact else "agrees"
@@ -312,7 +322,7 @@ def _off(metres: float, radians: float) -> str:
 
 
 def _proven(found: Comparison) -> str:
-    """Return the proven bound as text."""
+    """Return the proven bound of the tip error as text."""
     if found.exact:
         return "rounding alone"
     if math.isinf(found.most_metres):
@@ -325,7 +335,7 @@ def _is_moved(change: AbsorbedOffset, found: Comparison) -> bool:
 
 
 def _mistakes(found: Comparison, units: Units) -> list[str]:
-    """Return lines with the likely mistakes."""
+    """Return lines of text with the likely mistakes."""
     first = found.mistakes[0]
     left = "without a fit" if not first.fitted.count else f"after a fit of only {first.fitted}"
     count = "One change makes" if len(found.mistakes) == 1 else "Each of these changes makes"
@@ -341,7 +351,7 @@ def _mistakes(found: Comparison, units: Units) -> list[str]:
 
 
 def _change(mistake: Mistake, table: DHTable, units: Units) -> str:
-    """Describe a change of the table."""
+    """Describe in words the change of the table that corrects a likely mistake."""
     if mistake.cell is None:
         if mistake.kind is MistakeKind.REVERSED:
             return "the rows in reverse order"
@@ -390,7 +400,7 @@ def _table(cells: Sequence[CellDifference], units: Units) -> Table:
 
 
 def shown_offset(offset: float, row: DHRow, fine: float, units: Units) -> str:
-    """Format an offset at the resolution `fine`, as a fraction of pi if both are equal at this resolution."""
+    """Format an offset at the resolution `fine`; use a fraction of pi if it equals the offset at `fine`."""
     if abs(offset) <= fine:
         return "0"
     if not row.kind.turns:

@@ -1,18 +1,18 @@
-"""Find the convention, units or column names with which a disagreeing table would agree with a URDF.
+"""Find another convention, other units or other column names with which a table agrees with a URDF.
 
-A reading is one way to interpret the numbers of a table. Every reading has a shape: the distances and angles
-of consecutive axes, and the offsets between the feet of their common normals. The shape does not depend on
-signs, zeros, base and tool, and is fast to compute. Only the few readings with a shape closest to the URDF's
-are fitted.
+A reading is one way to interpret the numbers of a table. Every reading has a shape: the distance and the
+angle of each pair of consecutive axes, and the offset along each axis between the feet of two common normals.
+The shape does not depend on signs, zeros, base and tool, and is fast to compute. Only the few readings with a
+shape that is closest to the URDF's shape are fitted.
 
 `other_readings` changes the convention, units or column names of the plain data (in the form of
 `urdfkin.dh.rows`), and parses the data again. A reading with an impossible value, such as an angle of eighty
 turns, is rejected by the parser.
 
-`doubts` finds a suspicious table without a URDF. It checks the units, and whether two columns are exchanged.
-The check uses two facts. Most angles of an arm are multiples of 30 degrees, and lengths hardly ever look like
-such numbers. An arm is between some centimetres and some metres long. With a URDF, `diagnose` decides by a
-fit.
+`doubts` needs no URDF. It finds units that look wrong, and two columns that may be exchanged. It uses two
+facts. First, most angles in the table of an arm are multiples of 30 degrees, and lengths hardly ever look
+like such angles. Second, an arm is between some centimetres and some metres long. If there is a URDF,
+`diagnose` decides by a fit.
 """
 
 from __future__ import annotations
@@ -36,15 +36,16 @@ from urdfkin.errors import InputError, Question, RangeError
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
 
-#: Number of readings to fit, largest tilt of parallel axes (rad), and relative cost of one more difference.
+#: Number of readings to fit, largest tilt of axes that count as parallel (rad), and relative cost of each
+#: further difference from the reading that the file states.
 _TRIED, _PARALLEL, _WORTH = 3, 2e-2, 0.1
-#: Largest fraction of the original tip error that a reading may leave.
+#: Largest fraction of the original tip error that may remain with another reading.
 _EXPLAINS = 0.05
 
 
 @dataclass(frozen=True, slots=True)
 class CommonMistake:
-    """A reading of a table with which the table agrees with the URDF.
+    """A reading that a table's file does not state, and with which the table agrees with the URDF.
 
     Attributes:
         reading: The reading.
@@ -86,14 +87,14 @@ def diagnose(
         chain: The path of the URDF.
         data: The table's plain data from `urdfkin.dh.parse_table.mapping_from_text`.
         tolerance: Tolerance at the tip (metres).
-        off: Tip error of the table as its file states it (metres). The result must leave at most 5 % of this
-            error.
+        off: Tip error of the table as its file states it (metres). With the returned reading, at most 5 % of
+            this error remains.
     """
     kinds = [joint.kind.turns for joint in chain.joints]
     own = shape(derive(chain, Choices(last=Last.FLANGE)), chain.reach)
     try:
         said = as_said(data)
-    except InputError:  # an invalid convention or unit: another error reports it
+    except InputError:  # an invalid convention or unit, which is reported elsewhere
         return None
     close = list[tuple[float, int, ConventionHypothesis, DHTable]]()
     for reading, table in other_readings(data):
@@ -164,11 +165,11 @@ def convention_that_fits(
 def shape(table: DHTable, scale: float) -> FloatArray:
     """Return numbers of a table that do not depend on signs, zeros, base and tool.
 
-    The numbers are in metres, and in radians times `scale`. For each pair of consecutive axes they contain
-    the distance and the angle of the two lines. For each axis between two pairs that are not parallel, they
-    contain the offset along the axis. Offsets along a run of parallel axes are summed. The line of a
-    prismatic axis is free, so distances from this line and offsets next to it are set to zero. Offsets along
-    the first axis are also left out, because the base absorbs them.
+    Lengths are in metres, and angles are in radians times `scale`. For each pair of consecutive axes, the
+    result contains the distance and the angle of the two axes. For each axis that is parallel to neither of
+    its neighbours, the result also contains the offset along the axis. Offsets along a run of parallel axes
+    are summed. The line of a prismatic axis is free, so distances from this line and offsets next to it are
+    set to zero. Offsets along the first axis are also left out, because the base absorbs them.
     """
     rows = to_convention(table, Convention.STANDARD).rows
     numbers, offset, known = list[float](), 0.0, False
@@ -187,8 +188,8 @@ def shape(table: DHTable, scale: float) -> FloatArray:
     return np.array(numbers)
 
 
-#: Keys of a row that a reading uses, and keys of a table that a reading ignores because base and tool are
-#: fitted.
+#: `_CELLS` are the keys of a row that a reading uses. `_ENDS` are the keys of a table that a reading ignores,
+#: because base and tool are fitted.
 _CELLS = ("joint", "kind", "sense", "beta", *ORDER)
 _ENDS = ("base", "tool", "coordinates")
 
@@ -201,8 +202,8 @@ class ConventionHypothesis:
         convention: Standard or modified; None if the table names no convention.
         lengths: Metres or millimetres.
         angles: Radians or degrees.
-        columns: True contents of the columns with the names a, alpha, d, theta, or of unnamed columns in this
-            order.
+        columns: What the table's columns contain according to this reading. The columns are those with the
+            names a, alpha, d and theta, or unnamed columns in this order.
     """
 
     convention: Convention | None
@@ -221,12 +222,12 @@ class ConventionHypothesis:
         return {meant.get(key, key): value for key, value in row.items()}
 
     def slips(self, other: ConventionHypothesis) -> int:
-        """Count the differences from another reading; two exchanged columns count as one difference."""
+        """Count the differences between two readings; two exchanged columns count as one difference."""
         moved = sum(mine != theirs for mine, theirs in zip(self.columns, other.columns, strict=True))
         return len(self._differences(other)) + (moved + 1) // 2
 
     def words(self, other: ConventionHypothesis) -> str:
-        """Describe the differences from another reading: modified, millimetres, columns ..."""
+        """Describe in words the differences from another reading, for example "modified" or "millimetres"."""
         words = self._differences(other)
         if self.columns != other.columns:
             words.append(f"its columns {', '.join(ORDER)} as {', '.join(self.columns)}")
@@ -269,7 +270,7 @@ def _bare(data: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _row(row: Mapping[str, Any] | Sequence[Any]) -> dict[str, Any]:
-    """Return a row of a file's data by name, without mimic rules and limits."""
+    """Return a row of a file's data as a dict by cell name, without mimic rules and limits."""
     named = row if isinstance(row, Mapping) else dict(zip((*ORDER, "kind"), row, strict=False))
     return {key: value for key, value in named.items() if key in _CELLS}
 
