@@ -1,18 +1,21 @@
 """Convert a table to the other convention, to a kinematic tree, or to a URDF.
 
-Both conventions group the same factors differently:
+The standard and the modified convention group the same factors differently (`urdfkin.dh.table` defines S and
+X):
 
     standard   base . (S_1 X_1) (S_2 X_2) ... (S_n X_n) . tool
     modified   base' . (X_0 S_1) (X_1 S_2) ... (X_{n-1} S_n) . tool'
 
-The conversion to modified moves X_n into the tool; the conversion to standard moves X_0 into the base. A base
-or a tool of the form Tx(a) Rx(alpha) moves into the free cells of the first or the last row. The two
-conversions are therefore inverse to each other.
+The conversion to the modified convention moves X_n into the tool. The conversion to the standard convention
+moves X_0 into the base. A base of the form Tx(a) Rx(alpha) moves into the free cells of the first modified
+row. A tool of this form moves into the free cells of the last standard row. A conversion to the other
+convention and back therefore gives the original table.
 
 In a tree, each joint's frame is a Denavit-Hartenberg frame. In a standard table z_{i-1} is the axis of joint
 i, so the frame of joint i is frame i - 1. S_i X_i with the joint at zero leads to frame i: d_{i-1,i} = d_i
 z_{i-1} + a_i x_i (7.64). In a modified table z_i is the axis of joint i, so the frame of joint i is frame i,
-and X_{i-1} S_i leads to frame i. The forward recursion runs on this tree, and `to_urdf` writes it as a URDF.
+and X_{i-1} S_i leads to frame i. urdfkin computes the motion of a table on this tree, and `to_urdf` writes
+the tree as a URDF.
 """
 
 from __future__ import annotations
@@ -35,7 +38,7 @@ def to_convention(table: DHTable, convention: str) -> DHTable:
 
 
 def to_modified(table: DHTable) -> DHTable:
-    """Convert a standard table to a modified one: row i takes a, alpha and beta from row i - 1."""
+    """Convert a standard table to a modified table: row i takes a, alpha and beta from row i - 1."""
     first = as_step(table.base)
     steps = [(*(first or (0.0, 0.0)), 0.0), *((row.a, row.alpha, row.beta) for row in table.rows[:-1])]
     base = np.eye(4) if first else table.base
@@ -43,7 +46,7 @@ def to_modified(table: DHTable) -> DHTable:
 
 
 def to_standard(table: DHTable) -> DHTable:
-    """Convert a modified table to a standard one: row i takes a, alpha and beta from row i + 1."""
+    """Convert a modified table to a standard table: row i takes a, alpha and beta from row i + 1."""
     last = as_step(table.tool)
     steps = [*((row.a, row.alpha, row.beta) for row in table.rows[1:]), (*(last or (0.0, 0.0)), 0.0)]
     tool = np.eye(4) if last else table.tool
@@ -64,17 +67,17 @@ def _with(
     return replace(table, convention=convention, rows=rows, base=base, tool=tool)
 
 
-#: Limits of a prismatic joint without limits: -1 km to 1 km, 1000 m/s, 1000 N.
+#: Limits that a prismatic joint without limits gets in a URDF: -1 km to 1 km, 1000 m/s, 1000 N.
 UNBOUNDED_SLIDE = Limit(-1000.0, 1000.0, 1000.0, 1000.0)
 
 
 def to_tree(table: DHTable) -> KinematicTree:
     """Return the table's robot as a tree from the base frame to the tip.
 
-    Joint names, senses, limits and mimic rules are those of the rows. A mimicked joint outside the path
-    becomes a separate joint on the base, so that the tree has the table's coordinates. A revolute joint
-    without limits becomes continuous. A prismatic joint without limits gets -1 km to 1 km, because URDF
-    requires limits.
+    Joint names, senses, limits and mimic rules are those of the rows. If a mimicked joint is not on the path,
+    it becomes a separate joint on the base, so that the tree has the same coordinates as the table. A
+    revolute joint without limits becomes continuous. A prismatic joint without limits gets -1 km to 1 km,
+    because URDF requires limits.
 
     Args:
         table: Any table.
@@ -104,7 +107,7 @@ def to_urdf(table: DHTable) -> str:
 
 
 def free_tree(table: DHTable) -> KinematicTree:
-    """Return the same tree without mimic rules: one coordinate for each row, in row order."""
+    """Return the tree of `to_tree` without mimic rules: each row has its own coordinate, in row order."""
     joints, here = list[tuple[Joint, str, str]](), link_names(table)
     poses = frame_poses(table)
     for i, row in enumerate(table.rows):
@@ -116,7 +119,7 @@ def free_tree(table: DHTable) -> KinematicTree:
 
 
 def frame_poses(table: DHTable) -> list[FloatArray]:
-    """Return the poses of the frames in the zero configuration.
+    """Return the poses of the table's joint frames and of its tip in the zero configuration.
 
     Each joint's frame is given in the frame before it. The last pose is the tip in the last joint's frame.
     """

@@ -4,8 +4,9 @@ The derivation makes these choices; docs/dh.md gives the reasons:
 
 - Frame 0 is at the foot of the perpendicular from the base's origin to the first axis. x_0 is the projection
   of the base's x axis.
-- x_i is along the common normal. Its direction is reversed where theta would exceed a right angle.
-- Between parallel axes d = 0. The first row after a run of parallel axes takes the offset along them.
+- x_i is along the common normal. The direction of x_i is reversed if theta would exceed a right angle.
+- Between parallel axes d = 0. The first row after a run of parallel axes takes the whole offset along these
+axes.
 - The last row reaches the tip if four parameters suffice.
 - A prismatic axis is on the line through the joint's origin in the URDF, except for the first and the last
   joint.
@@ -48,21 +49,21 @@ RIGHT_ANGLE_SLACK = 1e-3
 
 
 class Last(StrEnum):
-    """Part of the table that reaches the tip: the last row if it can do so exactly, or the tool."""
+    """Part of the table that leads to the tip: the last row if it can reach the tip exactly, or the tool."""
 
     TIP = "tip"
     FLANGE = "flange"
 
 
 class First(StrEnum):
-    """Part of the table with the transform from base to first joint: d_1 and theta_1, or the base."""
+    """Part of the table that contains the transform from base to first joint: d_1 and theta_1, or the base."""
 
     BASE = "base"
     JOINT = "joint"
 
 
 class Sign(StrEnum):
-    """Rule for the direction of x: theta is at most a right angle, or a or alpha is not negative."""
+    """Rule for the direction of x: |theta| is at most a right angle, or a is not negative, or alpha is not."""
 
     THETA = "theta"
     A = "a"
@@ -70,14 +71,14 @@ class Sign(StrEnum):
 
 
 class Slide(StrEnum):
-    """Line of a prismatic joint: the one in the URDF, or one through the origin of a neighbouring joint."""
+    """Line of a prismatic joint: the line in the URDF, or a line through a neighbouring joint's origin."""
 
     DRAWN = "drawn"
     MINIMAL = "minimal"
 
 
 class ParallelOffset(StrEnum):
-    """Row of a run of parallel axes that takes the offset along them."""
+    """Row that takes the offset along a run of parallel axes."""
 
     LAST = "last"
     FIRST = "first"
@@ -139,7 +140,9 @@ def choices_of(
 
 
 def derive(chain: FrameChain, choices: Choices, like: DHTable | None = None) -> DHTable:
-    """Return the table of a chain: base . rows . tool equals the chain's placement for every q, to rounding.
+    """Return the table of a chain.
+
+    The product base . rows . tool equals the chain's placement for every q, except for rounding.
 
     Args:
         chain: The path.
@@ -188,7 +191,7 @@ def _table(
     steps: list[Step],
     ends: tuple[FloatArray, FloatArray],
 ) -> DHTable:
-    """Group the factors S_1 X_1 S_2 X_2 ... S_n X_n into rows, as the convention requires."""
+    """Group the factors S_1 X_1 S_2 X_2 ... S_n X_n into the rows of the chosen convention."""
     if choices.convention is Convention.MODIFIED and turns:
         first = as_step(ends[0])
         a, alpha = first or (0.0, 0.0)
@@ -221,7 +224,7 @@ def _row(joint: ChainJoint, turn: tuple[float, float], step: Step, sense: int) -
 
 
 def _reversed_axes(chain: FrameChain, flip: Collection[str]) -> list[FloatArray]:
-    """Return the chain's constants with the z axis of some joints reversed by a half turn about x."""
+    """Return the chain's constant poses, with the z axes of some joints reversed by a half turn about x."""
     constants = [np.array(A) for A in chain.constants]
     half = np.diag([1.0, -1.0, -1.0, 1.0])
     for i, joint in enumerate(chain.joints):
@@ -234,12 +237,13 @@ def _reversed_axes(chain: FrameChain, flip: Collection[str]) -> list[FloatArray]
 def _use_freedom_of_prismatic_axes(
     chain: FrameChain, constants: list[FloatArray], choices: Choices, reach: float
 ) -> None:
-    """Choose the lines of prismatic joints, of which only the direction is defined.
+    """Choose the lines of prismatic joints; a prismatic joint defines only a direction.
 
     Tz(q) commutes with any translation, so a shift of the line changes no placement. The first joint's line
     passes through the base's origin, so that the base can be the identity. The last joint's line passes
-    through the tip if the last row can then reach the tip. In strict tables a line that is nearly parallel to
-    a neighbouring axis passes through that joint's origin, so that no foot is far away.
+    through the tip if the last row can then reach the tip. In strict tables, the line may be nearly parallel
+    to the axis of a neighbouring joint. The line then passes through the origin of that joint, so that no
+    foot of a common normal is far away.
     """
     slides = [not joint.kind.turns for joint in chain.joints]
     noise = noises(chain, reach)
@@ -279,7 +283,7 @@ def _onto_neighbour(constants: list[FloatArray], k: int, slides: list[bool]) -> 
 
 
 def _meets_neighbour(constants: list[FloatArray], k: int, noise: list[Noise]) -> bool:
-    """Move joint k's line through the origin of a neighbouring joint with a nearly parallel axis, if any."""
+    """Move joint k's line through the origin of a neighbouring joint, if their axes are nearly parallel."""
     before, after = constants[k], constants[k + 1]
     if k > 0 and noise[k].radians < tilt_of(before) < NEARLY_PARALLEL:
         _shift_after(constants, k, before[:3, :3].T @ before[:3, 3])
@@ -291,7 +295,7 @@ def _meets_neighbour(constants: list[FloatArray], k: int, noise: list[Noise]) ->
 
 
 def _shift_after(constants: list[FloatArray], k: int, offset: FloatArray) -> None:
-    """Move the whole offset before joint k, in the joint's frame, to the pose after the joint."""
+    """Move `offset` (in joint k's frame) from the constant pose before joint k to the pose after it."""
     constants[k][:3, 3] = 0.0
     constants[k + 1][:3, 3] += offset
 
@@ -306,16 +310,16 @@ def _shift_before(constants: list[FloatArray], k: int, offset: FloatArray) -> No
 
 
 def _frame_zero(A: FloatArray, reach: float, noise: Noise) -> tuple[FloatArray, float, float]:
-    """Return T_base_0, and the angle about z_0 and the offset along z_0 to the first joint's frame."""
+    """Return T_base_0, and the angle about z_0 and offset along z_0 from frame 0 to the first joint's frame."""
     z, p = A[:3, 2], A[:3, 3]
     offset = cleaned_length(float(z @ p), reach, noise.metres)
     base = np.eye(4)
     base[:3, 3] = [cleaned_length(component, reach, noise.metres) for component in p - offset * z]
-    if tilt_of(A) <= noise.radians:  # z_0 is the base's z axis or its reverse
+    if tilt_of(A) <= noise.radians:  # z_0 is the base's z axis, or opposite to this axis
         z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
     # This is (1, 0, 0) - z_0 z for a unit vector z, in a form that avoids cancellation for z close to x.
     x = np.array([z[1] ** 2 + z[2] ** 2, -z[0] * z[1], -z[0] * z[2]])
-    if np.linalg.norm(x) < NEARLY_PARALLEL:  # the axis is along the base's x: project the base's y instead
+    if np.linalg.norm(x) < NEARLY_PARALLEL:  # the axis is along the base's x axis: project the base's y axis
         x = np.array([0.0, 1.0, 0.0]) - z[1] * z
     x /= np.linalg.norm(x)
     base[:3, :3] = np.column_stack([x, np.cross(z, x), z])
@@ -338,7 +342,7 @@ def _steps(
     choices: Choices,
     noise: Sequence[Noise],
 ) -> tuple[list[Step], list[float]]:
-    """Return the steps between consecutive axes and theta of each row, with x reversed where needed."""
+    """Return the steps between consecutive axes, and theta of each row; x is reversed where needed."""
     each = choices.parallel_offset is not ParallelOffset.LAST
     steps, thetas = list[Step](), list[float]()
     for A, rounding in zip(constants, noise, strict=True):
@@ -356,7 +360,7 @@ def _steps(
 def _offset_for_last_row(like: DHTable, A: FloatArray, choices: Choices, noise: Noise) -> float | None:
     """Return the offset that gives the last row the d of the other table.
 
-    The result is None if d is free, or if there is a tool.
+    The result is None if d of the last row is free, or if the other table has a tool.
     """
     row = like.rows[-1]
     if not row.kind.turns or not _has_no_tool(like) or not _representable(A, choices, noise):
@@ -371,7 +375,7 @@ def _has_no_tool(table: DHTable) -> bool:
 def _first_like(
     row: DHRow, base: FloatArray, first: tuple[float, float]
 ) -> tuple[FloatArray, tuple[float, float]]:
-    """Give the first row the theta of another table, and d = 0 if that table has d = 0.
+    """Set theta of the first row to that of another table, and d to 0 if the other table has d = 0.
 
     The base takes the rest of the rotation and the offset.
     """
@@ -388,8 +392,8 @@ def _last_like(
 ) -> tuple[float, float, Step, FloatArray]:
     """Return the numbers of the last row, and the tool.
 
-    If the row ends like the other table's last row, it keeps its own numbers. Otherwise it takes the numbers
-    of the other table, and the tool takes the difference.
+    If the row has the same a, alpha and beta as the other table's last row, the row keeps its numbers.
+    Otherwise the row takes the numbers of the other table, and the tool takes the difference.
     """
     row = like.rows[-1]
     as_there = _has_no_tool(like) and np.array_equal(tool, np.eye(4))
@@ -408,8 +412,8 @@ def _last_like(
 def _needs_reversal(step: Step, theta: float, sign: Sign) -> bool:
     """Whether x must be reversed by the rule `sign`.
 
-    If the cell of the rule cannot decide, the other cell does: where a = 0, alpha decides; where alpha is 0
-    or pi, a decides.
+    If the rule uses a, and a is 0, then alpha decides. If the rule uses alpha, and alpha is 0 or pi, then a
+    decides.
     """
     by_alpha = 0.0 if step.alpha == math.pi else step.alpha
     if sign is Sign.THETA or (not step.a and not by_alpha):
@@ -418,7 +422,7 @@ def _needs_reversal(step: Step, theta: float, sign: Sign) -> bool:
 
 
 def _representable(A: FloatArray, choices: Choices, noise: Noise) -> bool:
-    """Whether A has the form Rz Tz Tx Rx (standard) or Rz Tz (modified)."""
+    """Whether a row without a tool can express the pose A: Rz Tz Tx Rx (standard) or Rz Tz (modified)."""
     if choices.last is Last.FLANGE:
         return False
     x_along_z, lateral = abs(A[2, 0]), abs(A[0, 0] * A[1, 3] - A[1, 0] * A[0, 3])
@@ -431,7 +435,7 @@ def _representable(A: FloatArray, choices: Choices, noise: Noise) -> bool:
 def _last(
     A: FloatArray, phi_in: float, carry: float, reach: float, choices: Choices, noise: Noise
 ) -> tuple[float, float, Step, FloatArray]:
-    """Return theta, d and the step of the last row, and the tool; `A` is the tip's pose from O_{n-1}."""
+    """Return theta, d and the step of the last row, and the tool; `A` is the tip's pose in the last joint."""
     if _representable(A, choices, noise):
         phi = math.atan2(A[1, 0], A[0, 0])
         a = cleaned_length(A[0, 0] * A[0, 3] + A[1, 0] * A[1, 3], reach, noise.metres)
@@ -453,7 +457,8 @@ def _last(
 def _offsets_first(rows: list[tuple[float, float]], steps: list[Step]) -> list[tuple[float, float]]:
     """Move the offsets along each run of parallel axes into the first row of the run.
 
-    An offset commutes with Tx(a) Rx(0), and changes its sign when it moves past Tx(a) Rx(pi).
+    An offset along z that moves past Tx(a) Rx(0) keeps its sign. An offset that moves past Tx(a) Rx(pi)
+    changes its sign.
     """
     moved = list(rows)
     for i in range(len(steps) - 1, -1, -1):

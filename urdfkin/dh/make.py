@@ -1,10 +1,10 @@
 """Make the Denavit-Hartenberg table of the path between two frames of a robot.
 
-You can ask for the frames of a published table. The author of a table chooses the sense of each joint and the
-direction of each x axis. `reversed_like` derives a table for every pattern of senses that fits the published
-table approximately. It selects the pattern of the table closest to the published one. It compares first the
-cells, then the zeros, then base and tool. In the table of a Kinova arm, for example, the first joint has
-sense -1, and frame 0 is upright as in the data sheet.
+You can request a table with the same frames as a published table. The author of a table chooses the sense of
+each joint and the direction of each x axis. `reversed_like` derives a table for every pattern of senses that
+fits the published table approximately. It selects the pattern with the table that is closest to the published
+table. It compares first the cells, then the zeros, then base and tool. In the table of a Kinova arm, for
+example, the first joint has sense -1, and frame 0 is upright as in the data sheet.
 """
 
 from __future__ import annotations
@@ -26,18 +26,19 @@ from urdfkin.errors import InputError, Question
 from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.tree import KinematicTree
 
-#: Differences (relative to the reach, or in rad) from which cells belong to another robot, and zeros differ.
+#: Limits of differences, relative to the reach, or in rad. If cells differ by more than `_ANOTHER`, the table
+#: belongs to another robot. If zeros differ by more than `_OTHER`, they count as different.
 _ANOTHER, _OTHER = 0.1, 1e-2
-#: Cells with a smaller difference (relative to the reach, or in rad) are equal.
+#: Two cells with a smaller difference (relative to the reach, or in rad) count as equal.
 _ROUNDING = 1e-12
 
 
 def derive_like(chain: FrameChain, choices: Choices, reference: DHTable) -> DHTable:
-    """Return a chain's table in the frames of another table, in the convention of `choices`.
+    """Return a chain's table with the same frames as another table, in the convention of `choices`.
 
     Args:
         chain: The path.
-        choices: The options, with `flip` from `reversed_like`.
+        choices: The options. Their `flip` contains the joints from `reversed_like`.
         reference: The other table.
     """
     standard = replace(choices, convention=Convention.STANDARD)
@@ -45,7 +46,7 @@ def derive_like(chain: FrameChain, choices: Choices, reference: DHTable) -> DHTa
 
 
 def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tuple[str, ...]:
-    """Return the joints with opposite senses in the table and in the URDF.
+    """Return the names of the joints that have opposite senses in the table and in the URDF.
 
     Raises:
         InputError: the table has other joints, or describes another robot.
@@ -55,7 +56,8 @@ def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tu
     ends = replace(there, base=np.eye(4), tool=np.eye(4))
     names = [joint.name for joint in chain.joints]
     patterns = [one.senses for one in align(chain, ends)]
-    # Base and tool absorb the senses of the first and the last joint.
+    # Base and tool can absorb the sense of the first and of the last joint. Therefore both senses of these
+    # joints are tried.
     patterns += [(-first, *rest) for first, *rest in patterns]
     patterns += [(*rest, -last) for *rest, last in patterns]
     best, flip = (math.inf, 0, 0, 0.0, 0), tuple[str, ...]()
@@ -78,10 +80,10 @@ def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tu
 def _difference_key(found: DHTable, there: DHTable, reach: float) -> tuple[float, int, int, float, int]:
     """Return a key that ranks tables by their difference; the smallest is the best.
 
-    The key has these entries, in this order: the difference of the cells, its power of ten, the number of
-    different zeros and signs of d, the number of different ends (base and tool), and the number of reversed
-    senses. The line of a prismatic joint is free, so cells that depend on this line only affect the power of
-    ten.
+    The key has these entries, in this order: the largest difference of the cells, the power of ten of this
+    difference, the number of different zeros and signs of d, the number of different ends (base and tool),
+    and the number of reversed senses. The line of a prismatic joint is free, so cells that depend on this
+    line only affect the power of ten.
     """
     n, cells, lines, zeros = len(found.rows), 0.0, 0.0, 0
     for i, (row, other) in enumerate(zip(found.rows, there.rows, strict=True)):
@@ -133,8 +135,9 @@ def dh_table(
         convention: "standard" (distal, the textbook's) or "modified" (proximal, Craig's).
         near_parallel: "hayati" gives nearly parallel axes a fifth parameter beta; "strict" uses only the four
             parameters, and may give offsets of kilometres.
-        snap: Tolerance in radians. Angles within it of a multiple of 15 degrees become that multiple, and the
-            table's `snap` reports the effect. 0 leaves every angle as it is in the file.
+        snap: Tolerance in radians. An angle that differs by at most this tolerance from a multiple of 15
+            degrees becomes that multiple. The table's attribute `snap` reports the effect. 0 leaves every
+            angle as it is in the file.
         last: "tip" lets the last row reach the tip where four parameters suffice; "flange" puts the transform
             from the last axis to the tip into the tool.
         parallel_offset: Row that takes the offset along a run of parallel axes: "last" is the first row after
@@ -147,18 +150,18 @@ def dh_table(
             name not negative.
         slide: Line of a prismatic joint, because a prismatic joint defines only a direction. "drawn": the
             line through the joint's origin in the URDF. "minimal": the line through the origin of the next
-            revolute joint, so that a = 0.
+            revolute joint, so that a is 0.
         like: A published table. The result takes from it the senses, directions of x, zeros of the first and
             last joint, and offsets along parallel axes. The lengths, angles, base and tool are those of the
             URDF. `flip`, `first`, `last`, `sign` and `parallel_offset` are then ignored.
 
     Raises:
-        UnknownNameError: a frame or a joint that does not exist.
-        InputError: an invalid value of an option, or a planar or floating joint on the path.
-        RangeError: lengths with squares outside the range of doubles.
+        UnknownNameError: a frame or a joint does not exist.
+        InputError: an option has an invalid value, or the path contains a planar or floating joint.
+        RangeError: the square of a length is outside the range of doubles.
     """
     exact = chain(tree, tip, base)
-    # Check the whole path from the root, because Pinocchio measures from the root.
+    # Check the whole path from the root, because Pinocchio computes poses relative to the root.
     ends = [tip] if base is None else [base, tip]
     demand_squares(tree.joints[i] for end in ends for i in tree.path(tree.frame_link(end)))
     choices = choices_of(

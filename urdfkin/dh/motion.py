@@ -1,9 +1,9 @@
-"""Compute velocity, Jacobian and acceleration of a table by the textbook's recursion on the table's frames.
+"""Compute velocity, Jacobian and acceleration of a table's tip by the textbook's recursion on its frames.
 
 The module uses equations 7.85 and 7.127 to 7.130, with d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64). The forward
-recursion is that of `urdfkin.compiled`. It runs on a tree with its joint frames at the table's frames. In
-this tree mimic joints move freely. The module applies the coupling, values = G q + g, outside the tree: J =
-J_rows G.
+recursion is that of `urdfkin.compiled`. It runs on a tree with joint frames that are the table's frames. In
+this tree mimic joints move freely. The module applies the mimic rules outside the tree. The joint values are
+G q + g, so the Jacobian is J = J_rows G, where J_rows is the tree's Jacobian with one column for each row.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ def acceleration(
 
 
 def _joint_derivatives(table: DHTable, rates: Given, what: str) -> FloatArray:
-    """Return (..., rows) velocities or accelerations of all joints from those of the coordinates."""
+    """Convert velocities or accelerations of the coordinates to those (..., rows) of all joints."""
     return table.coupling.checked(rates, what) @ table.coupling.matrix.T
 
 

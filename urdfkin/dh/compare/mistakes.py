@@ -96,7 +96,7 @@ class Search:
         return ()
 
     def _needs_one_thing(self, table: DHTable) -> bool:
-        """Whether a table agrees after a fit of a single parameter: the base, the tool, one zero or one sense."""
+        """Whether a table agrees after a fit of one parameter: the base, the tool, one zero or one sense."""
         if self._with_one_end(table) is not None:
             return True
         model = self._with_zeros(table)

@@ -209,7 +209,7 @@ class Comparison:
 
     @property
     def rounding(self) -> float:
-        """Error that counts as rounding. It is in radians for angles, and in metres per metre of reach for lengths."""
+        """Error that counts as rounding: radians for angles, metres per metre of reach for lengths."""
         return EPS * of_a_fit(len(self.reference.rows))
 
     @property
@@ -219,7 +219,7 @@ class Comparison:
 
     @property
     def as_written(self) -> bool:
-        """Whether the table as it is written, with its base, tool and zeros, equals the URDF up to rounding."""
+        """Whether the written table, with its base, tool and zeros, equals the URDF up to rounding."""
         return self.written_metres <= self.rounding * self.reach and self.written_radians <= self.rounding
 
 
@@ -236,7 +236,7 @@ def resolution(share: float, radians: float) -> float:
 
 
 def document(found: Comparison, units: Units) -> TextDocument:
-    """Return the comparison as a text document: the verdict, the fitted parameters and the cells that differ."""
+    """Return the comparison as a text with the verdict, the fitted parameters and the cells that differ."""
     title, *verdict = _verdict(found)
     parts: Parts = [*verdict, *(_mistakes(found, units) if found.mistakes else _cells(found, units))]
     if found.residual > EXPLAINED * found.reach and not found.mistakes:

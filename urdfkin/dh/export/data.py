@@ -1,7 +1,7 @@
 """Write a table as plain data, or as JSON, TOML or CSV.
 
-`urdfkin.dh.rows.table_from_mapping` reads the plain data; `urdfkin.dh.read_table` reads the files. Both read
-back all numbers unchanged to the last bit. The reference tables in urdfkin are TOML files.
+`urdfkin.dh.rows.table_from_mapping` reads the plain data; `urdfkin.dh.read_table` reads the files. The plain
+data and the files keep all numbers unchanged to the last bit. The reference tables in urdfkin are TOML files.
 """
 
 from __future__ import annotations
@@ -20,7 +20,10 @@ from urdfkin.errors.escape import csv_cell, escape
 
 
 def to_mapping(table: DHTable) -> dict[str, Any]:
-    """Return strings, numbers, lists and mappings, in metres and radians; `snap` reports the snapping."""
+    """Return the table as plain data: strings, numbers, lists and mappings, in metres and radians.
+
+    The entry `snap` contains the report of the snapped angles.
+    """
     data: dict[str, Any] = {
         "convention": str(table.convention),
         "angles": "radians",

@@ -30,12 +30,13 @@ HAYATI_FORMULA = {
     Convention.MODIFIED: "T(i-1, i) = Tx(a(i-1)) Rx(alpha(i-1)) Ry(beta(i-1)) Rz(theta) Tz(d)",
 }
 
-#: Factor before a number is rounded up, because a relative excess of 1e-12 beyond a digit is rounding error.
+#: A number is multiplied by this factor before it is rounded up to some digits. Without this factor, a
+#: rounding error of 1e-12 above such a number would increase the last digit.
 _ON_THE_DIGIT = 1.0 - 1e-12
 
 
 def formula(table: DHTable) -> str:
-    """Return the product of transforms that a row stands for."""
+    """Return the formula for the transforms of a row, for example Rz(theta) Tz(d) Tx(a) Rx(alpha)."""
     return (HAYATI_FORMULA if table.has_hayati_rows else FORMULA)[table.convention]
 
 
@@ -54,14 +55,14 @@ def variable(
 
 
 def coordinate_names(table: DHTable) -> str:
-    """Return text with the joint of each coordinate; "" if the coordinates are the rows' joints in order."""
+    """Return text with the joint of each coordinate; "" if each row has its own coordinate, in row order."""
     if [row.joint for row in table.rows] == list(table.joint_names):
         return ""
     return "with " + ", ".join(f"q{i} = {name}" for i, name in enumerate(table.joint_names, 1))
 
 
 def constant_of(row: DHRow) -> float:
-    """Return the constant that is added to the variable: the cell plus the offset of a mimic rule."""
+    """Return the constant added to the joint's variable: the cell plus the offset of a mimic rule."""
     cell = row.theta if row.kind.turns else row.d
     return cell + row.sense * row.mimic.offset if row.mimic else cell
 
@@ -74,7 +75,10 @@ def added(variable: str, constant: str) -> str:
 
 
 def cells(table: DHTable, row: DHRow, units: Units, pi: str = "pi", **style: Any) -> list[str]:
-    """Return a, alpha, d and theta as text, with the joint's variable; also beta if any row needs it."""
+    """Return a row's cells a, alpha, d and theta as text with the joint's variable; also a beta column.
+
+    The column of beta is present only if any row of the table has a beta that is not 0.
+    """
     moves = variable(table, row, **style)
     theta, d = units.angle(row.theta, pi), units.length(row.d)
     if row.kind.turns:
@@ -106,7 +110,7 @@ def is_identity(T: FloatArray) -> bool:
 
 
 def pose_matrix(T: FloatArray, digits: int = 10) -> Matrix:
-    """Return the three upper rows of a pose in metres."""
+    """Return the three upper rows of a pose matrix, with the position in metres."""
     return Matrix([[f"{x + 0.0:.{digits}g}" for x in row] for row in T[:3]])
 
 
@@ -124,7 +128,7 @@ def at_most(value: float) -> str:
 
 
 def snap_lines(table: DHTable) -> list[str]:
-    """Return lines of text: first the effect of snapping, then a line for each change."""
+    """Return lines of text about snapping: first its effect on the tip, then a line for each snapped angle."""
     snap = table.snap
     if snap is None:
         return []
@@ -146,7 +150,7 @@ def snap_lines(table: DHTable) -> list[str]:
 
 
 def document(table: DHTable, units: Units, pi: str = "pi", *, wrapped: bool = False) -> TextDocument:
-    """Return a title, the formula, the table, base and tool, and the effect of snapping.
+    """Return a document with a title, the formula, the table, base and tool, and the effect of snapping.
 
     Args:
         table: The table.
@@ -265,7 +269,10 @@ def pose(what: str, T: FloatArray) -> list[str]:
 
 
 def maths(text: str) -> str:
-    """Write a cell in math mode: 1e-6 as a power of ten, a/b unchanged."""
+    """Write a cell in LaTeX's math mode.
+
+    The text 1e-6 becomes a power of ten, and a fraction a/b is not changed.
+    """
     return f"${_plain(text)}$"
 
 

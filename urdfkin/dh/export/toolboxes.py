@@ -5,18 +5,19 @@ A DHRobot cannot have a fifth parameter, and must have at least one joint. A tab
 without rows, therefore becomes a `Robot` of elementary transforms.
 
 For the Robotics System Toolbox the code makes a `rigidBodyTree`. The toolbox's "dh" and "mdh" transforms
-ignore theta of a revolute joint and d of a prismatic one, so they would lose offsets. They also have no
-Hayati rows. The code therefore sets each joint's frame by a matrix from the table, and the joint's axis is
-the z axis.
+ignore theta of a revolute joint and d of a prismatic joint, so they would lose the table's offsets. These
+transforms also have no fifth parameter for Hayati rows. The code therefore sets each joint's frame by a
+matrix from the table, and the joint's axis is the z axis.
 
 The MATLAB code is tested in Octave with substitutes for the toolbox's classes (`scripts/forms/octave`). It
 has not been tested in MATLAB.
 
 roboticstoolbox also accepts a sequence of elementary transforms (Haviland and Corke). Each elementary
-transform is a rotation, a translation or a joint. The fifth parameter of a Hayati row is one more transform.
-The numerical solvers of roboticstoolbox accept such a sequence.
+transform is a rotation, a translation or a joint. The fifth parameter of a Hayati row is an additional
+transform in this sequence. The numerical solvers of roboticstoolbox accept such a sequence.
 
-`write_screws` exports a product of exponentials as text, LaTeX, TOML, JSON and code; data and code are exact.
+`write_screws` exports a product of exponentials as text, LaTeX, TOML, JSON and code. The numbers in TOML,
+JSON and code are exact.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ def write_roboticstoolbox(table: DHTable, units: Units) -> str:
     """Return a module with `robot`: a DHRobot, or a Robot if a DHRobot cannot express the table.
 
     Raises:
-        InputError: a mimic joint, which neither class supports.
+        InputError: the table has a mimic joint, which neither class supports.
     """
     if table.has_hayati_rows or not table.rows:
         return write_ets(table, units)
@@ -95,7 +96,7 @@ def write_ets(table: DHTable, units: Units) -> str:
     """Return a module with two variables: `ets`, the transforms, and `robot`, a Robot of these transforms.
 
     Raises:
-        InputError: a mimic joint.
+        InputError: the table has a mimic joint, which the class does not support.
     """
     del units
     demand_free(table, "a sequence of elementary transforms")
@@ -216,7 +217,7 @@ def _matlab(screws: ProductOfExponentials) -> str:
     return "\n".join([*lines, "end"]) + "\n"
 
 
-#: Functions for the formats of data and code, which are exact.
+#: Functions that write the formats for data and code. These formats contain exact numbers.
 _CODE: dict[str, Callable[[ProductOfExponentials], str]] = {
     "toml": _toml,
     "json": _json,
