@@ -56,14 +56,14 @@ class Last(StrEnum):
 
 
 class First(StrEnum):
-    """Part of the table that contains the transform from base to first joint: d_1 and theta_1, or the base."""
+    """Part of the table with the transform from base to first joint: d_1 and theta_1, or the base."""
 
     BASE = "base"
     JOINT = "joint"
 
 
 class Sign(StrEnum):
-    """Rule for the direction of x: |theta| is at most a right angle, or a is not negative, or alpha is not."""
+    """Rule for the direction of x: theta within a right angle, a not negative, or alpha not negative."""
 
     THETA = "theta"
     A = "a"
@@ -295,13 +295,13 @@ def _meets_neighbour(constants: list[FloatArray], k: int, noise: list[Noise]) ->
 
 
 def _shift_after(constants: list[FloatArray], k: int, offset: FloatArray) -> None:
-    """Move `offset` (in joint k's frame) from the constant pose before joint k to the pose after it."""
+    """Move the whole offset before joint k to the pose after it; `offset` is this offset in joint k's frame."""
     constants[k][:3, 3] = 0.0
     constants[k + 1][:3, 3] += offset
 
 
 def _shift_before(constants: list[FloatArray], k: int, offset: FloatArray) -> None:
-    """Move `offset` (in joint k's frame) from the pose after joint k to the pose before it."""
+    """Move `offset` (in joint k's frame) from the constant pose after joint k to the pose before joint k."""
     constants[k][:3, 3] += constants[k][:3, :3] @ offset
     constants[k + 1][:3, 3] -= offset
 
@@ -310,7 +310,7 @@ def _shift_before(constants: list[FloatArray], k: int, offset: FloatArray) -> No
 
 
 def _frame_zero(A: FloatArray, reach: float, noise: Noise) -> tuple[FloatArray, float, float]:
-    """Return T_base_0, and the angle about z_0 and offset along z_0 from frame 0 to the first joint's frame."""
+    """Return T_base_0, and the angle about z_0 and the offset along z_0 to the frame of the first joint."""
     z, p = A[:3, 2], A[:3, 3]
     offset = cleaned_length(float(z @ p), reach, noise.metres)
     base = np.eye(4)
@@ -392,7 +392,7 @@ def _last_like(
 ) -> tuple[float, float, Step, FloatArray]:
     """Return the numbers of the last row, and the tool.
 
-    If the row has the same a, alpha and beta as the other table's last row, the row keeps its numbers.
+    If both tables have no tool, and theta agrees with the other table's last row, the row keeps its numbers.
     Otherwise the row takes the numbers of the other table, and the tool takes the difference.
     """
     row = like.rows[-1]

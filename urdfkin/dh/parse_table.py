@@ -2,13 +2,14 @@
 
 `urdfkin.dh.rows` defines the content of TOML and JSON files.
 
-A table in text has a line of headings, with a, alpha, d and theta in any order. Below the headings it has a
-line for each joint. Commas, semicolons, tabs, bars, ampersands or blanks separate the cells. The lines around
-the table may give the convention, names, base and tool. urdfkin prints its own tables in this form. The
-result is plain data for `urdfkin.dh.rows`. Nothing is guessed: `urdfkin.dh.rows` raises an error for a table
-without a convention.
+A table in text has a line of headings that contains a, alpha, d and theta in any order. Below the headings
+there is a line for each joint. Commas, semicolons, tabs, bars, ampersands or blanks separate the cells. The
+lines before and after the table may state the convention, names, base and tool. urdfkin prints its own tables
+in this form. The result is plain data for `urdfkin.dh.rows`. The module guesses nothing. For example,
+`urdfkin.dh.rows` raises an error for a table without a convention.
 
-`references` finds the reference tables in urdfkin: tables of vendors and textbooks, each with its source.
+`references` finds the reference tables in urdfkin. These are tables of vendors and textbooks, each with its
+source.
 """
 
 from __future__ import annotations
@@ -37,14 +38,15 @@ from urdfkin.kinematics.rotation.matrix import ROUNDED, polar_factor
 from urdfkin.system.files import exists, read_text
 from urdfkin.system.resources import robots_dir
 
-#: Largest deviation of a printed matrix (six digits) from a rotation matrix; a larger deviation is not
-#: corrected.
+#: Largest deviation of a matrix printed with six digits from a rotation matrix. A matrix with a larger
+#: deviation is not corrected.
 _PRINTED = 1e-5
-#: Number of lines after its heading that contain the three rows of a pose, with fences and blank lines.
+#: Number of lines after the heading of a pose in which the three rows of the pose are searched. Some of these
+#: lines may be blank or Markdown fences.
 _POSE_LINES = 6
 #: A setting on a separate line, such as `convention: modified`, with or without a comment mark.
 _SETTING = re.compile(r"^\W*(convention|angles|lengths|robot|base_frame|tip_frame)\s*[:=]\s*(.+)$")
-#: In a CSV file each `# key: value` is a setting; `table_from_mapping` rejects an unknown key.
+#: In a CSV file each line `# key: value` is a setting. `table_from_mapping` rejects an unknown key.
 _KEY = re.compile(r"^#?\s*(\w+)\s*:\s*([^,;\t].*)$")
 #: Names of columns that urdfkin writes; they have no synonyms.
 _OWN = ("leader", "multiplier", "lower", "upper", "velocity", "effort", "sense")
@@ -72,7 +74,7 @@ _RULE = re.compile(r"[\s|:+=_\-\u2500-\u257f]*")
 
 
 def from_sheet(text: str) -> dict[str, Any]:
-    """Return the plain data of a table in a text.
+    """Find the table in a text, and return it as plain data.
 
     Raises:
         InputError: there is no line of headings, a row has too few or too many cells, or a cell is invalid.
@@ -96,7 +98,7 @@ def from_sheet(text: str) -> dict[str, Any]:
     for end in ("base", "tool"):
         if end not in data and (pose := _pose(end, grid.around)):
             data[end] = pose
-    # Each cell carries the unit of its column's heading, so the rows need no common unit.
+    # Each cell gets the unit in its column's heading, so the table needs no common unit.
     named = _named_coordinates(grid.around)
     data["rows"] = [_row(grid, cells, i) for i, cells in enumerate(grid.rows)]
     _interpret_variables(data, named)
@@ -105,7 +107,7 @@ def from_sheet(text: str) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class _Column:
-    """A column: its name ("" if unknown), its heading, its unit, and whether its heading has an i-1."""
+    """A column: its name ("" if unknown), its heading, its unit, and whether the heading contains i-1."""
 
     name: str
     heading: str = ""
@@ -118,7 +120,7 @@ class _Grid:
     """The parts of a text with a table.
 
     Attributes:
-        columns: The headings.
+        columns: The columns, from the line of headings.
         rows: The cells of each row.
         around: All lines outside the table.
         commas: Whether a comma in a cell is a decimal comma.
@@ -166,7 +168,10 @@ def _grid(lines: list[str], split: Callable[[str], list[str]], mark: str = "") -
 
 
 def _no_header(lines: list[str]) -> InputError:
-    """Return the error for a text without all four headings; it names the line with the most headings."""
+    """Return the error for a text without the four required headings.
+
+    The error quotes the line with the most of these headings.
+    """
     said = [re.split(r"[,;|&\t]|\s{2,}", line.strip()) for line in lines if not line.startswith("#")]
     named = [[cell.strip() for cell in cells if cell.strip()] for cells in said]
     best = max(named, key=lambda cells: sum(_column(cell).name in ORDER for cell in cells), default=[])
@@ -245,7 +250,7 @@ def _aligned(lines: list[str]) -> _Grid | None:
 
 
 def _columns(cells: list[str]) -> tuple[_Column, ...] | None:
-    """Parse a line of headings; return None unless it has each of the four names. Names must be unique."""
+    """Parse a line of headings; return None unless a, alpha, d and theta all occur and names are unique."""
     columns = tuple(map(_column, cells))
     names = [column.name for column in columns]
     if any(name not in names for name in ORDER):
@@ -289,7 +294,10 @@ def _settings(lines: list[str], pattern: re.Pattern[str]) -> dict[str, Any]:
 
 
 def _convention(around: list[str], columns: tuple[_Column, ...]) -> str | None:
-    """Return the convention that the headings or the text name; None if they name no convention or both."""
+    """Return the convention that the headings or the text name.
+
+    The result is None if they name no convention, or both the standard and the modified convention.
+    """
     if any(column.previous for column in columns):
         return "modified"
     text = "\n".join(around)
@@ -313,9 +321,9 @@ def _pose(end: str, lines: list[str]) -> list[list[float]] | None:
 
 
 def _rigid(rows: list[list[float]], end: str) -> list[list[float]]:
-    """Return a printed pose with an exact rotation; raise InputError for numbers that are not finite."""
+    """Replace the rotation in a printed pose with an exact rotation; raise InputError for infinite numbers."""
     pose = np.array(rows)
-    if not np.isfinite(pose).all():  # LAPACK may not return for an infinite matrix
+    if not np.isfinite(pose).all():  # LAPACK may run forever for an infinite matrix
         raise InputError(f"the {end} must be a matrix of finite numbers", where=end, found=safe_repr(rows))
     off = polar_factor(pose[:3, :3]) - pose[:3, :3]
     if ROUNDED < np.abs(off).max() < _PRINTED:
@@ -324,7 +332,10 @@ def _rigid(rows: list[list[float]], end: str) -> list[list[float]]:
 
 
 def _named_coordinates(lines: list[str]) -> list[str]:
-    """Parse `with q1 = left, q2 = right`, which urdfkin prints if rows and coordinates differ."""
+    """Return the joint names in `with q1 = left, q2 = right`.
+
+    urdfkin prints this text if the coordinates are not the rows' joints in row order.
+    """
     line = next((line for line in lines if line.startswith("with q1 = ")), "")
     return [_unescaped(name).strip("`") for name in re.findall(r"q[0-9]+ = ([^,]+)", line)]
 
@@ -333,14 +344,14 @@ def _named_coordinates(lines: list[str]) -> list[str]:
 
 
 def _row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
-    """Return a row as a mapping by column name, with each cell's unit.
+    """Return a row as a mapping from column names to cells with units.
 
     Empty cells are left out, except the four required cells.
     """
     row: dict[str, Any] = {}
     for column, cell in zip(grid.columns, cells, strict=True):
         if not column.name and grid.strict and column.heading not in _COUNTS:
-            row[column.heading] = cell  # rejected later, because the name may be misspelt
+            row[column.heading] = cell  # this unknown heading, which may be misspelt, is rejected later
         elif not column.name or (not cell and column.name not in ORDER):
             continue
         elif column.name in (*ORDER, "beta", "offset"):
@@ -354,7 +365,10 @@ def _row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
 
 
 def _number(cell: str, column: _Column, where: str, commas: bool) -> str:
-    """Return a cell with its own unit or the unit of its heading; raise InputError for an invalid cell."""
+    """Return a cell as text with a unit: that of the cell, or else that of the column's heading.
+
+    An invalid cell raises InputError.
+    """
     text = re.sub(r"(?<=[0-9]),(?=[0-9])", ".", cell) if commas else cell
     try:
         found: Cell = cell_of(text)
@@ -376,7 +390,10 @@ def _unescaped(name: str) -> str:
 
 
 def _nested(row: dict[str, Any]) -> dict[str, Any]:
-    """Nest the columns of mimic rules and of limits; without a mimic rule, add `offset` to theta or d."""
+    """Collect the columns of a mimic rule and of limits in one mapping each.
+
+    If the row has no mimic rule, `offset` is added to theta or d.
+    """
     leads: dict[str, Any] = {key: row.pop(key) for key in ("leader", "multiplier") if key in row}
     if leads and "offset" in row:
         leads["offset"] = row.pop("offset")
@@ -388,7 +405,10 @@ def _nested(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def _interpret_variables(data: dict[str, Any], named: list[str]) -> None:
-    """Interpret the variables q1, q2, ...: a row with another row's variable is a mimic joint."""
+    """Interpret the variables q1, q2, ... of the rows.
+
+    A row with the variable of another row is a mimic joint.
+    """
     rows = data["rows"]
     names = named or [row.get("joint", f"joint_{i + 1}") for i, row in enumerate(rows)]
     for i, row in enumerate(rows):
@@ -451,7 +471,7 @@ def read_table(path: str | os.PathLike[str]) -> DHTable:
 
 
 def read_table_or_screws(path: str | os.PathLike[str]) -> DHTable | ProductOfExponentials:
-    """Read a table, or screws if the file has the key M; errors as for `read_table`."""
+    """Read a table, or a product of exponentials if the file has the key M; errors as for `read_table`."""
     data = read_mapping(path)
     return _with_place(screws_of_mapping, data, str(path)) if "M" in data else table_of(data, str(path))
 
@@ -528,12 +548,12 @@ _PARSERS: dict[str, Callable[[str], Any]] = {
 
 
 def references() -> dict[str, Path]:
-    """Return name -> file for each reference table in urdfkin."""
+    """Return the names of the reference tables in urdfkin, each with the path of its file."""
     return {path.stem: path for path in sorted((robots_dir() / "dh").glob("*.toml"))}
 
 
 def published(robot: str) -> list[str]:
-    """Return a line with the option `--like` for each published table of a robot."""
+    """Return, for each published table of a robot, a line of text with the option `--like` and the table."""
     lines = []
     for name, path in references().items():
         data = read_mapping(path)

@@ -1,8 +1,9 @@
-"""Compute the error that rounding of the printed numbers causes in a printed table.
+"""Compute the tip error of a printed table, which is caused by the rounding of its numbers.
 
-Each rounded angle turns the rest of the chain, with a lever of at most the sum of all later lengths. Each
-rounded length shifts the rest of the chain. The sum of these effects is a bound for every configuration
-within the limits. The largest error on samples is measured as well.
+The rounding of an angle turns the rest of the chain. This moves the tip by at most the rounding error times
+the sum of all later lengths. The rounding of a length shifts the rest of the chain. The sum of these effects
+is a bound of the tip error for every configuration within the limits. The module also computes the largest
+error on samples.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ from urdfkin.model.tree import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class PrintedPrecision:
-    """The error of a printed table.
+    """The tip error of a printed table.
 
     Attributes:
-        digits: Number of digits.
+        digits: Number of printed significant digits.
         metres: Largest distance between the tips of the printed table and of the exact table, on samples.
         bound: Guaranteed bound of this distance within the limits (metres); None if there is no bound.
         samples: Number of samples.
@@ -59,8 +60,8 @@ def printed(table: DHTable, units: Units, pose_digits: int | None = None) -> Pri
     base, tool = (_pose(T, digits) for T in (table.base, table.tool))
     bounds = {row.joint: axis_range(row.kind, row.limit) for row in table.rows if row.mimic is None}
     q = values_within([bounds.get(name, UNKNOWN) for name in table.joint_names], SAMPLES)
-    # The rounded entries of base and tool do not form a rotation, so base and tool are multiplied outside the
-    # table.
+    # A DHTable accepts only exact rotations in base and tool. The rounded base and tool are therefore
+    # multiplied outside the table.
     between = replace(table, rows=rows, base=np.eye(4), tool=np.eye(4)).placement(q)
     off = np.linalg.norm((base @ between @ tool - table.placement(q))[:, :3, 3], axis=-1)
     bound = _bound(table, rows, base, tool)
@@ -72,7 +73,7 @@ def _row(row: DHRow, units: Units) -> DHRow:
     """Return the row as it is printed."""
     a, alpha, d, theta, beta = row.cells
     rule = row.mimic
-    own = row.sense * rule.offset if rule else 0.0  # the printed constant includes the mimic offset
+    own = row.sense * rule.offset if rule else 0.0  # the printed constant includes the offset of the mimic rule
     constant = constant_of(row)
     theta, d = (
         (_angle(constant, units) - own, _length(d, units))
@@ -109,7 +110,10 @@ def _pose(T: FloatArray, digits: int) -> FloatArray:
 
 
 def _bound(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, tool: FloatArray) -> float:
-    """Add up the errors of all numbers, each multiplied by its longest lever."""
+    """Return the sum of the tip errors (metres) that the rounding of each number can cause.
+
+    The rounding of an angle counts with the largest possible distance of the tip from the row.
+    """
     lever = float(np.linalg.norm(table.tool[:3, 3]))
     total = float(np.linalg.norm((tool - table.tool)[:3, 3]))
     for row, other in zip(reversed(table.rows), reversed(rows), strict=True):
@@ -127,7 +131,7 @@ def _bound(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, tool: Floa
 
 
 def printed_tree(table: TreeParameters, units: Units, q: FloatArray) -> PrintedPrecision:
-    """Return the error of a whole robot's printed parameters, at the link with the largest error.
+    """Return the error of the printed parameters of a whole robot, at the link with the largest error.
 
     Args:
         table: The parameters.

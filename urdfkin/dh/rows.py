@@ -1,6 +1,6 @@
-"""Make tables from handwritten rows in Python, TOML, JSON or CSV, in the units that the rows name.
+"""Make tables from handwritten rows in Python, TOML, JSON or CSV, in the units that the data state.
 
-All formats become one mapping:
+All formats are converted to the same mapping:
 
     convention = "modified"         # or "standard"; required
     angles = "degrees"              # default: radians
@@ -39,7 +39,7 @@ from urdfkin.model.tree import FloatArray, JointKind, Limit, Mimic
 
 
 class Literal(float):
-    """A number with its text, as a parser found it."""
+    """A number that also stores its text in the file."""
 
     text: str
 
@@ -51,7 +51,7 @@ class Literal(float):
 
 
 def last_digits(data: Mapping[str, Any]) -> tuple[dict[str, float], ...]:
-    """Return half a unit of the last digit of each cell, for each row, in metres and radians.
+    """Return, for each row, half a unit of the last digit of each cell, in metres and radians.
 
     Args:
         data: A valid table's mapping from `urdfkin.dh.parse_table.mapping_from_text`.
@@ -92,7 +92,8 @@ def half_a_digit(value: object, whole_is_rounded: bool = False) -> float:
     return 0.5 * 10.0 ** min(exponent, 0)
 
 
-#: Order of the cells in a row given as a list; "R" or "P" may follow. A row with beta must be a mapping.
+#: Order of the cells in a row that is a list. The list may also have "R" or "P" at the end. A row with beta
+#: must be a mapping.
 ORDER = ("a", "alpha", "d", "theta")
 _KINDS = {
     "r": JointKind.REVOLUTE,
@@ -114,7 +115,7 @@ def written_row(row: Any, index: int, units: Units) -> DHRow:
         units: Units of its numbers.
 
     Raises:
-        InputError: the row is anything else; the message names the row and the column.
+        InputError: the row has another type or an invalid cell; the message names the row and the column.
     """
     if isinstance(row, DHRow):
         return row
@@ -135,10 +136,11 @@ def written_row(row: Any, index: int, units: Units) -> DHRow:
 
 
 def refuse_other_order(rows: Sequence[Any]) -> None:
-    """Reject lists with columns that look like the Robotics Toolbox's order theta, d, a, alpha.
+    """Reject rows, given as lists, that seem to be in the Robotics Toolbox's order theta, d, a, alpha.
 
-    Angles of a table are nearly always multiples of 15 degrees; lengths are hardly ever. Lists are rejected
-    if all numbers in the first and fourth columns are such multiples and none in the second column is.
+    Angles of a table are nearly always multiples of 15 degrees. Lengths hardly ever look like such angles.
+    Lists are rejected if all numbers in the first and fourth columns are such multiples and none in the
+    second column is.
 
     Raises:
         InputError: the columns look like the other order; the message names both orders.
@@ -173,7 +175,7 @@ def _is_zero(value: Any) -> bool:
 
 
 def _looks_round(value: Any) -> bool:
-    """Whether a cell looks like a multiple of 15 degrees, written in radians or in degrees."""
+    """Whether a cell looks like a multiple of 15 degrees in radians or in degrees."""
     if isinstance(value, str):
         return "pi" in value
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
@@ -214,7 +216,7 @@ def _check_keys(given: Mapping[str, Any], keys: Sequence[str], what: str, where:
 
 
 def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mapping[str, Any]:
-    """Replace a cell such as "q3 + pi" with its constant, and add the kind and the sense of the joint."""
+    """Replace a cell such as "q3 + pi" with its constant pi, and add the joint's kind and sense to the row."""
     written = {name: fields[name] for name in ORDER if isinstance(fields.get(name), str)}
     cells = {name: _read(value, f"{where}, {name}") for name, value in written.items()}
     own = [name for name, cell in cells.items() if cell.times is not None]
@@ -242,7 +244,7 @@ def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mappin
 
 
 def units_in(cell: Cell, units: Units) -> Units:
-    """Return the units of a cell: the table's units, replaced by the cell's own unit if it has one."""
+    """Return the units of a cell: the cell's own unit if it has one, and otherwise the table's units."""
     if cell.unit in ("m", "mm"):
         return units_of(units.angles, cell.unit, units.digits)
     return units_of(cell.unit or units.angles, units.lengths, units.digits)
@@ -261,7 +263,7 @@ def _read(text: str, where: str) -> Cell:
 
 
 def _cell(name: str, value: Any, units: Units, where: str) -> float:
-    """Parse a cell into metres or radians; an angle above one turn in radians is an error."""
+    """Parse a cell into metres or radians; an angle in radians that exceeds one turn is an error."""
     in_pi = False
     if isinstance(value, str):
         cell = _read(value, f"{where}, {name}")
@@ -310,7 +312,7 @@ def _sense(value: Any, where: str) -> int:
 
 
 def _own(name: str, value: Any, fields: Mapping[str, Any], units: Units, where: str) -> float:
-    """Parse a joint's value: an angle of a revolute joint, a length of a prismatic joint."""
+    """Parse a number for a joint's variable: an angle if the joint is revolute, a length if it is prismatic."""
     number = read_number(value, f"{where}, {name}")
     return cell_in_si("theta" if _kind(fields.get("kind", "R"), where).turns else "d", number, units)
 
@@ -356,7 +358,8 @@ _TABLE_KEYS = (
     *("convention", "angles", "lengths", "robot", "base_frame", "tip_frame", "base", "tool"),
     *("coordinates", "rows"),
 )
-#: Keys for information only, for example the source of the numbers and the URDF that they describe.
+#: Keys that do not change the table. They contain information, for example the source of the numbers and the
+#: URDF of the same robot.
 NOTES = ("source", "source_kind", "note", "name", "urdf", "snap", "last", "fit_sign", "checked")
 
 
@@ -391,7 +394,7 @@ def table_from_rows(
     Raises:
         InputError: the convention or a unit is unknown, a row is invalid, there are no rows, or one joint has
             two rows.
-        UnknownNameError: a mimicked joint that has no row and is not in `coordinates`.
+        UnknownNameError: a mimicked joint has no row and is not in `coordinates`.
 
     Example:
         >>> table = table_from_rows([[0, 90, 0.3, 0], [0.4, 0, 0, 0]], "standard", angles="degrees")

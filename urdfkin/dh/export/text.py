@@ -128,7 +128,7 @@ def at_most(value: float) -> str:
 
 
 def snap_lines(table: DHTable) -> list[str]:
-    """Return lines of text about snapping: first its effect on the tip, then a line for each snapped angle."""
+    """Return lines of text about snapping: the effect on the tip, then a line for each snapped angle."""
     snap = table.snap
     if snap is None:
         return []
