@@ -295,7 +295,10 @@ def _meets_neighbour(constants: list[FloatArray], k: int, noise: list[Noise]) ->
 
 
 def _shift_after(constants: list[FloatArray], k: int, offset: FloatArray) -> None:
-    """Move the whole offset before joint k to the pose after it; `offset` is this offset in joint k's frame."""
+    """Move the whole offset before joint k to the pose after the joint.
+
+    `offset` is this offset, expressed in the frame of joint k.
+    """
     constants[k][:3, 3] = 0.0
     constants[k + 1][:3, 3] += offset
 
@@ -435,7 +438,7 @@ def _representable(A: FloatArray, choices: Choices, noise: Noise) -> bool:
 def _last(
     A: FloatArray, phi_in: float, carry: float, reach: float, choices: Choices, noise: Noise
 ) -> tuple[float, float, Step, FloatArray]:
-    """Return theta, d and the step of the last row, and the tool; `A` is the tip's pose in the last joint."""
+    """Return theta, d and the step of the last row, and the tool; `A` is the tip's pose from O_{n-1}."""
     if _representable(A, choices, noise):
         phi = math.atan2(A[1, 0], A[0, 0])
         a = cleaned_length(A[0, 0] * A[0, 3] + A[1, 0] * A[1, 3], reach, noise.metres)

@@ -321,7 +321,10 @@ def _pose(end: str, lines: list[str]) -> list[list[float]] | None:
 
 
 def _rigid(rows: list[list[float]], end: str) -> list[list[float]]:
-    """Replace the rotation in a printed pose with an exact rotation; raise InputError for infinite numbers."""
+    """Replace the rotation in a printed pose with the nearest exact rotation if it differs only by rounding.
+
+    A number that is not finite raises InputError.
+    """
     pose = np.array(rows)
     if not np.isfinite(pose).all():  # LAPACK may run forever for an infinite matrix
         raise InputError(f"the {end} must be a matrix of finite numbers", where=end, found=safe_repr(rows))

@@ -73,7 +73,7 @@ def _row(row: DHRow, units: Units) -> DHRow:
     """Return the row as it is printed."""
     a, alpha, d, theta, beta = row.cells
     rule = row.mimic
-    own = row.sense * rule.offset if rule else 0.0  # the printed constant includes the offset of the mimic rule
+    own = row.sense * rule.offset if rule else 0.0  # the printed constant includes this offset
     constant = constant_of(row)
     theta, d = (
         (_angle(constant, units) - own, _length(d, units))

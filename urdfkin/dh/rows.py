@@ -216,7 +216,7 @@ def _check_keys(given: Mapping[str, Any], keys: Sequence[str], what: str, where:
 
 
 def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mapping[str, Any]:
-    """Replace a cell such as "q3 + pi" with its constant pi, and add the joint's kind and sense to the row."""
+    """Replace a cell such as "q3 + pi" with the constant pi, and add kind and sense of the joint."""
     written = {name: fields[name] for name in ORDER if isinstance(fields.get(name), str)}
     cells = {name: _read(value, f"{where}, {name}") for name, value in written.items()}
     own = [name for name, cell in cells.items() if cell.times is not None]
@@ -312,7 +312,7 @@ def _sense(value: Any, where: str) -> int:
 
 
 def _own(name: str, value: Any, fields: Mapping[str, Any], units: Units, where: str) -> float:
-    """Parse a number for a joint's variable: an angle if the joint is revolute, a length if it is prismatic."""
+    """Parse a value of a joint's variable: the angle of a revolute joint, the length of a prismatic joint."""
     number = read_number(value, f"{where}, {name}")
     return cell_in_si("theta" if _kind(fields.get("kind", "R"), where).turns else "d", number, units)
 

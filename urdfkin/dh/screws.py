@@ -1,12 +1,12 @@
-"""Compute the product of exponentials in Lynch and Park's form: a zero pose, and a screw for each joint.
+"""Compute a path's product of exponentials, in Lynch and Park's form: a zero pose and a screw per joint.
 
     T(q) = exp([S_1] q_1) ... exp([S_n] q_n) M = M exp([B_1] q_1) ... exp([B_n] q_n)    (Modern Robotics, 4.1)
 
 M is the tip's pose in the zero configuration. A screw is (w, v), with the **angular part first**, as in that
 book and in its code. For a revolute joint through p, w is the unit axis and v = p x w. For a prismatic joint,
 w = 0 and v is the unit direction. Space screws S are in the base frame, body screws B = Ad(M^-1) S in the tip
-frame. The frames of a Denavit-Hartenberg table leave choices. Screws leave none: the base frame, the tip
-frame and the joint zeros define all numbers.
+frame. The author of a Denavit-Hartenberg table can choose some of its frames. Screws leave no such choice:
+the base frame, the tip frame and the joint zeros define all numbers.
 """
 
 from __future__ import annotations
@@ -34,7 +34,8 @@ from urdfkin.model.path import Motion, Path
 from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, build_tree, frozen
 
-#: Tolerances of a handwritten screw: deviation of its axis' length from 1, and of its pitch from 0 (m/rad).
+#: Tolerance of handwritten screws. It applies to the deviation of an axis' length from 1, and to the
+#: deviation of a pitch from 0 (m/rad).
 _WRITTEN = 1e-4
 
 
@@ -54,8 +55,9 @@ class ProductOfExponentials(Displayable):
 
     Attributes:
         joints: The joints, base to tip.
-        M: (4, 4) the tip's pose in the base in the zero configuration (metres).
-        space: (n, 6) screws (w, v) in the base frame: rad/rad and m/rad, or 0 and m/m.
+        M: (4, 4) pose of the tip in the base frame in the zero configuration (metres).
+        space: (n, 6) screws (w, v) in the base frame. For a revolute joint, w is in rad/rad and v in m/rad.
+            For a prismatic joint, w is 0 and v is in m/m.
         robot: The robot's name.
         base_frame: Name of the base frame.
         tip_frame: Name of the tip frame.
@@ -119,7 +121,9 @@ class ProductOfExponentials(Displayable):
 
     @property
     def points(self) -> FloatArray:
-        """(n, 3) point of each revolute axis nearest to the base; a prismatic joint has the previous point.
+        """(n, 3) point of each revolute axis that is nearest to the base's origin.
+
+        A prismatic joint has the point of the previous joint.
 
         >>> import urdfkin
         >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
@@ -149,10 +153,11 @@ class ProductOfExponentials(Displayable):
 
     @cached_property
     def path(self) -> Path:
-        """The same product of exponentials as elementary motions; their amounts are the joints' values.
+        """The product of exponentials as a path: each joint is a rotation or translation along a z axis.
 
-        exp([S] q) = A Rz(q) A^-1, or A Tz(q) A^-1, where z of the pose A is along the joint's axis. The
-        constant between two motions is A_i^-1 A_{i+1}; the last one is A_n^-1 M.
+        For a revolute joint, exp([S] q) = A Rz(q) A^-1. For a prismatic joint, exp([S] q) = A Tz(q) A^-1. The
+        z axis of the pose A is along the joint's axis. The constant pose between two motions is A_i^-1
+        A_{i+1}. The last constant pose is A_n^-1 M.
 
         >>> import urdfkin
         >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
@@ -168,9 +173,11 @@ class ProductOfExponentials(Displayable):
 
     @property
     def roundings(self) -> float:
-        """Bound of the rotation error of `placement` by rounding, in eps, without the rounding of q.
+        """Bound of the rotation error of `placement` by rounding, in multiples of the machine epsilon.
 
-        The bound counts each exponential as two rows of a table.
+        The bound does not contain the effect of rounding in q.
+
+        Each exponential counts as two rows of a Denavit-Hartenberg table.
 
         >>> import urdfkin
         >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
@@ -195,7 +202,7 @@ class ProductOfExponentials(Displayable):
         return np.asarray(EPS * (self.roundings + values[..., turns].sum(axis=-1)) * lever)
 
     def to_tree(self) -> KinematicTree:
-        """Return the robot as a tree.
+        """Return the path as a kinematic tree.
 
         In the zero configuration each link frame is parallel to the base frame. The origin of the link frame
         is on the axis of the link's joint.
@@ -221,7 +228,7 @@ class ProductOfExponentials(Displayable):
         return build_tree(self.robot, self.base_frame, [*joints, (end, links[-1], self.tip_frame)])
 
     def as_mapping(self) -> dict[str, Any]:
-        """Return plain data for `screws_of_mapping`, without mimic rules and limits.
+        """Return the screws as plain data for `screws_of_mapping`, without mimic rules and limits.
 
         >>> import urdfkin
         >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
@@ -276,9 +283,10 @@ def screws_from(
     """Make a product of exponentials from handwritten screws; a joint is revolute if w is not zero.
 
     Args:
-        screws: (n, 6) rows (w, v), angular first; or Modern Robotics' columns, (6, n), unless n is six.
+        screws: (n, 6) one row (w, v) for each joint, with the angular part first. An array (6, n) with one
+            column for each joint, as in Modern Robotics, is also accepted if n is not six.
         M: (4, 4) or (3, 4) pose of the tip in the zero configuration (metres).
-        frame: "space" or "body".
+        frame: Frame of the screws: "space" is the base frame, and "body" is the tip frame.
         joints: The joints' names; joint_1, joint_2, ... by default.
         robot: The robot's name.
         base_frame: Name of the base frame.
@@ -335,7 +343,7 @@ def screws_of_mapping(data: Mapping[str, Any]) -> ProductOfExponentials:
     """Make screws from a file's plain data, with the keys M and space or body; errors as for `screws_from`.
 
     Raises:
-        InputError: the data has an unknown key, or neither space nor body.
+        InputError: the data has an unknown key, or has neither the key space nor the key body.
     """
     known = ("robot", "base_frame", "tip_frame", "joints", "M", "space", "body")
     for key in data:

@@ -3,17 +3,16 @@
 A file may write an angle inexactly (1.5708), or a calibration may have changed it slightly. Three angles are
 snapped, from base to tip:
 
-1. the orientation of each joint's origin in the URDF (roll, pitch and yaw);
-2. the tilt between consecutive axes, and the rotations before and after it;
-3. theta of the finished rows.
+1. the orientation of each joint's origin in the URDF (roll, pitch and yaw); 2. the tilt between consecutive
+axes, and the rotations before and after it; 3. the angle theta of each row, after the rows are computed.
 
 Positions stay as they are in the file, so each change only turns the rest of the chain about a joint's
 origin. `urdfkin.dh.table` derives the bound from this.
 
-`snap_hint` finds cells that look like angles rounded by the file (1.5708, 3.14159265359). A tilt of 5e-12
-rad, for example, is larger than the rounding of the computation (`urdfkin.dh.common_normals`). A table
-therefore contains this tilt, and the offsets of about 1e-12 m that the tilt causes. The hint states that
-these numbers come from the file.
+`snap_hint` finds cells that look like angles rounded by the file (1.5708, 3.14159265359). For example, such
+an angle may cause a tilt of 5e-12 rad. This tilt is larger than rounding errors of the computation
+(`urdfkin.dh.common_normals`). The table therefore contains the tilt, and offsets of about 1e-12 m that the
+tilt causes. The hint explains that these numbers come from the file.
 """
 
 from __future__ import annotations
@@ -33,8 +32,8 @@ from urdfkin.model.chain import FrameChain, chain, steps_between
 from urdfkin.model.ranges import axis_range, values_within
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, frozen
 
-#: Largest tolerance (rad): 5 degrees. A change of more than 7.5 degrees would lead to another multiple of 15
-#: degrees.
+#: Largest tolerance (rad): 5 degrees. With a tolerance of more than 7.5 degrees, an angle could be within the
+#: tolerance of two multiples of 15 degrees.
 LARGEST_TOLERANCE = math.pi / 36.0
 #: Number of configurations at which a snapped table is compared with the exact chain.
 SAMPLES = 500
@@ -53,7 +52,10 @@ def checked_tolerance(snap: float) -> float:
 def snap_chain(
     tree: KinematicTree, tip: str, base: str | None, tolerance: float
 ) -> tuple[FrameChain, list[tuple[int, SnapChange]]]:
-    """Return the chain with its angles snapped, and the list of changes, each with its constant's index."""
+    """Return the chain with snapped angles, and the list of changes.
+
+    Each change comes with the index of the chain's constant pose that changed.
+    """
     exact = chain(tree, tip, base)
     rounder, moved = _snap_origins(tree, tolerance)
     path = chain(rounder, tip, base)
@@ -72,7 +74,10 @@ def snap_chain(
 
 
 def snap_thetas(table: DHTable, exact: FrameChain, tolerance: float) -> tuple[DHTable, list[SnapChange]]:
-    """Snap theta of the finished rows; the rest of the chain turns about the row's axis."""
+    """Snap theta of each row of a derived table.
+
+    A change of theta turns the rest of the chain about the row's axis.
+    """
     rows, changes = list(table.rows), list[SnapChange]()
     for i, row in enumerate(rows):
         theta = wrapped(nearest_twelfth(row.theta)) + 0.0
@@ -89,7 +94,7 @@ def snap_thetas(table: DHTable, exact: FrameChain, tolerance: float) -> tuple[DH
 def statement(
     exact: FrameChain, table: DHTable, changes: Sequence[SnapChange], tolerance: float
 ) -> SnapReport:
-    """Add up the bounds of the changes, and measure their effect on samples within the limits."""
+    """Return the sum of the bounds of the changes, and their largest effect on samples within the limits."""
     radians = sum((change.angle for change in changes), 0.0)
     per_metre = dict[str, float]()
     for change in changes:
@@ -128,7 +133,11 @@ def rotation_angle(R: FloatArray, S: FloatArray) -> FloatArray:
 
 
 def _snap_origins(tree: KinematicTree, tolerance: float) -> tuple[KinematicTree, dict[str, float]]:
-    """Snap roll, pitch and yaw of all joint origins; return the tree and each joint's rotation (rad)."""
+    """Snap roll, pitch and yaw of all joint origins.
+
+    The function returns the tree with snapped origins. For each changed joint it also returns the angle (rad)
+    by which the origin rotated.
+    """
     joints, moved = list(tree.joints), dict[str, float]()
     for i, joint in enumerate(joints):
         T = np.array(joint.T_parent_joint)
@@ -192,7 +201,7 @@ def _product(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray
 def _changes_of_origins(
     steps: Sequence[tuple[Joint, bool]], moved: Mapping[str, float]
 ) -> list[tuple[int, SnapChange]]:
-    """Return a change for each snapped origin on the path; its lever is the path length to the tip."""
+    """Return a change for each snapped origin on the path, with the path length to the tip as its lever."""
     changes, lever, sliders = list[tuple[int, SnapChange]](), 0.0, list[str]()
     moving = sum(joint.kind.has_axis for joint, _ in steps)
     for joint, backwards in reversed(steps):
@@ -211,7 +220,9 @@ def _changes_of_origins(
 
 
 def _change(exact: FrameChain, k: int, what: str, angle: float) -> SnapChange:
-    """Return the record of a change about the origin of joint k, with its lever to the tip.
+    """Return the record of a rotation about the origin of joint k, with its lever.
+
+    The lever is the largest possible distance from this origin to the tip.
 
     Joints are counted from 1; n + 1 is the tip.
     """
@@ -229,7 +240,7 @@ def row_of_constant(table: DHTable, k: int) -> int:
     return k - 1 if table.convention is Convention.STANDARD else k
 
 
-#: Range of the coordinate of a mimicked joint that is not on the path (rad or metres).
+#: Assumed range of the coordinate of a mimicked joint that is not on the path (rad or metres).
 UNKNOWN = (-1.0, 1.0)
 
 
@@ -238,17 +249,17 @@ def travel(limit: Limit | None) -> float:
     return 1.0 if limit is None else max(abs(limit.lower), abs(limit.upper))
 
 
-#: Largest deviation from a round value in a cell that looks rounded: radians from a multiple of 15 degrees,
-#: or metres per metre of span.
+#: Largest difference between a cell that looks rounded and the nearest round value. Angles differ from a
+#: multiple of 15 degrees, in radians. Lengths differ from 0, in metres per metre of span.
 LARGEST = 1e-4
-#: Tolerances to try, in radians, in ascending order.
+#: Tolerances for snapping that the hint tries, in radians, in ascending order.
 TOLERANCES = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
 
 
 def noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
-    """Return (joint, cell, distance from a round value in rad or m) of cells that look rounded.
+    """Return (joint, cell, difference from the nearest round value in rad or m) of cells that look rounded.
 
-    The cell with the smallest distance is first.
+    The cell with the smallest difference is first.
     """
     found = []
     for row in table.rows:
@@ -263,14 +274,16 @@ def noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
 
 
 def snap_hint(table: DHTable, snapped: Callable[[float], DHTable]) -> str | None:
-    """Return a line of text with a cell that looks rounded, and the tolerance that snaps most such cells.
+    """Return a line of text that names a cell that looks rounded, and a tolerance for snapping.
+
+    This tolerance snaps most of the cells that look rounded.
 
     Args:
         table: An exact table.
         snapped: Function that returns the same table, snapped with a tolerance (rad).
 
     Returns:
-        None if no cell looks rounded, or if no tolerance helps.
+        The line of text. None if no cell looks rounded, or if no tolerance snaps such a cell.
     """
     noisy = noisy_cells(table) if table.snap is None else []
     if not noisy:

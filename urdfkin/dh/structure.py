@@ -1,11 +1,11 @@
 """Find the structure of an arm and export it for closed-form inverse kinematics solvers.
 
-`structure` reports which axes are parallel or intersect, with the deviation from this property, and which
-closed-form solutions exist. The distance and the angle of two consecutive axes are the same in every
-configuration. It is therefore enough to compute them in the zero configuration, from the screws
-(`urdfkin.dh.screws`, checked by Pinocchio). Pieper (1968): six revolute joints have a closed-form solution if
-three consecutive axes are parallel or intersect in one point. A calibrated robot has such a property only
-approximately. The deviation is given in radians and metres.
+`structure` reports which axes are parallel or intersect, with the deviation from this property. It also
+reports which closed-form solutions exist. The distance and the angle of two consecutive axes are the same in
+every configuration. They are therefore computed only in the zero configuration, from the screws
+(`urdfkin.dh.screws`). Pinocchio checks the screws. Pieper (1968): six revolute joints have a closed-form
+solution if three consecutive axes are parallel or intersect in one point. A calibrated robot has such a
+property only approximately. The deviation is given in radians and metres.
 
 `opw_of` returns the seven parameters of an ortho-parallel arm with a spherical wrist (OPW, Brandstoetter et
 al., 2014). An OPW arm is the standard table
@@ -13,9 +13,9 @@ al., 2014). An OPW arm is the standard table
     a1 -90 c1 q1    c2 0 0 q2-90    a2 90 b q3+90    0 -90 c3 q4    0 90 0 q5    0 0 c4 q6
 
 with cells in the order a, alpha, d, theta. `opw_of` derives the URDF's table in the frames, zeros and senses
-of this table (`urdfkin.dh.make`), and reads the parameters from it. OPW has no parameter for a tilt from
-calibration, so `opw_of` drops the tilt. `Opw.placement` computes the solver's forward kinematics, which show
-the resulting error.
+of this table (`urdfkin.dh.make`), and reads the parameters from it. OPW has no parameter for the small tilts
+of a calibrated arm, so `opw_of` ignores these tilts. `Opw.placement` computes the forward kinematics of the
+solver. Its difference from the arm's placement is the resulting error.
 
 `axes_and_steps` returns H and P, the input of solvers by subproblem decomposition (IK-Geo, EAIK):
 
@@ -46,10 +46,11 @@ from urdfkin.model.path import elementary
 from urdfkin.model.ranges import axis_range, values_within
 from urdfkin.model.tree import FloatArray, JointKind
 
-#: Largest deviation of a property that is reported (rad, metres), and of one that counts as exact (both
-#: units).
+#: A property such as parallel axes is reported if its deviation is at most `NEAR_ANGLE` (rad) and
+#: `NEAR_LENGTH` (metres). The property counts as exact if its deviation is at most `EXACT` (rad and metres).
 NEAR_ANGLE, NEAR_LENGTH, EXACT = 0.02, 0.005, 1e-9
-#: Singular values below this limit count as zero. The limit is far above rounding and far below a lever arm.
+#: Singular values of the Jacobian below this limit count as zero. The limit is far above rounding errors and
+#: far below the distances of real axes.
 _RANK = 1e-6
 #: Number of random configurations within the limits for the estimate of the reach; mimic rules are ignored.
 _SAMPLES = 2000
@@ -57,7 +58,7 @@ _SAMPLES = 2000
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """Two consecutive axes: the angle of their lines (at most pi/2), and their distance.
+    """Two consecutive axes: the angle between the two lines (at most pi/2), and their distance.
 
     The distance is 0 if one of the two joints is prismatic.
     """
@@ -70,13 +71,13 @@ class Pair:
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A property of some consecutive joints.
+    """A geometric property of some consecutive joints, for example three parallel axes.
 
     Attributes:
         name: "parallel", "meet in a point", "spherical wrist", ...
         joints: Names of the joints.
-        radians: Deviation from the exact property.
-        metres: Deviation from the exact property.
+        radians: Angular deviation from the exact property.
+        metres: Linear deviation from the exact property.
         at: (3,) position of the intersection in the base at the zero configuration (metres), or None.
     """
 
@@ -104,8 +105,9 @@ class Structure:
         freedoms: Degrees of freedom of the tip: the Jacobian's rank at a random configuration.
         pairs: Angle and distance of each pair of consecutive axes.
         kinds: Properties that the path has exactly or approximately, in ascending order of the deviation.
-        reach: Upper bound of the tip's distance from the point of the first axis nearest to the second (m).
-        reached: Largest distance from the same point on samples (metres).
+        reach: Upper bound of the tip's distance (metres) from the point of the first axis that is nearest to
+            the second axis.
+        reached: Largest distance of the tip from the same point on samples (metres).
         solvers: Closed-form solutions, with libraries that implement them.
     """
 
@@ -176,7 +178,10 @@ def _pair(screws: ProductOfExponentials, i: int) -> Pair:
 
 
 def meeting(screws: ProductOfExponentials, at: tuple[int, ...]) -> tuple[FloatArray, float]:
-    """Return the least-squares nearest point to some axes, and its largest distance from an axis (metres)."""
+    """Return the point nearest to some axes, and the largest of its distances from these axes (metres).
+
+    The point minimizes the sum of the squared distances.
+    """
     A, b = np.zeros((3, 3)), np.zeros(3)
     for i in at:
         across = np.eye(3) - np.outer(_axis(screws, i), _axis(screws, i))
@@ -222,7 +227,7 @@ def _arm_kinds(screws: ProductOfExponentials, letters: str, pairs: tuple[Pair, .
 def _solvers(letters: str, kinds: list[Kind], pairs: tuple[Pair, ...]) -> list[str]:
     """Return the known closed-form solutions.
 
-    A property with a small deviation gives a solution with a small error.
+    If the arm has a property only with a small deviation, the solution has a small error.
     """
     named = {kind.name for kind in kinds}
     spherical = [kind for kind in kinds if kind.name in ("spherical wrist", "spherical shoulder")]
@@ -274,7 +279,10 @@ def _origin(screws: ProductOfExponentials) -> FloatArray:
 
 
 def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
-    """Return an upper bound of the tip's distance: the path length along axes and their perpendiculars."""
+    """Return an upper bound of the tip's distance from a point of the first axis, in metres.
+
+    The bound is the length of the path that follows the axes and the perpendiculars between them.
+    """
     here, total = origin, 0.0
     for i, joint in enumerate(screws.joints):
         if not joint.kind.turns:
@@ -295,7 +303,8 @@ def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]
     return screws.path.poses(values)[:, :3, 3], screws.path.columns(values[0])[1]
 
 
-#: Default tolerance of OPW parameters at the tip (metres, rad), and the number of samples that measure it.
+#: Default tolerance of the tip error that OPW parameters cause (metres, rad), and the number of samples on
+#: which this error is computed.
 TOLERANCE, SAMPLES = 1e-6, 200
 _H = math.pi / 2.0
 _ALPHA, _THETA = (-_H, 0.0, _H, -_H, _H, 0.0), (0.0, -_H, _H, 0.0, 0.0, 0.0)
@@ -303,13 +312,15 @@ _ALPHA, _THETA = (-_H, 0.0, _H, -_H, _H, 0.0), (0.0, -_H, _H, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Opw:
-    """An arm's parameters in the solver's convention: q_opw = sign * q - offset.
+    """The OPW parameters of an arm.
+
+    The solver's joint values are q_opw = sign * q - offset, where q are the URDF's joint values.
 
     Attributes:
         joints: Joint names, base to tip.
         lengths: a1, a2, b, c1, c2, c3, c4 in metres.
-        offsets: Offset of each joint (rad).
-        signs: +1 or -1 for each joint.
+        offsets: Constant `offset` of each joint (rad).
+        signs: Factor `sign` of each joint, +1 or -1.
         base: (4, 4) pose of the solver's base in the URDF's base.
         tool: (4, 4) pose of the URDF's tip in the solver's flange.
     """
@@ -322,7 +333,7 @@ class Opw:
     tool: FloatArray
 
     def placement(self, q: FloatArray) -> FloatArray:
-        """Return the (..., 4, 4) pose base . F(sign * q - offset) . tool, with F of the solver's library."""
+        """Return the (..., 4, 4) pose base . F(sign * q - offset) . tool, where F is the solver's kinematics."""
         t = np.moveaxis(np.asarray(q) * self.signs - np.array(self.offsets), -1, 0)
         a1, a2, b, c1, c2, c3, c4 = self.lengths.values()
         x = c2 * np.sin(t[1]) + a2 * np.cos(t[1] + t[2]) + c3 * np.sin(t[1] + t[2]) + a1
@@ -360,7 +371,7 @@ def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
         tolerance: Largest error of the tip on `SAMPLES` configurations, in metres and in radians.
 
     Raises:
-        InputError: the path has other joints, or is no OPW arm; the message gives the error of the tip.
+        InputError: the path has other joints, or is not an OPW arm. The message contains the tip error.
     """
     where = f"{path.robot}, {path.base} to {path.tip}"
     if [joint.kind.turns for joint in path.joints] != [True] * 6:
@@ -394,7 +405,7 @@ def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
 
 
 def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
-    """Yield OPW tables of approximately the arm's lengths, for each combination of signs of a1, a2 and b."""
+    """Yield OPW tables with approximately the lengths of the arm, for each sign pattern of a1, a2 and b."""
     rows = derive(path, Choices(last=Last.FLANGE)).rows
     tip = float(np.linalg.norm(path.T_last_tip[:3, 3])) or 1.0
     a1, c2, a2 = (abs(row.a) for row in rows[:3])
@@ -422,7 +433,7 @@ def _read(table: DHTable) -> Opw:
 
 
 def axes_and_steps(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
-    """Return the unit axes H (n, 3) and the steps P (n + 1, 3) between their points, in metres.
+    """Return the unit axes H (n, 3), and the steps P (n + 1, 3) between points on these axes, in metres.
 
     The first step begins at the base; the last one ends at the tip.
 
@@ -434,10 +445,10 @@ def axes_and_steps(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArra
 
 
 def _points(screws: ProductOfExponentials) -> FloatArray:
-    """Return an (n, 3) array with a point of each axis; intersecting axes share their point.
+    """Return an (n, 3) array with a point of each axis; intersecting axes have the same point.
 
-    A point of three intersecting axes has priority over a point of two. The wrist has priority over the
-    shoulder.
+    If an axis has several intersections, the intersection of three axes has priority over that of two axes.
+    The wrist has priority over the shoulder.
     """
     points, taken, n = screws.points.copy(), set[int](), len(screws.joints)
     for size in (3, 2):
