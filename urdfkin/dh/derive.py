@@ -6,7 +6,7 @@ The derivation makes these choices; docs/dh.md gives the reasons:
   of the base's x axis.
 - x_i is along the common normal. The direction of x_i is reversed if theta would exceed a right angle.
 - Between parallel axes d = 0. The first row after a run of parallel axes takes the whole offset along these
-axes.
+  axes.
 - The last row reaches the tip if four parameters suffice.
 - A prismatic axis is on the line through the joint's origin in the URDF, except for the first and the last
   joint.

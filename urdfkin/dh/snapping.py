@@ -3,8 +3,9 @@
 A file may write an angle inexactly (1.5708), or a calibration may have changed it slightly. Three angles are
 snapped, from base to tip:
 
-1. the orientation of each joint's origin in the URDF (roll, pitch and yaw); 2. the tilt between consecutive
-axes, and the rotations before and after it; 3. the angle theta of each row, after the rows are computed.
+1. the orientation of each joint's origin in the URDF (roll, pitch and yaw);
+2. the tilt between consecutive axes, and the rotations before and after it;
+3. the angle theta of each row, after the rows are computed.
 
 Positions stay as they are in the file, so each change only turns the rest of the chain about a joint's
 origin. `urdfkin.dh.table` derives the bound from this.
@@ -154,7 +155,7 @@ def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
     """Factor R into Rz(yaw) Ry(pitch) Rx(roll), and snap each angle to a multiple of pi/12."""
     level = math.hypot(R[0, 0], R[1, 0])
     pitch = math.atan2(-R[2, 0], level)
-    if level <= tolerance:  # roll and yaw turn about the same axis: use yaw alone
+    if level <= tolerance:  # roll and yaw are about the same axis: use only yaw
         roll, yaw = 0.0, math.atan2(-R[0, 1], R[1, 1])
     else:
         roll, yaw = math.atan2(R[2, 1], R[2, 2]), math.atan2(R[1, 0], R[0, 0])
@@ -162,7 +163,7 @@ def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
 
 
 def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
-    """Factor the rotation of a pose into Rz(phi) Rx(tilt) Rz(psi), and snap each angle.
+    """Factor the rotation of a pose into Rz(phi) Rx(tilt) Rz(psi), and snap each of the three angles.
 
     The position of the pose is unchanged. The result also contains the angle by which the rotation changed.
     """

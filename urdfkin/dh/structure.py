@@ -333,7 +333,7 @@ class Opw:
     tool: FloatArray
 
     def placement(self, q: FloatArray) -> FloatArray:
-        """Return the (..., 4, 4) pose base . F(sign * q - offset) . tool, where F is the solver's kinematics."""
+        """Return the (..., 4, 4) pose base . F(sign * q - offset) . tool; F is the solver's kinematics."""
         t = np.moveaxis(np.asarray(q) * self.signs - np.array(self.offsets), -1, 0)
         a1, a2, b, c1, c2, c3, c4 = self.lengths.values()
         x = c2 * np.sin(t[1]) + a2 * np.cos(t[1] + t[2]) + c3 * np.sin(t[1] + t[2]) + a1

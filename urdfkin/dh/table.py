@@ -1,24 +1,25 @@
-"""Define the Denavit-Hartenberg table: rows, a base and a tool, in the standard or modified convention.
+"""Define the Denavit-Hartenberg table: rows, base and tool, in the standard or the modified convention.
 
-Section 7.5 of the textbook. A table is an alternating product of two kinds of factors:
+Section 7.5 of the textbook describes these tables. A table stands for a product in which two kinds of factors
+alternate:
 
     S = Rz(theta) Tz(d)              about and along a joint's axis
     X = Tx(a) Rx(alpha) Ry(beta)     from one axis to the next; beta = 0 except in a Hayati row
 
-Both conventions have the same factors, grouped differently:
+The two conventions have the same factors, but group them differently into rows:
 
     standard   T_base_tip = base . S_1 X_1 . S_2 X_2 ... S_n X_n . tool        (X_i from row i)
     modified   T_base_tip = base . X_0 S_1 . X_1 S_2 ... X_{n-1} S_n . tool    (X_{i-1} from row i)
 
-The variable of row i is theta_i for a revolute joint and d_i for a prismatic joint. The variable is the
-constant in the row plus `sense` times the joint's value. The standard convention is the textbook's: z_{i-1}
-is the axis of joint i, and d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
+The variable of row i is theta_i for a revolute joint and d_i for a prismatic joint. The value of the variable
+is the constant in the row plus `sense` times the joint's value. The standard convention is the textbook's:
+z_{i-1} is the axis of joint i, and d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
 
-`SnapReport` states the effect of snapping: a guaranteed bound, and the largest effect on samples. A rotation
-by a small angle about a joint's origin moves the tip by at most that angle times the tip's distance from the
-origin. This distance is at most the path length: the sum of the constant offsets from that origin to the tip,
-plus the travel of the prismatic joints. The sum of the bounds of all changes is valid for every
-configuration.
+Snapping replaces angles by multiples of 15 degrees. `SnapReport` states the effect of snapping on the tip: a
+guaranteed bound, and the largest effect on samples. A rotation by a small angle about a joint's origin moves
+the tip by at most that angle times the tip's distance from the origin. This distance is at most the path
+length: the sum of the constant offsets from that origin to the tip, plus the travel of the prismatic joints.
+The sum of the bounds of all changes is valid for every configuration.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ from urdfkin.system.lazy_import import hook
 
 
 class Convention(StrEnum):
-    """Axis of joint i: z_{i-1} (standard, distal) or z_i (modified, proximal, Craig)."""
+    """The convention of a table: joint i has the axis z_{i-1} (standard, distal) or z_i (modified, Craig)."""
 
     STANDARD = "standard"
     MODIFIED = "modified"
@@ -67,7 +68,7 @@ def convention_of(name: str) -> Convention:
 
 @dataclass(frozen=True, slots=True)
 class DHRow:
-    """One joint: the constant parts of its parameters, in metres and radians.
+    """One row of a table: the constant parts of one joint's parameters, in metres and radians.
 
     Attributes:
         a: Length along x: a_i in a standard table, a_{i-1} in a modified one.
@@ -78,7 +79,7 @@ class DHRow:
         joint: The joint's name.
         sense: +1, or -1 if the row subtracts the joint's value.
         beta: Rotation about y, after alpha; 0 except in a Hayati row.
-        mimic: The mimic rule; None if the joint has a coordinate.
+        mimic: The mimic rule; None if the joint is not a mimic joint and has its own coordinate.
         limit: The joint's limits; None if it has no limits.
 
     >>> import urdfkin
@@ -128,11 +129,12 @@ class DHRow:
 
     @property
     def foot(self) -> float:
-        """Distance of the foot of this row's common normal, for a row of four parameters (metres).
+        """Distance to the foot of the common normal, along the next axis (metres); 0 if `beta` is 0.
 
-        In a Hayati row, the x axis meets the next joint's axis at the distance `a`. There this joint axis is
-        tilted by `beta` along x and by `alpha` across x. The foot of the common normal is at a sin(beta) /
-        sin^2(tilt).
+        In a Hayati row, the x axis meets the next joint's axis at the distance `a`. There the next joint's
+        axis is tilted by `beta` along x and by `alpha` across x. A row of four parameters would use the
+        common normal of the two axes. The distance along the next joint's axis, from the point where x meets
+        this axis to the foot of the common normal, is |a sin(beta)| / sin^2(tilt).
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -165,12 +167,13 @@ class DHRow:
         return along_axis(self.theta, self.d)
 
 
-#: Largest rounding error of a handwritten multiple of 15 degrees, as a fraction of 15 degrees.
+#: Largest difference between a handwritten angle and a multiple of 15 degrees for which the angle looks like
+#: this multiple, as a fraction of 15 degrees.
 _WRITTEN = 1e-3
 
 
 def along_axis(theta: ArrayLike, d: ArrayLike) -> FloatArray:
-    """Return (..., 4, 4) S = Rz(theta) Tz(d), radians and metres; the arguments broadcast."""
+    """Return the transforms S = Rz(theta) Tz(d) (..., 4, 4), radians and metres; the arguments broadcast."""
     theta, d = np.broadcast_arrays(np.asarray(theta, np.float64), np.asarray(d, np.float64))
     S = np.zeros((*theta.shape, 4, 4))
     S[..., 0, 0] = S[..., 1, 1] = np.cos(theta)
@@ -195,13 +198,13 @@ def between_axes(a: float, alpha: float, beta: float = 0.0) -> FloatArray:
 
 
 def as_step(T: FloatArray) -> tuple[float, float] | None:
-    """Return (a, alpha) if a pose is Tx(a) Rx(alpha), up to rounding of the rotation; else None.
+    """Return (a, alpha) if a pose is Tx(a) Rx(alpha), except for rounding in the rotation; else None.
 
     Example:
         >>> as_step(between_axes(0.5, math.pi))
         (0.5, 3.141592653589793)
     """
-    tilt = max(abs(T[0, 1]), abs(T[0, 2]))  # tilt of the x axis; in the first column it has the same size
+    tilt = max(abs(T[0, 1]), abs(T[0, 2]))  # tilt of the x axis; the first column contains the same tilt
     if tilt > ANGLE * EPS or T[0, 0] < 0.0 or T[1, 3] or T[2, 3]:
         return None
     alpha = math.atan2(T[2, 1], T[2, 2])
@@ -236,11 +239,12 @@ def nearest_twelfth(angle: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class SnapChange:
-    """One snapped rotation.
+    """One snapped angle, and the rotation of the chain that it causes.
 
     Attributes:
-        row: Index of the row that contains it, from 0; -1 for the base, the number of rows for the tool.
-        what: The joint and the quantity.
+        row: Index of the row that contains the angle, from 0; -1 for the base, the number of rows for the
+            tool.
+        what: The joint and the snapped quantity, as text.
         angle: Rotation of the rest of the chain (rad).
         lever: Largest distance of the tip from the pivot of the rotation, with the prismatic joints at zero
             (metres).
@@ -255,22 +259,22 @@ class SnapChange:
 
     @property
     def tip(self) -> float:
-        """Bound of the tip's displacement with the prismatic joints at zero (metres)."""
+        """Bound of the tip's displacement by this change, with the prismatic joints at zero (metres)."""
         return self.angle * self.lever
 
 
 @dataclass(frozen=True, slots=True)
 class SnapReport:
-    """All snapped rotations, and their effect on the tip.
+    """All snapped angles of a table, and their effect on the tip.
 
     Attributes:
         tolerance: The requested tolerance (rad).
-        changes: The snapped rotations, base to tip.
-        metres: Guaranteed bound of the tip's displacement within the limits of prismatic joints.
-        radians: Guaranteed bound of the tip's rotation.
+        changes: The snapped angles, base to tip.
+        metres: Guaranteed bound of the tip's displacement within the limits of prismatic joints (metres).
+        radians: Guaranteed bound of the tip's rotation (radians).
         per_metre: For each prismatic joint, the increase of the bound per metre of travel (metres per metre).
-        measured_metres: Largest displacement on samples.
-        measured_radians: Largest rotation on samples.
+        measured_metres: Largest displacement of the tip on samples (metres).
+        measured_radians: Largest rotation of the tip on samples (radians).
         samples: Number of samples.
     """
 
@@ -285,17 +289,24 @@ class SnapReport:
 
     @property
     def rows(self) -> tuple[int, ...]:
-        """Sorted indices of the changed rows, from 0; -1 is the base, the number of rows is the tool."""
+        """Sorted indices of the changed rows, from 0.
+
+        The index -1 stands for the base, and the number of rows for the tool.
+        """
         return tuple(sorted({change.row for change in self.changes}))
 
     def bound(self, values: Mapping[str, FloatArray]) -> FloatArray:
-        """Return the (...,) guaranteed bound (metres) at given values of the prismatic joints, by name."""
+        """Return the (...,) guaranteed bound of the tip's displacement at values of prismatic joints (metres).
+
+        `values` contains the values of the prismatic joints by the joints' names.
+        """
         at_zero = sum(change.tip for change in self.changes)
         travel = [np.abs(values[name]) * rate for name, rate in self.per_metre.items()]
         return np.asarray(at_zero + sum(travel, np.zeros(())), dtype=np.float64)
 
 
-#: Tolerance of the rotation in a pose: handwritten numbers often have seven digits.
+#: Tolerance for the rotation matrix in a handwritten pose. Such a matrix often has numbers with only seven
+#: digits.
 _TYPED = 1e-6
 
 
@@ -429,7 +440,9 @@ class DHTable(Displayable):
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the table's coordinates: independent joints in row order, mimicked joints included.
+        """Names of the table's coordinates: the joints that are not mimic joints, in row order.
+
+        Mimicked joints are included.
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -453,7 +466,7 @@ class DHTable(Displayable):
 
     @cached_property
     def span(self) -> float:
-        """Sum of all |a|, all |d| and the tool's length, with all joints at zero (metres).
+        """Sum of all |a|, of all |d| and of the length of the tool, with all joints at zero (metres).
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -464,10 +477,12 @@ class DHTable(Displayable):
         return lengths + math.hypot(*self.tool[:3, 3])
 
     def rounding(self, q: Given) -> FloatArray:
-        """Return the (...,) bound of the rounding of `placement(q)` in metres; divided by `span`, in radians.
+        """Return the (...,) bound of the position error of `placement(q)` by rounding, in metres.
 
-        The bound adds the rounding of the rows (`urdfkin.kinematics.roundings`) and of their angles, and
-        multiplies the sum by the lever.
+        The bound divided by `span` is a bound of the orientation error in radians.
+
+        The position bound is the sum of the rounding errors of the rows (`urdfkin.kinematics.roundings`) and
+        of their angles, multiplied by the length of the chain.
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -481,10 +496,10 @@ class DHTable(Displayable):
         return np.asarray(EPS * (of_rows(len(self.rows)) + angle) * lever)
 
     def tolerance(self, q: Given) -> tuple[FloatArray, FloatArray]:
-        """Return the (...,) bounds of the difference from the URDF's placement, in metres and in radians.
+        """Return the (...,) bounds of the difference between the table's and the URDF's placement (m, rad).
 
-        For an exact table these are the bounds of rounding. For a snapped table the bounds of its snapping
-        are added.
+        For an exact table these are the bounds of rounding errors. For a snapped table the bounds of the
+        effect of snapping are added.
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -506,8 +521,8 @@ class DHTable(Displayable):
         """Return the (..., n + 1, 4, 4) poses of the frames 0 to n in the base frame.
 
         Args:
-            q: (..., coordinates) in the order of `joint_names` (rad or m), or by name as a mapping or text.
-                None is the zero configuration.
+            q: (..., coordinates) in the order of `joint_names` (rad or m), or the values by name as a mapping
+                or text. None stands for the zero configuration.
 
         Raises:
             InputError: `q` has the wrong length.
@@ -524,10 +539,11 @@ class DHTable(Displayable):
 
     @cached_property
     def _path(self) -> Path:
-        """The table as a path: the base, then a motion and a constant for each row, then the tool.
+        """The table as a path: the base, then a motion and a constant pose for each row, then the tool.
 
-        In a modified table the constant of a row is before its motion. The amount of a motion is the row's
-        variable, theta or d. The constant contains the row's other cells.
+        In a modified table the constant pose of a row comes before the row's motion. The motion is a rotation
+        by theta or a translation by d, whichever is the row's variable. The constant pose contains the row's
+        other cells.
         """
         steps: list[FloatArray | Motion] = [self.base]
         for row in self.rows:

@@ -1,11 +1,11 @@
-r"""Convert a table's numbers from and to text: fractions of pi, degrees, millimetres.
+r"""Convert a table's numbers from text and to text, with fractions of pi, degrees or millimetres.
 
-A table itself is always in metres and radians. Other units exist only in its input and output.
+A table itself is always in metres and radians. Other units occur only when a table is read or written.
 
 A cell is parsed from text such as `q1 + pi/2`, `90 deg`, `107 mm`, `-θ₂*`, `\frac{\pi}{2}` or `180°`. The
-text is a sum. At most one term is the joint's variable; the other terms are numbers or multiples of pi, with
-or without a unit. This module rejects invalid cells. `urdfkin.dh.rows` supplies a missing unit, and decides
-which cells may have a variable.
+text of a cell is a sum. At most one term of the sum is the joint's variable. The other terms are numbers or
+multiples of pi, with or without a unit. This module rejects invalid cells. `urdfkin.dh.rows` supplies a
+missing unit, and decides which cells may have a variable.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ COLUMNS = ("a", "alpha", "d", "theta")
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """Format of a table's numbers; radians and metres by default.
+    """Format of the numbers in a printed table; radians and metres by default.
 
     Attributes:
         angles: Radians (exact multiples of pi/12 as fractions of pi) or degrees.
@@ -64,12 +64,12 @@ class Units:
 
     @property
     def angle_name(self) -> str:
-        """Unit in a column's heading."""
+        """Name of the angle unit in a column's heading."""
         return "rad" if self.angles is Angles.RADIANS else "deg"
 
     @property
     def length_name(self) -> str:
-        """Unit in a column's heading."""
+        """Name of the length unit in a column's heading."""
         return "m" if self.lengths is Lengths.METRES else "mm"
 
     def angle(self, radians: float, pi: str = "pi") -> str:
@@ -121,7 +121,7 @@ def units_of(angles: str = "radians", lengths: str = "metres", digits: int = 10)
 
 
 def pi_fraction(radians: float) -> Fraction | None:
-    """Return the factor of pi in an angle that is exactly a multiple of pi/12; None for any other angle.
+    """Return an angle as a multiple of pi if it is exactly a multiple of pi/12; None for any other angle.
 
     Example:
         >>> pi_fraction(math.pi / 2), pi_fraction(1.5708)
@@ -143,7 +143,7 @@ def read_number(value: object, where: str) -> float:
     """Parse a number, a number in text, or a multiple of pi such as "-pi/2" or "3*pi/4".
 
     Raises:
-        InputError: the value is anything else; the message names `where`.
+        InputError: the value is not such a number; the message contains `where`.
 
     Example:
         >>> read_number("-pi/2", "alpha") == -math.pi / 2
@@ -178,7 +178,7 @@ def cell_in_si(name: str, number: float, units: Units) -> float:
     return number if units.angles is Angles.RADIANS else in_radians(number)
 
 
-#: Characters that occur in web pages, PDFs and LaTeX -> the same in plain text.
+#: Characters that occur in web pages, PDFs and LaTeX, each with the equivalent plain text.
 _SAME = str.maketrans(
     {
         **dict.fromkeys("\u2212\u2013\u2010\u2011\ufe63", "-"),
@@ -215,7 +215,7 @@ _LONGEST = 200
 
 
 class NoCellError(ValueError):
-    """A text that is not a cell; the message names the invalid part."""
+    """Error for a text that is not a valid cell; the message names the invalid part."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,9 +225,9 @@ class Cell:
     Attributes:
         number: The constant part, in `unit`; in the table's unit if `unit` is None.
         unit: "rad" (also for a multiple of pi), "deg", "m" or "mm"; None without a unit.
-        times: Factor of the joint's variable; None without a variable.
-        variable: Number of the variable (3 for q3); None without a number.
-        text: The constant's text if the constant is a single number; "" if it is computed from several.
+        times: Factor of the joint's variable; None if the cell has no variable.
+        variable: Number in the variable's name, for example 3 for q3. None if the name has no number.
+        text: Text of the constant if it is a single number; "" if it is computed from several numbers.
     """
 
     number: float
@@ -286,7 +286,7 @@ def cell_of(written: str) -> Cell:
 
 @dataclass(slots=True)
 class _Term:
-    """A term: the text between two signs."""
+    """A term of a sum in a cell: the text between two signs."""
 
     sign: float = 1.0
     size: float | None = None
@@ -305,7 +305,7 @@ class _Term:
         return self.size is None and not self.variable
 
     def take(self, token: str, kind: str) -> None:
-        """Add a token; raise NoCellError if it is invalid here."""
+        """Add a token to the term; raise NoCellError if the token cannot follow the tokens before it."""
         divides, joined = self.operator == "/", self.operator == ""
         if kind == "sign" and not self.is_empty and joined:
             self.operator = token

@@ -58,7 +58,8 @@ _MOVED = 1e-10
 _FIXED_TIP = 1e-6
 #: Range in which a prismatic joint without limits is sampled (metres).
 _SLIDE = (-0.5, 0.5)
-#: For each row, half a unit of the last digit of each cell in the table's file (metres and radians).
+#: For each row of a table, the precision of each cell: half a unit of the cell's last digit in the table's
+#: file (metres and radians).
 Digits = Sequence[Mapping[str, float]]
 
 
