@@ -1,6 +1,6 @@
 """Conventions as data: the built-in conventions, and a user's own convention from a TOML file.
 
-In this package, a tool is another program or library for robots. A user's file may start from a built-in
+The target program can be any other program or library for robots. A user's file may start from a built-in
 convention and change some of its joints:
 
     like = "urdf"                     # the default
@@ -8,13 +8,13 @@ convention and change some of its joints:
     angle = "deg"                     # unit of all angles, optional
 
     [joint.elbow]
-    name = "2"                        # its name in the tool
+    name = "2"                        # its name in the target program
     sign = -1
-    zero = 12.5                       # the tool's value where the URDF's joint is at 0, in the tool's unit
+    zero = 12.5                       # the program's value where the URDF's joint is at 0, in its unit
     unit = 4096                       # units of one turn; or "rad", "deg", "turn", "m", "mm"
 
-The joint value in the tool is `sign * value * factor + zero`, where `value` is the URDF's joint value in rad
-or m.
+The joint value in the target program is `sign * value * factor + zero`, where `value` is the URDF's joint
+value in rad or m.
 """
 
 from __future__ import annotations
@@ -69,9 +69,9 @@ class JointRule:
     """The rule that converts a joint's value to another program's: `factor * value + zero`, in its unit.
 
     Attributes:
-        name: The joint's name in the tool. None means the name in the URDF.
+        name: The joint's name in the target program. None means the name in the URDF.
         sign: 1 or -1.
-        zero: The tool's value where the URDF's joint is at 0.
+        zero: The target program's value where the URDF's joint is at 0.
         unit: "rad", "deg", "turn", "m", "mm", or the number of units in one turn. None means the convention's
             unit.
     """

@@ -1,10 +1,10 @@
 """Convert q, v, a, Jacobians and six-vectors of one robot to another program's convention, and back.
 
-In this module, a tool is another program or library for robots. With the matrix M of `Conversion.matrix`,
+The target program can be any other program or library for robots. With the matrix M of `Conversion.matrix`,
 joint velocities convert as v_tool = M(q) v, accelerations as a_tool = M a + M' v, and Jacobians as J_tool = S
-J M^-1. M' is the time derivative of M. S exchanges the linear and the angular rows if the tool has the
-angular rows first. M is constant unless the tool and urdfkin use different axes for the velocity of a
-floating or planar joint.
+J M^-1. M' is the time derivative of M. S exchanges the linear and the angular rows if the target program has
+the angular rows first. M is constant unless the target program and urdfkin use different axes for the
+velocity of a floating or planar joint.
 """
 
 from __future__ import annotations
@@ -34,10 +34,12 @@ _SWAPPED = [3, 4, 5, 0, 1, 2]
 
 @dataclass(frozen=True, slots=True)
 class _Column:
-    """One number of q in the tool: `factor * value + zero`, where `value` is urdfkin's q at the index `at`.
+    """One number of the target program's q: `factor * value + zero`.
 
-    `part` is "cos" or "sin" for a continuous joint that the tool stores as two numbers. `copy` is True for a
-    mimic joint.
+    `value` is the number at the index `at` of urdfkin's q.
+
+    `part` is "cos" or "sin" for a continuous joint that the target program stores as two numbers. `copy` is
+    True for a mimic joint.
     """
 
     name: str
@@ -51,7 +53,10 @@ class _Column:
 
 @dataclass(frozen=True, slots=True)
 class _Block:
-    """A planar or floating joint with another velocity in the tool: in another frame, or of another point."""
+    """A planar or floating joint for which the target program defines another velocity.
+
+    The velocity is expressed in another frame, or is the velocity of another point.
+    """
 
     joint: Joint
     q: int
@@ -114,7 +119,7 @@ class Conversion:
     # -- layout --------------------------------------------------------------------------------------
 
     def _ordered(self) -> list[int]:
-        """Return the indices of the joints that have columns, in the tool's order."""
+        """Return the indices of the joints that have columns, in the target program's order."""
         tree, how = self.tree, self.convention
         moving = {i for i, joint in enumerate(tree.joints) if joint.kind.nv}
         if how.order == "given":
@@ -213,7 +218,7 @@ class Conversion:
         return order
 
     def _add(self, i: int) -> str:
-        """Add the columns of a joint, and return the joint's name in the tool."""
+        """Add the columns of a joint, and return the joint's name in the target program."""
         how, joint = self.convention, self.tree.joints[i]
         rule = how.rules.get(joint.name, JointRule())
         name = rule.name or spelled(joint.name, how.names)
@@ -314,8 +319,8 @@ class Conversion:
         self._plain_q = bool((self._q_factor == 1.0).all() and not self._q_zero.any())
         self._plain_q &= not any(c.part for c in columns)
         self._same_q = self._plain_q and np.array_equal(self._q_index, np.arange(self.tree.nq))
-        # For each number of urdfkin's q, find the column of the tool that contains it. A mimic joint's column
-        # is used only if no other column contains the number.
+        # For each number of urdfkin's q, find the column of the target program that contains it. A mimic
+        # joint's column is used only if no other column contains the number.
         self._q_source = [
             min((k for k, c in enumerate(columns) if c.at == at and c.factor), key=lambda k: columns[k].copy)
             for at in range(self.tree.nq)
@@ -336,21 +341,21 @@ class Conversion:
 
     @property
     def has_pairs(self) -> bool:
-        """Whether the tool's q contains the cosine and the sine of an angle."""
+        """Whether the target program's q contains the cosine and the sine of an angle."""
         return any(column.part for column in self._columns)
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
-        """Names of the numbers of the tool's q."""
+        """Names of the numbers of the target program's q."""
         return tuple(column.name for column in self._columns)
 
     @property
     def rate_names(self) -> tuple[str, ...]:
-        """Names of the numbers of the tool's v and a, which are also the names of its Jacobian's columns."""
+        """Names of the numbers of the target program's v and a, and of the columns of its Jacobian."""
         return tuple(self._v_names)
 
     def layout(self, what: str) -> CoordinateLayout:
-        """Return the names and units of the tool's "q", "v" or "a", with which values are parsed by name."""
+        """Return names and units of the target program's "q", "v" or "a", to parse values by name."""
         if what != "q":
             rest = {"neutral": np.zeros(self.nv)}
             return CoordinateLayout(what, self.rate_names, tuple(self._v_units), poses=lambda: rest)
@@ -386,7 +391,7 @@ class Conversion:
 
     @cached_property
     def q_and_v_indices(self) -> dict[str, tuple[list[int], list[int]]]:
-        """The indices of each joint in the tool's q and v, by its name in the URDF."""
+        """The indices of each joint in the target program's q and v, by its name in the URDF."""
         names = [self.tree.joints[i].name for i in self._order]
         found, q, v = {}, 0, 0
         for i, name in zip(self._order, names, strict=True):
@@ -405,15 +410,16 @@ class Conversion:
     def to(
         self, q: Given, v: Given | None = None, a: Given | None = None
     ) -> FloatArray | tuple[FloatArray, ...]:
-        """Convert q, (q, v) or (q, v, a) from urdfkin's convention to the tool's.
+        """Convert q, (q, v) or (q, v, a) from urdfkin's convention to the target program's.
 
         Args:
-            q: (..., nq) rad, m. The same array is returned if the tool has the same q.
+            q: (..., nq) rad, m. The same array is returned if the target program has the same q.
             v: (..., nv); for a floating base, its conversion depends on q.
             a: (..., nv); its conversion depends on q and v.
 
         Returns:
-            The tool's q (..., tool's nq), or a tuple of the tool's q and v, or of its q, v and a.
+            The target program's q (..., program's nq), or a tuple of the target program's q and v, or of its
+            q, v and a.
 
         Raises:
             InputError: a wrong length, or a number that is not finite.
@@ -440,7 +446,7 @@ class Conversion:
     def from_(
         self, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None
     ) -> FloatArray | tuple[FloatArray, ...]:
-        """Convert q, (q, v) or (q, v, a) from the tool's convention to urdfkin's; the inverse of `to`.
+        """Convert q, (q, v) or (q, v, a) from the target program's convention to urdfkin's: inverse of `to`.
 
         Raises:
             InputError: a wrong length, a number that is not finite, or a mimic joint's value that differs
@@ -566,7 +572,7 @@ class Conversion:
     def matrix(self, q: Given | None = None) -> FloatArray:
         """Return the matrix M with v_tool = M v.
 
-        Its shape is (tool's nv, nv), or (..., tool's nv, nv) if M depends on q.
+        Its shape is (program's nv, nv), or (..., program's nv, nv) if M depends on q.
 
         Raises:
             InputError: q is missing, although M depends on it.
@@ -590,7 +596,7 @@ class Conversion:
         return M
 
     def matrix_rate(self, q: Given, v: Given) -> FloatArray:
-        """Return M' (..., tool's nv, nv), the time derivative of `matrix`."""
+        """Return M' (..., program's nv, nv), the time derivative of `matrix`."""
         ours, rates = self._ours(q, v, None)
         shape = np.broadcast_shapes(ours.shape[:-1], rates.shape[:-1])
         found = np.zeros((*shape, self.nv, self.tree.nv))
@@ -644,7 +650,7 @@ class Conversion:
         return self._rows(A, -A @ _cross(block.point), unit * turn)
 
     def _rows(self, A: FloatArray, arm: FloatArray, turn: FloatArray) -> FloatArray:
-        """Return [[A, arm], [0, turn]], with the angular rows first if the tool has them first."""
+        """Return [[A, arm], [0, turn]], with the angular rows first if the target program has them first."""
         B = np.zeros((*A.shape[:-2], 6, 6))
         B[..., :3, :3], B[..., :3, 3:], B[..., 3:, 3:] = A, arm, turn
         return B if self.convention.base_v == "linear first" else B[..., _SWAPPED, :]
@@ -652,7 +658,7 @@ class Conversion:
     # -- results -------------------------------------------------------------------------------------
 
     def six(self, x: ArrayLike, axis: int = -1) -> FloatArray:
-        """Exchange the linear and angular parts of six-vectors if the tool has the angular part first.
+        """Exchange linear and angular parts of six-vectors if the target program has the angular part first.
 
         A second call restores the original order.
 
@@ -666,23 +672,25 @@ class Conversion:
         return np.take(array, _SWAPPED, axis) if self.angular_first else array
 
     def jacobian(self, q: Given, J: ArrayLike) -> FloatArray:
-        """Convert a Jacobian J (..., 6, nv) to the tool's rows and columns: S J M^-1.
+        """Convert a Jacobian J (..., 6, nv) to the target program's rows and columns: S J M^-1.
 
-        M is `matrix`. S exchanges the linear and the angular rows if the tool has the angular rows first.
+        M is `matrix`. S exchanges the linear and the angular rows if the program has angular rows first.
 
         Raises:
-            InputError: a column of J belongs to several joints of the tool, because one mimics the other.
+            InputError: a column of J belongs to several joints of the target program, because one joint mimics
+                the other joint.
         """
         return self.columns(q, self.six(J, -2))
 
     def columns(self, q: Given, J: ArrayLike) -> FloatArray:
-        """Convert only the columns of a matrix J (..., rows, nv) to the tool's: J M^-1.
+        """Convert only the columns of a matrix J (..., rows, nv) to the target program's: J M^-1.
 
         The rows of J are derivatives of quantities that are the same in both conventions, such as Euler
         angles. M is `matrix`.
 
         Raises:
-            InputError: a column of J belongs to several joints of the tool, because one mimics the other.
+            InputError: a column of J belongs to several joints of the target program, because one joint mimics
+                the other joint.
 
         >>> import urdfkin
         >>> a1 = urdfkin.load("a1", verify=False)
@@ -696,18 +704,18 @@ class Conversion:
         return array @ _for_frames(self.inverse_matrix(q), array.ndim)
 
     def from_jacobian(self, q: Given, J: ArrayLike) -> FloatArray:
-        """Convert the tool's Jacobian J (..., 6, tool's nv) to urdfkin's (..., 6, nv): S J M.
+        """Convert the target program's Jacobian J (..., 6, program's nv) to urdfkin's (..., 6, nv): S J M.
 
-        M is `matrix`. S exchanges the linear and the angular rows if the tool has the angular rows first. The
-        column of a mimic joint is added to the mimicked joint's column.
+        M is `matrix`. S exchanges the linear and the angular rows if the target program has the angular rows
+        first. The column of a mimic joint is added to the mimicked joint's column.
         """
         array = self.six(J, -2)
         return array @ _for_frames(self.matrix(q), array.ndim)
 
     def jacobian_rate(self, q: Given, v: Given, J: ArrayLike, rate: ArrayLike) -> FloatArray:
-        """Convert the time derivative J' of a Jacobian J to the tool's: S (J' M^-1 + J (M^-1)').
+        """Convert the time derivative J' of a Jacobian J to the target program's: S (J' M^-1 + J (M^-1)').
 
-        M is `matrix`. S exchanges the linear and the angular rows if the tool has the angular rows first.
+        M is `matrix`. S exchanges the linear and the angular rows if the program has angular rows first.
         """
         found = self.jacobian(q, rate)
         if not self._blocks:
@@ -739,7 +747,7 @@ class Conversion:
         result: FloatArray,
         jacobian: Callable[[], FloatArray],
     ) -> FloatArray:
-        """Convert a computed quantity, such as a velocity or a Jacobian, to the tool's rows and columns.
+        """Convert a quantity, such as a velocity or Jacobian, to the target program's rows and columns.
 
         Args:
             quantity: Name of the quantity.

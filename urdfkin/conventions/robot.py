@@ -17,11 +17,12 @@ if TYPE_CHECKING:
 
 
 class ConventionRobot:
-    """A robot in the convention of another program, the tool; `robot.with_convention("mujoco")` returns it.
+    """A robot in the convention of a target program; `robot.with_convention("mujoco")` returns it.
 
-    Its methods are those of `Robot` with the same arguments. q, v and a have the tool's order and units.
-    Jacobians have the tool's columns, and six-vectors the tool's order of rows. The frame and `reference`
-    mean the same as in `Robot`. Pinocchio checks each result as usual, before the result is converted.
+    The methods are those of `Robot` with the same arguments. q, v and a have the target program's order and
+    units. Jacobians have the target program's columns, and six-vectors the target program's order of rows.
+    The frame and `reference` mean the same as in `Robot`. Pinocchio checks each result as usual, before the
+    result is converted.
 
     Attributes:
         robot: The robot itself.
@@ -43,35 +44,35 @@ class ConventionRobot:
 
     @property
     def nq(self) -> int:
-        """Length of q in the tool."""
+        """Length of q in the target program."""
         return self.conversion.nq
 
     @property
     def nv(self) -> int:
-        """Length of v and a in the tool."""
+        """Length of v and a in the target program."""
         return self.conversion.nv
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the joints in the tool, in the tool's order."""
+        """Names of the joints in the target program, in that program's order."""
         return self.conversion.joint_names
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
-        """Names of the numbers of q in the tool."""
+        """Names of the numbers of q in the target program."""
         return self.conversion.coordinate_names
 
     @property
     def rate_names(self) -> tuple[str, ...]:
-        """Names of the numbers of v and a in the tool."""
+        """Names of the numbers of v and a in the target program."""
         return self.conversion.rate_names
 
     def neutral(self) -> FloatArray:
-        """Return the zero configuration of the URDF, converted to the tool's q."""
+        """Return the zero configuration of the URDF, converted to the target program's q."""
         return self.conversion.to(self.robot.neutral())
 
     def sample(self, n: int, seed: int = 0) -> FloatArray:
-        """Return random configurations (n, nq): those of `Robot.sample`, converted to the tool's q."""
+        """Return the random configurations (n, nq) of `Robot.sample`, converted to the target program's q."""
         return self.conversion.to(self.robot.sample(n, seed))
 
     def certificate(self) -> Certificate:
@@ -90,46 +91,46 @@ class ConventionRobot:
     def velocity(
         self, q: ArrayLike, v: ArrayLike, frame: Any = None, *more: Any, **options: Any
     ) -> FloatArray:
-        """Return the velocity (..., 6) of a frame with rows in the tool's order; see `Robot.velocity`."""
+        """Return a frame's velocity (..., 6) with the target program's row order; see `Robot.velocity`."""
         return self.conversion.six(self._call(self.robot.velocity, (q, v), frame, *more, **options)[1])
 
     def acceleration(
         self, q: ArrayLike, v: ArrayLike, a: ArrayLike, frame: Any = None, *more: Any, **options: Any
     ) -> FloatArray:
-        """Return the classical acceleration (..., 6) with rows as in the tool; see `Robot.acceleration`."""
+        """Return the target program's classical acceleration (..., 6) of a frame; see `Robot.acceleration`."""
         return self.conversion.six(self._call(self.robot.acceleration, (q, v, a), frame, *more, **options)[1])
 
     def jacobian(self, q: ArrayLike, frame: Any = None, *more: Any, **options: Any) -> FloatArray:
-        """Return the Jacobian (..., 6, nv) with rows and columns as in the tool; see `Robot.jacobian`."""
+        """Return the target program's Jacobian (..., 6, nv) of a frame; see `Robot.jacobian`."""
         ours, J = self._call(self.robot.jacobian, (q,), frame, *more, **options)
         return self.conversion.jacobian(ours[0], J)
 
     def jacobian_rate(
         self, q: ArrayLike, v: ArrayLike, frame: Any = None, *more: Any, **options: Any
     ) -> FloatArray:
-        """Return the time derivative of the tool's Jacobian; see `Robot.jacobian_rate`."""
+        """Return the time derivative of the target program's Jacobian; see `Robot.jacobian_rate`."""
         ours, rate = self._call(self.robot.jacobian_rate, (q, v), frame, *more, **options)
         J = self.robot.jacobian(ours[0], frame, *more, **options)
         return self.conversion.jacobian_rate(ours[0], ours[1], J, rate)
 
     def hessian(self, q: ArrayLike, frame: Any = None, *more: Any, **options: Any) -> FloatArray:
-        """Return the derivatives (..., 6, nv, nv) of the tool's Jacobian; see `Robot.hessian`."""
+        """Return the derivatives (..., 6, nv, nv) of the target program's Jacobian; see `Robot.hessian`."""
         ours, H = self._call(self.robot.hessian, (q,), frame, *more, **options)
         return self.conversion.hessian(ours[0], self.robot.jacobian(ours[0], frame, *more, **options), H)
 
     def analytical_jacobian(self, q: ArrayLike, frame: Any = None, *more: Any, **options: Any) -> FloatArray:
-        """Return the analytical Jacobian with columns as in the tool; see `Robot.analytical_jacobian`."""
+        """Return the target program's analytical Jacobian; see `Robot.analytical_jacobian`."""
         ours, J = self._call(self.robot.analytical_jacobian, (q,), frame, *more, **options)
         return self.conversion.columns(ours[0], J)
 
     def imu(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, frame: Any = None, **options: Any) -> FloatArray:
-        """Return an IMU's readings (..., 6) for any tool: accelerometer, then gyroscope; see `Robot.imu`."""
+        """Return an IMU's readings (..., 6), in this order: accelerometer, gyroscope; see `Robot.imu`."""
         return self._call(self.robot.imu, (q, v, a), frame, **options)[1]
 
     def _call(
         self, method: Callable[..., FloatArray], given: tuple[Any, ...], *more: Any, **options: Any
     ) -> tuple[tuple[FloatArray, ...], FloatArray]:
-        """Convert the tool's inputs, and return them with the result of a `Robot` method for these inputs."""
+        """Convert the target program's inputs; return these inputs and the result of a `Robot` method."""
         read: list[ArrayLike] = [
             self.conversion.layout(letter).read(x) if isinstance(x, str | dict) else x
             for letter, x in zip("qva", given, strict=False)
