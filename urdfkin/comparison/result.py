@@ -713,7 +713,7 @@ def _of_step(found: Alignment, variables: Variables, i: int) -> list[Difference]
 
 
 def _beyond(one: Step | FramePair, rounding: Tolerance) -> tuple[float, float]:
-    """Return the tilt (rad) and the shift (m) of a joint or frame from A to B; rounding becomes 0."""
+    """Return the tilt (rad) and shift (m) of a joint or frame between A and B; rounding becomes 0."""
     return one.tilt if one.tilt > rounding.angle else 0.0, one.shift if one.shift > rounding.way else 0.0
 
 

@@ -677,8 +677,8 @@ class Conversion:
         M is `matrix`. S exchanges the linear and the angular rows if the program has angular rows first.
 
         Raises:
-            InputError: a column of J belongs to several joints of the target program, because one joint mimics
-                the other joint.
+            InputError: a column of J belongs to several joints of the target program, because one joint
+                mimics the other joint.
         """
         return self.columns(q, self.six(J, -2))
 
@@ -689,8 +689,8 @@ class Conversion:
         angles. M is `matrix`.
 
         Raises:
-            InputError: a column of J belongs to several joints of the target program, because one joint mimics
-                the other joint.
+            InputError: a column of J belongs to several joints of the target program, because one joint
+                mimics the other joint.
 
         >>> import urdfkin
         >>> a1 = urdfkin.load("a1", verify=False)

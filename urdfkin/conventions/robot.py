@@ -97,7 +97,7 @@ class ConventionRobot:
     def acceleration(
         self, q: ArrayLike, v: ArrayLike, a: ArrayLike, frame: Any = None, *more: Any, **options: Any
     ) -> FloatArray:
-        """Return the target program's classical acceleration (..., 6) of a frame; see `Robot.acceleration`."""
+        """Return the target program's classical acceleration (..., 6); see `Robot.acceleration`."""
         return self.conversion.six(self._call(self.robot.acceleration, (q, v, a), frame, *more, **options)[1])
 
     def jacobian(self, q: ArrayLike, frame: Any = None, *more: Any, **options: Any) -> FloatArray:

@@ -398,7 +398,7 @@ def _phi_of_coinciding(pairs: Sequence[PairLike], steps: Sequence[Step], i: int,
 
 
 def _closer_direction(step: Step, pair: PairLike, phi_in: float = 0.0) -> Step:
-    """Return the step or the same step with x reversed, whichever is closer to the other table.
+    """Return the step, or the same step with x reversed if that is closer to the other table.
 
     The function compares the cells a, alpha and beta with those of the other table. If both directions of x
     are equally close, theta decides.

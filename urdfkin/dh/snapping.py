@@ -202,7 +202,10 @@ def _product(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray
 def _changes_of_origins(
     steps: Sequence[tuple[Joint, bool]], moved: Mapping[str, float]
 ) -> list[tuple[int, SnapChange]]:
-    """Return a change for each snapped origin on the path, with the path length to the tip as its lever."""
+    """Return a change for each snapped origin on the path.
+
+    The attribute `lever` of a change is the path length from the origin to the tip.
+    """
     changes, lever, sliders = list[tuple[int, SnapChange]](), 0.0, list[str]()
     moving = sum(joint.kind.has_axis for joint, _ in steps)
     for joint, backwards in reversed(steps):
@@ -221,9 +224,9 @@ def _changes_of_origins(
 
 
 def _change(exact: FrameChain, k: int, what: str, angle: float) -> SnapChange:
-    """Return the record of a rotation about the origin of joint k, with its lever.
+    """Return the record of a rotation about the origin of joint k.
 
-    The lever is the largest possible distance from this origin to the tip.
+    The attribute `lever` of the record is the largest possible distance from this origin to the tip.
 
     Joints are counted from 1; n + 1 is the tip.
     """

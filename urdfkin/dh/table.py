@@ -541,9 +541,9 @@ class DHTable(Displayable):
     def _path(self) -> Path:
         """The table as a path: the base, then a motion and a constant pose for each row, then the tool.
 
-        In a modified table the constant pose of a row comes before the row's motion. The motion is a rotation
-        by theta or a translation by d, whichever is the row's variable. The constant pose contains the row's
-        other cells.
+        In a modified table the constant pose of a row comes before the row's motion. The motion of a revolute
+        joint is a rotation by theta. The motion of a prismatic joint is a translation by d. The constant pose
+        contains the row's other cells.
         """
         steps: list[FloatArray | Motion] = [self.base]
         for row in self.rows:

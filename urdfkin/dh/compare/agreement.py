@@ -237,7 +237,7 @@ def _cell_at(reference: DHTable, i: int, cell: str) -> int:
 
 
 def _cells_of(reference: DHTable) -> FloatArray:
-    """Return an (n, 5) mask of the standard rows' cells: 1 for cells of the reference, else 0."""
+    """Return an (n, 5) mask of the cells in standard rows: 1 for the cells of the reference, otherwise 0."""
     n = len(reference.rows)
     return np.array([[float(_cell_at(reference, i, cell) < n) for cell in CELLS] for i in range(n)])
 
