@@ -1,4 +1,4 @@
-"""The motion of the base: the initial conditions of the forward recursion (end of section 7.7)."""
+"""The motion of the base, which is the initial condition of the forward recursion (end of section 7.7)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from urdfkin.model.tree import FloatArray, frozen
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BaseMotion:
-    """Motion of the robot's root link in the world, which is the textbook's frame -1.
+    """Motion of the robot's root link relative to the world; the textbook calls the world frame -1.
 
     Every field may have leading batch axes, which broadcast with the batch axes of the configuration. The
     fields store the numbers without changes, because Pinocchio receives the same numbers in a comparison.
@@ -76,7 +76,9 @@ class BaseMotion:
         )
 
     def state(self, batch_shape: tuple[int, ...]) -> FloatArray:
-        """Return rows [R, p, w, v, alpha, a] (n, 24) for the kernels; one row without batch axes.
+        """Return rows [R, p, w, v, alpha, a], (n, 24), for the compiled kernels.
+
+        Without batch axes, n is 1.
 
         >>> BaseMotion().state(()).shape
         (1, 24)
@@ -102,8 +104,8 @@ STILL_STATE = frozen(STILL.state(()))
 def against_gravity(state: FloatArray, gravity: FloatArray) -> FloatArray:
     """Return the base state (1 or n, 24) in a world that is accelerated by -gravity (3,).
 
-    An accelerometer on a fixed base under gravity measures the same as one on this accelerated base without
-    gravity.
+    An accelerometer on a fixed base under gravity has the same readings as an accelerometer on this
+    accelerated base without gravity.
     """
     lifted = state.copy()
     lifted[:, -3:] -= gravity

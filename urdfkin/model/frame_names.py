@@ -8,9 +8,9 @@ from typing import ClassVar, Self
 class FrameName(str):
     """`link:NAME` or `joint:NAME`: the link or joint NAME, even if another frame is named `link:NAME`.
 
-    Reports and messages print a `FrameName` like an ordinary name. A plain `str` with the same text has
-    another meaning: `KinematicTree.frame_link` first looks for a link or joint with exactly that text as its
-    name.
+    Reports and messages print a `FrameName` like an ordinary name. A plain `str` with the same text has a
+    different meaning: `KinematicTree.frame_link` first looks for a link or joint whose own name is exactly
+    that text.
 
     >>> LinkFrame.of("hand"), LinkFrame.of("hand").own
     ('link:hand', 'hand')

@@ -1,4 +1,4 @@
-"""Integrate joint velocities, and find the joint velocities between two configurations.
+"""Integrate joint velocities, and compute the joint velocities that lead from one configuration to another.
 
 `integrate` and `difference` replace + and - for configurations q that contain orientations. They agree with
 Pinocchio's functions of the same names. For a joint with one coordinate they add and subtract numbers. For a
@@ -69,7 +69,7 @@ def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> Float
 
 
 def _common_shape(one: FloatArray, other: FloatArray) -> tuple[int, ...]:
-    """Return the common batch shape; raises InputError if there is none."""
+    """Return the common batch shape of two arrays; raise InputError if their shapes do not broadcast."""
     try:
         return np.broadcast_shapes(one.shape[:-1], other.shape[:-1])
     except ValueError:
@@ -78,7 +78,10 @@ def _common_shape(one: FloatArray, other: FloatArray) -> tuple[int, ...]:
 
 
 def _coordinate_joints(tree: KinematicTree) -> list[tuple[Joint, int, int]]:
-    """Return the joints with their own coordinates, and the first index of each in q and in v."""
+    """Return the joints with their own coordinates.
+
+    For each joint, the result also has the index of its first number in q and in v.
+    """
     rows = zip(tree.joints, tree.q_index, tree.v_index, strict=True)
     return [(joint, at, to) for joint, at, to in rows if joint.nv]
 
@@ -110,7 +113,7 @@ def _about_z(angle: FloatArray) -> FloatArray:
 
 
 def _V(w: FloatArray) -> FloatArray:
-    """Return V(w), (..., 3, 3)."""
+    """Return the matrix V(w), (..., 3, 3), of the module's description."""
     square = (w * w).sum(axis=-1)[..., np.newaxis, np.newaxis]
     angle, W = np.sqrt(square), skew(w)
     half = np.sinc(angle / (2.0 * math.pi))

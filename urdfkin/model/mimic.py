@@ -1,8 +1,8 @@
-"""The map from the coordinates of a path to the values of its joints, mimic joints included.
+"""The linear map from the coordinates of a path to the values of all joints on the path, with mimic joints.
 
 The coordinates of a path are its independent joints, in path order. A mimic joint has no coordinate: its
-value is `multiplier * q_mimicked + offset`. The mimicked joint is a coordinate of the path even if it lies
-elsewhere on the robot.
+value is `multiplier * q_mimicked + offset`. The mimicked joint is a coordinate of the path even if this joint
+is not on the path itself.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class Coupling:
     """The linear map from a path's coordinates to the values of its joints: values = G q + g.
 
     Attributes:
-        joints: Names of all moving joints of the path, base to tip.
+        joints: Names of all moving joints of the path, from the base to the tip.
         mimics: The mimic rule of each joint; None for a joint with its own coordinate.
         kinds: The kind of each joint.
 
@@ -60,10 +60,13 @@ class Coupling:
         return frozen([mimic.offset if mimic else 0.0 for mimic in self.mimics])
 
     def places(self, what: str = "q") -> CoordinateLayout:
-        """Return the names and units of the path's q, v or a, to parse values that are given by name."""
+        """Return the names and units of the numbers of the path's q, v or a.
+
+        They are needed to read values that are given by name.
+        """
         rules = list(zip(self.joints, self.mimics, self.kinds, strict=True))
         units = {joint: "rad" if kind.turns else "m" for joint, mimic, kind in rules if not mimic}
-        # A mimicked joint that is not on the path may be of any kind: its unit is unknown here.
+        # A mimicked joint that is not on the path may be of any kind, so its unit is unknown here.
         own = tuple(map(units.get, self.names))
         follow = {
             joint: Hint(f"it mimics {mimic.leader}: give that value", Question.MIMIC_JOINTS)
@@ -85,11 +88,16 @@ class Coupling:
             UnknownNameError: a name is not a coordinate of the path.
         """
         coordinates = self.checked(q, "q")
-        # One multiplication and one addition for each joint: the zeros of G cause no rounding.
+        # The result is rounded as one multiplication and one addition for each joint, because products with
+        # the zeros of G are exact.
         return np.asarray(coordinates[..., self._leader_index] * self._multiplier + self.offset)
 
     def checked(self, array: Given, what: str) -> FloatArray:
-        """Return `array` ("q", "v" or "a") as float64; raises InputError for a wrong last axis."""
+        """Return `array` as float64; `what` ("q", "v" or "a") is its name in messages.
+
+        Raises:
+            InputError: the last axis has the wrong length.
+        """
         if (named := by_name(array, what)) is not None:
             return self.places(what).read(named)
         values = np.asarray(array, dtype=np.float64)
@@ -120,15 +128,15 @@ class Coupling:
         return tuple(tree.v_index[tree.joint_index(name)] for name in self.names)
 
     def select(self, tree: KinematicTree, q: Given) -> FloatArray:
-        """Return the coordinates (..., coordinates) of the path from the whole robot's `q` (..., nq).
+        """Select this path's coordinates (..., coordinates) in the robot's configuration `q` (..., nq).
 
         Raises:
-            InputError: `q` does not have the robot's length.
+            InputError: the last axis of `q` does not have the length nq.
         """
         return numbers(tree, q, "q")[..., list(self.q_index(tree))]
 
 
 def coupling_of(joints: Sequence[tuple[str, Mimic | None, JointKind]]) -> Coupling:
-    """Return the coupling of joints given as (name, mimic rule or None, kind)."""
+    """Return the coupling of some joints; each joint is given as (name, mimic rule or None, kind)."""
     names, mimics, kinds = zip(*joints, strict=True) if joints else ((), (), ())
     return Coupling(names, mimics, kinds)

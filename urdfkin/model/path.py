@@ -1,14 +1,15 @@
-"""A path: the product of constant poses and elementary motions, with its poses and Jacobian columns.
+"""A path: a product of constant poses and elementary motions. The module computes its poses and its Jacobian.
 
     T(x) = C_0 E_1(x_1) C_1 E_2(x_2) ...,      E_k = Rx, Ry, Rz, Tx, Ty or Tz of the amount x_k
 
 Chains, Denavit-Hartenberg tables, screws, and the models that `dh --compare` and `calibrate` fit have this
-form. They differ only in the amounts: joint values, cells of a table, or parameters. The derivative of the
-last pose by an amount is a twist. With the axis e and its origin O, in the frame before the path,
+form. Only the meaning of the amounts x_k differs: joint values, cells of a table, or parameters. The
+derivative of the last pose with respect to an amount is a twist. Let e be the axis of the motion and O a
+point of this axis, in the frame before the path. The twist is then
 
     rotation   dp/dx = e x (p - O),   w = e;       translation   dp/dx = e,   w = 0
 
-which is a column of 7.85.
+It is a column of the Jacobian in equation 7.85.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ class Motion:
 
     Attributes:
         axis: The axis: 0, 1 or 2.
-        turns: Whether it is a rotation.
+        turns: Whether the motion is a rotation.
     """
 
     axis: int
@@ -73,11 +74,14 @@ class Path:
         return np.ascontiguousarray(self.frames(amounts)[..., -1, :, :])
 
     def columns(self, amounts: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return the last pose, and its Jacobian (..., 6, motions), [linear; angular], by the amounts."""
+        """Return the last pose and its Jacobian (..., 6, motions), [linear; angular], for given amounts.
+
+        Each column is the derivative with respect to one amount.
+        """
         frames = self.frames(amounts)
         T = frames[..., -1, :, :]
         motions = [(i, step) for i, step in enumerate(self.steps) if isinstance(step, Motion)]
-        # A motion does not move its own axis, so the axis can be read from the frame after the motion.
+        # A motion does not move its own axis, so the frame after the motion also contains the axis.
         columns = np.zeros((*T.shape[:-2], 6, len(motions)))
         for k, (i, step) in enumerate(motions):
             axis = frames[..., i, :3, step.axis]
@@ -89,14 +93,17 @@ class Path:
 
 
 def elementary(axis: int, turns: bool, amount: ArrayLike) -> FloatArray:
-    """Return the rotation about, or translation along, a coordinate axis by amounts (...), (..., 4, 4)."""
+    """Return the poses (..., 4, 4) of a rotation about a coordinate axis, or of a translation along it.
+
+    The amounts (...) are angles in rad or distances in m.
+    """
     amount = np.asarray(amount, np.float64)
     return _moved(np.tile(np.eye(4), (*amount.shape, 1, 1)), Motion(axis, turns), amount)
 
 
 def _moved(T: FloatArray, motion: Motion, amount: FloatArray) -> FloatArray:
-    """Return the product of poses (..., 4, 4) and an elementary motion by amounts (...)."""
-    if not amount.any():  # many cells of a table are zero
+    """Return poses (..., 4, 4) multiplied by the elementary motion with amounts (...)."""
+    if not amount.any():  # an amount of zero changes nothing, and many cells of a table are zero
         return T
     moved = np.array(T)
     if motion.turns:

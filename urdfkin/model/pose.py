@@ -10,7 +10,9 @@ from urdfkin.model.tree import FloatArray
 
 
 def pose(R: ArrayLike | None = None, p: ArrayLike | None = None) -> FloatArray:
-    """Return the pose (4, 4) with a rotation (3, 3) and an origin (3,), m; each defaults to the identity's.
+    """Return the pose (4, 4) with a rotation (3, 3) and an origin (3,), m.
+
+    By default the rotation is the identity and the origin is zero.
 
     >>> pose(p=[1.0, 2.0, 3.0])[:3, 3].tolist()
     [1.0, 2.0, 3.0]
@@ -24,7 +26,7 @@ def pose(R: ArrayLike | None = None, p: ArrayLike | None = None) -> FloatArray:
 
 
 def is_rigid(T: FloatArray, tolerance: float) -> bool:
-    """Return whether a matrix (4, 4) is a rotation and a translation; the rotation within a tolerance."""
+    """Return whether a matrix (4, 4) is a rigid transform; its rotation must be one within the tolerance."""
     return bool(rotation_defect(T[:3, :3]) <= tolerance) and T[3].tolist() == [0.0, 0.0, 0.0, 1.0]
 
 

@@ -1,4 +1,4 @@
-"""Ranges of the coordinates, from each joint's limits and those of its mimic joints."""
+"""Ranges of the coordinates, computed from the limits of each joint and of the joints that mimic it."""
 
 from __future__ import annotations
 
@@ -21,8 +21,9 @@ class NarrowedRange:
 
     Attributes:
         joint: Name of the mimicked joint.
-        own: Its own range.
-        kept: The part of it in which all mimic joints are within their limits; None if there is no such part.
+        own: The range that the limits of the mimicked joint give.
+        kept: The part of the range `own` in which all mimic joints are within their limits; None if there is
+            no such part.
         by: Names of the mimic joints whose limits make the range smaller.
         unit: Unit of the ranges, "rad" or "m".
     """
@@ -51,9 +52,10 @@ def range_words(ends: tuple[float, float]) -> str:
 
 
 def axis_range(kind: JointKind, limit: Limit | None, slide: float = 1.0) -> tuple[float, float]:
-    """Return the limits of a joint with one axis.
+    """Return the range of a joint with one axis.
 
-    Without limits the range is -pi to pi (revolute), or -slide to slide (prismatic; metres).
+    Without limits, the range of a revolute joint is -pi to pi (rad), and that of a prismatic joint is -slide
+    to slide (m).
     """
     if kind is not JointKind.CONTINUOUS and is_bounded(limit):
         return limit.lower, limit.upper
@@ -61,7 +63,7 @@ def axis_range(kind: JointKind, limit: Limit | None, slide: float = 1.0) -> tupl
 
 
 def values_within(ranges: Sequence[tuple[float, float]], count: int, seed: int = 0) -> FloatArray:
-    """Draw values (count, ranges) uniformly within ranges (lower, upper)."""
+    """Draw `count` random values in each range (lower, upper), uniformly: an array (count, ranges)."""
     lower, upper = np.array(ranges).reshape(-1, 2).T
     return np.random.default_rng(seed).uniform(lower, upper, (count, len(ranges)))
 
@@ -72,7 +74,10 @@ def own_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
 
 
 def coordinate_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Return the ranges of `own_ranges`, narrowed to keep mimic joints within their limits, if possible."""
+    """Return the ranges of `own_ranges`, narrowed so that the mimic joints are within their limits.
+
+    A range is not narrowed if no part of it keeps the mimic joints within their limits.
+    """
     ranges = own_ranges(tree)
     narrowed = {one.joint: one.kept for one in narrowed_ranges(tree)}
     return {name: narrowed.get(name) or own for name, own in ranges.items()}
@@ -108,14 +113,17 @@ def _narrowed(leader: Joint, own: tuple[float, float], joints: list[Joint]) -> N
 
 
 def kept_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tuple[float, float]:
-    """Return the part of a range in which a mimic joint is within its limits; empty if there is none."""
+    """Return the part of a mimicked joint's range in which a mimic joint is within its limits.
+
+    If there is no such part, the result is empty.
+    """
 
     def keeps(leader: float) -> bool:
         # As in `configuration.limit_violations`: a limit printed in decimal is rounded.
         own = rule.multiplier * leader + rule.offset
         return bool(np.nextafter(limit.lower, -np.inf) <= own <= np.nextafter(limit.upper, np.inf))
 
-    if keeps(lower) and keeps(upper):  # every value between the two ends is then within the limits too
+    if keeps(lower) and keeps(upper):  # if the ends are within the limits, so is every value between the ends
         return lower, upper
     if rule.multiplier == 0.0:
         return math.inf, -math.inf

@@ -16,7 +16,7 @@ Number = Any
 Vector = tuple[Number, Number, Number]
 Matrix = tuple[Vector, Vector, Vector]
 Six = tuple[Number, ...]
-#: Coordinates or rates from a joint's first one on.
+#: The coordinates, joint velocities or joint accelerations of a joint, from the joint's first one on.
 Numbers = Sequence[Number]
 
 ZERO: Vector = (0, 0, 0)
@@ -46,7 +46,7 @@ class Column:
     Attributes:
         z: The joint's axis.
         turns: Whether the joint is revolute.
-        carrier: State of the joint's frame.
+        carrier: State of the frame that carries the joint's axis.
         order: Index of the column on the path.
         place: Index of the joint velocity in v.
         factor: Factor on that joint velocity (the multiplier of a mimic joint).
@@ -62,7 +62,7 @@ class Column:
 
 @dataclass(eq=False)
 class Recursion:
-    """The steps of the recursion, from a link's state to the next.
+    """The steps of the recursion. Each step computes the state of the next link from that of a link.
 
     Attributes:
         eq: The equations.
@@ -73,17 +73,20 @@ class Recursion:
     own: bool = False
 
     def seen(self, s: State, x: Vector) -> Vector:
-        """Express x, given in the link's own axes, in the link's axes (`own`) or in world axes."""
+        """Return a vector x, given in the link's own axes, in the axes that `own` selects.
+
+        These are the link's own axes or the world axes.
+        """
         return x if self.own else self.eq.rotate(s.R, x)
 
     def carried(self, s: State, d: Vector) -> State:
-        """Move the state along the rigid link: 7.58, 7.128, 7.130."""
+        """Return the state of the link's point at d: 7.58, 7.128, 7.130."""
         eq, lever = self.eq, self.seen(s, d)
         vel, acc = eq.point_velocity(s.vel, s.w, lever), eq.point_acceleration(s.acc, s.alpha, s.w, lever)
         return replace(s, p=eq.point_position(s.p, s.R, d), vel=vel, acc=acc)
 
     def turned(self, s: State, S: Matrix) -> State:
-        """Return the state of the same body with its frame rotated by S."""
+        """Return the state of the same body for a frame that is rotated by S."""
         R = self.eq.product(s.R, S)
         if not self.own:
             return replace(s, R=R)
@@ -104,17 +107,20 @@ class Recursion:
         return replace(s, vel=self.eq.sliding_velocity(s.vel, z, v), acc=acc)
 
     def planar(self, s: State, q: Numbers, S: Matrix, v: Numbers, a: Numbers) -> State:
-        """Return the state after a planar joint, with its rotation S."""
+        """Return the state after a planar joint; S is the joint's rotation."""
         rates = [x for u in (v, a) for x in ((u[0], u[1], 0), (0, 0, u[2]))]
         return self._free(s, (q[0], q[1], 0), S, rates)
 
     def floating(self, s: State, q: Numbers, S: Matrix, v: Numbers, a: Numbers) -> State:
-        """Return the state after a floating joint, with its rotation S."""
+        """Return the state after a floating joint; S is the joint's rotation."""
         rates = [(u[k], u[k + 1], u[k + 2]) for u in (v, a) for k in (0, 3)]
         return self._free(s, (q[0], q[1], q[2]), S, rates)
 
     def _free(self, s: State, slide: Vector, S: Matrix, rates: Sequence[Vector]) -> State:
-        """Return the state after a free motion; `rates` are given in the child link's axes."""
+        """Return the state after a displacement `slide` and a rotation S.
+
+        `rates` are in the child link's axes.
+        """
         eq, s = self.eq, self.turned(self.carried(s, slide), S)
         u, o, u_rate, o_rate = (self.seen(s, x) for x in rates)
         return replace(
@@ -140,7 +146,7 @@ class Recursion:
         return self.eq.point_acceleration(s.acc, s.alpha, s.w, self.eq.minus(ZERO, s.p)), s.alpha
 
     def in_reference(self, s: State, reference: Reference, linear: Vector, angular: Vector) -> Six:
-        """Express a pair of world-axes vectors in the axes of the reference frame."""
+        """Return two vectors, given in world axes, in the axes of the reference frame."""
         if reference.own_axes:
             back = self.eq.transposed(s.R)
             linear, angular = self.eq.rotate(back, linear), self.eq.rotate(back, angular)
@@ -191,7 +197,11 @@ class Recursion:
     def hessian(
         self, s: State, columns: Sequence[Column], reference: Reference
     ) -> Iterator[tuple[int, int, Number, Six]]:
-        """Yield column index, joint velocity index, factor, and derivative of the column."""
+        """Yield each derivative of a Jacobian column by a joint velocity.
+
+        Each item consists of the column's index, the index of the joint velocity in v, a factor and the
+        derivative.
+        """
         to = ZERO if reference.at_world else s.p
         ends = [(one, self._column(one, to)) for one in columns]
         for of, six in ends:
@@ -204,9 +214,9 @@ class Recursion:
 
         Args:
             six: The column.
-            by: The column of the joint velocity.
+            by: The column of the joint whose velocity is meant.
             reference: The reference frame.
-            before: Whether the moving joint is before the column's joint on the path, or is that joint.
+            before: Whether the moving joint is the joint of the column `six`, or is before it on the path.
         """
         eq = self.eq
         change: tuple[Vector, Vector] = ZERO, ZERO

@@ -11,7 +11,8 @@ from urdfkin.errors.validators import safe_repr
 class Reference(IntEnum):
     """The three reference frames, with Pinocchio's names.
 
-    Each member has the number that the kernels use, and two properties: its axes and its point.
+    Each member has the number that the compiled kernels use. It also has two properties: the axes and the
+    point of the results.
 
     * `LOCAL`: the frame's own origin, in the frame's axes.
     * `WORLD`: the point of the moving body that is now at the world's origin, in the world's axes.
@@ -23,11 +24,12 @@ class Reference(IntEnum):
     True
     """
 
-    own_axes: bool  #: The axes: True: the frame's. False: the world's.
-    at_world: bool  #: The point: True: the one at the world's origin. False: the frame's origin.
+    own_axes: bool  #: The axes of the results: the frame's axes if True, the world's axes if False.
+    # The point of the results: the point at the world's origin if True, the frame's origin if False.
+    at_world: bool  #:
 
     def __new__(cls, number: int, own_axes: bool, at_world: bool) -> Reference:
-        """Create a member; a member without axes and point is an error."""
+        """Create a member from its number, its axes and its point; all three are required."""
         member = int.__new__(cls, number)
         member._value_, member.own_axes, member.at_world = number, own_axes, at_world
         return member

@@ -1,15 +1,17 @@
-"""The alignment of two mechanisms A and B: matched joints and frames, and the differences of each.
+"""The alignment of two mechanisms A and B: the matched joints and frames, and the differences of each pair.
 
-The matcher starts from a body that both mechanisms have. Let G be the motion that moves A's zero
-configuration to B's. A joint of A moves by exp(S t), and the matched joint of B by exp(S' t'). B's coordinate
-may have the opposite sense and another zero; t' and S' are therefore expressed with A's sense and zero. G
-changes at a joint if B's axis, or the body after the joint, is in another place than in A. B is therefore the
-same as A, except that a rigid motion L is inserted before some joints and some axes are replaced:
+The matcher starts from a body of A that corresponds to a body of B. Let G be the rigid motion that moves a
+body of A, in A's zero configuration, to the corresponding body of B in B's zero configuration. A joint of A
+moves by exp(S t), and the matched joint of B by exp(S' t'). B's coordinate may have the opposite sense and a
+different zero. Therefore t' and S' are expressed with A's sense and zero. G changes at a joint if B's axis,
+or the body after the joint, has a different pose than in A. B is therefore the same as A, except that a rigid
+motion L is inserted before some joints and some axes are different:
 
     T_A = exp(S_1 t_1) ... exp(S_n t_n) H,      T_B = L_1 exp(S'_1 t'_1) ... L_n exp(S'_n t'_n) L H,
 
 with S'_i = S_i, t'_i = t_i and L_i = 1 where nothing differs. The two models have the same motion if and only
-if nothing differs. There is one exception: joints on a common line can exchange parts of their rotation.
+if nothing differs. There is one exception: two revolute joints on a common line can divide the sum of their
+rotations differently.
 
 **Variables.** The joint values of both models are linear functions of shared variables. Each coordinate of A
 is a variable. The coordinates of B are computed from these variables, with the senses and zeros of the
@@ -44,21 +46,23 @@ IDENTITY.setflags(write=False)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Step:
-    """A joint pair on the path from the base.
+    """A joint of A and the matched joint of B.
 
     Attributes:
         a: Joint of A (index in its tree).
         b: Joint of B (index in its tree).
-        kind: "turns" (revolute), "prismatic", "planar", "floating".
-        previous: Index of the step before it, -1 for none.
-        sense: +1 or -1; see `offset`.
+        kind: Kind of motion: "turns" (revolute), "prismatic", "planar" or "floating".
+        previous: Index of the step for the joint pair before this one on the path; -1 if there is none.
+        sense: +1 or -1; `offset` states its meaning.
         offset: B's value is sense * A's value + offset, rad or m.
-        before: (4, 4) L, inserted before the joint, in A's zero configuration.
-        axis: A's screw in the zero configuration, directed away from the base.
-        other: B's screw in the zero configuration, directed away from the base; `axis` itself if both agree.
-        tilt: Angle (rad) between the axes, or between the normals of planar joints.
-        shift: Distance (m) between the axes; for a planar or floating joint, between the frames.
-        conversion: From A's coordinates of a planar or floating joint to B's; None if they are equal.
+        before: (4, 4) the rigid motion L that is inserted before B's joint, in A's zero configuration.
+        axis: Screw of A's joint in the zero configuration, for the motion of the body farther from the base.
+        other: Screw of B's joint, in the same form; it is the object `axis` itself if the two screws agree.
+        tilt: Angle (rad) between the axes of the two joints, or between the normals of two planar joints.
+        shift: Distance (m) between the axes of the two joints; for planar or floating joints, between the
+            origins of their frames.
+        conversion: Converts the coordinates of A's planar or floating joint to those of B's joint; None if
+            the coordinates are equal.
         unlike: "a" or "b" if the joint is fixed in that model and moves in the other, "kind" if the kinds of
             motion differ; else "".
     """
@@ -79,23 +83,24 @@ class Step:
 
     @property
     def differs(self) -> bool:
-        """Whether the axes differ."""
+        """Whether the axes of the two joints differ."""
         return self.tilt > 0.0 or self.shift > 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FramePair:
-    """A link of both models.
+    """A link of A and the matched link of B.
 
     Attributes:
         a: Link of A (index in its tree).
         b: Link of B (index in its tree).
-        previous: Index of the step that carries it, -1 for none.
+        previous: Index of the step whose joints move the links; -1 if no joint moves them.
         home: (4, 4) pose of A's link in the zero configuration.
-        end: (4, 4) L, inserted behind the last joint, in A's zero configuration.
-        tilt: Angle (rad) between A's and B's link frames on the matched body.
-        shift: Distance (m) between A's and B's link frames on the matched body.
-        tool: (4, 4) pose of B's link in A's, if it counts as a different tool on the same body.
+        end: (4, 4) the rigid motion L that is inserted behind the last joint, in A's zero configuration.
+        tilt: Angle (rad) between the frames of A's link and B's link on the matched body.
+        shift: Distance (m) between the origins of these two frames on the matched body.
+        tool: (4, 4) pose of B's link in the frame of A's link, if B's link counts as a different end-effector
+            frame on the same body.
     """
 
     a: int
@@ -108,13 +113,13 @@ class FramePair:
     tool: FloatArray = field(default_factory=lambda: IDENTITY)
 
     def put_right(self) -> FramePair:
-        """Return the same pair, but count B's frame as a different tool on the same body."""
+        """Return the same pair, but count B's frame as a different end-effector frame on the same body."""
         tool = inverse(self.home) @ self.end @ self.home
         return replace(self, end=IDENTITY, tilt=0.0, shift=0.0, tool=tool)
 
     @property
     def differs(self) -> bool:
-        """Whether the link frame has another pose on its body in B than in A."""
+        """Whether the pose of the link frame on its body is different in B and in A."""
         return self.tilt > 0.0 or self.shift > 0.0
 
 
@@ -125,14 +130,15 @@ class Alignment:
     Attributes:
         a: One mechanism.
         b: The other mechanism.
-        base: Links of A and of B at which the matcher began.
+        base: The link of A and the link of B at which the matcher began.
         X: (4, 4) pose of B's root in A's root frame.
-        steps: The joint pairs; each comes after the pair before it on its path.
-        frames: The links of both.
-        only_a: Joints that only A has (indices).
-        only_b: Joints that only B has (indices).
-        matched: Number of joints and links that agree.
-        worst: The largest disagreement (m); angles are multiplied by the robot's size.
+        steps: The joint pairs, in an order in which each pair comes after all pairs before it on its path.
+        frames: The pairs of matched links.
+        only_a: Indices of the joints that only A has.
+        only_b: Indices of the joints that only B has.
+        matched: Number of joint pairs and link pairs that agree.
+        worst: The largest difference between a joint or link of A and the matched one of B, m. Differences of
+            angles are multiplied by the robot's size.
     """
 
     a: Mechanism
@@ -148,13 +154,13 @@ class Alignment:
 
     @property
     def complete(self) -> bool:
-        """Whether every joint and link agrees."""
+        """Whether every joint and link of A agrees with a joint or link of B, and the reverse."""
         alike = not any(step.unlike for step in self.steps)
         return alike and not (self.worst or self.only_a or self.only_b)
 
     @property
     def differing(self) -> int:
-        """Number of joints and links that differ."""
+        """Number of joint pairs and link pairs that differ."""
         return sum(step.differs or bool(step.unlike) for step in self.steps) + sum(
             frame.differs for frame in self.frames
         )
@@ -166,9 +172,9 @@ class Alignment:
 
     @property
     def inner_off(self) -> tuple[float, float]:
-        """Smallest and largest disagreement (m) of axes, and of links that carry joints.
+        """Smallest and largest difference (m) between matched axes, or matched links with joints.
 
-        Only actual disagreements count; both are 0 if there is none.
+        Pairs that agree are not counted. If all pairs agree, the two results are 0.
         """
         carry = [{joint.parent for joint in m.tree.joints} for m in (self.a, self.b)]
         links = [one for one in self.frames if one.a in carry[0] or one.b in carry[1]]
@@ -178,13 +184,16 @@ class Alignment:
 
     @property
     def names(self) -> dict[str, str]:
-        """Joints of A and their names in B."""
+        """The name of each joint of A, with the name of the matched joint of B."""
         joints = self.a.tree.joints, self.b.tree.joints
         return {joints[0][step.a].name: joints[1][step.b].name for step in self.steps}
 
     @property
     def gauge(self) -> Gauge:
-        """The free choices of this alignment, without joint orders; `b` already has the chosen order."""
+        """The free choices of this alignment.
+
+        They contain no joint orders, because `b` already has the chosen order.
+        """
         joints = self.a.tree.joints
         return Gauge(
             (self.a.tree.links[self.base[0]], self.b.tree.links[self.base[1]]),
@@ -194,7 +203,11 @@ class Alignment:
         )
 
     def exchangeable(self, given: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
-        """Yield sets of two joint pairs at one body that are not paired by name and lead to a difference."""
+        """Yield two joint pairs at one body that could exchange their partners.
+
+        The user named no partner for their joints of A, and B has no joint of the same name. Each pair is on
+        the path to a difference.
+        """
         known_names = {joint.name for joint in self.b.tree.joints} | set(given)
         ends = [i for i, step in enumerate(self.steps) if step.differs]
         ends += [frame.previous for frame in self.frames if frame.differs]
@@ -206,14 +219,15 @@ class Alignment:
                     yield frozenset(((one.a, one.b), (other.a, other.b)))
 
     def frames_of(self, pairs: Sequence[tuple[int, int]]) -> list[FramePair]:
-        """Return links (of A, of B) on aligned bodies as frame pairs."""
+        """Return pairs of links, one of A and one of B on aligned bodies, as frame pairs."""
         on = {(self.a.body_of[frame.a], self.b.body_of[frame.b]): frame for frame in self.frames}
         rounding = tolerance_of(self.a, self.b)
         found = []
         for a, b in pairs:
             if (known := on.get((self.a.body_of[a], self.b.body_of[b]))) is None:
                 continue
-            # Any known frame pair on the body gives the motion from B's zero configuration to A's body.
+            # Any known frame pair on the body gives the motion from B's body in B's zero configuration to A's
+            # body.
             T_a_b = known.end @ known.home @ known.tool @ inverse(self.b.homes[known.b])
             home, at = self.a.homes[a], T_a_b @ self.b.homes[b]
             tilt, shift = apart(home, at)
@@ -225,7 +239,7 @@ class Alignment:
         return found
 
     def indices(self, previous: int) -> list[int]:
-        """Return the indices of the steps from the base to one of them, including it."""
+        """Return the indices of the steps from the base to the step `previous`, including that step."""
         found = []
         while previous >= 0:
             found.append(previous)
@@ -233,25 +247,28 @@ class Alignment:
         return found[::-1]
 
     def path(self, previous: int) -> list[Step]:
-        """Return the steps from the base to one of them, including it."""
+        """Return the steps from the base to the step `previous`, including that step."""
         return [self.steps[i] for i in self.indices(previous)]
 
     @property
     def deepest(self) -> int:
-        """The largest number of steps on a path, plus one for the base."""
+        """The largest number of steps on any path, plus one for the base."""
         return 1 + max((len(self.indices(i)) for i in range(len(self.steps))), default=0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gauge:
-    """Prescribed free choices: the pose of B's root, and each joint's sense and zero.
+    """Prescribed values of the free choices: the pose of B's root, and each joint's sense and zero.
 
     Attributes:
-        base: Links of A and of B on the bodies at which the matcher begins; None: by names.
+        base: A link of A and a link of B. The matcher begins at the bodies of these links; None: it chooses
+            the bodies by names.
         X: (4, 4) pose of B's root in A's root frame.
-        zeros: Sense and offset of joints of A, if not (1, 0.0).
-        conversions: Of planar and floating joints of A with other coordinates in B.
-        orders: Joints of B in another order, one for each reordered run.
+        zeros: Sense and offset of each joint of A for which they are not (1, 0.0).
+        conversions: For each planar or floating joint of A whose coordinates differ from those in B: the
+            conversion from A's coordinates to B's.
+        orders: New orders of consecutive joints of B. Each entry is one such series of joints in its new
+            order.
     """
 
     base: tuple[str, str] | None = None
@@ -261,13 +278,14 @@ class Gauge:
     orders: tuple[tuple[str, ...], ...] = ()
 
 
-#: A gauge without any change: both roots have the same pose, and all coordinates are equal.
+#: The gauge without any change: the roots of A and B have the same pose, and the coordinates of A and B are
+#: equal.
 AS_WRITTEN = Gauge()
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """The linear function constant + slope * variable; `variable` has no meaning if the slope is 0."""
+    """The linear function constant + slope * variable. If the slope is 0, `variable` has no meaning."""
 
     variable: str
     slope: float
@@ -278,24 +296,25 @@ class Line:
         return Line(self.variable, slope * self.slope, slope * self.constant + constant)
 
     def at(self, values: Mapping[str, float | FloatArray]) -> float | FloatArray:
-        """Return the value of the linear function for given values of the variables."""
+        """Return the function's value for given values of the variables."""
         return self.constant + (self.slope * values[self.variable] if self.slope else 0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """The values of one step's joint in both models, both as A's coordinate."""
+    """The joint values of one step in models A and B, expressed with the sense and zero of A's joint."""
 
     a: Line
     b: Line
-    #: The value in B's own coordinate: sense * b + offset.
+    #: Sense and offset that convert the value `b` to the value of B's own joint: sense * b + offset.
     written: Line
-    #: Difference of the constants (rad or m) that counts as rounding, beyond that of one step.
+    #: Difference of the two constants (rad or m) that counts as rounding, in addition to the rounding of one
+    #: step.
     rounding: float = 0.0
 
     @property
     def variable(self) -> str | None:
-        """The one variable that moves the joint in both models; None if two variables do."""
+        """The variable that moves the joint in A and in B; None if A and B have different variables."""
         if self.a.slope and self.b.slope and self.a.variable != self.b.variable:
             return None
         return self.a.variable if self.a.slope else self.b.variable
@@ -303,15 +322,15 @@ class Pair:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Variables:
-    """The values of all steps and the ranges of the variables.
+    """The joint values of all steps as functions of shared variables, and the ranges of these variables.
 
     Attributes:
-        pairs: For each step; None for planar and floating joints.
-        ranges: Of each variable, rad or m; infinite without a limit.
-        freer_a: Steps (indices) with a joint that is independent in A and a mimic joint in B.
-        freer_b: Steps (indices) with a joint that is independent in B and a mimic joint in A.
-        rules: Steps (indices) with different mimic rules in A and B.
-        leaders: B's coordinates, by joint name.
+        pairs: The joint values of each step; None for planar and floating joints.
+        ranges: Range of each variable, rad or m; infinite without a limit.
+        freer_a: Indices of the steps whose joint is independent in A and a mimic joint in B.
+        freer_b: Indices of the steps whose joint is independent in B and a mimic joint in A.
+        rules: Indices of the steps with different mimic rules in A and B.
+        leaders: Each coordinate of B as a linear function of a variable, by joint name.
     """
 
     pairs: tuple[Pair | None, ...]
@@ -329,7 +348,7 @@ class Variables:
         return ends[0], ends[1]
 
     def off(self, pair: Pair) -> float:
-        """Return the largest difference (rad, m) between a joint's values in A and B."""
+        """Return the largest difference (rad or m) between a joint's values in A and in B."""
         if (variable := pair.variable) is not None:
             low, high = self.range(
                 Line(variable, pair.b.slope - pair.a.slope, pair.b.constant - pair.a.constant)
@@ -341,7 +360,7 @@ class Variables:
 
 
 def variables_of(found: Alignment, tolerance: Tolerance) -> Variables:
-    """Return the values of all steps of an alignment, and the ranges of their variables."""
+    """Return the joint values of all steps of an alignment, and the ranges of their variables."""
     return _Maker(found, tolerance).make()
 
 
@@ -354,9 +373,9 @@ class _Maker:
         self.deepest = found.deepest
 
     def _leaders(self) -> dict[str, Line]:
-        """Return each coordinate of B as a linear function of one of A's, or as a variable of its own.
+        """Return each coordinate of B as a linear function of a coordinate of A, or as a separate variable.
 
-        A's independent joints come first.
+        Steps whose joint is independent in A are used first.
         """
         tree, used, lines = self.trees[1], set[str](), dict[str, Line]()
         own = [i for i, joint in enumerate(tree.joints) if joint.kind.nq == 1 and joint.mimic is None]
@@ -424,8 +443,9 @@ class _Maker:
         """Return whether two linear functions differ by rounding only.
 
         The constant of a mimic rule depends on the zeros of two joints. Each zero is computed from poses at
-        the end of a path, so its rounding error is at most the sum for all steps of the path. A slope does
-        not depend on a zero, so its bound is the rounding error of one step.
+        the end of a path. The tolerance for the constants is therefore the sum of the rounding errors of all
+        steps of the path. A slope does not depend on a zero, so its tolerance is the rounding error of one
+        step.
         """
         same = a.variable == b.variable or not (a.slope or b.slope)
         one = self._one_step(a)
@@ -435,7 +455,7 @@ class _Maker:
         return self.tolerance.angle * max(1.0, abs(line.slope), abs(line.constant))
 
     def _ranges(self, pairs: list[Pair | None]) -> dict[str, tuple[float, float]]:
-        """Return the limits of each coordinate.
+        """Return the range of each coordinate, from the limits of the joints that it moves.
 
         If a coordinate moves joints of both models, its range is the intersection of their limits, or A's
         limits if the intersection is empty. The limits of a mimic joint are used only for a coordinate that
@@ -447,7 +467,7 @@ class _Maker:
         for step, pair in zip(self.found.steps, pairs, strict=True):
             for k, j in enumerate((step.a, step.b)):
                 joint = self.trees[k].joints[j]
-                if pair is None:  # joints of two kinds, each with its own coordinate
+                if pair is None:  # the two joints are of different kinds, and each has its own coordinate
                     if step.unlike and joint.nq == 1:
                         own[f"{'ab'[k]}:{joint.name}"] = limits(joint)
                     continue
@@ -470,7 +490,7 @@ class _Maker:
 
 
 def limits(joint: Joint) -> tuple[float, float]:
-    """Return the limits of a joint's value; infinite without limits."""
+    """Return the lower and the upper limit of a joint's value; infinite without limits."""
     if joint.kind is JointKind.CONTINUOUS or joint.limit is None:
         return -math.inf, math.inf
     low, high = sorted((joint.limit.lower, joint.limit.upper))

@@ -1,14 +1,15 @@
-"""Candidates for matching two mechanisms: pairs of joints, and poses and zeros that align their axes.
+"""Candidates for matching two mechanisms: pairs of joints, and poses and joint zeros that align joint axes.
 
-The joints at two matched bodies are paired by the names that the user gives, then by equal names, then by
-geometry. The functions for poses and zeros yield candidates; the matcher tries each of them.
+Joints at two matched bodies are paired in three ways: by the names that the user gives, by equal names, and
+by geometry. Other functions yield candidate poses of a body and candidate zeros of a joint. The matcher tries
+each candidate.
 
-Two subtrees match exactly if, for some zeros of the joints, every axis of one subtree coincides with an axis
-of the other. The axes on one body are fixed relative to each other. A joint allows only a rotation about its
-axis, or a translation along its axis. The subtrees after two joints therefore match or not for every angle of
-the joints. The result depends only on the two joints and on the directions and positions of their axes, so it
-is computed once for each such case. The search visits each pair of joints only a few times, even for long
-chains and for many joints with two possible zeros.
+Two subtrees match exactly if joint zeros exist with which every axis of one subtree coincides with an axis of
+the other. The angles of the two joints before the subtrees do not matter, because a zero can compensate for
+an angle. Whether the subtrees match therefore depends only on the two joints and on the directions and
+positions of the two joint axes. The result is computed once for each such case and then stored. The search
+therefore visits each pair of joints only a few times, even for long chains and for many joints with two
+possible zeros.
 """
 
 from __future__ import annotations
@@ -44,32 +45,35 @@ Via = tuple[Edge | None, Edge | None]
 
 
 def family(kind: JointKind) -> str:
-    """Return the kind of motion that two joints must share to be paired; limits do not matter."""
+    """Return a joint's kind of motion, without regard to limits.
+
+    Joints of different kinds are never paired.
+    """
     return "turns" if kind.turns else kind.value
 
 
 class Pairing:
-    """The joint pairs of two mechanisms, body by body.
+    """The pairs of joints of mechanism A with joints of mechanism B, for each pair of bodies.
 
     Args:
         a: One mechanism.
         b: The other mechanism.
-        given: Joint names of `a` and their names in `b`.
-        tolerance: Tolerance for axes.
+        given: Names of joints of `a`, each with the name of the corresponding joint of `b`.
+        tolerance: Tolerance for the comparison of joint axes.
     """
 
     def __init__(self, a: Mechanism, b: Mechanism, given: Mapping[str, str], tolerance: Tolerance) -> None:
         self.a, self.b, self.given, self._tolerance = a, b, given, tolerance
         self._named = {name for pair in given.items() for name in pair}
         self._signatures: dict[tuple[bool, int, int], str] = {}
-        #: Pairs by name are needed again for thousands of candidate poses, so they are cached.
+        #: The pairs by name are used for thousands of candidate poses, so they are computed once and stored.
         self._links: dict[tuple[int, int], tuple[tuple[int, int], ...]] = {}
         self._by_names = dict[
             tuple[tuple[int, int], Via], tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]
         ]()
 
     def links(self, body_a: int, body_b: int) -> tuple[tuple[int, int], ...]:
-        """Return the links of equal names on two bodies."""
+        """Return pairs of links that have the same name, one on a body of A and one on a body of B."""
         if (known := self._links.get((body_a, body_b))) is None:
             there = {self.b.tree.links[link]: link for link in self.b.bodies[body_b]}
             known = self._links[body_a, body_b] = tuple(
@@ -82,7 +86,9 @@ class Pairing:
     def edges(
         self, bodies: tuple[int, int], via: Via, G: FloatArray, XC: FloatArray
     ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
-        """Return the pairs of next joints at two bodies, and the unpaired joints of A and of B.
+        """Return the pairs of the joints that follow two bodies, and the joints without a partner.
+
+        The joints without a partner are those of A, then those of B.
 
         Args:
             bodies: Of A and of B.
@@ -113,13 +119,16 @@ class Pairing:
     def by_names(
         self, bodies: tuple[int, int], via: Via
     ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
-        """Return the pairs by name, and the joints of A and of B that remain to be paired by geometry."""
+        """Return the joint pairs found by name, and the joints that must be paired by geometry.
+
+        The latter are the joints of A, then those of B.
+        """
         if (known := self._by_names.get((bodies, via))) is None:
             known = self._by_names[bodies, via] = self._named_alike(bodies, via)
         return known
 
     def same_shape(self, bodies: tuple[int, int], via: Via) -> bool:
-        """Return whether the subtrees behind two bodies have the same joint kinds, branch by branch."""
+        """Return whether the subtrees behind two bodies have equal branches with equal kinds of joints."""
         shapes = (
             sorted(self._signature(m, body, edge) for edge in m.edges_of[body] if edge is not by)
             for m, body, by in zip((self.a, self.b), bodies, via, strict=True)
@@ -127,11 +136,14 @@ class Pairing:
         return next(shapes) == next(shapes)
 
     def alike(self, bodies: tuple[int, int], e: Edge, f: Edge) -> bool:
-        """Return whether the subtrees behind two joints have the same joint kinds."""
+        """Return whether the subtrees behind two joints have equal branches with equal kinds of joints."""
         return self._signature(self.a, bodies[0], e) == self._signature(self.b, bodies[1], f)
 
     def all_lie_alike(self, bodies: tuple[int, int], X: FloatArray) -> bool:
-        """Return whether each axis at a body of A coincides with one of B, after B is moved by X."""
+        """Return whether each joint axis at a body of A coincides with an axis of B.
+
+        B's axes are those after the rigid motion X.
+        """
         at = np.eye(4)
         return all(
             any(
@@ -144,7 +156,9 @@ class Pairing:
         )
 
     def likeliest(self, bodies: tuple[int, int], e: Edge, edges: Sequence[Edge], X: FloatArray) -> list[Edge]:
-        """Return the joints of B without a given name, the most similar to a joint of A first.
+        """Return the joints of B whose partners the user did not name, sorted by similarity to a joint of A.
+
+        The most similar joint comes first.
 
         Args:
             bodies: Of A and of B.
@@ -183,7 +197,10 @@ class Pairing:
     def _geometries(
         self, mechanism: Mechanism, body: int, edges: Sequence[Edge], T: FloatArray
     ) -> list[tuple[int, _JointGeometry]]:
-        """Return the joints without a given name, with their index, moved by T."""
+        """Return the geometry of the joints whose partners the user did not name, with their indices.
+
+        The geometry is that after the rigid motion T.
+        """
         return [
             (i, _JointGeometry.of(mechanism, edge, T, self._signature(mechanism, body, edge)))
             for i, edge in enumerate(edges)
@@ -191,7 +208,11 @@ class Pairing:
         ]
 
     def _unlikeness(self, one: _JointGeometry, other: _JointGeometry) -> tuple[bool, float, float]:
-        """Return a sort key: different shape, then distance of axes, then direction and origin."""
+        """Return a sort key for the difference of two joints; a larger key means a larger difference.
+
+        The key compares the shapes of the subtrees first, then the distance of the axes, then the directions
+        and the origins of the joint frames.
+        """
         angle, way = one.mismatch(other)
         off = 0.0 if self._tolerance.holds(angle, way) else angle * max(self.a.size, LEAST_SIZE) + way
         place = math.dist(one.place, other.place)
@@ -199,7 +220,7 @@ class Pairing:
         return one.shape != other.shape, off, place + self.a.size * points_back
 
     def _signature(self, mechanism: Mechanism, body: int, edge: Edge) -> str:
-        """Return the joint kinds of the subtree behind a joint, as text."""
+        """Return a text that lists the kinds of the joints in the subtree behind a joint."""
         key = mechanism is self.a, body, edge.joint
         if (known := self._signatures.get(key)) is None:
             beyond = edge.beyond(body)
@@ -213,7 +234,10 @@ class Pairing:
         return known
 
     def mismatch(self, e: Edge, f: Edge, G: FloatArray, XC: FloatArray) -> tuple[float, float]:
-        """Return the angle and distance (rad, m) between two joint axes as lines, for either direction."""
+        """Return the angle (rad) and the distance (m) between the axes of two joints.
+
+        Axes of opposite directions count as equal.
+        """
         kind = family(self.a.joint(e).kind)
         if kind != family(self.b.joint(f).kind):
             return 0.0, 0.0
@@ -224,7 +248,11 @@ class Pairing:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _JointGeometry:
-    """The geometry of a joint: kind, subtree shape, axis, origin and z axis of its frame."""
+    """The geometry of a joint.
+
+    It consists of the joint's kind and axis, the shape of its subtree, and the origin and the z axis of its
+    frame.
+    """
 
     kind: str
     shape: str
@@ -234,13 +262,16 @@ class _JointGeometry:
 
     @classmethod
     def of(cls, mechanism: Mechanism, edge: Edge, T: FloatArray, shape: str = "") -> _JointGeometry:
-        """Return the geometry of an edge's joint, moved by T."""
+        """Return the geometry of a joint after the rigid motion T."""
         pose = T @ mechanism.homes[edge.joint + 1]
         screw = mechanism.screw(edge).moved(T)
         return cls(family(mechanism.joint(edge).kind), shape, screw, pose[:3, 3].tolist(), pose[:3, 2])
 
     def mismatch(self, other: _JointGeometry) -> tuple[float, float]:
-        """Return the angle and distance (rad, m) between this axis and that of a joint of the same kind."""
+        """Return the angle (rad) and the distance (m) between this joint's axis and another's.
+
+        The two joints are of the same kind.
+        """
         if self.kind == "planar":
             normals = (Screw(one.normal, one.normal) for one in (self, other))
             return between_lines(*normals, placed=False)
@@ -248,14 +279,14 @@ class _JointGeometry:
 
 
 def _lines_apart(kind: str, s: Screw, t: Screw) -> tuple[float, float]:
-    """Return the angle and distance (rad, m) between the axes of two joints of the same kind."""
-    if kind == "floating":  # a floating joint reaches every pose from any origin
+    """Return the angle (rad) and the distance (m) between the axes of two joints of the same kind."""
+    if kind == "floating":  # a floating joint reaches every pose, so its frame does not matter
         return 0.0, 0.0
     return between_lines(s, t, placed=kind == "turns")
 
 
 _Some = TypeVar("_Some")
-#: A pair of objects of the same type: the first belongs to A, the second to B.
+#: A pair of objects of the same type. The first belongs to mechanism A, the second to mechanism B.
 Both = tuple[_Some, _Some]
 
 
@@ -267,7 +298,8 @@ class Axis:
         screw: The axis as a directed line; for a prismatic joint, only the direction of the line has a
             meaning.
         turns: Whether the joint is revolute.
-        seen: The reference line; the height is measured at its point nearest to the joint's axis.
+        seen: A reference line. The method `height` uses the point of this line that is nearest to the joint's
+            axis.
     """
 
     screw: Screw
@@ -275,11 +307,14 @@ class Axis:
     seen: Screw
 
     def moved(self, T: FloatArray) -> Axis:
-        """Return the axis after a rigid motion."""
+        """Return the axis after a rigid motion T."""
         return Axis(self.screw.moved(T), self.turns, self.seen.moved(T))
 
     def height(self, u: FloatArray) -> float | None:
-        """Return the height (m) along u of the nearest point of the reference line; None if not unique."""
+        """Return the height (m), measured along u, of the reference line's point nearest to the joint's axis.
+
+        If the nearest point is not unique, the result is None.
+        """
         s, start = self.screw, self.seen
         along_s = float(start.direction @ s.direction)
         if not self.turns or 1.0 - along_s**2 < ALONG**2:
@@ -290,7 +325,7 @@ class Axis:
 
 
 def zeros(u: Screw, ours: Axis, theirs: Axis, turns: bool) -> Iterator[float]:
-    """Yield rotations about u, or translations along it, that align the second axis with the first."""
+    """Yield rotations about u, or translations along u, that align the second axis with the first."""
     if not turns:
         heights = ours.height(u.direction), theirs.height(u.direction)
         if heights[0] is not None and heights[1] is not None:
@@ -311,10 +346,10 @@ def zeros(u: Screw, ours: Axis, theirs: Axis, turns: bool) -> Iterator[float]:
 def behind(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], seen: Both[Screw]
 ) -> Iterator[Both[Axis]]:
-    """Yield pairs of axes at two bodies.
+    """Yield pairs of joint axes, one at a body of A and one at a body of B.
 
-    If an axis is parallel to the line `seen`, the joint does not move that line. The axes after this joint
-    are then yielded too.
+    If a joint's axis is parallel to the line `seen`, the joint does not move that line. The axes after this
+    joint are then yielded too.
     """
     for e, f in _next_joints(mechanisms, via, bodies):
         axes = _axis(mechanisms[0], e, seen[0]), _axis(mechanisms[1], f, seen[1])
@@ -326,10 +361,11 @@ def behind(
 
 
 def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
-    """Yield poses of B's root that align its axes with A's: the first axis, then those behind it.
+    """Yield poses of B's root that align the first axis of B with that of A, and then the axes behind it.
 
     After the first axis is aligned, a rotation about it and a translation along it are still free. The axes
-    after it determine both. If there are none, as for a rotor, the other axes of the body determine both.
+    behind the first axis determine this rotation and this translation. If no axes follow, as for a rotor, the
+    other axes of the body determine them.
     """
     firsts = _firsts((a, b), (None, None), bodies, ())
     for (ours, theirs), near, far in firsts:
@@ -347,12 +383,12 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
 def root_poses_by_siblings(
     a: Mechanism, b: Mechanism, bodies: Both[int], alike: Callable[[Edge, Edge], bool]
 ) -> Iterator[FloatArray]:
-    """Yield poses of B's root that align three axes of one body with three of A's.
+    """Yield poses of B's root that align three joint axes of a body of B with three axes of a body of A.
 
     Args:
         a: One mechanism.
         b: The other mechanism.
-        bodies: Of both, with several joints each.
+        bodies: A body of A and a body of B, with several joints each.
         alike: Whether a joint of A may be paired with a joint of B.
     """
     edges = _with_axes(a, bodies[0])
@@ -377,7 +413,7 @@ def root_poses_by_siblings(
             more = [
                 pair_of(ours[i], one) for i in others for h, one in theirs[i] if h is not f and h is not g
             ]
-            if not ours[second].turns:  # a translation perpendicular to the first axis keeps heights along it
+            if not ours[second].turns:  # such a translation does not change heights along the first axis
                 carried = edges[second].beyond(bodies[0]), g.beyond(bodies[1])
                 led = _next_joints((a, b), (edges[second], g), carried)
                 more += [pair_of(_axis(a, e), _axis(b, h)) for e, h in led]
@@ -398,7 +434,7 @@ def _with_axes(mechanism: Mechanism, body: int) -> list[Edge]:
 
 
 def _across(u: Screw, s: Screw) -> float:
-    """Return the sine of the angle between two axes."""
+    """Return the sine of the angle between the directions of two axes."""
     return float(np.linalg.norm(np.cross(u.direction, s.direction)))
 
 
@@ -409,9 +445,9 @@ def _guesses(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: boo
 def _firsts(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], near: tuple[Both[Axis], ...]
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
-    """Return pairs of first revolute axes, each with the prismatic axes before it and the axes behind it.
+    """Return pairs of first revolute axes, with the prismatic axes before each pair and the axes behind it.
 
-    Prismatic axes are used if there is no revolute one.
+    If there is no revolute axis, the pairs are those of the prismatic axes.
     """
     found = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):
@@ -428,7 +464,10 @@ def _firsts(
 def _next_joints(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int]
 ) -> Iterator[Both[Edge]]:
-    """Yield all pairs of next joints at two bodies that both have an axis and the same kind of motion."""
+    """Yield all pairs of the joints that follow two bodies and are of the same kind.
+
+    Joints without an axis are left out.
+    """
     ours, theirs = (
         [edge for edge in mechanism.edges_of[body] if edge is not by and mechanism.joint(edge).kind.has_axis]
         for mechanism, by, body in zip(mechanisms, via, bodies, strict=True)
@@ -443,17 +482,20 @@ def _axis(mechanism: Mechanism, edge: Edge, seen: Screw | None = None) -> Axis:
     return Axis(screw, mechanism.joint(edge).kind.turns, seen or screw)
 
 
-#: Poses of B's body behind two joints, from the bodies behind them, the joints, and B's pose before them.
+#: A function that returns candidate poses of B's body behind two joints. Its arguments are the bodies behind
+#: the joints, the joints, and the pose of B's body before the joints.
 Poses = Callable[[tuple[int, int], Pair, FloatArray], Iterable[FloatArray]]
 
-#: Largest depth of a tree for this recursive search; deeper trees are matched joint by joint.
+#: Largest number of joints on a path for the recursive search. Robots with longer paths are matched joint by
+#: joint.
 DEEPEST = 200
-#: Largest number of attempts to assign the joints of two bodies.
+#: Largest number of attempts to find a partner at B's body for each joint at A's body.
 MOST_ASSIGNMENTS = 5000
 
 IDENTITY = np.eye(4)
 
-#: A's coordinates, each with B's coordinate and the ratio of their velocities (its sign is the sense).
+#: For each coordinate of A: the corresponding coordinate of B, and the velocity of B's coordinate divided by
+#: that of A's. The ratio is negative if the two coordinates have opposite senses.
 Rates = Mapping[str, tuple[str, float]]
 
 
@@ -463,7 +505,7 @@ class _Match:
 
     Attributes:
         X: (4, 4) pose of B's body behind the joint.
-        rates: Corresponding coordinates in these subtrees.
+        rates: The corresponding coordinates of A and B in these subtrees.
     """
 
     X: FloatArray
@@ -471,13 +513,13 @@ class _Match:
 
 
 class Congruence:
-    """Exact matches of the subtrees of two mechanisms.
+    """Exact matches between subtrees of mechanism A and subtrees of mechanism B.
 
     Args:
         a: One mechanism.
         b: The other mechanism.
         pairing: Joints and links paired by name.
-        tolerance: Tolerance for axes.
+        tolerance: Tolerance for the comparison of joint axes.
         poses: Returns candidate poses of B's body behind a joint.
     """
 
@@ -490,23 +532,23 @@ class Congruence:
         self._rules = True
 
     def ignore_rules(self) -> None:
-        """Match axes only, from now on; the mimic rules differ."""
+        """Compare only the axes from now on, because the mimic rules of the two mechanisms differ."""
         self._rules = False
         self._known.clear()
 
     def at(self, bodies: tuple[int, int], via: Via, X: FloatArray) -> Sequence[Pair] | None:
-        """Return the joint pairs of two bodies if their subtrees match exactly, else None.
+        """Return the joint pairs at two bodies if the subtrees behind these bodies match exactly, else None.
 
         Args:
             bodies: Of A and of B.
-            via: The joints by which they were reached.
-            X: (4, 4) motion of B's body from its zero configuration to its pose at A's.
+            via: The joints through which the search reached these bodies.
+            X: (4, 4) motion of B's body from B's zero configuration to the pose of A's body.
         """
         found = None if self._off else self._at(bodies, via, X)
         return None if found is None else found[0]
 
     def behind(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> FloatArray | None:
-        """Return the pose (4, 4) of B's body behind two joints for an exact match; None if there is none.
+        """Return the pose (4, 4) of B's body behind two joints that gives an exact match, or None.
 
         Args:
             e: Joint of A.
@@ -543,7 +585,10 @@ class Congruence:
         tries: list[int],
         rates: Rates,
     ) -> tuple[Sequence[Pair], Rates] | None:
-        """Assign a different joint of B to each joint of A, so that subtrees match; None if impossible."""
+        """Assign a different joint of B to each joint of A, so that the subtrees behind each pair match.
+
+        If there is no such assignment, the result is None.
+        """
         if not left:
             return [], rates
         at = min(range(len(left)), key=lambda i: len(candidates[i]))
@@ -579,7 +624,10 @@ class Congruence:
         return found
 
     def _rate(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> Rates:
-        """Return the corresponding coordinates of two joints; empty if one of them has none."""
+        """Return the correspondence of the coordinates of two joints.
+
+        It is empty if one of the joints has no coordinate.
+        """
         joints = self.a.joint(e), self.b.joint(f)
         if not self._rules or not joints[0].kind.has_axis:
             return {}
@@ -594,7 +642,10 @@ class Congruence:
         return {x: (y, (1.0 if alike != back else -1.0) * m / n)}
 
     def _together(self, some: Rates, others: Rates) -> Rates | None:
-        """Return the union of two correspondences, or None if they contradict each other."""
+        """Return the union of two sets of corresponding coordinates.
+
+        If the two sets contradict each other, the result is None.
+        """
         for x, (y, rate) in others.items():
             there = some.get(x)
             if there is None:
@@ -612,7 +663,7 @@ class Congruence:
         return self.tolerance.holds(*self.pairing.mismatch(e, f, IDENTITY, X))
 
     def _same_case(self, e: Edge, X: FloatArray, other: FloatArray) -> bool:
-        """Return whether two poses of B's body before a joint differ by a motion that the joint can undo."""
+        """Return whether a joint can undo the difference between two poses of B's body before it."""
         kind = self.a.joint(e).kind
         if kind.nq > 1:
             return family(kind) == "floating" or self.tolerance.holds(*apart(X, other))

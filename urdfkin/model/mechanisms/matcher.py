@@ -1,13 +1,16 @@
-"""Align mechanism B with mechanism A: match their joints, and choose B's base, senses, zeros and joint order.
+"""Align mechanism B with mechanism A.
 
-The matcher goes through both mechanisms from a common body outwards. At each joint it chooses the sense and
-the zero with which most links and axes behind the joint agree. `align` calls it for several starting bodies
-and joint orders, and returns the best result.
+The alignment matches the joints of A and B. It chooses the base of B, the order of B's joints, and the sense
+and the zero of each joint.
 
-Most joint zeros are determined by axes or link frames. The zero of a joint without an axis or a common link
-frame after it is determined only by a mimic rule. Let v = m w + c be a rule of A and v' = m' w' + c' a rule
-of B. The rules are equivalent if the substitution v' = s v + o, w' = s' w + o' converts one rule to the
-other. If nothing is attached to the joint's link, its offset o is free, and the rules determine it. For a
+The matcher starts at a common body and goes outwards through A and B at the same time. At each joint it
+chooses the sense and the zero with which most links and axes behind the joint agree. `align` calls the
+matcher for several starting bodies and joint orders, and returns the best result.
+
+Most joint zeros are determined by axes or link frames. If neither an axis nor a common link frame follows a
+joint, only a mimic rule determines the joint's zero. Let v = m w + c be a rule of A and v' = m' w' + c' a
+rule of B. The two rules are equivalent if the substitution v' = s v + o, w' = s' w + o' converts one rule to
+the other. If nothing is attached to the joint's link, its offset o is free, and the rules determine it. For a
 revolute joint, a multiple of a full turn may always be added to o.
 """
 
@@ -50,35 +53,36 @@ from urdfkin.model.mechanisms.mechanism import (
 from urdfkin.model.pose import inverse
 from urdfkin.model.tree import FloatArray, Joint
 
-#: Number of joints that the matcher looks ahead if the next axis does not decide between two choices.
+#: Number of further joints that the matcher examines if the next axis does not decide between two choices.
 AHEAD = 6
-#: Largest number of poses of B's root that are tried with all axes of a body of B on axes of a body of A.
+#: Largest number of poses of B's root that the search for an exact match tries. In each such pose, all axes
+#: of a body of B coincide with axes of a body of A.
 MOST_ROOT_POSES = 48
-#: Of two choices with equally many agreements, one is better only if its largest disagreement is less than
-#: this fraction of the other's.
+#: If two choices have equally many agreements, one choice is better only if its largest difference is less
+#: than this fraction of the other choice's.
 TWICE_AS_WELL = 0.5
 
-#: The free part of a joint: an offset, or a pose.
+#: The value that the matcher chooses for a joint: an offset, or a pose for a planar or floating joint.
 _Free = TypeVar("_Free", float, FloatArray)
-#: Number of links and axes that agree, and the largest disagreement (m).
+#: The number of links and axes that agree, and the largest difference (m).
 Score = tuple[int, float]
 
 
 @dataclass(slots=True)
 class Ahead:
-    """The number of look-ahead steps that are left to a search; several matchers may share one."""
+    """The number of look-ahead steps that a search may still make; several matchers may share this object."""
 
     left: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Place:
-    """A position of the matcher in both mechanisms.
+    """A position of the matcher: a body of A and the corresponding body of B.
 
     Attributes:
         bodies: The current body of A and of B.
         via: The joints from which the matcher reached these bodies; None at the base.
-        previous: Index of the last step, -1 for none.
+        previous: Index of the last step; -1 at the base.
         G: (4, 4) motion that moves A's zero configuration to the current pose of B.
         XC: (4, 4) motion that moves B's zero configuration to the current pose of B.
     """
@@ -96,11 +100,12 @@ class MechanismMatcher:
     Args:
         a: One mechanism.
         b: The other mechanism, which is aligned with `a`.
-        pairing: The joints of `a` and `b` that may be matched.
-        gauge: Prescribed free choices; None: those with which most agrees.
-        ahead: The number of look-ahead steps.
-        tolerance: Tolerance for poses and axes.
-        base: Links of both on the bodies to begin at; None: the likeliest.
+        pairing: Finds the joints of `a` and `b` that may be matched.
+        gauge: Prescribed free choices; None: the choices with which most joints and links agree.
+        ahead: The number of look-ahead steps that the matcher may make.
+        tolerance: Tolerance for the comparison of poses and axes.
+        base: A link of `a` and a link of `b`. The matcher begins at the bodies of these links; None: at the
+            likeliest bodies.
     """
 
     def __init__(
@@ -116,13 +121,13 @@ class MechanismMatcher:
         self.a, self.b, self.pairing, self.gauge, self.ahead = a, b, pairing, gauge, ahead
         self.tolerance, self.base = tolerance, base
         self.size = size_of(a, b)
-        #: Subtrees that match exactly; None for a prescribed gauge.
+        #: Finds subtrees that match exactly; None if the gauge is prescribed.
         self.exact = Congruence(a, b, pairing, tolerance, self._poses_behind) if gauge is None else None
 
     # -- where to begin ------------------------------------------------------------------------------
 
     def beginnings(self) -> Iterator[tuple[tuple[int, int], FloatArray]]:
-        """Yield common bodies with possible poses of B's root in A's root frame, the likeliest first."""
+        """Yield common bodies with possible poses of B's root in A's root frame; the likeliest come first."""
         if self.gauge is not None:
             names = self.gauge.base
             base = next(self._bases()) if names is None else self._bodies_of(*names)
@@ -148,7 +153,7 @@ class MechanismMatcher:
         return any(joint.mimic is not None for m in (self.a, self.b) for joint in m.tree.joints)
 
     def _exact_beginning(self, bases: Sequence[tuple[int, int]]) -> tuple[tuple[int, int], FloatArray] | None:
-        """Return the first pair of bodies, and pose of B's root, with which everything matches."""
+        """Return the first pair of bodies, and the pose of B's root, with which A and B match exactly."""
         for base in bases:
             if self.pairing.same_shape(base, (None, None)):
                 for X in self._exact_places(base):
@@ -157,7 +162,7 @@ class MechanismMatcher:
         return None
 
     def _exact_places(self, base: tuple[int, int]) -> Iterator[FloatArray]:
-        """Yield poses of B's root for an exact match: all axes of a body lie on axes of the other."""
+        """Yield poses of B's root for which all axes of B's body coincide with axes of A's body."""
         yield from self._by_names(base)
         siblings = root_poses_by_siblings(self.a, self.b, base, lambda e, f: self.pairing.alike(base, e, f))
         some = (
@@ -168,12 +173,16 @@ class MechanismMatcher:
         yield from islice(some, MOST_ROOT_POSES)
 
     def _places(self, base: tuple[int, int]) -> Iterator[FloatArray]:
-        """Yield poses of B's root: A's root, poses that align links of equal names, poses that align axes."""
+        """Yield candidate poses of B's root.
+
+        The first is the pose of A's root. Then come poses that align links of equal names, and poses that
+        align axes.
+        """
         yield from self._by_names(base)
         yield from self._by_axes(base)
 
     def _by_names(self, base: tuple[int, int]) -> Iterator[FloatArray]:
-        """Yield A's root, then the poses that align links of equal names."""
+        """Yield the pose of A's root, then the poses of B's root that align links of equal names."""
         yield IDENTITY
         for link_a, link_b in self.pairing.links(*base):
             yield self.a.homes[link_a] @ inverse(self.b.homes[link_b])
@@ -183,10 +192,14 @@ class MechanismMatcher:
         return a.body_of[a.tree.link_index(link_a)], b.body_of[b.tree.link_index(link_b)]
 
     def _bases(self) -> Iterator[tuple[int, int]]:
-        """Yield A's root body with the body of B that shares most links with it, or with each body of B.
+        """Yield pairs of bodies at which the matcher may begin, one of A and one of B.
 
-        If no names are shared, yield B's root body too, with the body of A that shares most links with it.
-        A's root may have no counterpart in B, for example before a floating joint.
+        The first body is A's root body. Its partner is the body of B that has most link names in common with
+        it. If no body has, the partner is each body of B in turn.
+
+        If A's root body has no link names in common with B, B's root body is also yielded, with the body of A
+        that has most link names in common. A's root may have no counterpart in B, for example before a
+        floating joint.
         """
         if self.base is not None:
             yield self.a.body_of[self.base[0]], self.b.body_of[self.base[1]]
@@ -201,7 +214,7 @@ class MechanismMatcher:
             yield ours, 0
 
     def _by_axes(self, base: tuple[int, int]) -> Iterator[FloatArray]:
-        """Yield poses of B's root that align B's first axes with A's best."""
+        """Yield the poses of B's root that align B's first axes best with A's first axes."""
         scored = list[tuple[float, Place, Score]]()
         for X in root_poses_by_axes(self.a, self.b, base):
             place = Place(base, (None, None), -1, IDENTITY, X)
@@ -212,7 +225,7 @@ class MechanismMatcher:
     # -- matching ------------------------------------------------------------------------------------
 
     def run(self, base: tuple[int, int], X: FloatArray) -> Alignment:
-        """Return the alignment from a pair of bodies, with B's root at X."""
+        """Return the alignment that starts at a pair of bodies, with the pose X of B's root."""
         found = Alignment(self.a, self.b, (self.a.bodies[base[0]][0], self.b.bodies[base[1]][0]), X)
         stack = [Place(base, (None, None), -1, IDENTITY, X)]
         while stack:
@@ -232,18 +245,21 @@ class MechanismMatcher:
         return found
 
     def _edges(self, place: Place) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
-        """Return the matched pairs of next joints, and the unmatched joints of A and of B."""
+        """Return the matched pairs of the next joints, and the joints of A and of B without a match."""
         pairs = self._exact_pairs(place.bodies, place.via, inverse(place.G) @ place.XC)
         if pairs is not None:
             return pairs, (), ()
         return self.pairing.edges(place.bodies, place.via, place.G, place.XC)
 
     def _exact_pairs(self, bodies: tuple[int, int], via: Via, X: FloatArray) -> Sequence[Pair] | None:
-        """Return the joint pairs of two bodies if their subtrees match exactly; None otherwise."""
+        """Return the joint pairs at two bodies if the subtrees behind the bodies match exactly, else None."""
         return None if self.exact is None else self.exact.at(bodies, via, X)
 
     def _poses_behind(self, beyond: tuple[int, int], via: Pair, X: FloatArray) -> Iterator[FloatArray]:
-        """Yield candidate poses of B's body behind two joints of the same kind, from its pose before them."""
+        """Yield candidate poses of B's body behind two joints of the same kind.
+
+        They follow from the pose of B's body before the joint.
+        """
         there = Place(beyond, via, -1, IDENTITY, X)
         kind, f = family(self.a.joint(via[0]).kind), via[1]
         if kind in ("turns", "prismatic"):
@@ -274,7 +290,7 @@ class MechanismMatcher:
             found.frames.append(FramePair(link_a, link_b, place.previous, home, end, angle, way))
 
     def _as_tools(self, place: Place, taken: list[tuple[int, int]]) -> FramePair | None:
-        """Return any two links as different tools on the same body, if no links of the bodies match."""
+        """Return one link of each body as different end-effector frames, if no links of the bodies match."""
         ours, theirs = self._own_links(place)
         if taken or not ours or not theirs:
             return None
@@ -283,7 +299,10 @@ class MechanismMatcher:
         return FramePair(ours[0], theirs[0], place.previous, home, IDENTITY, 0.0, 0.0, tool)
 
     def _all_links(self, place: Place) -> list[tuple[int, int]]:
-        """Return links of equal names, then links at the same pose whose names the other model lacks."""
+        """Return pairs of links with equal names, then pairs of links with equal poses.
+
+        The second kind contains only links whose names do not exist in the other model.
+        """
         pairs = list(self.pairing.links(*place.bodies))
         taken = {j for _, j in pairs}
         ours, theirs = self._own_links(place)
@@ -297,13 +316,13 @@ class MechanismMatcher:
         return pairs
 
     def _own_links(self, place: Place) -> tuple[list[int], list[int]]:
-        """Return the links of two bodies whose names do not exist in the other model."""
+        """Return the links of two bodies whose names exist only in their own model."""
         names_a, names_b = self.a.tree.links, self.b.tree.links
         ours = [i for i in self.a.bodies[place.bodies[0]] if names_a[i] not in names_b]
         return ours, [j for j in self.b.bodies[place.bodies[1]] if names_b[j] not in names_a]
 
     def _step(self, place: Place, e: Edge, f: Edge, index: int, depth: int) -> tuple[Step, Place, Score]:
-        """Return the step over a pair of joints, the position behind it, and its score."""
+        """Return the step over a pair of joints, the position behind the joints and its score."""
         kinds = family(self.a.joint(e).kind), family(self.b.joint(f).kind)
         via = e, f
         backwards = e.outer == place.bodies[0], f.outer == place.bodies[1]
@@ -318,7 +337,7 @@ class MechanismMatcher:
     def _unlike(
         self, place: Place, via: tuple[Edge, Edge], kinds: tuple[str, str], backwards: tuple[bool, bool]
     ) -> Step:
-        """Return the step over two joints of different kinds; one may be fixed."""
+        """Return the step over two joints of different kinds; one of the joints may be fixed."""
         unlike = {kinds[0]: "a", kinds[1]: "b"}.get("fixed", "kind")
         if unlike == "a":
             axis = _outwards(self.b.screw(via[1]), backwards[1]).moved(inverse(place.G) @ place.XC)
@@ -332,7 +351,7 @@ class MechanismMatcher:
     def _free(
         self, place: Place, there: Place, backwards: tuple[bool, bool], depth: int, kind: str
     ) -> tuple[Step, Place, Score]:
-        """Pass a planar or floating joint: its frame and the origin of its coordinates are free."""
+        """Pass a planar or floating joint, whose frame and whose origin of coordinates are free choices."""
         e, f = _both(there.via)
         homes = self.a.homes[e.joint + 1], self.b.homes[f.joint + 1]
         at, seen = place.G @ homes[0], place.XC @ homes[1]
@@ -375,13 +394,16 @@ class MechanismMatcher:
         plane: FloatArray | None,
         poses_behind: Iterable[FloatArray],
     ) -> Iterator[FloatArray]:
-        """Yield candidates for N: the identity, the zero configuration, and those that align a link or axis.
+        """Yield candidates for the rigid motion N between B's joint frame and the body behind it.
+
+        The candidates are the identity, N in the zero configuration, and motions that align a link or an
+        axis.
 
         Args:
             there: The position behind the joint, with B in its zero configuration.
             at: (4, 4) the joint's frame.
             home_b: (4, 4) the frame of B's joint in the zero configuration.
-            plane: (4, 4) N of a planar joint up to motions in its plane; None for a floating joint.
+            plane: (4, 4) N of a planar joint, up to a motion in the joint's plane; None for a floating joint.
             poses_behind: (4, 4) poses that align B's axes behind the joint with A's.
         """
         yield IDENTITY if plane is None else plane
@@ -396,7 +418,10 @@ class MechanismMatcher:
     def _like(
         self, place: Place, there: Place, backwards: tuple[bool, bool], depth: int, *, turns: bool
     ) -> tuple[Step, Place, Score]:
-        """Pass a joint that is revolute, or prismatic, in both: choose sense, zero and change of axis."""
+        """Pass a joint that is revolute in A and B, or prismatic in A and B.
+
+        The method chooses the joint's sense and zero, and whether its axis differs.
+        """
         e, f = _both(there.via)
         s = _outwards(self.a.screw(e), backwards[0])
         t = _outwards(self.b.screw(f), backwards[1])
@@ -427,7 +452,7 @@ class MechanismMatcher:
         return Step(a, b, kind, place.previous, sense, with_it[0], before, s, s, tilt, shift), *with_it[1:]
 
     def _exact_pose(self, place: Place, there: Place) -> FloatArray | None:
-        """Return the exactly matching XC (4, 4) behind two joints; None if there is none."""
+        """Return the motion XC (4, 4) behind two joints that gives an exact match, or None."""
         if self.exact is None:
             return None
         X = self.exact.behind(*_both(there.via), place.bodies, inverse(place.G) @ place.XC)
@@ -436,13 +461,13 @@ class MechanismMatcher:
     # -- a joint's zero ------------------------------------------------------------------------------
 
     def _prescribed(self, joint: str) -> tuple[int, float | None]:
-        """Return the prescribed sense and zero of a joint; 0 and None if they are free."""
+        """Return the prescribed sense and zero of a joint; 0 and None if sense and zero are free."""
         return (0, None) if self.gauge is None else self.gauge.zeros.get(joint, (1, 0.0))
 
     def _best_zero(
         self, there: Place, G: FloatArray, t: Screw, turns: bool, zero: float | None, depth: int
     ) -> tuple[float, Place, Score]:
-        """Return the offset of B's joint with which most of the rest agrees; 0 is tried first."""
+        """Return the offset of B's joint with which most links and axes behind it agree; 0 is tried first."""
         offsets = self._offsets(there, G, t, turns) if zero is None else (zero,)
         moved = (
             (offset, there.XC @ along(t, offset, turns=turns) if offset else there.XC) for offset in offsets
@@ -450,9 +475,12 @@ class MechanismMatcher:
         return self._best(((offset, replace(there, G=G, XC=XC)) for offset, XC in moved), depth)
 
     def _best(self, choices: Iterable[tuple[_Free, Place]], depth: int) -> tuple[_Free, Place, Score]:
-        """Return the first choice with most agreements; ties are resolved by looking `depth` joints ahead.
+        """Return the first choice with most agreements.
 
-        Example: two axes that meet at right angles lie on two others in two ways; a third axis decides.
+        If several choices are equally good, the next `depth` joints decide.
+
+        Example: two axes that intersect at right angles can be aligned with two such axes of A in two ways. A
+            third axis decides.
         """
         scored = list[tuple[_Free, Place, Score]]()
         for what, place in choices:
@@ -474,14 +502,14 @@ class MechanismMatcher:
         return _best_of(seen)
 
     def _with_behind(self, place: Place, here: Score, depth: int) -> Score:
-        """Return the score of a position together with the joints behind it."""
+        """Return the score of a position, including the scores of the joints behind it."""
         pairs = self.pairing.edges(place.bodies, place.via, place.G, place.XC)[0]
         self.ahead.left -= len(pairs)
         scores = [here, *(self._step(place, e, f, -1, depth - 1)[2] for e, f in pairs)]
         return sum(count for count, _ in scores), max(off for _, off in scores)
 
     def _score(self, place: Place) -> Score:
-        """Return the number of links and axes that agree at a position, and the largest disagreement (m)."""
+        """Return the number of links and axes that agree at a position, and the largest difference (m)."""
         off = [
             apart(place.G @ self.a.homes[i], place.XC @ self.b.homes[j])
             for i, j in self.pairing.links(*place.bodies)
@@ -492,7 +520,7 @@ class MechanismMatcher:
         return len(off) - len(wrong), max(wrong, default=0.0)
 
     def _offsets(self, there: Place, G: FloatArray, t: Screw, turns: bool) -> Iterator[float]:
-        """Yield candidate zeros of B's joint: 0, and those that align a link or an axis behind it."""
+        """Yield candidate zeros of B's joint: 0, then zeros that align a link or an axis behind the joint."""
         yield 0.0
         u = t.moved(there.XC)
         for i, j in self.pairing.links(*there.bodies):
@@ -506,14 +534,17 @@ class MechanismMatcher:
 
 
 def _most_shared(one: Mechanism, other: Mechanism) -> int | None:
-    """Return the body of `other` that shares most link names with the root of `one`; None if none does."""
+    """Return the body of `other` that has most link names in common with the root body of `one`.
+
+    If no body has a name in common, the result is None.
+    """
     names = {one.tree.links[link] for link in one.bodies[0]}
     shared = [len(names & {other.tree.links[k] for k in body}) for body in other.bodies]
     return max(range(len(shared)), key=shared.__getitem__) if any(shared) else None
 
 
 def _best_of(scored: Sequence[tuple[_Free, Place, Score]]) -> tuple[_Free, Place, Score]:
-    """Return the first element that no other element clearly beats (`better`)."""
+    """Return the first element for which no other element is `better`."""
     best = scored[0]
     for one in scored[1:]:
         best = one if better(one[2], best[2]) else best
@@ -521,19 +552,26 @@ def _best_of(scored: Sequence[tuple[_Free, Place, Score]]) -> tuple[_Free, Place
 
 
 def better(score: Score, than: Score) -> bool:
-    """Return whether `score` has more agreements, or as many and less than half the largest disagreement."""
+    """Return whether `score` is better than the score `than`.
+
+    It is better if it has more agreements, or equally many agreements and less than half the largest
+    difference.
+    """
     return score[0] > than[0] or (score[0] == than[0] and score[1] < TWICE_AS_WELL * than[1])
 
 
 def _value_of(screw: Screw, T: FloatArray, *, turns: bool) -> float:
-    """Return the value at which a joint makes the rigid motion T."""
+    """Return the joint value at which a joint with this screw makes the rigid motion T."""
     if turns:
         return turn_about(screw.direction, T[:3, :3])
     return float(screw.direction @ T[:3, 3])
 
 
 def _outwards(screw: Screw, backwards: bool) -> Screw:
-    """Return a joint's screw for the motion of the body behind it; reversed if the path goes backwards."""
+    """Return a joint's screw for the motion of the body that is farther from the base.
+
+    If the path goes through the joint from child to parent, the screw is reversed.
+    """
     return screw.reversed() if backwards else screw
 
 
@@ -545,7 +583,7 @@ def _both(via: tuple[Edge | None, Edge | None]) -> tuple[Edge, Edge]:
 
 
 def _all_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> list[int]:
-    """Return the indices of some joints at a body and of all joints behind them."""
+    """Return the indices of the given joints at a body and of all joints behind these joints."""
     found, stack = [], [(body, edge) for edge in edges]
     while stack:
         here, edge = stack.pop()
@@ -556,18 +594,22 @@ def _all_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> list[
 
 
 def _normals_apart(at: FloatArray, seen: FloatArray) -> tuple[FloatArray, float, float]:
-    """Return `between` of two planes, for either direction of their normals."""
+    """Return the angle and the distance of two planes (`between`), for either direction of the normals."""
     start, end = (Screw(T[:3, 2], T[:3, 3]) for T in (at, seen))
     return between(start, end.reversed() if start.direction @ end.direction < 0.0 else end, turns=False)
 
 
-#: Number of orders that are tried for commuting joints: all orders of five prismatic joints.
+#: Largest number of orders that are tried for commuting joints. It is the number of orders of five prismatic
+#: joints.
 MOST_ORDERS = 120
-#: Look-ahead steps of each search in all, which take seconds: TALOS without names needs 500, Baxter 1,000.
+#: Total number of look-ahead steps of one search; all of them take seconds. Without names, TALOS needs 500
+#: steps and Baxter 1,000.
 MOST_AHEAD = 2000
-#: Tolerances (rad, and as a share of the size) that are tried when the exact match fails.
+#: Larger tolerances that are tried when the exact match fails: an angle in rad, and a distance as a fraction
+#: of the robot's size.
 NEARLY = (1e-11, 1e-9, 1e-7, 1e-5, 1e-3)
-#: Number of exchanges of joints with different names that are tried.
+#: Largest number of exchanges between joint pairs that are tried. The joints of such a pair have different
+#: names.
 MOST_EXCHANGED = 12
 
 
@@ -578,7 +620,7 @@ def align(a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | N
         a: One mechanism.
         b: The other mechanism.
         given: Joints of A and their names in B.
-        gauge: Prescribed free choices; None: those with which most agrees.
+        gauge: Prescribed free choices; None: the choices with which most joints and links agree.
     """
     if gauge is not None:
         for taken in gauge.orders:
@@ -601,14 +643,16 @@ def align(a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | N
 def _orders_to_try(
     a: Mechanism, b: Mechanism, given: Mapping[str, str], run: Sequence[str], orders: Iterator[list[str]]
 ) -> Iterator[Sequence[str]]:
-    """Yield other orders of commuting joints of B: A's order if A has all their names, else all orders.
+    """Yield other orders of commuting joints of B.
+
+    If A has all names of these joints, the only order is A's. Otherwise all orders are yielded.
 
     Args:
         a: One mechanism.
         b: The other mechanism.
         given: Joints of A and their names in B.
-        run: Names of B's joints, from the inner body outwards.
-        orders: All other orders that their axes allow.
+        run: Names of the commuting joints of B, from the inner body outwards.
+        orders: All other orders of these joints that their axes allow.
     """
     called = {given.get(joint.name, joint.name): i for i, joint in enumerate(a.tree.joints)}
     if not all(name in called for name in run):
@@ -621,7 +665,10 @@ def _orders_to_try(
 
 
 def _by_rules(best: Alignment) -> Alignment:
-    """Return the alignment with zeros from mimic rules, if it agrees at least as well; else the same."""
+    """Return the alignment with the zeros that the mimic rules determine.
+
+    If this alignment agrees less well than the given one, the given one is returned.
+    """
     zeros = zeros_by_rules(best, tolerance_of(best.a, best.b))
     if not zeros:
         return best
@@ -631,8 +678,11 @@ def _by_rules(best: Alignment) -> Alignment:
 
 
 def _exchanged(best: Alignment, given: Mapping[str, str]) -> Alignment:
-    """Try to exchange joints of one body that share no name, for example two mirrored arms."""
-    if best.only_a or best.only_b:  # two different robots; an exchange cannot make them equal
+    """Try to exchange the partners of two joint pairs, for example those of two mirrored arms.
+
+    Only pairs of joints of one body that have different names are exchanged.
+    """
+    if best.only_a or best.only_b:  # A and B are different robots, and an exchange cannot make them equal
         return best
     tried, ahead = set[frozenset[tuple[int, int]]](), Ahead(MOST_AHEAD)
     while (two := next((two for two in best.exchangeable(given) if two not in tried), None)) is not None:
@@ -649,7 +699,9 @@ def _exchanged(best: Alignment, given: Mapping[str, str]) -> Alignment:
 
 
 def _nearly(best: Alignment, given: Mapping[str, str]) -> Alignment:
-    """Return a much better alignment found with a larger tolerance; the same one if there is none.
+    """Return a much better alignment that a search with a larger tolerance finds.
+
+    If there is none, the given alignment is returned.
 
     If every axis differs slightly, no exact agreement decides between two candidates. The search is therefore
     repeated with increasing tolerances until everything agrees. Then the mechanisms are aligned once more,
@@ -681,7 +733,7 @@ def _best_alignment(
     tolerance: Tolerance | None = None,
     base: tuple[int, int] | None = None,
 ) -> Alignment:
-    """Return the best alignment over all starting bodies, or from the bodies of the two `base` links."""
+    """Return the best alignment over all starting bodies, or that from the bodies of the `base` links."""
     tolerance = tolerance or tolerance_of(a, b)
     walk = MechanismMatcher(a, b, Pairing(a, b, given, tolerance), gauge, ahead or Ahead(0), tolerance, base)
     best: Alignment | None = None
@@ -695,26 +747,29 @@ def _best_alignment(
     return best
 
 
-#: Full turns by which the zero of a mimicked joint may be changed.
+#: Numbers of full turns by which the zero of a mimicked joint may be changed.
 TURNS = (0, 1, -1)
-#: Tolerance of a zero that axes determine, as a multiple of the angle tolerance. It is large because axes
-#: that are close together determine a zero only inexactly.
+#: Tolerance of a zero that axes determine, as a multiple of the angle tolerance. It is large, because two
+#: axes that are close together determine a zero inexactly.
 LEVER = 1e4
 
 
 @dataclass(frozen=True, slots=True)
 class _Rule:
-    """A step whose joint moves with a coordinate of B: its value is m x + c in A, n y + d in B.
+    """A joint that moves with a coordinate x of A and a coordinate y of B.
+
+    The joint's value is m x + c in A and n y + d in B. The alignment has the sense s and the offset o: B's
+    value is s times A's value, plus o.
 
     Attributes:
         step: Index of the step.
-        slope: s m, the slope of sense * A's value.
-        constant: s c.
+        slope: The product s m: the slope of A's value with B's sense.
+        constant: The product s c: the constant of A's value with B's sense.
         n: Multiplier of B's rule.
         d: Offset of B's rule.
-        offset: o, as the alignment found it.
+        offset: The offset o that the alignment found.
         turns: Whether the joint is revolute.
-        free: Whether o is free, because no axis and no common link determines it.
+        free: Whether o is free: no axis and no common link determines it.
         meets: Whether links of A and of B coincide on the body behind the joint.
     """
 
@@ -729,15 +784,15 @@ class _Rule:
     meets: bool
 
     def beta(self, turn: int) -> float:
-        """Return beta of y = alpha x + beta, from this joint's zero moved by some full turns."""
+        """Return beta in y = alpha x + beta, if this joint's zero is changed by some full turns."""
         return (self.constant + self.offset + 2.0 * math.pi * turn - self.d) / self.n
 
     def wanted(self, beta: float) -> float:
-        """Return the offset that corresponds to beta."""
+        """Return the offset o of this joint that corresponds to beta in y = alpha x + beta."""
         return self.n * beta + self.d - self.constant
 
     def allows(self, offset: float, tolerance: Tolerance) -> bool:
-        """Return whether the joint can have this offset, within rounding."""
+        """Return whether the joint can have this offset, up to rounding."""
         off = offset - self.offset
         if self.turns:
             off = math.remainder(off, 2.0 * math.pi)
@@ -745,11 +800,11 @@ class _Rule:
 
 
 def zeros_by_rules(found: Alignment, tolerance: Tolerance) -> Mapping[str, tuple[int, float]]:
-    """Return sense and offset of the joints of A whose zero mimic rules change."""
+    """Return the sense and the offset of each joint of A whose zero the mimic rules change."""
     zeros = dict[str, tuple[int, float]]()
     for rules in _groups(found):
         alphas = [rule.slope / rule.n for rule in rules if rule.n]
-        # The zero of a joint with a different slope stays as it is; the zeros of the other joints are set.
+        # The zero of a joint with a different slope is not changed; the zeros of the other joints are set.
         alpha = max(
             alphas, key=lambda one: sum(_near(one, other, tolerance) for other in alphas), default=0.0
         )
@@ -773,7 +828,7 @@ def _near(x: float, y: float, tolerance: Tolerance) -> bool:
 
 
 def _groups(found: Alignment) -> Iterator[list[_Rule]]:
-    """Yield groups of steps whose joints move with one coordinate of A and one of B."""
+    """Yield groups of steps; all joints of a group move with the same coordinate of A and of B."""
     groups = dict[tuple[str, str], list[_Rule]]()
     for i, step in enumerate(found.steps):
         if step.unlike or step.kind not in ("turns", "prismatic"):
@@ -788,13 +843,16 @@ def _groups(found: Alignment) -> Iterator[list[_Rule]]:
 
 
 def _as_rule(joint: Joint) -> tuple[str, float, float]:
-    """Return the coordinate of a joint, its multiplier and its offset."""
+    """Return the coordinate that moves a joint, and the multiplier and offset of its mimic rule."""
     rule = joint.mimic
     return (joint.name, 1.0, 0.0) if rule is None else (rule.leader, rule.multiplier, rule.offset)
 
 
 def _is_determined(found: Alignment, i: int) -> tuple[bool, bool]:
-    """Return whether axes or common links determine a joint's zero, and whether other links coincide."""
+    """Return whether axes or common links determine a joint's zero, and whether other links coincide.
+
+    The other links are links of A and B without common names, on the body behind the joint.
+    """
     names = set(found.a.tree.links) & set(found.b.tree.links)
     behind = {i}
     for k, step in enumerate(found.steps):
@@ -808,7 +866,7 @@ def _is_determined(found: Alignment, i: int) -> tuple[bool, bool]:
 
 
 def _keeps_axis(one: Step, other: Step) -> bool:
-    """Return whether the motion of one joint keeps the axis of another unchanged."""
+    """Return whether the motion of the first joint leaves the axis of the second joint in its place."""
     if "turns" not in (one.kind, other.kind):
         return other.kind == "prismatic"
     if {one.kind, other.kind} - {"turns", "prismatic"}:

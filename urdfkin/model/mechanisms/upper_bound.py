@@ -1,27 +1,29 @@
-"""Upper bounds on the distance between a frame in two models, proven for all configurations at once.
+"""Upper bounds on the distance between a frame's poses in two models, proven for all configurations.
 
 Support functions. The support function of a set W of points is h(u) = max over p in W of u . p. A bound on
-distances needs only h. The effect of a joint on h is simple. If W rotates about an axis by any angle of a
-range, the new h'(u) is the largest h over the directions that result when u is rotated back by these angles.
-If W translates, h'(u) is h(u) plus the largest product of u and the translation. One function of the
-direction therefore describes the reach of a chain with any number of joints, and no search over joint values
-is needed.
+distances needs only h, and a joint changes h in a simple way. Suppose that W rotates about an axis by any
+angle of a range. The new h'(u) is then the largest h over the directions that result when u is rotated back
+by these angles. If W translates, h'(u) is h(u) plus the largest product of u and the translation. One
+function of the direction therefore describes the reach of a chain with any number of joints, and no search
+over joint values is needed.
 
-h is stored at the points of a grid on the surface of a cube. It is convex with h(s u) = s h(u), so
-interpolation between grid points gives an upper bound. A rotation is bounded in the same way: an arc of
-directions lies in a circumscribed polygon, and h on the polygon is largest at a corner. Each joint enlarges
-the bound by a fraction that decreases with the square of the distance between grid points.
+h is stored at the points of a grid on the surface of a cube. It is convex, and h(s u) = s h(u) for s >= 0, so
+interpolation between grid points gives an upper bound. For a rotation, the directions form an arc. The arc
+lies in a circumscribed polygon, and h on the polygon is largest at a corner. For each joint, the grid makes
+the bound too large by a fraction. This fraction decreases with the square of the distance between grid
+points.
 
-Recursion. Let y be the position of B's frame behind joint i, in A's zero configuration, and d its difference
-from A's frame. In front of the joint
+Recursion. Let y be the position of B's frame, as the joints behind joint i move it, and let d be y minus the
+position of A's frame. The joint and its L change d to
 
     d' = (L - 1) e(S' t') y  +  (e(S' t') - e(S t')) y  +  (e(S t') - e(S t)) y  +  e(S t) d.
 
-All terms but the last vanish if nothing differs. For each direction u, the largest u . d' is at most the sum
-of the largest values of the terms. The support functions of y and d give these values. If there is one
-difference between the models, there is one term, and only the grid makes the bound larger than the true
-maximum. Several differences may be largest in different configurations, so their bound is larger than the
-true maximum. If only fixed offsets differ, a sum of path lengths gives a second bound without grid error.
+If nothing differs at the joint, all terms but the last are 0. For each direction u, the largest u . d' is at
+most the sum of the largest values of u times each term. The support functions of y and d give these values.
+If the models have a single difference, there is a single term, and only the grid makes the bound larger than
+the true maximum. Several differences may be largest in different configurations, so their bound is larger
+than the true maximum. If only fixed offsets differ, a sum of path lengths gives a second bound without grid
+error.
 """
 
 from __future__ import annotations
@@ -40,8 +42,8 @@ from urdfkin.model.mechanisms.mechanism import Screw, apart
 from urdfkin.model.tree import FloatArray
 
 _WHOLE = 2.0 * math.pi
-#: Number of corners of the polygon around a circle; the corners are 0.1 % farther from the centre than the
-#: circle.
+#: Number of corners of the polygon around a circle. The distance of a corner from the centre is 0.1 % larger
+#: than the circle's radius.
 _AROUND = 64
 
 
@@ -51,7 +53,7 @@ class Grid:
 
     Attributes:
         cells: Number of cells along an edge of a face.
-        segments: Number of segments of a full turn.
+        segments: Number of sides of the polygon that contains a full circle of directions.
     """
 
     cells: int
@@ -64,7 +66,7 @@ class Grid:
 
     @property
     def lengths(self) -> FloatArray:
-        """The lengths (n,) of the grid points."""
+        """The distances (n,) of the grid points from the cube's centre."""
         return np.asarray(np.linalg.norm(self.points, axis=1))
 
 
@@ -91,7 +93,10 @@ class Support:
     values: FloatArray
 
     def at(self, u: FloatArray) -> FloatArray:
-        """Return bounds (...) for directions (..., 3) of any length; 0 for the zero vector."""
+        """Return upper bounds (...) on the support function for vectors (..., 3) of any length.
+
+        0 for zero.
+        """
         cells, v = self.grid.cells, self.values
         x, y, z = u[..., 0].ravel(), u[..., 1].ravel(), u[..., 2].ravel()
         X, Y, Z = np.abs(x), np.abs(y), np.abs(z)
@@ -125,9 +130,11 @@ class Support:
         return Support(self.grid, best + G @ screw.point)
 
     def turned_back(self, axis: FloatArray, angles: FloatArray, factors: FloatArray | float) -> FloatArray:
-        """Return the support (angles, n) at the grid points rotated back about an axis.
+        """Return the support function (angles, n) at the grid points after a rotation about an axis.
 
-        `factors` lengthen the component perpendicular to the axis.
+        The grid points are rotated back by each angle.
+
+        The component perpendicular to the axis is multiplied by `factors`, one factor for each angle.
         """
         G = self.grid.points
         along = (G @ axis)[:, np.newaxis] * axis
@@ -147,7 +154,7 @@ class Support:
         return Support(self.grid, self.at(self.grid.points @ T[:3, :3]) + self.grid.points @ T[:3, 3])
 
     def radius(self, screw: Screw) -> float:
-        """Return an upper bound (m) on the distance from a screw's line to any point of the set."""
+        """Return an upper bound (m) on the distance of any point of the set from a screw's line."""
         x, y, _ = axis_aligning(screw.direction).T
         corners = [
             factor * (math.cos(t) * x + math.sin(t) * y) for t, factor in _corners(0.0, _WHOLE, _AROUND)
@@ -156,11 +163,11 @@ class Support:
         return float(max((self.at(u) - u @ screw.point).max(), 0.0))
 
     def largest(self) -> float:
-        """Return an upper bound (m) on the distance from the origin to any point of the set.
+        """Return an upper bound (m) on the distance of any point of the set from the origin.
 
-        A direction between grid points g_k is a sum c_k g_k, all within an angle r of the cell's centre. So
-        its length is at least cos r times the sum of c_k |g_k|. Hence h per unit length there is at most
-        1 / cos r times the largest h per unit length at the g_k.
+        A vector between the grid points g_k of a cell is a sum of c_k g_k with c_k >= 0. All g_k are within
+        an angle r of the cell's centre, so the vector's length is at least cos r times the sum of c_k |g_k|.
+        Therefore h divided by this length is at most 1 / cos r times the largest h(g_k) / |g_k|.
         """
         share = (self.values / self.grid.lengths).max(initial=0.0)
         return float(share) / math.cos(math.atan(math.sqrt(2.0) / self.grid.cells))
@@ -170,7 +177,7 @@ class Support:
 
 
 def point(grid: Grid, p: FloatArray) -> Support:
-    """Return the support of a single point."""
+    """Return the support function of a single point p."""
     return Support(grid, grid.points @ p)
 
 
@@ -187,7 +194,7 @@ def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]
     return [(low, 1.0), *middles, (high, 1.0)]
 
 
-#: Grids: coarse for every frame, fine for the frame with the largest bound.
+#: The two grids: a coarse grid for every frame, and a fine grid for the frame with the largest bound.
 COARSE, FINE = Grid(8, 24), Grid(16, 48)
 #: Largest number of values of a variable that are treated one by one.
 MOST_VALUES = 1024
@@ -196,10 +203,12 @@ MOST_VALUES = 1024
 def upper_bounds(
     found: Alignment, variables: Variables, frame: FramePair, grid: Grid = COARSE
 ) -> tuple[float, float]:
-    """Return upper bounds (m, rad) on the distance and the angle between a frame in A and B, within limits.
+    """Return upper bounds on the distance (m) and the angle (rad) between a frame's poses in A and in B.
 
-    The bounds are 0 if nothing differs on the path. They are inf if an unlimited joint makes the difference
-    grow without bound, or if two joints are of different kinds.
+    The bounds hold for all joint values within the limits.
+
+    The bounds are 0 if nothing differs on the path. They are inf in two cases: the difference grows without
+    bound with the value of an unlimited joint, or two matched joints are of different kinds.
     """
     steps, pairs = behind_first(found, variables, frame)
     if not steps and frame.end is IDENTITY:
@@ -216,7 +225,7 @@ def upper_bounds(
 def behind_first(
     found: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[Step], list[Pair | None]]:
-    """Return the steps on the path to a frame, and their values, from the first step that differs."""
+    """Return the steps on the path to a frame, and their joint values, from the first step that differs."""
     steps = found.path(frame.previous)
     pairs = [variables.pairs[i] for i in found.indices(frame.previous)]
     first = next((i for i, (s, p) in enumerate(zip(steps, pairs, strict=True)) if _differs(s, p)), len(steps))
@@ -230,7 +239,10 @@ def _differs(step: Step, pair: Pair | None) -> bool:
 def _radians(
     steps: Sequence[Step], pairs: Sequence[Pair | None], variables: Variables, frame: FramePair
 ) -> float:
-    """Return a bound (rad) on the frame's angle: the sum of the angles of all differing rotations."""
+    """Return a bound (rad) on the angle between a frame's orientations in A and B.
+
+    It is the sum of the angles of all rotations that differ.
+    """
     total = apart(IDENTITY, frame.end)[0]
     for step, pair in zip(steps, pairs, strict=True):
         total += apart(IDENTITY, step.before)[0]
@@ -258,13 +270,13 @@ def _metres(
 
 
 def _off(L: FloatArray, reach: float) -> float:
-    """Return a bound (m) on |(R - 1) y + p|: how far L moves a point with |y| up to `reach`."""
+    """Return a bound (m) on the distance |(R - 1) y + p| by which L moves a point y, |y| <= `reach`."""
     turned, moved = float(np.linalg.norm(L[:3, :3] - np.eye(3))), float(np.linalg.norm(L[:3, 3]))
     return moved + turned * reach if turned else moved
 
 
 def at_the_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
-    """Return the supports of d and y behind the last joint."""
+    """Return the support functions of d and y behind the last joint."""
     p, end = frame.home[:3, 3], frame.end
     y = end[:3, :3] @ p + end[:3, 3]
     return point(grid, y - p), point(grid, y)
@@ -273,8 +285,9 @@ def at_the_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
 def passed(
     step: Step, pair: Pair | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
-    """Return the supports of d and y in front of a step, from those behind it."""
-    if pair is None:  # a planar or floating joint may rotate to the worst direction, and has no limits
+    """Return the support functions of d and y in front of a step, from those behind the step."""
+    # a planar or floating joint has no limits, so it may rotate to the direction with the largest value
+    if pair is None:
         d = Support(d.grid, d.largest() * d.grid.lengths)
         y = Support(d.grid, np.full(len(d.grid.points), math.inf))
     else:
@@ -285,7 +298,7 @@ def passed(
 
 
 def before_it(step: Step, d: Support, y: Support) -> tuple[Support, Support]:
-    """Return the supports of d and y in front of a step's L."""
+    """Return the support functions of d and y in front of the rigid motion L of a step."""
     if step.before is IDENTITY:
         return d, y
     G, L = d.grid.points, step.before
@@ -293,7 +306,7 @@ def before_it(step: Step, d: Support, y: Support) -> tuple[Support, Support]:
 
 
 def difference(step: Step, pair: Pair, variables: Variables, y: Support, d: Support) -> Support:
-    """Return the support of (e(S' t') - e(S t)) y + e(S t) d, over the ranges of t and t'."""
+    """Return the support function of (e(S' t') - e(S t)) y + e(S t) d, over the ranges of t and t'."""
     same = step.other is step.axis and pair.a == pair.b
     if step.kind == "turns":
         about = Screw(step.axis.direction, np.zeros(3))
@@ -307,7 +320,10 @@ def difference(step: Step, pair: Pair, variables: Variables, y: Support, d: Supp
 
 
 def _prismatic_difference(step: Step, pair: Pair, variables: Variables, grid: Grid) -> Support:
-    """Return the support of the difference of two translations; it is largest at the ends of the ranges."""
+    """Return the support function of the difference between the translations of two prismatic joints.
+
+    The difference is largest at the ends of the ranges.
+    """
     if (name := pair.variable) is not None:
         ends = [(z, z) for z in variables.ranges.get(name, (0.0, 0.0))]
         values = [
@@ -329,7 +345,10 @@ def _prismatic_difference(step: Step, pair: Pair, variables: Variables, grid: Gr
 
 
 def _values(pair: Pair, variables: Variables, grid: Grid) -> FloatArray | None:
-    """Return values (n,) of the variable of a revolute joint; None without one common bounded variable."""
+    """Return values (n,) of the variable that moves a revolute joint in A and B.
+
+    If A and B have different variables, or if the variable has no limits, the result is None.
+    """
     if (name := pair.variable) is None:
         return None
     low, high = variables.ranges[name]
@@ -343,13 +362,15 @@ def _values(pair: Pair, variables: Variables, grid: Grid) -> FloatArray | None:
 
 
 def _common_difference(step: Step, pair: Pair, z: FloatArray, y: Support, d: Support) -> Support:
-    """Return the support of a joint's difference if one variable moves it in both models.
+    """Return the support function of a joint's difference if the same variable moves the joint in A and B.
 
-    Between two values of the variable, h apart, the bound is the larger end plus h^2/8 of the largest second
-    derivative. For t' = t + c this derivative is R' P' x' - R P x. Here x is the vector from the axis to y, P
-    projects perpendicular to the axis, and R' rotates about the other axis: |R' - R| <= 2 |u' - u| + |c|,
-    |P' - P| <= |u' - u|, and the perpendicular part of x' - x is the offset of the axes. Otherwise it is at
-    most the sum for the two rotations, each times its squared slope.
+    Consider two neighbouring values of the variable, which differ by h. Between them, the bound is the larger
+    of the bounds at these two values, plus h^2/8 times the largest second derivative. For t' = t + c the
+    second derivative is, up to its sign, R' P' x' - R P x. Here x is the vector from the axis to y, P
+    projects perpendicular to the axis, and R' rotates about the other axis: |R' - R| <= 2 |u' - u| + |c|, |P'
+    - P| <= |u' - u|, and the perpendicular part of x' - x is the offset of the axes. In all other cases, the
+    second derivative is at most the sum of the second derivatives of the two rotations, each times its
+    squared slope.
     """
     G = y.grid.points
     axis, other = step.axis, step.other
@@ -378,10 +399,12 @@ def _common_difference(step: Step, pair: Pair, z: FloatArray, y: Support, d: Sup
 
 
 def _independent_difference(step: Step, pair: Pair, variables: Variables, y: Support) -> Support:
-    """Return the support of (e(S' t') - e(S t)) y if two variables, or an unlimited one, move t' and t.
+    """Return the support function of (e(S' t') - e(S t)) y for a joint without a common bounded variable.
 
-    With one common axis, the bound is the chord of the largest difference of t' and t. With different axes,
-    it is the sum of the full ranges of both rotations.
+    The joint has different variables in A and B, or its variable has no limits.
+
+    If the axes in A and B are equal, the bound is the chord of the largest difference between t' and t. If
+    the axes differ, the bound is the sum of the full ranges of the two rotations.
     """
     G, u = y.grid.points, step.axis.direction
     if step.other is not step.axis:
