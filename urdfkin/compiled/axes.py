@@ -20,20 +20,26 @@ from urdfkin.kinematics import equations as eq
 
 
 def link_axes(own, world):
-    """Return the vector expressed in the link's own axes, the first of the two arguments."""
+    """Return the first argument: the vector expressed in the link's own axes."""
     return own
 
 
 def world_axes(own, world):
-    """Return the vector expressed in world axes, the second of the two arguments."""
+    """Return the second argument: the same vector expressed in world axes."""
     return world
 
 
 def seen(axes, R, x):
-    """Express x, given in a link's own axes, in world axes or in the link's axes, as `axes` selects."""
+    """Return a vector x, given in a link's own axes, in the axes that the function `axes` selects.
+
+    These are the link's own axes or the world axes.
+    """
     return axes(x, eq.rotate(R, x))
 
 
 def seen_after(axes, S, x):
-    """Express a velocity or acceleration x after the link's axes are rotated by S; world axes stay fixed."""
+    """Return a velocity or acceleration x after the link's frame is rotated by S.
+
+    In world axes x does not change. In the link's own axes, it is rotated to the new axes.
+    """
     return axes(eq.rotate(eq.transposed(S), x), x)

@@ -19,12 +19,12 @@ from urdfkin.model.tree import FloatArray
 #: Smallest batch for several threads by default; starting a thread costs about ten microseconds.
 _WORTH_THREADS = 4096
 
-#: Number of rows that NumPy computes at a time, so that the intermediate results fit into the processor's
-#: cache.
+#: Number of configurations that NumPy computes at a time, so that the intermediate results fit into the
+#: processor's cache.
 PART = 2048
 
 #: A function (inputs, out) that computes the rows of `out` from the rows of the inputs. It returns 1 if an
-#: input is not ordinary (`urdfkin.compiled.memory.ordinary`), else 0.
+#: input is nan, infinite or too large (see `ordinary` in `urdfkin.compiled.machine.memory`), else 0.
 Compute = Callable[[Sequence[FloatArray], FloatArray], int]
 
 
@@ -41,13 +41,15 @@ def _processors() -> int:
 
 
 def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, threads: int | None) -> int:
-    """Compute `out` (n, ...) from `inputs`, each (n, ...) or (1, ...); return 1 if an input is not ordinary.
+    """Compute `out` (n, ...) from `inputs`, each (n, ...) or (1, ...), with several threads.
+
+    The result is 1 if an input is nan, infinite or too large, else 0.
 
     Args:
-        compute: The computation; it must release the interpreter's lock.
+        compute: The computation. It must release Python's global interpreter lock.
         inputs: C-contiguous arrays.
         out: C-contiguous array.
-        threads: Largest number of threads; None for `default_threads`.
+        threads: Largest number of threads; None for the number from `default_threads`.
 
     Raises:
         InputError: `threads` is not an integer of at least 1.
@@ -60,7 +62,7 @@ def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, t
     if len(parts) == 1:
         return compute(inputs, out)
     work = [_pool().submit(compute, _rows(inputs, n, *part), out[slice(*part)]) for part in parts]
-    return max([future.result() for future in work])  # waits for all of them
+    return max([future.result() for future in work])  # this waits until all threads have finished
 
 
 def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> None:
@@ -93,7 +95,7 @@ def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> N
 
 
 def _parts(n: int, threads: int) -> list[tuple[int, int]]:
-    """Split `n` rows at block boundaries into at most `threads` parts; each part has at least one block."""
+    """Split `n` rows into at most `threads` parts of whole blocks; each part has at least one block."""
     blocks = n // LANES
     edges = [*(LANES * (blocks * i // threads) for i in range(threads)), n]
     return [(a, b) for a, b in pairwise(edges) if a < b]
@@ -105,7 +107,7 @@ def _rows(inputs: Sequence[FloatArray], n: int, start: int, stop: int) -> list[F
 
 @cache
 def _pool() -> ThreadPoolExecutor:
-    """Return the thread pool; a forked child process starts its own."""
+    """Return the thread pool of this process; a forked child process starts a new thread pool."""
     return ThreadPoolExecutor(_processors(), thread_name_prefix="urdfkin")
 
 

@@ -1,4 +1,4 @@
-"""The acceleration of a frame as a sum of contributions by joint and kind.
+"""The acceleration of a frame as a sum of contributions, one for each joint and each kind of acceleration.
 
 This module follows sections 7.6 and 7.7. Consider joint k, with all later joints fixed. Relative to link k-1,
 the frame's origin then moves about or along the axis of joint k, with velocity u_k = v_k z x d (or v_k z).
@@ -13,12 +13,13 @@ terms of its acceleration. The sum of these terms over all joints, from the last
 | sliding | a_k z | acceleration of a prismatic joint |
 
 The vector d leads from the joint's origin to the frame's origin. It is computed as the sum of the interorigin
-vectors after the joint, as in 7.110. A difference of two positions would lose digits if the robot is far from
-the world's origin or has a long link.
+vectors after the joint, as in 7.110. A difference of two positions in the world would lose digits if the
+robot is far from the world's origin or has a long link.
 
-The angular rows follow from 7.129: a_k z under transverse, and v_k w_{k-1} x z under coriolis. A planar or
-floating joint translates and rotates at the same time, and its axes of translation rotate with it. Let s be
-the joint's linear velocity and o its angular velocity. Such a joint then adds o x s under coriolis.
+The angular acceleration follows from 7.129. Its term a_k z has the kind transverse, and its term v_k w_{k-1}
+x z has the kind coriolis. A planar or floating joint translates and rotates at the same time, and its axes of
+translation rotate with it. Let s be the joint's linear velocity and o its angular velocity. Such a joint then
+adds the term o x s, of the kind coriolis.
 """
 
 from __future__ import annotations
@@ -55,8 +56,9 @@ class AccelerationBreakdown(Displayable):
 
     Attributes:
         joints: Names of the moving joints from the base to the frame.
-        base: (..., 6) contribution of a moving base with all joints fixed.
-        terms: (..., joints, 4, 6) contributions, kinds in the order of `KINDS`, [linear; angular].
+        base: (..., 6) acceleration that the moving base alone gives the frame, with all joints fixed.
+        terms: (..., joints, 4, 6) contributions of the joints. The four kinds are in the order of `KINDS`,
+            and the six numbers are [linear; angular].
     """
 
     joints: tuple[str, ...]
@@ -67,7 +69,7 @@ class AccelerationBreakdown(Displayable):
         return f"<AccelerationBreakdown of {len(self.joints)} joints, batch {self.base.shape[:-1]}>"
 
     def contributions(self, sample: tuple[int, ...] = ()) -> Iterator[tuple[str, str, FloatArray]]:
-        """Yield (joint, kind, six numbers) of one sample, without contributions that are exactly zero."""
+        """Yield (joint, kind, six numbers) for each contribution of one sample that is not exactly zero."""
         if self.base[sample].any():
             yield "base", "moving base", self.base[sample]
         for j, joint in enumerate(self.joints):
@@ -107,9 +109,9 @@ class AccelerationBreakdown(Displayable):
 
 
 class _Moves(NamedTuple):
-    """Linear and angular part (n, 3) of a joint's velocity or acceleration, in world axes.
+    """Linear and angular part, each (n, 3), of a joint's velocity or acceleration, in world axes.
 
-    Both are relative to the joint's parent link.
+    The two parts are relative to the joint's parent link.
     """
 
     slide: FloatArray
@@ -148,10 +150,10 @@ def acceleration_breakdown(
         NotFiniteError: a number of q, v or a is not finite.
         RangeError: a contribution exceeds the range of double precision.
     """
-    if not np.isfinite(a).all():  # the recursions below check q and v themselves
+    if not np.isfinite(a).all():  # the recursions that are called below check q and v
         raise NotFiniteError("q, v and a must be finite")
     moving = moving_joints(tree, link)
-    plan = compile_tree(tree, [0, *(i + 1 for i in tree.path(link))])  # the links on the path
+    plan = compile_tree(tree, [0, *(i + 1 for i in tree.path(link))])  # all links on the path
     n = len(q)
     terms = np.empty((n, len(moving), len(KINDS), 6)) if out is None else out
     of_base = np.empty((n, 6))
@@ -173,11 +175,12 @@ def acceleration_breakdown(
 
 
 def moving_joints(tree: KinematicTree, link: int) -> list[int]:
-    """Return the joints that contribute, from the base to the link."""
+    """Return the moving joints on the path from the base to the link."""
     return [i for i in tree.path(link) if tree.joints[i].kind.nv]
 
 
-@np.errstate(over="ignore", under="ignore", invalid="ignore")  # non-finite results raise at the end
+# a result that is not finite raises an error at the end of this function
+@np.errstate(over="ignore", under="ignore", invalid="ignore")
 def _contributions(
     tree: KinematicTree,
     link: int,
@@ -189,7 +192,10 @@ def _contributions(
     base: FloatArray,
     terms: FloatArray,
 ) -> FloatArray:
-    """Fill in the terms; return the base's contribution. Joint k of the path moves link k + 1 of the path."""
+    """Write the joints' contributions to `terms`, and return the base's contribution.
+
+    Joint k of the path moves link k + 1 of the path.
+    """
     path = tree.path(link)
     Ts = placements(plan, q, base=base, threads=1)
     velocity = velocities(plan, q, v, base=base, threads=1)
@@ -212,7 +218,7 @@ def _contributions(
 
 
 def _levers(tree: KinematicTree, path: Sequence[int], q: FloatArray, Rs: FloatArray) -> FloatArray:
-    """Return the vectors (n, links, 3) from each link's origin to the end of the path, in world axes."""
+    """Return the vectors (n, links, 3) from the origin of each link to the end of the path, in world axes."""
     levers = np.zeros(Rs.shape[:-1])
     for k in reversed(range(len(path))):
         joint, at = tree.joints[path[k]], tree.q_index[path[k]]
@@ -222,7 +228,10 @@ def _levers(tree: KinematicTree, path: Sequence[int], q: FloatArray, Rs: FloatAr
 
 
 def _slide(joint: Joint, q: FloatArray) -> FloatArray:
-    """Return the displacement (n, 3) of a joint in the joint's axes; q begins with the displacement."""
+    """Return a joint's displacement (n, 3) in the joint's axes, from the joint's coordinates q.
+
+    The first numbers of q are the displacement.
+    """
     slide = np.zeros((len(q), 3))
     if joint.kind is JointKind.PLANAR:
         slide[:, :2] = q[:, :2]
@@ -235,7 +244,7 @@ def _slide(joint: Joint, q: FloatArray) -> FloatArray:
 
 
 def _terms(rate: _Moves, rate_2: _Moves, w_before: FloatArray, d: FloatArray) -> FloatArray:
-    """Return the contributions (n, 4, 6) of one joint."""
+    """Return the contributions (n, 4, 6) of one joint: four kinds, each [linear; angular]."""
     nothing = np.zeros_like(d)
     u = eq.point_velocity(rate.slide, rate.turn, d)
     kinds = (
@@ -263,7 +272,10 @@ def _moves(joint: Joint, x: FloatArray, R: FloatArray) -> _Moves:
 
 
 def _rigid(base: FloatArray, d: FloatArray) -> FloatArray:
-    """Return the acceleration of a point fixed to the base; d leads from the base's origin to it (7.123)."""
+    """Return the acceleration of a point that is fixed to the base (7.123).
+
+    The vector d leads from the base's origin to the point.
+    """
     w, alpha, a = base[:, 12:15], base[:, 18:21], base[:, 21:24]
     linear = eq.point_acceleration(a, alpha, w, d)
     return np.concatenate((linear, np.broadcast_to(alpha, linear.shape)), axis=-1)

@@ -1,7 +1,7 @@
-"""The folder of compiled kernels, and events of their compilation, without importing Numba.
+"""The cache folder of compiled kernels, and messages about compilations; this module does not import Numba.
 
-Compiling takes seconds, reading from disk almost no time. Listeners are informed of each compilation that
-this process waits for.
+Compiling a kernel takes seconds, and reading it from disk takes almost no time. Functions called listeners
+receive an event for each compilation that this process waits for.
 """
 
 from __future__ import annotations
@@ -19,17 +19,22 @@ from urdfkin.kinematics import equations
 from urdfkin.system.lazy_import import installed_version
 from urdfkin.system.locks import importing, lock_over_forks
 
-#: Held while Numba is imported, and while a kernel is compiled. A fork waits for both, because the child
-#: process could not finish them. A fork takes the newest lock first; this one is newer than the lock of
-#: `logging` that the import of Numba takes, and exists before that import begins.
+#: Lock for the import of Numba and for compilations. A fork of the process waits for this lock, because the
+#: child process could not finish an import or a compilation. A fork takes the newest lock first. This lock is
+#: newer than the lock of `logging`, which the import of Numba uses. It exists before that import begins.
 compiling = lock_over_forks()
 
-#: Called with a kernel's name and None when its compilation begins, and with the seconds when it is ready.
+#: A function that receives the events of compilations. When a compilation begins, it is called with the
+#: kernel's name and None. When the kernel is ready, it is called with the kernel's name and the duration in
+#: seconds.
 Listener = Callable[[str, float | None], None]
 
 
 def _log(name: str, seconds: float | None) -> None:
-    """Log one warning in each process, which goes to standard error by default."""
+    """Log a warning about a compilation, at most once in each process.
+
+    By default the warning is printed on standard error.
+    """
     if seconds is None and not _logged:
         _logged.append(name)
         logging.getLogger("urdfkin").warning(
@@ -44,7 +49,7 @@ _listeners: list[Listener] = [_log]
 
 @contextmanager
 def listen_to_compile_events(listener: Listener) -> Iterator[None]:
-    """Send compile events to `listener` only, while the context is open."""
+    """Send the events of compilations to `listener` only, while the context is open."""
     _listeners.append(listener)
     try:
         yield
@@ -54,7 +59,10 @@ def listen_to_compile_events(listener: Listener) -> Iterator[None]:
 
 @contextmanager
 def compile_event(name: str) -> Iterator[Callable[[], None]]:
-    """Report a compilation. The context yields a function that must be called if a compilation begins."""
+    """Send the events of a possible compilation of the kernel `name`.
+
+    The context yields a function, which must be called if the compilation begins.
+    """
     begun: list[float] = []
 
     def missed() -> None:

@@ -1,4 +1,4 @@
-"""The arguments of a kernel as one row of integers: addresses, sizes and options."""
+"""The arguments of a compiled kernel, stored as one row of integers: addresses, sizes and options."""
 
 from __future__ import annotations
 
@@ -10,17 +10,18 @@ from urdfkin.compiled.program import LANES, Program
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
-#: Bytes of a cache line. A vector across two lines would halve the speed.
+#: Size of a cache line of the processor, bytes. Access to a vector that lies across two cache lines takes
+#: twice as long.
 _LINE = 64
-#: The reference frames that the kernels support, each with its number in a kernel. Other frames raise a
-#: KeyError.
+#: The reference frames that the kernels support, each with its number in a kernel. Any other reference frame
+#: raises a KeyError.
 REFERENCES = {
     known: int(known) for known in (Reference.LOCAL, Reference.WORLD, Reference.LOCAL_WORLD_ALIGNED)
 }
 
 
 class KernelArgs(IntEnum):
-    """Indices of the arguments in the row; those from CORE on are for calls with one configuration."""
+    """Index of each argument in the row; arguments from CORE on are for calls with one configuration."""
 
     @staticmethod
     def _generate_next_value_(name: str, start: int, count: int, last_values: list[int]) -> int:
@@ -36,8 +37,8 @@ class KernelArgs(IntEnum):
     A = auto()
     #: Address of the base's state (rows of 24 numbers); 0 for a fixed base at the world's origin.
     BASE = auto()
-    #: Distance between the first numbers of two consecutive configurations; 0 if all configurations share
-    #: them.
+    #: Distance in memory between the first numbers of two consecutive configurations; 0 if all configurations
+    #: use the same numbers.
     STRIDE_Q = auto()
     STRIDE_V = auto()
     STRIDE_A = auto()
@@ -45,7 +46,8 @@ class KernelArgs(IntEnum):
     OUT = auto()
     #: Number of output numbers for one configuration.
     WIDTH = auto()
-    #: Address of a buffer that collects a block's results before output; 0 for direct output.
+    #: Address of a buffer that collects the results of a block before they are written to the output; 0 if
+    #: they are written directly.
     STAGE = auto()
 
     CORE = auto()
@@ -60,12 +62,12 @@ class KernelArgs(IntEnum):
 
 
 def scratch(program: Program) -> FloatArray:
-    """Return scratch memory for a run of a program."""
+    """Return memory for the intermediate results of one run of a program."""
     return lines(program.rows * LANES)
 
 
 def lines(count: int) -> FloatArray:
-    """Return memory for `count` numbers, aligned to a cache line."""
+    """Return memory for `count` numbers that begins at the start of a cache line."""
     numbers = np.empty(count + _LINE // 8)
     first = -numbers.ctypes.data % _LINE // 8
     return numbers[first : first + count]

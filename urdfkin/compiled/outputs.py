@@ -1,7 +1,7 @@
 """Outputs of the forward recursion: placements, velocities, accelerations, Jacobians and their derivatives.
 
-Each output has one function that selects the needed parts of a link's state, and one function that writes the
-result of a frame. Velocities and accelerations are computed in the axes of their reference frame
+For each output, one function selects the parts of a link's state that the output needs, and one function
+writes the result of a frame. Velocities and accelerations are computed in the axes of their reference frame
 (`urdfkin.compiled.axes`). Jacobian columns are computed in world axes; for LOCAL they are rotated to the axes
 of the frame.
 """
@@ -19,8 +19,8 @@ from urdfkin.kinematics import equations as eq
 _LOCAL, _WORLD, _ALIGNED = REFERENCES.values()
 _FRAMES, _NV = int(Head.FRAMES), int(Head.NV)
 
-#: The scratch rows with the numbers of a 4 by 4 pose, row by row, and those with the numbers of
-#: [linear; angular].
+#: Indices of rows of scratch memory: those for the numbers of a 4 by 4 pose, row by row, and those for the
+#: six numbers of [linear; angular].
 _POSE = np.array([*range(OUT_ROW, OUT_ROW + 12), ZERO_ROW, ZERO_ROW, ZERO_ROW, ONE_ROW])
 _SIX = np.arange(OUT_ROW, OUT_ROW + 6)
 
@@ -43,7 +43,7 @@ def follow_velocity(state):
 
 
 def follow_acceleration(state):
-    """Keep R, p, w, alpha and acc, because 7.130 does not contain vel."""
+    """Keep R, p, w, alpha and acc. The velocity vel is not needed, because 7.130 does not contain it."""
     return state[0], state[1], state[2], _unused_vector(), state[4], state[5]
 
 
@@ -71,15 +71,15 @@ def _pose_row(s, row, x, last):
 
 
 def emit_velocity(m, s, program, place, sources, b, reference, state, to):
-    """Write [linear; angular] velocity, 7.127 and 7.128, in a reference frame."""
+    """Write a frame's velocity [linear; angular], 7.127 and 7.128, in the given reference frame."""
     p, w, vel = state[1], state[2], state[3]
-    if reference == _WORLD:  # the point of the body that is now at the world's origin
+    if reference == _WORLD:  # use the point of the body that is now at the world's origin
         vel = eq.point_velocity(vel, w, eq.minus(_no_vector(), p))
     _emit_six(m, s, program, place, b, vel, w, to)
 
 
 def emit_acceleration(m, s, program, place, sources, b, reference, state, to):
-    """Write [linear; angular] acceleration, 7.129 and 7.130, in a reference frame."""
+    """Write a frame's acceleration [linear; angular], 7.129 and 7.130, in the given reference frame."""
     p, w, alpha, acc = state[1], state[2], state[4], state[5]
     if reference == _WORLD:
         acc = eq.point_acceleration(acc, alpha, w, eq.minus(_no_vector(), p))
@@ -87,7 +87,7 @@ def emit_acceleration(m, s, program, place, sources, b, reference, state, to):
 
 
 def emit_imu(m, s, program, place, sources, b, reference, state, to):
-    """Write accelerometer and gyroscope readings; the base is accelerated by -gravity."""
+    """Write the readings of an accelerometer and a gyroscope. The base's acceleration contains -gravity."""
     _emit_six(m, s, program, place, b, state[5], state[2], to)
 
 
@@ -99,7 +99,7 @@ def _emit_six(m, s, program, place, b, linear, angular, to):
 
 
 def emit_matrix(m, s, program, place, sources, b, reference, state, to):
-    """Write the computed columns, and zeros for the joint velocities that do not move the frame."""
+    """Write a frame's Jacobian columns, with zeros for the joint velocities that do not move the frame."""
     frames, size = program[_FRAMES], 6 * program[_NV]
     write_rows(m, s, program, sources, size, to, (b * frames + place) * size, frames * size)
 
@@ -128,14 +128,14 @@ def keep_axis(s, row, axis, state):
 
 
 def keep_moving_axis(s, row, axis, state):
-    """Store the axis and the origin, and w and vel of the link that carries the axis."""
+    """Store a joint's axis and origin, and the velocities w and vel of the link that carries the axis."""
     keep_axis(s, row, axis, state)
     put_vector(s, row + 6, state[2])
     put_vector(s, row + 9, state[3])
 
 
 def column_jacobian(s, row, to, how, g, c, reference, state):
-    """Compute [z x d_{i-1,n}; z] (revolute) or [z; 0] (prismatic), eq. 7.85, in a reference frame."""
+    """Compute a Jacobian column: [z x d_{i-1,n}; z] (revolute) or [z; 0] (prismatic), eq. 7.85."""
     z, R = vector(s, row), state[0]
     if how & 1:
         d = eq.minus(_end(reference, state[1]), vector(s, row + 3))
@@ -146,7 +146,10 @@ def column_jacobian(s, row, to, how, g, c, reference, state):
 
 
 def column_rate(s, row, to, how, g, c, reference, state):
-    """Compute the time derivative of a Jacobian column (7.126); for LOCAL, of its components in the frame."""
+    """Compute the time derivative of a Jacobian column (7.126).
+
+    For the reference frame LOCAL, this is the derivative of the column's components in the frame's own axes.
+    """
     R, p, w, vel = state[0], state[1], state[2], state[3]
     z = vector(s, row)
     z_rate = eq.axis_rate(vector(s, row + 6), z)
@@ -205,7 +208,7 @@ def _add_six(s, to, linear, angular):
 
 
 def emit_pairs(m, s, program, place, pairs, b, reference, state, to):
-    """Compute and write the derivative of each column by each joint velocity, (6, nv, nv)."""
+    """Write the derivative of each Jacobian column with respect to each joint's motion, (6, nv, nv)."""
     count, nv = program[pairs], program[_NV]
     first, end = pairs + 1, pairs + 1 + PAIR_WIDTH * count
     frames, size = program[_FRAMES], nv * nv
@@ -215,7 +218,7 @@ def emit_pairs(m, s, program, place, pairs, b, reference, state, to):
             put_vector(s, program[j + 3], _no_vector())
             put_vector(s, program[j + 3] + 3, _no_vector())
         for i in range(first, end, PAIR_WIDTH):
-            if program[i + 2] == rate:  # the joint's own column, or a mimic joint's
+            if program[i + 2] == rate:  # the column of the coordinate's own joint, or of a mimic joint
                 _add_changes(s, program, i, first, end, reference)
         for row in range(6):
             at = begin + row * size + rate * nv
@@ -223,7 +226,7 @@ def emit_pairs(m, s, program, place, pairs, b, reference, state, to):
 
 
 def _add_changes(s, program, i, first, end, reference):
-    """Add the derivatives of column i by each joint velocity.
+    """Add the derivatives of column i with respect to the motion of each joint.
 
     Consider the joint of column i. A joint before it on the path rotates the whole column. A joint after it
     moves only the reference point of the column, which is the frame's origin. For WORLD, the reference point

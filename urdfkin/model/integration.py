@@ -87,7 +87,10 @@ def _coordinate_joints(tree: KinematicTree) -> list[tuple[Joint, int, int]]:
 
 
 def _pose(joint: Joint, own: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return position (..., 3) and rotation (..., 3, 3) of a planar or floating joint."""
+    """Return the position (..., 3) and rotation (..., 3, 3) that a joint's coordinates describe.
+
+    The joint is planar or floating.
+    """
     if joint.kind is JointKind.FLOATING:
         return own[..., :3], rotation_of(own[..., 3:])
     if joint.kind is not JointKind.PLANAR:

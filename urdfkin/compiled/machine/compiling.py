@@ -1,14 +1,15 @@
 """Compile kernels with Numba and cache them on disk.
 
-Cache. Each machine compiles a kernel once. The name of the cache folder contains a digest of all source files
-of `compiled` and `kinematics`, because a kernel may use functions of any of these files. Numba's own cache
-files have no digest: a truncated file makes every later run fail, and a changed bit is executed. Here each
-cache file has a digest. If a cache file is damaged, its kernel is compiled again. If no folder is writable,
-nothing is cached.
+Cache. Each computer compiles a kernel once. The name of the cache folder contains a digest of all source
+files of `compiled` and `kinematics`, because a kernel may use functions of any of these files. Numba's own
+cache files have no digest: a truncated file makes every later run fail, and a changed bit is executed. In
+this module each cache file has a digest. If a cache file is damaged, its kernel is compiled again. If no
+folder is writable, nothing is cached.
 
-Parts. A function that is only a part of kernels is inlined and never called by itself. It needs no machine
-code, no optimization before it is inlined, and no passes for closures, `with`, literal loops, inlining by
-Numba, or rewriting of array expressions. Skipping them halves the compile time.
+Parts. Some functions are only called by kernels, never by Python. The compiler inlines such a function, which
+is called a part, into each kernel. A part therefore needs no machine code of its own, and no optimization
+before it is inlined. It also needs no passes for closures, `with`, literal loops, inlining by Numba, or
+rewriting of array expressions. Skipping these steps halves the compile time.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ _dumps: Any = dumps
 
 
 class KernelCache(_Null):  # type: ignore[misc]
-    """Numba's cache of one function: Numba reads it before a compilation and writes it afterwards.
+    """The disk cache of one function. Numba reads the cache before a compilation and writes it afterwards.
 
     The folder's name contains a digest of the source files that all kernels share. A file's name depends on
     the function, on its own source file (which may be in another package), on its argument types and on the
@@ -56,20 +57,22 @@ class KernelCache(_Null):  # type: ignore[misc]
         self._source = read_bytes(Path(function.__code__.co_filename))
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the cached result for these arguments; None if there is no usable file."""
+        """Return the compiled function for these argument types from the cache, or None."""
         target_context.refresh()
         place = self._place(sig, target_context.codegen())
         if (content := get(place)) is not None:
             try:
                 return _Result._rebuild(target_context, *pickle.loads(content))
-            except Exception as error:  # an undamaged file of another version can cause any error
+            # a file that another version wrote can cause any error, even if it is not damaged
+            except Exception as error:
                 report_damaged(place, f"{type(error).__name__}: {error}")
         self._missed()
         return None
 
     def save_overload(self, sig: Any, cres: Any) -> None:
-        """Write the compiled result to the cache."""
-        if not cres.library.has_dynamic_globals:  # dynamic globals are addresses of this process
+        """Write the compiled function to the cache."""
+        # code with dynamic globals contains addresses of this process, so it cannot be cached
+        if not cres.library.has_dynamic_globals:
             put(self._place(sig, cres.library.codegen), _dumps(cres._reduce()))
 
     def _place(self, signature: Any, codegen: Any) -> Path:
@@ -78,7 +81,7 @@ class KernelCache(_Null):  # type: ignore[misc]
 
 
 def function_name(function: Callable[..., int]) -> str:
-    """Return the last part of the module's name, and the function's name."""
+    """Return a name for a function: the last part of its module's name, followed by the function's name."""
     return f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
 
 
@@ -90,10 +93,13 @@ _register: Any = register_pass
 
 
 class _Part(_Library):  # type: ignore[misc]
-    """LLVM code of a part, which is linked into a kernel together with the functions that the part calls."""
+    """The LLVM code of a part.
+
+    It is linked into a kernel with the code of all functions that the part calls.
+    """
 
     def finalize(self) -> None:
-        """Complete the library without machine code of its own."""
+        """Complete the library without generating machine code for it."""
         self._finalize_dynamic_globals()
         self._finalized = True
 
@@ -108,11 +114,11 @@ class _PartLowering(_Lowering):  # type: ignore[misc]
     _name = "part_lowering"
 
     def run_pass(self, state: Any) -> bool:
-        """Translate to LLVM code only."""
+        """Translate the function to LLVM code, but not to machine code."""
         state.library = _Part(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         super().run_pass(state)
-        # Numba registers a function by the pointer that Python calls; a part has no such pointer.
+        # Numba registers a function by the pointer that Python calls. A part has no such pointer.
         what, environment = state.cr.fndesc, state.cr.env
         handle = make_function(what.lookup_module(), what.qualname, "", 0, environment, (state.library,))
         state.targetctx.insert_user_function(handle, what, state.library.all)
@@ -121,10 +127,10 @@ class _PartLowering(_Lowering):  # type: ignore[misc]
 
 
 class PartCompiler(_Compiler):  # type: ignore[misc]
-    """The passes of Numba that a part needs."""
+    """The compiler passes of Numba that a part needs."""
 
     def define_pipelines(self) -> list[Any]:
-        """Return the single pipeline."""
+        """Return a list with the only pipeline of compiler passes."""
         passes = _Passes("part")
         for each in (
             untyped_passes.TranslateByteCode,
@@ -145,14 +151,14 @@ class PartCompiler(_Compiler):  # type: ignore[misc]
         return [passes]
 
 
-_config: Any = numba.config  # settings that numba sets at run time
+_config: Any = numba.config  # Numba defines these settings at run time
 
-#: Options of every compiled function. The compiler must not reorder operations, and it fuses a product and a
-#: sum only where `numbers` requests it, so that results do not depend on the compiler. Division by zero gives
-#: inf as in C, so that loops contain no branch that raises an error. The functions allocate no memory, so
-#: their arrays need no reference counts.
+#: Options of every compiled function. The compiler must not reorder operations. It fuses a product and a sum
+#: only where the module `numbers` requests it. Results therefore do not depend on the compiler. Division by
+#: zero gives inf as in C, so that loops contain no branch that raises an error. The functions allocate no
+#: memory, so their arrays need no reference counts.
 COMPILED: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
-#: Options of a part, which is only inlined: no entry point for Python or C.
+#: Options of a part. Because a part is only inlined into kernels, it has no entry point for Python or C.
 _PART: dict[str, Any] = {
     "forceinline": True,
     "no_cpython_wrapper": True,
@@ -163,7 +169,7 @@ _PART: dict[str, Any] = {
 
 @contextmanager
 def compiling_allowed() -> Iterator[None]:
-    """Allow compilation even with NUMBA_DISABLE_JIT, because Python cannot run these functions uncompiled."""
+    """Allow compilation even if NUMBA_DISABLE_JIT is set; Python cannot run these functions uncompiled."""
     before, _config.DISABLE_JIT = _config.DISABLE_JIT, 0
     try:
         yield
@@ -174,9 +180,9 @@ def compiling_allowed() -> Iterator[None]:
 def _skip_blas_check() -> None:
     """Prevent Numba from importing SciPy's linear algebra for a check.
 
-    The import takes a fifth of a command's time. No kernel calls linear algebra. Other compiled code that
-    calls it still imports and checks it. If a version of Numba makes this check in another function,
-    `_skip_blas_check` has no effect.
+    The import takes a fifth of the running time of a command. No kernel calls linear algebra. Other compiled
+    code that calls linear algebra still imports and checks it. If a version of Numba makes this check in a
+    different function, `_skip_blas_check` has no effect.
     """
     if "numba.np.arraymath" in sys.modules or find_spec("scipy") is None:
         return
@@ -199,7 +205,7 @@ def jitted(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     return decorate
 
 
-#: Decorator for functions that are parts of kernels.
+#: Decorator for a function that is a part of kernels.
 compiled = jitted(**_PART)
 
 # An input array may be read-only. Numba passes a writable array to this signature without a copy, so the
@@ -214,7 +220,8 @@ class Kernel:
     """A function that is compiled, or read from disk, when it is first called.
 
     Attributes:
-        compiled: The compiled function itself; calling it directly costs a tenth of a microsecond.
+        compiled: The compiled function. Calling it directly, without `Kernel`, costs a tenth of a
+            microsecond.
     """
 
     compiled: Any
@@ -224,8 +231,8 @@ class Kernel:
         self.__doc__, self.__name__ = function.__doc__, function.__name__
 
     def __getattr__(self, name: str) -> Any:
-        # Python calls this for attributes that do not exist yet. A cached property is no alternative: before
-        # Python 3.12 it has a lock of its own, which could stay locked forever in a forked child process.
+        # Python calls this for attributes that do not exist yet. A cached property is not used here: before
+        # Python 3.12 it has its own lock, which could stay locked forever in a forked child process.
         if name != "compiled":
             raise AttributeError(name)
         with compiling:
@@ -240,7 +247,7 @@ class Kernel:
         return dispatcher
 
     def _compile_or_load(self, made: Any, make: Callable[[], object]) -> None:
-        """Compile, or read from disk; listeners receive the events of a compilation."""
+        """Return the compiled function: read it from disk, or compile it and inform the listeners."""
         with compile_event(self.__name__.strip("_").replace("_", " ")) as missed, compiling_allowed():
             _skip_blas_check()
             if (folder := cache_folder()) is None:
@@ -255,10 +262,10 @@ class Kernel:
 
 
 class Core(Kernel):
-    """A compiled function that takes addresses and has C's calling convention.
+    """A compiled function that C code can call; its arguments are integers, such as addresses.
 
-    Kernels call this function directly. Python calls it through ctypes, which releases the interpreter's
-    lock.
+    Kernels call this function directly. Python calls it through ctypes, which releases Python's global
+    interpreter lock.
     """
 
     def __init__(self, function: Callable[..., int]) -> None:
@@ -280,21 +287,23 @@ class Core(Kernel):
 
 
 def core(function: Callable[..., int]) -> Core:
-    """Decorate a function that takes addresses: it is compiled at the first call and cached on disk."""
+    """Decorate a function that takes an address. It is compiled at the first call and cached on disk."""
     return Core(function)
 
 
 def helper(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Return a decorator for a part of kernels, with additional options of Numba."""
+    """Return a decorator for a function that is a part of kernels, with additional options for Numba."""
     return jitted(**_PART, **options)
 
 
 def kernel(*arguments: Any, nogil: bool = True) -> Callable[[Callable[..., int]], Kernel]:
-    """Return a decorator for a kernel with these argument types, compiled at the first call, cached on disk.
+    """Return a decorator for a kernel with these argument types.
+
+    The kernel is compiled at the first call and cached on disk.
 
     Args:
         arguments: Numba's types.
-        nogil: Whether a call releases the interpreter's lock. This is not worthwhile for calls of a
-            microsecond.
+        nogil: Whether a call releases Python's global interpreter lock. For a call that takes a microsecond,
+            this would cost more time than it saves.
     """
     return lambda function: Kernel(function, arguments, nogil)

@@ -1,7 +1,10 @@
-"""The compiled recursions, one for each function of `recursions`. Each takes the address of its arguments.
+"""The compiled recursions, one for each function of the module `recursions`.
 
-The same kernel computes a batch, eight configurations at a time, and a single configuration in all eight
-lanes. So the result of a configuration has the same bits at every position of a batch.
+Each compiled function takes the address of its arguments.
+
+For a batch, a kernel computes eight configurations at a time, one in each of the eight lanes of a vector
+register. For a single configuration, the same kernel computes the same numbers in all eight lanes. The result
+of a configuration therefore has the same bits alone and at every position of a batch.
 """
 
 from __future__ import annotations
@@ -13,7 +16,7 @@ from urdfkin.compiled.machine import compiled_equations, memory, numbers, sine
 from urdfkin.compiled.machine.compiling import Core, compiled, core
 from urdfkin.kinematics.arithmetic import rebound
 
-#: Numba's numbers and memory instead of Python's.
+#: The number types and memory functions for Numba, which replace those for Python.
 _OTHERS = {
     name: x for part in (numbers, memory, sine) for name, x in vars(part).items() if not name.startswith("_")
 } | {"eq": compiled_equations}

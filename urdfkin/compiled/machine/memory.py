@@ -2,11 +2,11 @@
 
 Scratch memory consists of *rows* of `LANES` doubles, one double for each configuration of a block.
 
-In an array, all numbers of one configuration are adjacent. In scratch memory, a row contains the same number
-of all eight configurations. The transfer is therefore a transposition. Transposing one number at a time would
-take a third of the time of a Jacobian. Transposing a block of eight by eight numbers takes only a few shuffle
-instructions. If the number of values is not a multiple of eight, the remainder is transferred in blocks of
-four, two and one.
+In an array, all numbers of one configuration are adjacent. In scratch memory, a row contains one quantity for
+all eight configurations. The transfer is therefore a transposition. Transposing one number at a time would
+take a third of the time that the computation of a Jacobian takes. Transposing a block of eight by eight
+numbers takes only a few shuffle instructions. If the number of values is not a multiple of eight, the
+remaining values are transferred in blocks of four, two and one.
 """
 
 from __future__ import annotations
@@ -45,7 +45,10 @@ def number(context: Any, s: Any, row: Any) -> Any:
 
 @intrinsic
 def number_if(context: Any, wanted: Any, s: Any, row: Any) -> Any:
-    """Return the number in a row; return `nothing()` if `wanted` is `nothing()` (`numbers`)."""
+    """Return the number in a row if it is wanted.
+
+    If `wanted` is the unused number `nothing()` of the module `numbers`, return `nothing()`.
+    """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         if isinstance(wanted, Known):
@@ -57,7 +60,10 @@ def number_if(context: Any, wanted: Any, s: Any, row: Any) -> Any:
 
 @intrinsic
 def put(context: Any, s: Any, row: Any, x: Any) -> Any:
-    """Write a number to a row of scratch memory; if the number is `nothing()`, write nothing."""
+    """Write a number to a row of scratch memory.
+
+    If x is the unused number `nothing()` of the module `numbers`, the row is not changed.
+    """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         s, row, value = arguments
@@ -71,7 +77,7 @@ def put(context: Any, s: Any, row: Any, x: Any) -> Any:
 
 @intrinsic
 def constant(context: Any, g: Any, i: Any) -> Any:
-    """Return `g[i]` as a number with the same value for all configurations."""
+    """Return element i of the constants g as a number with the same value for all configurations."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return in_all_lanes(builder, builder.load(builder.gep(arguments[0], [arguments[1]])), LANES)
@@ -81,7 +87,7 @@ def constant(context: Any, g: Any, i: Any) -> Any:
 
 @intrinsic
 def same(context: Any, x: Any) -> Any:
-    """Return a double as a number with the same value for all configurations."""
+    """Return the double x as a number with the same value for all configurations."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return in_all_lanes(builder, arguments[0], LANES)
@@ -91,7 +97,10 @@ def same(context: Any, x: Any) -> Any:
 
 @intrinsic
 def numbers_of(context: Any, array: Any) -> Any:
-    """Return a pointer to an array's numbers; access through it has no test for negative indices."""
+    """Return a pointer to an array's numbers.
+
+    Unlike the array, the pointer does not test for negative indices.
+    """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return context.make_array(signature.args[0])(context, builder, arguments[0]).data
@@ -110,23 +119,23 @@ def _at_address(kind: Any) -> Any:
     return at_address
 
 
-#: Functions that return a pointer to the doubles, or to the integers, at an address.
+#: The first function returns a pointer to the doubles at an address, the second a pointer to the integers.
 numbers_at, whole_numbers_at = map(_at_address, (NUMBERS, WHOLE_NUMBERS))
 
 
-#: Number of doubles that fit into half of a first-level cache.
+#: Largest number of doubles that are prefetched: they fill half of a processor's first-level cache.
 _MOST_FETCHED = 3072
 _NUMBERS = types.CPointer(types.float64)
 
 
 def _piece(builder: Any, vector: Any, start: int, width: int) -> Any:
-    """Return `width` elements of a vector."""
+    """Return `width` elements of a vector, from index `start` on."""
     mask = ir.Constant(ir.VectorType(ir.IntType(32), width), list(range(start, start + width)))
     return builder.shuffle_vector(vector, ir.Constant(vector.type, ir.Undefined), mask)
 
 
 def _concatenate(builder: Any, pieces: Sequence[Any]) -> Any:
-    """Concatenate vectors of equal width; the number of vectors is a power of two."""
+    """Concatenate vectors of equal length. The number of vectors must be a power of two."""
     while len(pieces) > 1:
         width = 2 * pieces[0].type.count
         mask = ir.Constant(ir.VectorType(ir.IntType(32), width), list(range(width)))
@@ -135,10 +144,10 @@ def _concatenate(builder: Any, pieces: Sequence[Any]) -> Any:
 
 
 def _transpose_blocks(builder: Any, vectors: Sequence[Any]) -> list[Any]:
-    """Transpose the square blocks that the vectors contain side by side.
+    """Transpose eight vectors, which contain square blocks of numbers side by side.
 
-    The function repeats this step for w = 1, 2 and 4: in each block of 2w by 2w, exchange the upper right and
-    the lower left block of w by w.
+    The function makes one step for each of w = 1, 2 and 4. In each block of 2w by 2w numbers, the step
+    exchanges the upper right and the lower left block of w by w numbers.
     """
     x, w = list(vectors), 1
     while w < len(x):
@@ -215,10 +224,12 @@ _write_8, _write_4, _write_2, _write_1 = map(_make_writer, (8, 4, 2, 1))
 
 @compiled
 def read_rows(m, x, at, stride, count, s, row):
-    """Read `count` numbers of each of eight configurations into rows; the first number is `x[at]`.
+    """Read `count` numbers of each of eight configurations into rows of scratch memory.
+
+    The first number of the first configuration is `x[at]`.
 
     The numbers of the next configuration begin `stride` numbers later. If `m` is 1, the numbers of one
-    configuration are read into all lanes.
+    configuration are read for all eight configurations.
     """
     i = 0
     if m == 1:
@@ -240,7 +251,11 @@ def read_rows(m, x, at, stride, count, s, row):
 
 @compiled
 def write_rows(m, s, rows, first, count, to, at, stride):
-    """Write `count` rows, `rows[first]` and the next, to `to[at]` and after it, for one or eight lanes."""
+    """Write `count` rows of scratch memory to the array `to`, from `to[at]` on.
+
+    The indices of the rows are `rows[first]` and the following ones. If `m` is 1, only one configuration is
+    written, else eight.
+    """
     i = 0
     if m == 1:
         for i in range(count):
@@ -261,7 +276,9 @@ def write_rows(m, s, rows, first, count, to, at, stride):
 
 @helper(fastmath={"reassoc"})
 def ordinary(x, at, count):
-    """Return whether `count` numbers are ordinary: none is nan, and no absolute value exceeds `LARGE`.
+    """Return whether `count` numbers from `x[at]` on are ordinary.
+
+    Ordinary means that no number is nan and that no absolute value exceeds `LARGE`.
 
     The compiler may reorder the additions of this function.
     """
@@ -273,7 +290,7 @@ def ordinary(x, at, count):
 
 @intrinsic
 def _fetch(context: Any, x: Any, at: Any) -> Any:
-    """Prefetch the memory around `x[at]`; an address beyond the end is harmless."""
+    """Load the memory around `x[at]` into the cache. An address beyond the end of the array is harmless."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         address = builder.bitcast(builder.gep(arguments[0], [arguments[1]]), ir.IntType(8).as_pointer())
@@ -289,7 +306,10 @@ def _fetch(context: Any, x: Any, at: Any) -> Any:
 
 @compiled
 def fetch(x, at, count):
-    """Prefetch `count` numbers from `x[at]` on: the inputs of the next block, during this block."""
+    """Load `count` numbers from `x[at]` on into the cache.
+
+    These are the inputs of the next block, which are loaded while this block is computed.
+    """
     if count <= _MOST_FETCHED:
         for number in range(at, at + count, LANES):
             _fetch(x, number)
@@ -297,7 +317,10 @@ def fetch(x, at, count):
 
 @intrinsic
 def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
-    """Copy a cache line of `x` to a cache line of `to`; the copy goes to memory past the caches."""
+    """Copy a cache line of `x` to a cache line of `to`.
+
+    The copy is written to memory and not to the caches.
+    """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         x, i, to, at = arguments
@@ -311,9 +334,10 @@ def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
 
 @compiled
 def stream(x, count, to, at, address):
-    """Copy `count` numbers to `to[at]` and after it, past the caches.
+    """Copy `count` numbers to the array `to`, from `to[at]` on, without writing them to the caches.
 
-    The processor does not read a cache line that is written as a whole. `address` is the address of `to[0]`.
+    Before it writes a part of a cache line, a processor reads this line. It does not read a line that is
+    written as a whole. `address` is the address of `to[0]`.
     """
     edge = -(address // 8 + at) % LANES
     lines = edge + (count - edge) // LANES * LANES
@@ -327,7 +351,7 @@ def stream(x, count, to, at, address):
 
 @intrinsic
 def all_written(context: Any) -> Any:
-    """Wait until the copied lines are in memory, so that another processor can read them."""
+    """Wait until the copied cache lines are in memory, so that other processors can read them."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         builder.fence("seq_cst")

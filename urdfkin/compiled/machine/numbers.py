@@ -1,15 +1,15 @@
-"""Number types for compiled code: one double or several doubles as one number.
+"""Number types for compiled code; a number consists of one double or of several doubles.
 
 A number of type `Lanes(8)` is eight doubles in one vector register; `Lanes(1)` is one double. Both are Numba
 types that use LLVM's vectors, so a number stays in a register from one equation to the next. A product is
 kept as its two factors until it is added. The sum x y + z is then one fused multiply-add, which is rounded
-once. This module decides which operations are fused; the compiler decides nothing. Results therefore have the
-same bits for one lane and for eight lanes, on every machine.
+once. This module, and not the compiler, decides which operations are fused. Results therefore have the same
+bits for one lane and for eight lanes, on every machine.
 
-`zero()` and `one()` are 0 and 1, known at compile time: a product with one of them, or a sum with zero, costs
-no time. If z = (0, 0, 1) is written with these numbers, the equations for any axis simplify to those for the
-axis z. A rotation about x then does not compute the x component. `nothing()` is an unused number: a result
-that is computed from it is also `nothing()` and costs no time.
+`zero()` and `one()` are the numbers 0 and 1, known at compile time. A product with one of these numbers, or a
+sum with zero, costs no time. If z = (0, 0, 1) is written with these numbers, the equations for any axis
+simplify to those for the axis z. A rotation about x then does not compute the x component. `nothing()` stands
+for a number that is not needed. A result that is computed from it is also `nothing()` and costs no time.
 """
 
 from __future__ import annotations
@@ -30,35 +30,35 @@ _DOUBLE = ir.DoubleType()
 
 
 class Lanes(types.Type):
-    """Several doubles in one vector."""
+    """The type of a number that consists of several doubles in one vector."""
 
     def __init__(self, width: int) -> None:
         self.width = width
         super().__init__(name=f"Lanes({width})")
 
     def can_convert_from(self, context: Any, other: Any) -> Any:
-        """Convert a product to a number."""
+        """Return whether another type can be converted to this type: a product can be."""
         return Conversion.safe if isinstance(other, Product) and other.width == self.width else None
 
     def unify(self, context: Any, other: Any) -> Any:
-        """Return the common type of a number and a product: a number."""
+        """Return the common type of a number and a product, which is the number's type."""
         return self if isinstance(other, Product) and other.width == self.width else None
 
 
 class Product(types.Type):
-    """Two numbers that are not yet multiplied."""
+    """The type of a product that is still stored as its two factors."""
 
     def __init__(self, width: int) -> None:
         self.width = width
         super().__init__(name=f"Product({width})")
 
     def unify(self, context: Any, other: Any) -> Any:
-        """Return the common type of a number and a product: a number."""
+        """Return the common type of a number and a product, which is the number's type."""
         return other if isinstance(other, Lanes) and other.width == self.width else None
 
 
 class Known(types.Type):
-    """The type of 0 or 1, known when a kernel is compiled; the type for None is that of `nothing()`."""
+    """The type of a number that is known at compile time: 0, 1, or None for the unused number `nothing()`."""
 
     def __init__(self, value: int | None) -> None:
         self.value = value
@@ -90,7 +90,7 @@ class _KnownModel(models.OpaqueModel):
 
 
 class _Value:
-    """A number during compilation: its type and its LLVM value."""
+    """A number during compilation. It consists of its type and its LLVM value."""
 
     def __init__(self, context: Any, builder: Any, type_: Any, value: Any) -> None:
         self.context, self.builder, self.type = context, builder, type_
@@ -105,7 +105,7 @@ class _Value:
         return pair.x, pair.y
 
     def number(self, width: int) -> Any:
-        """Return the number as a vector; a product is multiplied and rounded."""
+        """Return the number as an LLVM vector; a product is multiplied and rounded."""
         if self.is_product:
             return self.builder.fmul(*self.factors())
         if isinstance(self.type, Known):
@@ -116,7 +116,7 @@ class _Value:
 
 
 def in_all_lanes(builder: Any, double: Any, width: int) -> Any:
-    """Return a vector with one double in every lane."""
+    """Return an LLVM vector that contains the same double in every lane."""
     empty = ir.Constant(ir.VectorType(_DOUBLE, width), ir.Undefined)
     first = builder.insert_element(empty, double, ir.Constant(ir.IntType(32), 0))
     mask = ir.Constant(ir.VectorType(ir.IntType(32), width), [0] * width)
@@ -124,7 +124,7 @@ def in_all_lanes(builder: Any, double: Any, width: int) -> Any:
 
 
 def fused(builder: Any, x: Any, y: Any, z: Any) -> Any:
-    """Return `x y + z`, rounded once."""
+    """Return `x y + z`, which is rounded only once."""
     function = builder.module.globals.get(name := f"llvm.fma.v{x.type.count}f64")
     if function is None:
         function = ir.Function(builder.module, ir.FunctionType(x.type, [x.type] * 3), name)
@@ -140,7 +140,7 @@ def _known(kind: Any, value: int | None) -> bool:
 
 
 def _ours(*kinds: Any) -> bool:
-    """Return whether all types are types of this module or integers, such as the 2 in 2 w x u."""
+    """Return whether each type is a type of this module or an integer, such as the 2 in 2 w x u."""
     ours = [isinstance(kind, Lanes | Product | Known) for kind in kinds]
     return any(ours) and all(
         mine or isinstance(kind, types.Integer) for mine, kind in zip(ours, kinds, strict=True)
@@ -223,7 +223,10 @@ def _lower_mul(context: Any, builder: Any, signature: Any, arguments: Any) -> An
 
 
 def as_number(context: Any, builder: Any, kind: Any, value: Any, width: int) -> Any:
-    """Return a number as an LLVM vector; the number must not be `nothing()`."""
+    """Return a number as an LLVM vector.
+
+    The number must not be `nothing()`, which stands for a number that is not needed.
+    """
     return _Value(context, builder, kind, value).number(width)
 
 
@@ -306,7 +309,10 @@ zero, one, nothing = map(_known_number, (ZERO, ONE, NOTHING))
 
 @intrinsic
 def rounded(context: Any, x: Any) -> Any:
-    """Multiply a product and round it, so that it is not fused later; return other numbers unchanged."""
+    """Multiply the factors of a product and round the result, so that no later sum is fused with it.
+
+    Return other numbers unchanged.
+    """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         kind = signature.args[0]

@@ -3,9 +3,9 @@
 The angle is reduced to [-pi/4, pi/4] by Cody and Waite's method; the rounding error of the reduction is
 computed too. The polynomials are those of fdlibm (Sun Microsystems, k_sin.c and k_cos.c). Below 2^20 quarter
 turns it is enough to represent pi/2 by two doubles, because the multiplications and additions are fused. Near
-a multiple of pi/2, the sine or the cosine is near 0; this value has an error of up to 1e-27. For a larger
-angle, its lane uses the functions of the C library. The other lanes do not, because the result of a
-configuration must not depend on the other configurations.
+a multiple of pi/2, the sine or the cosine is near 0, and this small value has an error of up to 1e-27. The
+sine and the cosine of a larger angle are computed by the C library. Only the lane with this angle uses the C
+library, because the result of a configuration must not depend on the other configurations.
 """
 
 from __future__ import annotations
@@ -28,7 +28,10 @@ _2_PI = 2.0 / math.pi
 
 @compiled
 def sine_cosine(s, row, x):
-    """Return (sine, cosine) of angles; `row` is a row of scratch memory that may be overwritten."""
+    """Return the sines and the cosines of angles.
+
+    `row` is the index of a row of scratch memory that may be overwritten.
+    """
     sine, cosine = _of_small(x)
     if _any_large(x):
         put(s, row, x)
@@ -43,7 +46,7 @@ def sine_cosine(s, row, x):
 
 @intrinsic
 def _of_small(context: Any, x: Any) -> Any:
-    """Return sine and cosine of angles of less than 2^20 quarter turns, without a branch."""
+    """Return the sines and cosines of angles below 2^20 quarter turns; the code has no branch."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         (x,) = arguments
@@ -65,8 +68,8 @@ def _of_small(context: Any, x: Any) -> Any:
         shifted = fused(builder, x, all_lanes(_2_PI), all_lanes(NO_FRACTION))
         quarters = builder.bitcast(shifted, whole)
         n = builder.fsub(shifted, all_lanes(NO_FRACTION))
-        # Exact: both terms are multiples of 2^-53, and their difference is below 1. The rounding error of r
-        # is `lost`, that of z is `z_lost`.
+        # This difference is exact, because the two terms are multiples of 2^-53 and differ by less than 1.
+        # The rounding error of r is `lost`, that of z is `z_lost`.
         near = fused(builder, n, all_lanes(-PI_2), x)
         r = fused(builder, n, all_lanes(-PI_2_REST), near)
         lost = fused(builder, n, all_lanes(-PI_2_REST), builder.fsub(near, r))
@@ -102,7 +105,7 @@ def _of_small(context: Any, x: Any) -> Any:
 
 @intrinsic
 def _any_large(context: Any, x: Any) -> Any:
-    """Return whether a lane contains an angle of 2^20 quarter turns or more, or nan."""
+    """Return whether any lane contains an angle of 2^20 quarter turns or more, or nan."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         (x,) = arguments
@@ -119,7 +122,7 @@ def _any_large(context: Any, x: Any) -> Any:
 
 @intrinsic
 def _with_lane(context: Any, x: Any, lane: Any, value: Any) -> Any:
-    """Return a copy of the number x in which one lane contains another double."""
+    """Return a copy of the number x in which one lane contains the double `value` instead."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         x, lane, value = arguments

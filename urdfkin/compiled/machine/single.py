@@ -1,14 +1,14 @@
-"""Fast calls with one configuration: a compiled function that Python calls like a built-in function.
+"""Fast calls with one configuration, by compiled functions that Python calls like built-in functions.
 
 A call through Numba checks the type of each argument and unpacks every array, which takes as long as the
 recursion itself. CPython calls a built-in function without these checks: it passes the addresses of the
-arguments. The compiled function of this module is such a function. It reads the few words of each array that
-it needs, at the offsets that CPython and NumPy guarantee to C code. It holds the interpreter's lock for about
-a microsecond. It returns None for arguments that it does not support.
+arguments. The compiled function of this module is such a function. It reads the few words of each array
+object that it needs, at the offsets that CPython and NumPy guarantee to C code. It holds Python's global
+interpreter lock for about a microsecond. It returns None for arguments that it does not support.
 
-A call marks its scratch memory as busy in one atomic operation, which works also without the interpreter's
-lock. If another thread is using the scratch memory, the function also returns None, and the caller computes
-the result in another way.
+A call marks its scratch memory as busy in one atomic operation, which is also safe in a Python without a
+global interpreter lock. If another thread is using the scratch memory, the function also returns None, and
+the caller computes the result in another way.
 """
 
 from __future__ import annotations
@@ -42,17 +42,17 @@ _Q, _OUT, _NQ, _NV, _ORDERS = (
 )
 _AXES, _ROWS, _COLUMNS = int(KernelArgs.AXES), int(KernelArgs.ROWS), int(KernelArgs.COLUMNS)
 
-#: Numbers of words (eight bytes): the length of a Python object's header, the index of its type, and the
-#: index of the first item of a tuple.
+#: Positions in a Python object, in words of eight bytes: the length of the object's header, the index of its
+#: type, and the index of a tuple's first item.
 _OWN = object.__basicsize__ // 8
 _TYPE, _ITEMS = _OWN - 1, tuple.__basicsize__ // 8
-#: Indices of words of a NumPy array (PyArrayObject_fields; the number of axes and the flags are half a word
-#: each) and of its element type (PyArray_Descr), in which one word contains the byte order and NumPy's type
-#: number.
+#: Indices of words in a NumPy array (PyArrayObject_fields) and in its element type (PyArray_Descr). In the
+#: array, the number of axes and the flags occupy half a word each. In the element type, one word contains the
+#: byte order and NumPy's type number.
 _DATA, _NDIM, _SHAPE, _KIND, _FLAGS = _OWN, _OWN + 1, _OWN + 2, _OWN + 5, _OWN + 6
 _KIND_AND_ORDER, _NATIVE, _DOUBLE = _OWN + 1, ord("="), 12
 _HALF, _BYTE = 0xFFFFFFFF, 0xFF
-#: Flags of an input array (C-contiguous and aligned) and of an output array (also writable).
+#: Required flags of an input array (C-contiguous and aligned), and of an output array (also writable).
 _READABLE, _WRITABLE = 0x101, 0x501
 
 _incref = types.ExternalFunction("Py_IncRef", types.void(types.int64))
@@ -62,7 +62,7 @@ _call_one_arg = types.ExternalFunction("PyObject_CallOneArg", types.int64(types.
 
 @intrinsic
 def _call(context: Any, address: Any, argument: Any) -> Any:
-    """Call the kernel at an address and return its result."""
+    """Call the kernel whose code is at an address, and return the kernel's result."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         whole = ir.IntType(64)
@@ -74,7 +74,7 @@ def _call(context: Any, address: Any, argument: Any) -> Any:
 
 @intrinsic
 def _test_and_set(context: Any, numbers: Any, place: Any) -> Any:
-    """Write 1 and return the previous value, in one atomic operation."""
+    """Write 1 to `numbers[place]` and return the previous value, in one atomic operation."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         one = ir.Constant(ir.IntType(64), 1)
@@ -95,7 +95,10 @@ def _release(context: Any, numbers: Any, place: Any) -> Any:
 
 @compiled
 def _doubles_address(given, ndarray, flags, axes, rows, columns):
-    """Return the address of an array's doubles; 0 if the object is not such an array of this shape."""
+    """Return the address of an array's doubles.
+
+    If the object is not an array of doubles with this shape and these flags, the result is 0.
+    """
     x = whole_numbers_at(given)
     if x[_TYPE] != ndarray or x[_NDIM] & _HALF != axes or x[_FLAGS] & flags != flags:
         return 0
@@ -110,15 +113,18 @@ def _doubles_address(given, ndarray, flags, axes, rows, columns):
 
 @core
 def one_configuration(bound, arguments, count):
-    """Compute the result for q, or q and v, or q, v and a, then the output array or None.
+    """Compute the result for one configuration.
+
+    The arguments are q, or q and v, or q, v and a. The last argument is the output array, or None for a new
+    array.
 
     The function returns the result, or None if it does not support the arguments or if its memory is busy.
 
     Args:
         bound: Address of the bound tuple: kernel arguments, array type, None, the function that creates an
             array, its shape, and the objects that must stay alive.
-        arguments: Address of the arguments.
-        count: Number of arguments.
+        arguments: Address of the Python call's arguments.
+        count: Number of these arguments.
     """
     items, given = whole_numbers_at(bound), whole_numbers_at(arguments)
     address, ndarray, none = whole_numbers_at(items[_ITEMS])[_DATA], items[_ITEMS + 1], items[_ITEMS + 2]
@@ -138,7 +144,7 @@ def one_configuration(bound, arguments, count):
 
 @compiled
 def _compute_into(address, given, to, ndarray):
-    """Write the kernel's result into an array; return whether the array was suitable."""
+    """Write the kernel's result into the array `to`; return whether the type and the shape of `to` fit."""
     task = whole_numbers_at(address)
     orders, rows, columns, width = task[_ORDERS], task[_ROWS], task[_COLUMNS], task[_NQ]
     out = _doubles_address(to, ndarray, _WRITABLE, task[_AXES], rows, columns)
@@ -162,7 +168,7 @@ def _compute_into(address, given, to, ndarray):
 
 
 class _Method(ctypes.Structure):
-    """CPython's PyMethodDef."""
+    """CPython's structure PyMethodDef, which describes a built-in function."""
 
     _fields_ = (
         ("name", ctypes.c_char_p),
@@ -177,7 +183,10 @@ _FUNCTION = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.POINTER(_Method), ctypes.
 
 
 def _built_in(name: str, address: int, *bound: object) -> Callable[..., FloatArray | None]:
-    """Return the code at an address as a Python function, which keeps its bound objects alive."""
+    """Return a Python function that runs the code at an address.
+
+    The function keeps the objects alive that are bound to it.
+    """
     method = _Method(name.encode(), address, _FASTCALL, None)
     new = _FUNCTION(("PyCFunction_NewEx", ctypes.pythonapi))
     function: Callable[..., FloatArray | None] = new(ctypes.byref(method), (*bound, method), None)
@@ -186,7 +195,10 @@ def _built_in(name: str, address: int, *bound: object) -> Callable[..., FloatArr
 
 @cache
 def arrays_are_known() -> bool:
-    """Return whether this NumPy has the array layout that the code expects; if not, `single` is not used."""
+    """Return whether this NumPy stores arrays in memory as this module expects.
+
+    If it does not, `single` is not used.
+    """
     x = np.zeros((2, 3))
     if np.ndarray.__basicsize__ < 8 * (_FLAGS + 1) or np.dtype.__basicsize__ < 8 * (_KIND_AND_ORDER + 1):
         return False
@@ -200,8 +212,9 @@ def arrays_are_known() -> bool:
     )
 
 
-#: For each quantity: its kernel, its kernel for LOCAL, the number of inputs (1 for q, 2 for q and v, 3 for q,
-#: v and a), and how many axes of the result have length nv.
+#: Four values for each quantity: its kernel, its kernel for the reference frame LOCAL, its number of inputs,
+#: and the number of the result's axes that have length nv. The inputs are q (1), q and v (2), or q, v and a
+#: (3).
 _HOW: dict[str, tuple[Core, Core, int, int]] = {
     "placement": (kernels.placements, kernels.placements, 1, 0),
     "velocity": (kernels.velocities, kernels.local_velocities, 2, 0),
@@ -214,13 +227,13 @@ _HOW: dict[str, tuple[Core, Core, int, int]] = {
 def single(
     quantity: str, plan: CompiledTree, reference: Reference
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    """Return the fast function of a quantity for a plan's only frame, with a fixed base.
+    """Return the fast function of a quantity for the only frame of a compiled tree, with a fixed base.
 
     The function is compiled or read from disk.
 
     Returns:
         The function and its kernel arguments. The function takes (q, ..., out or None) and returns the
-        result, or None if it does not support the arguments. The kernel arguments contain the number of
+        result, or None if it does not support the arguments. The kernel arguments also contain a count of the
         results.
     """
     core, local_core, orders, columns = _HOW[quantity]
@@ -242,10 +255,10 @@ def called(
     """Return a fast function, as `single` does, for a C function that takes kernel arguments.
 
     Args:
-        core: The function, from `ctypes`.
+        core: The C function, as a `ctypes` object.
         orders: Number of inputs of the function: 1 for q, 2 for q and v, 3 for q, v and a.
         shape: Shape of the result.
-        plan: The compiled tree of q and v.
+        plan: The compiled tree, which gives the lengths of q and v.
     """
     address = ctypes.cast(core, ctypes.c_void_p).value
     return _called(address or 0, orders, shape, plan, core)
@@ -259,7 +272,7 @@ def _called(
     task[KernelArgs.NQ], task[KernelArgs.NV] = (
         plan.nq,
         plan.nv,
-    )  # all strides are 0: there is one configuration
+    )  # all strides are 0, because there is only one configuration
     task[KernelArgs.AXES], task[KernelArgs.ROWS], task[KernelArgs.COLUMNS] = len(shape), *(*shape, 1)[:2]
     bound = task, np.ndarray, None, np.empty, shape, *alive
     return _built_in("compute", one_configuration.address, *bound), task

@@ -182,7 +182,10 @@ def point(grid: Grid, p: FloatArray) -> Support:
 
 
 def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]]:
-    """Return angles and lengths of the corners of a polygon that contains an arc of radius 1."""
+    """Return the corners of a polygon that contains an arc of radius 1.
+
+    Each corner is given by its angle and its distance from the arc's centre.
+    """
     if high - low >= _WHOLE:
         half = math.pi / segments
         return [(2.0 * half * k, 1.0 / math.cos(half)) for k in range(segments)]
