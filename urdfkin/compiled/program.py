@@ -1,8 +1,8 @@
-"""A plan as a program: the instructions that a kernel executes for every block of configurations.
+"""The program of a compiled tree: the instructions that a kernel executes for each block of configurations.
 
 The instructions are chosen once for each robot. There are special instructions for a translation along a
-coordinate axis and for a rotation about a coordinate axis. They take a third of the time of the general
-instructions. A translation by zero needs no instruction. The state of a link stays in registers until the
+coordinate axis and for a rotation about a coordinate axis. These instructions take a third of the time of the
+general ones. A translation by zero needs no instruction. The state of a link stays in registers until the
 next link is computed. At a branch of the tree, the state is saved to memory and read again later.
 """
 
@@ -21,7 +21,10 @@ from urdfkin.model.tree import FloatArray
 
 
 class Op(IntEnum):
-    """The instructions. An instruction with an axis has four forms, in the order x, y, z, any axis."""
+    """The instructions of a program.
+
+    An instruction with an axis has four forms, in this order: for the axis x, y, z, and for any axis.
+    """
 
     END = 0
     CARRY_X = 1  # translation along a rigid link
@@ -38,42 +41,43 @@ class Op(IntEnum):
     FLOATING = 12
     SAVE = 13
     RESUME = 14
-    KEEP = 15  # store the joint's data for its column of the Jacobian
+    KEEP = 15  # store what the joint's Jacobian column needs
     COLUMN = 16
     EMIT = 17
 
 
 class Head(IntEnum):
-    """Indices of the numbers at the beginning of a program, before its instructions."""
+    """Positions of the numbers at the beginning of a program, before its instructions."""
 
     CODE = 0  # index of the first instruction
     NQ = 1
     NV = 2
     FRAMES = 3
-    BLOCKS_Q = 4  # index of the list of needed blocks of eight coordinates
+    BLOCKS_Q = 4  # index of the list of the blocks of eight coordinates that the program needs
     BLOCKS_V = 5
     BLOCKS_END = 6
-    ANGLES = 7  # index of the list of angles
+    ANGLES = 7  # index of the list of joint angles
     ANGLES_END = 8
-    Q = 9  # first scratch rows of the coordinates, and so on
+    Q = 9  # first scratch row of the coordinates; the next entries are those of other numbers
     V = 10
     A = 11
     BASE = 12
 
 
-#: Number of configurations in a row of scratch memory: one AVX-512 register, or two of AVX2.
+#: Number of configurations in a row of scratch memory. A row fills one AVX-512 register or two AVX2
+#: registers.
 LANES = 8
-#: Length of an instruction: the operation, three operands, and the index of its constants.
+#: Number of integers in an instruction: the operation, three operands, and the index of its constants.
 WIDTH = 5
-#: Length of an entry in the list of angles: the angle's row, the row of its sine, the index of a mimic rule,
-#: and whether there is a mimic rule.
+#: Number of integers in an entry of the list of angles: the row of the angle, the row of its sine, the index
+#: of the mimic rule, and whether there is a mimic rule.
 ANGLE_WIDTH = 4
-#: Reserved scratch rows: the number 0, the number 1, a result before its output, an angle; then the first
-#: free row.
+#: Reserved scratch rows: a row for the number 0, one for the number 1, rows for a result before it is
+#: written, and one for an angle. The last value is the first free row.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, KEPT_ROWS, COLUMN_ROWS = 24, 12, 6
-#: Length of an entry for a column in a list of pairs: the column's row, its step, its index in v, and the
-#: first scratch row of the sums for that index.
+#: Number of integers in an entry of a list of pairs. An entry describes a Jacobian column: the column's row,
+#: its step, its index in v, and the first scratch row of the sums for that index.
 PAIR_WIDTH = 4
 
 _JOINTS = {
@@ -89,7 +93,7 @@ class Program:
     """The program of a kernel.
 
     Attributes:
-        words: The numbers of `Head`, then lists and instructions.
+        words: The integers of the program: the numbers of `Head`, then lists and instructions.
         constants: The constants of the instructions.
         rows: Number of scratch rows of a run.
     """
@@ -100,26 +104,26 @@ class Program:
 
     @cached_property
     def addresses(self) -> tuple[int, int]:
-        """Addresses of words and constants; valid while the program exists."""
+        """The memory addresses of `words` and `constants`, which are valid while the program exists."""
         return self.words.ctypes.data, self.constants.ctypes.data
 
     @cached_property
     def lists(self) -> tuple[list[int], list[Number]]:
-        """Words and constants for Python."""
+        """`words` and `constants` as Python lists, for the recursion without a compiler."""
         words: list[int] = self.words.tolist()
         return words, list(map(Number, self.constants.tolist()))
 
 
 def program_of(plan: CompiledTree, *, turned: bool, columns: bool = False, pairs: bool = False) -> Program:
-    """Return the program for a plan's frames; the plan stores the program for later calls.
+    """Return the program for the frames of a compiled tree, which stores the program for later calls.
 
     Args:
         plan: The compiled tree.
-        turned: Whether the state is rotated to the axes of each frame: for placements, and for results in the
-            frame's own axes.
+        turned: Whether the state is rotated to the axes of each frame. Placements need this, and results in
+            the frame's own axes.
         columns: Whether Jacobian columns are needed.
-        pairs: Whether each column is needed separately, also that of a mimic joint, to compute pairs of
-            columns.
+        pairs: Whether the column of each joint, also of a mimic joint, is stored separately, to compute
+            derivatives from pairs of columns.
     """
     key = turned, columns, pairs
     made: Program | None = plan.made.get(key)
@@ -159,7 +163,7 @@ class _Writer:
         return Program(np.array(words, dtype=np.int64), np.array(self.constants), rows)
 
     def _write(self) -> None:
-        """Write steps and frames in the order of the recursion."""
+        """Write the instructions for all steps and frames, in the order of the recursion."""
         events = list(self._events())
         last = {origin: k for k, (origin, _, _) in enumerate(events)}
         now, c = -1, 0
@@ -177,10 +181,13 @@ class _Writer:
                     c += 1
                 self._save(step, last, k + 1)
             elif frame is not None and self._frame(frame):
-                now = -2  # the state is now that of the frame
+                now = -2  # the current state is now that of the frame
 
     def _events(self) -> Iterator[tuple[int, int | None, int | None]]:
-        """Yield (previous step, the step or None, the frame or None)."""
+        """Yield the events of the recursion in order: each is a step or a frame.
+
+        An event is (previous step, index of the step or None, index of the frame or None).
+        """
         f = 0
         for i in range(-1, len(self.plan.steps)):
             if i >= 0:
@@ -190,7 +197,10 @@ class _Writer:
                 f += 1
 
     def _save(self, step: int, last: Mapping[int, int], following: int) -> None:
-        """Save the current state if another event than the next one also starts from this state."""
+        """Write an instruction that saves the state after a step, if it is needed again later.
+
+        The state is needed again if an event after the one with index `following` starts from it.
+        """
         if last.get(step, -1) > following:
             self._put(Op.SAVE, self._slot(step))
 
@@ -206,7 +216,10 @@ class _Writer:
         return len(self.constants) - len(numbers)
 
     def _rigid(self, R: FloatArray, p: FloatArray, *, turned: bool = True) -> bool:
-        """Write a translation by p, then a rotation by R; return whether any instruction was needed."""
+        """Write the instructions for a translation by p and a rotation by R.
+
+        Return whether any instruction was needed.
+        """
         before = len(self.code)
         along = np.flatnonzero(p).tolist()
         if along:
@@ -218,7 +231,10 @@ class _Writer:
         return len(self.code) > before
 
     def _rule(self, i: int) -> int:
-        """Return the index of a mimic joint's multiplier and offset in the constants; 0 for other joints."""
+        """Return the index in the constants at which a mimic joint's multiplier and offset begin.
+
+        For other joints, the result is 0.
+        """
         multiplier, constant = self.plan.geometry[i, Geometry.MULTIPLIER :].tolist()
         return 0 if (multiplier, constant) == (1.0, 0.0) else self._constants(multiplier, constant)
 
@@ -244,7 +260,10 @@ class _Writer:
         self._put(op, first, int(step[Step.V]), sine if op is Op.PLANAR else int(rule > 0), at=rule)
 
     def _frame(self, f: int) -> bool:
-        """Write the instructions that output a frame's results; return whether they change the state."""
+        """Write the instructions that write a frame's results.
+
+        Return whether they change the current state.
+        """
         plan, offsets = self.plan, self.plan.offsets[f]
         moved = self._rigid(offsets[:9].reshape(3, 3), offsets[9:], turned=self.turned)
         sources = 0
@@ -266,7 +285,10 @@ class _Writer:
                 self._put(Op.COLUMN, *rows, how, at=follows)
 
     def _sources(self, f: int, row: int) -> list[int]:
-        """Return the scratch row of each number of the frame's (6, nv) matrix; `row` is the first row."""
+        """Return the scratch row of each number of the frame's (6, nv) matrix.
+
+        The argument `row` is the first scratch row of the matrix.
+        """
         plan = self.plan
         sources = np.full((6, plan.nv), ZERO_ROW, dtype=np.int64)
         for c in np.flatnonzero(plan.leaders[f] == np.arange(len(plan.columns))):
@@ -275,7 +297,11 @@ class _Writer:
         return found
 
     def _pairs(self, f: int) -> list[int]:
-        """Return the count of a frame's columns, an entry for each (`PAIR_WIDTH`), and the sums' rows."""
+        """Return the list of pairs of a frame.
+
+        The list consists of the number of columns, an entry (`PAIR_WIDTH` numbers) for each column, and the
+        scratch rows of the sums.
+        """
         columns, leaders = self.plan.columns, self.plan.leaders[f]
         own = np.flatnonzero(leaders >= 0)
         rows = self.results + COLUMN_ROWS * own, self.sums + COLUMN_ROWS * leaders[own]
@@ -284,11 +310,11 @@ class _Writer:
 
 
 def _is_rotation_about(R: FloatArray, axis: int) -> bool:
-    """Return whether R is exactly a rotation about this axis."""
+    """Return whether R is exactly a rotation about the coordinate axis with this index."""
     one = np.eye(3)[axis]
     return bool((R[axis] == one).all() and (R[:, axis] == one).all())
 
 
 def _blocks(places: Sequence[int]) -> list[int]:
-    """Return the first index of each block of eight that contains any of the indices."""
+    """Return the first index of each block of eight indices that contains at least one of `places`."""
     return sorted({int(place) // 8 * 8 for place in places})

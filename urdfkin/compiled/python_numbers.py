@@ -1,10 +1,12 @@
-"""Numbers for the recursion without a compiler: one configuration, computed by Python's floats.
+"""Number types for the recursion without a compiler, which computes one configuration with Python's floats.
 
 Results have the same bits as those of compiled kernels (`urdfkin.compiled.machine.numbers`). A product is
 stored as its two factors until it is added: x y + z is then one fused multiply-add, rounded once. `zero()`
-and `one()` are known numbers, and everything computed from `nothing()` is nothing.
+and `one()` are the constants 0 and 1. `nothing()` stands for a number that is not needed, and everything that
+is computed from it is also `nothing()`.
 
-Scratch memory is a list with a number in each row. A kernel's arguments are lists instead of addresses.
+Scratch memory is a list with one number for each row. Functions take lists where a compiled kernel takes
+addresses.
 """
 
 from __future__ import annotations
@@ -18,7 +20,8 @@ from urdfkin.compiled.plan import LARGE
 
 LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
 _2_PI, PI_2, PI_2_REST = 2.0 / math.pi, math.pi / 2.0, 6.123233995736766e-17
-#: Adding it rounds a number below 2^51 to an integer: the last bits of the sum are the nearest integer.
+#: The sum of this constant and a number below 2^51 is rounded to an integer. The last bits of the sum are the
+#: integer that is nearest to the number.
 NO_FRACTION = 1.5 * 2.0**52
 SINE = (
     -1.66666666666666324348e-01,
@@ -39,7 +42,7 @@ COSINE = (
 
 
 def _c_fma() -> Callable[[float, float, float], float]:
-    """Return the C library's fused multiply-add, which Python has loaded already."""
+    """Return the fused multiply-add of the C library, which the Python interpreter has already loaded."""
     function = ctypes.PyDLL(None).fma
     function.restype, function.argtypes = ctypes.c_double, (ctypes.c_double,) * 3
     result: Callable[[float, float, float], float] = function
@@ -47,7 +50,7 @@ def _c_fma() -> Callable[[float, float, float], float]:
 
 
 def _python_fma(own: Callable[..., float], c: Callable[..., float]) -> Callable[[float, float, float], float]:
-    """Return Python's fused multiply-add; it raises errors where C returns inf or nan."""
+    """Return a function that computes `math.fma`, with C's results inf and nan instead of Python's errors."""
 
     def fma(x: float, y: float, z: float) -> float:
         try:
@@ -58,12 +61,12 @@ def _python_fma(own: Callable[..., float], c: Callable[..., float]) -> Callable[
     return fma
 
 
-#: x y + z, rounded once.
+#: Return x y + z, which is rounded only once.
 fma = _python_fma(math.fma, _c_fma()) if hasattr(math, "fma") else _c_fma()
 
 
 class Number:
-    """A double."""
+    """A number that is one double."""
 
     __slots__ = ("x",)
 
@@ -109,7 +112,7 @@ class Number:
 
 
 class Product:
-    """Two doubles that are not yet multiplied."""
+    """A product that is still stored as its two factors."""
 
     __slots__ = ("x", "y")
 
@@ -148,7 +151,7 @@ class Product:
 
 
 class Known:
-    """0 or 1; None for an unused number."""
+    """A number with a known value: 0 or 1, or None for a number that is not needed."""
 
     __slots__ = ("value",)
 
@@ -181,7 +184,10 @@ class Known:
 
 
 def _double(x: Any) -> float:
-    """Return any number except nothing as a float; a product is multiplied and rounded."""
+    """Return a number as a float; a product is multiplied and rounded.
+
+    The number must not be `nothing()`.
+    """
     if type(x) is Product:
         product: float = x.x * x.y
         return product
@@ -193,22 +199,22 @@ _ZERO, _ONE, _NOTHING = Known(0), Known(1), Known(None)
 
 
 def zero() -> Known:
-    """Return the known 0."""
+    """Return the constant 0, whose products and sums need no computation."""
     return _ZERO
 
 
 def one() -> Known:
-    """Return the known 1."""
+    """Return the constant 1, whose products need no computation."""
     return _ONE
 
 
 def nothing() -> Known:
-    """Return an unused number."""
+    """Return the object that stands for a number that is not needed."""
     return _NOTHING
 
 
 def rounded(x: Any) -> Any:
-    """Multiply and round a product; return other numbers unchanged."""
+    """Multiply the factors of a product and round the result; return other numbers unchanged."""
     return Number(x.x * x.y) if type(x) is Product else x
 
 
@@ -221,18 +227,18 @@ def number(s: Sequence[Number], row: int) -> Number:
 
 
 def number_if(wanted: Any, s: Sequence[Number], row: int) -> Any:
-    """Return the number in a row; nothing if `wanted` is nothing."""
+    """Return the number in a row of scratch memory; if `wanted` is `nothing()`, return `nothing()`."""
     return wanted if wanted is _NOTHING else s[row]
 
 
 def put(s: list[Number], row: int, x: Any) -> None:
-    """Write a number to a row of scratch memory; for nothing, do nothing."""
+    """Write a number to a row of scratch memory; if the number is `nothing()`, do not change the row."""
     if x is not _NOTHING:
         s[row] = x if type(x) is Number else Number(_double(x))
 
 
 def constant(g: Sequence[Number], i: int) -> Number:
-    """Return `g[i]`."""
+    """Return element i of the constants g as a number."""
     return g[i]
 
 
@@ -241,12 +247,12 @@ same = Number
 
 
 def numbers_of(array: Any) -> Any:
-    """Return an array's numbers."""
+    """Return the numbers of an array; here they are given as a list already."""
     return array.tolist()
 
 
 def numbers_at(address: Any) -> Any:
-    """Return the list that is given instead of an address."""
+    """Return the list of numbers that is given instead of an address."""
     return address
 
 
@@ -256,24 +262,30 @@ whole_numbers_at = numbers_at
 def read_rows(
     m: int, x: Sequence[float], at: int, stride: int, count: int, s: list[Number], row: int
 ) -> None:
-    """Read `count` numbers, from `x[at]` on, into rows."""
+    """Read `count` numbers from the list x, from `x[at]` on, into rows of scratch memory."""
     s[row : row + count] = map(Number, x[at : at + count])
 
 
 def write_rows(
     m: int, s: Sequence[Number], rows: Sequence[int], first: int, count: int, to: list[float], at: int, _: int
 ) -> None:
-    """Write rows `rows[first]`, ... from `to[at]` on."""
+    """Write `count` rows of scratch memory to the list `to`, from `to[at]` on.
+
+    The indices of the rows are `rows[first]` and the following ones.
+    """
     to[at : at + count] = [s[row].x for row in rows[first : first + count]]
 
 
 def ordinary(x: Sequence[float], at: int, count: int) -> bool:
-    """Return whether `count` numbers are ordinary: none is nan or infinite, and sizes are at most `LARGE`."""
+    """Return whether `count` numbers from `x[at]` on are ordinary.
+
+    Ordinary means that no number is nan and that no absolute value exceeds `LARGE`.
+    """
     return sum(map(abs, x[at : at + count])) < LARGE
 
 
 def fetch(*_: object) -> None:
-    """Do nothing: there is no next block."""
+    """Do nothing, because there is no next block whose inputs could be loaded in advance."""
 
 
 stream = all_written = fetch

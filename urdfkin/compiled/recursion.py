@@ -8,14 +8,15 @@ The state of a link consists of:
 | w, vel | angular velocity, velocity of the origin | world or link axes, as `axes` selects |
 | alpha, acc | angular acceleration, acceleration of the origin | world or link axes, as `axes` selects |
 
-The axes of the recursion are those of the requested result, the world's or the link's own. A rotation at the
-end would add the rounding of a second rotation. The equations are those of `urdfkin.kinematics.equations`;
-they are the same in both axes.
+The recursion expresses vectors in the axes of the requested result: world axes or the link's own axes. A
+rotation of the result at the end would add rounding errors. The equations are those of
+`urdfkin.kinematics.equations`. They are the same in world axes and in a link's own axes.
 
-A part of the state that an output does not need is `nothing`; it costs no time.
+If an output does not need a part of the state, this part is `nothing()` and costs no time.
 
-This module, `axes`, `outputs` and `recursions` are plain functions of Python's numbers. The kernels are
-copies of them that use Numba's numbers (`urdfkin.compiled.machine.kernels`).
+This module and the modules `axes`, `outputs` and `recursions` contain plain functions that compute with the
+module `python_numbers`. The kernels are copies of these functions for Numba's number types
+(`urdfkin.compiled.machine.kernels`).
 """
 
 from __future__ import annotations
@@ -76,7 +77,7 @@ _SAVE, _RESUME, _KEEP, _COLUMN = map(int, (Op.SAVE, Op.RESUME, Op.KEEP, Op.COLUM
 
 
 def carried(axes, state, d):
-    """Move the state along the rigid link by d; d is given in the link's axes (7.58, 7.128, 7.130)."""
+    """Return the state of the link's point at d (7.58, 7.128, 7.130); d is given in the link's axes."""
     R, p, w, vel, alpha, acc = state
     lever = seen(axes, R, d)
     return (
@@ -90,7 +91,7 @@ def carried(axes, state, d):
 
 
 def turned(axes, state, S):
-    """Return the state of the same body with its frame rotated by S."""
+    """Return the state of the same body for a frame that is rotated by S."""
     R, p, w, vel, alpha, acc = state
     return (
         eq.product(R, S),
@@ -103,7 +104,10 @@ def turned(axes, state, S):
 
 
 def _turned_about_z(axes, state, s, row):
-    """Rotate the frame by a joint's angle (7.5); its sine and cosine are in `row` and the row after it."""
+    """Rotate the frame about z by a joint's angle (7.5).
+
+    The sine of the angle is in the scratch row `row`, and the cosine is in the row after it.
+    """
     return turned(axes, state, eq.about_z(number(s, row), number(s, row + 1), zero(), one()))
 
 
@@ -123,7 +127,10 @@ def prismatic(axes, state, slide, v, a):
 
 
 def free(axes, state, o, u, o_rate, u_rate):
-    """Add the velocity of a planar or floating joint, in the child link's axes, after its displacement."""
+    """Add the velocity and the acceleration of a planar or floating joint to the displaced state.
+
+    The joint's velocity and acceleration are given in the child link's axes.
+    """
     R, p, w, vel, alpha, acc = state
     o, u, o_rate, u_rate = seen(axes, R, o), seen(axes, R, u), seen(axes, R, o_rate), seen(axes, R, u_rate)
     return (
@@ -137,7 +144,10 @@ def free(axes, state, o, u, o_rate, u_rate):
 
 
 def _coordinate(s, row, g, c, follows):
-    """Return a joint's coordinate; for a mimic joint, product and sum are each rounded, as in Pinocchio."""
+    """Return a joint's value, which is its coordinate or follows from its mimic rule.
+
+    For a mimic joint, the product and the sum are rounded separately, as in Pinocchio.
+    """
     x = number(s, row)
     if follows:
         x = rounded(constant(g, c) * x) + constant(g, c + 1)
@@ -152,12 +162,15 @@ def _rate(wanted, s, row, g, c, follows):
 
 
 def _vector_if(wanted, s, row):
-    """Return the numbers of three consecutive rows; return `nothing()` if `wanted` is `nothing()`."""
+    """Return the numbers of three consecutive scratch rows as a vector.
+
+    If `wanted` is `nothing()`, the result is `nothing()`.
+    """
     return number_if(wanted[0], s, row), number_if(wanted[1], s, row + 1), number_if(wanted[2], s, row + 2)
 
 
 def _planar(axes, state, s, q, row, v, a):
-    """Compute the state after a planar joint: translation along x and y, rotation about z."""
+    """Compute the state after a planar joint, which translates along x and y and rotates about z."""
     state = carried(axes, state, (number(s, q), number(s, q + 1), zero()))
     state = _turned_about_z(axes, state, s, row)
     w, alpha = state[2][0], state[4][0]
@@ -167,7 +180,7 @@ def _planar(axes, state, s, q, row, v, a):
 
 
 def _floating(axes, state, s, q, v, a):
-    """Compute the state after a floating joint: translation along, and rotation about, all three axes."""
+    """Compute the state after a floating joint, which translates along and rotates about all three axes."""
     state = carried(axes, state, (number(s, q), number(s, q + 1), number(s, q + 2)))
     x, y, z, w = number(s, q + 3), number(s, q + 4), number(s, q + 5), number(s, q + 6)
     state = turned(axes, state, eq.rotation_of_quaternion(x, y, z, w))
@@ -191,14 +204,14 @@ def _rotation(g, i):
 
 
 def put_vector(s, row, x):
-    """Write a vector to three rows."""
+    """Write a vector to three consecutive rows of scratch memory."""
     put(s, row, x[0])
     put(s, row + 1, x[1])
     put(s, row + 2, x[2])
 
 
 def vector(s, row):
-    """Return the vector in three rows."""
+    """Return the vector in three consecutive rows of scratch memory."""
     return number(s, row), number(s, row + 1), number(s, row + 2)
 
 
@@ -215,7 +228,7 @@ def _save(s, row, state):
 
 
 def _resume(s, row, state):
-    """Return the saved state, without the parts that this recursion does not need."""
+    """Return a saved state, but without the parts that this recursion does not need."""
     R, p, w, vel, alpha, acc = state
     return (
         (_vector_if(R[0], s, row), _vector_if(R[1], s, row + 3), _vector_if(R[2], s, row + 6)),
@@ -231,7 +244,10 @@ def _resume(s, row, state):
 
 
 def _read(m, x, b, width, stride, blocks, begin, end, s, row):
-    """Read the needed blocks of eight numbers from rows `b` to `b + m - 1` of x, or from its only row."""
+    """Read the needed blocks of eight numbers of `m` configurations, from configuration b on.
+
+    If x has one row, all configurations use this row.
+    """
     for i in range(begin, end):
         at = blocks[i]
         wide = width - at
@@ -240,7 +256,10 @@ def _read(m, x, b, width, stride, blocks, begin, end, s, row):
 
 
 def _start(axes, m, s, task, row, b):
-    """Return the initial conditions: the state of the base (motion of the textbook's frame 0 in -1)."""
+    """Return the initial state of the recursion, which is the base's motion in the world.
+
+    In the textbook it is the motion of frame 0 relative to frame -1.
+    """
     nil, unit = same(0.0), same(1.0)
     R = (unit, nil, nil), (nil, unit, nil), (nil, nil, unit)
     p = w = vel = alpha = acc = nil, nil, nil
@@ -254,7 +273,7 @@ def _start(axes, m, s, task, row, b):
 
 
 def _sines_and_cosines(s, program, g):
-    """Compute sine and cosine of all joint angles in advance, because the recursion needs all registers."""
+    """Compute the sines and cosines of all joint angles before the recursion, which needs all registers."""
     for i in range(program[_ANGLES], program[_ANGLES_END], ANGLE_WIDTH):
         angle = _coordinate(s, program[i], g, program[i + 2], program[i + 3])
         sine, cosine = sine_cosine(s, ANGLE_ROW, angle)
@@ -266,7 +285,7 @@ def _sines_and_cosines(s, program, g):
 
 
 def _along_link(axes, op, state, g, c):
-    """Execute an instruction with a constant translation or rotation."""
+    """Execute an instruction for a constant translation or a constant rotation."""
     if op == _CARRY_X:
         state = carried(axes, state, (constant(g, c), zero(), zero()))
     elif op == _CARRY_Y:
@@ -287,7 +306,11 @@ def _along_link(axes, op, state, g, c):
 
 
 def _over_joint(axes, op, state, s, x, v, a, z, g, c):
-    """Execute a joint's instruction; x, z, c are operands, v and a are the rows of velocity, acceleration."""
+    """Execute a joint's instruction.
+
+    The operands of the instruction are x, z and c. The arguments v and a are the scratch rows of the joint's
+    velocity and acceleration.
+    """
     if op == _REVOLUTE:
         rate, rate_2 = _rate(state[2][0], s, v, g, c, z), _rate(state[4][0], s, a, g, c, z)
         state = revolute(axes, state, s, x, rate, rate_2)
@@ -315,7 +338,10 @@ def _read_inputs(m, task, program, s, b, orders):
 
 
 def _ordinary(m, task, program, b, orders):
-    """Return whether all inputs of a block are ordinary, also those that the recursion does not need."""
+    """Return whether no input of a block is nan, infinite or too large.
+
+    Inputs that the recursion does not need are tested too.
+    """
     good = _rows_are_ordinary(m, numbers_at(task[_Q]), b, program[_NQ], task[_STRIDE_Q])
     if orders > 1:
         good = good and _rows_are_ordinary(m, numbers_at(task[_V]), b, program[_NV], task[_STRIDE_V])
@@ -358,14 +384,16 @@ def _block(axes, m, task, program, g, s, b, reference, orders, follow, keep, col
 
 
 def forward_recursion(address, axes, orders, follow, keep, column, emit):
-    """Execute a program for every block of configurations; return 0, or 1 if an input is not ordinary.
+    """Execute a program for every block of configurations.
+
+    The result is 1 if an input is nan, infinite or too large, else 0.
 
     Args:
         address: Address of the kernel's arguments (`kernel_args`).
         axes: `link_axes` or `world_axes`: the axes in which vectors are expressed.
         orders: Number of inputs that are read: 1 for q, 2 for q and v, 3 for q, v and a.
         follow: Replaces the parts of a state that the output does not need by `nothing()`.
-        keep: Stores the data of a joint that are needed to compute the joint's column.
+        keep: Stores the data of a joint that are needed to compute the joint's Jacobian column.
         column: Computes a column of the Jacobian, or of its derivative.
         emit: Writes the result of a frame.
     """

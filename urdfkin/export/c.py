@@ -1,9 +1,9 @@
 """Write C99 code in double or single precision, for one configuration and for batches.
 
-The code has no allocation and no global variables. A function is straight-line code. Consecutive numbers of
-one configuration are `L` elements apart in memory. For one configuration L is 1. For a batch L is the number
-of configurations that are computed together, and a compiler turns each line of code into one vector
-instruction. The parts of a file that do not depend on the robot are templates in `frames/`.
+The written code allocates no memory and has no global variables. A function is straight-line code. In its
+arrays, two successive numbers of one configuration are `L` elements apart. For one configuration L is 1. For
+a batch L is the number of configurations that are computed together, and a compiler turns each line of code
+into one vector instruction. The parts of a file that do not depend on the robot are templates in `frames/`.
 """
 
 from __future__ import annotations
@@ -22,12 +22,15 @@ _PLACE = re.compile(r"@(\w+)@")
 
 
 def write(code: Code, to: str = "c") -> str:
-    """Return a translation unit; if `NAME_DECLARATIONS` is defined, it only declares the functions."""
+    """Return the text of a C file.
+
+    If `NAME_DECLARATIONS` is defined, the file only declares its functions.
+    """
     return unit(code, comment(_head(code)), "\n".join([*vectors(code), main(code, "check_one.c")]))
 
 
 def unit(code: Code, head: str = "", main: str = "") -> str:
-    """Return the C file: its header comment, the functions, and the check program."""
+    """Return the text of the C file: a header comment, the functions, and a program that checks them."""
     return framed(
         "file.c",
         head=head,
@@ -40,13 +43,13 @@ def unit(code: Code, head: str = "", main: str = "") -> str:
 
 
 def framed(name: str, /, **parts: str | int) -> str:
-    """Return a template with each `@name@` replaced; inserted text is not searched for further names."""
+    """Return a template in which each `@name@` is replaced. A name in inserted text is not replaced."""
     text = (_FRAMES / name).read_text(encoding="utf-8")
     return _PLACE.sub(lambda found: str(parts[found[1]]), text)
 
 
 def literal(x: float) -> str:
-    """Return a constant as text in the number type of the file."""
+    """Return a constant as C text; it has the number type of the file."""
     return f"R({x!r})"
 
 
@@ -76,7 +79,7 @@ def _head(code: Code) -> list[str]:
 
 
 def what(function: Function) -> str:
-    """Return the shape and the equations of a function's result in words."""
+    """Return a text with the shape and the equation numbers of a function's result."""
     return f"{' x '.join(map(str, function.shape))}, eq. {', '.join(function.quantity.equations)}"
 
 
@@ -142,7 +145,7 @@ def advance(code: Code, function: Function) -> str:
 class Layout:
     """Layout of a function's inputs, angles, sines and cosines in the array `in`.
 
-    The angles are contiguous: first the angles that are inputs, then the angles that are computed.
+    All angles are adjacent: first the angles that are inputs, then the angles that are computed.
     """
 
     def __init__(self, function: Function) -> None:
@@ -209,7 +212,8 @@ def _lane_sines(writer: Writer, layout: Layout) -> Iterator[str]:
         yield f"sines_cosines({', '.join(places)}, {count});"
 
 
-# -- its test vectors --------------------------------------------------------------------------------------
+# -- the function's test vectors
+# --------------------------------------------------------------------------------------
 
 
 def vectors(code: Code) -> Iterator[str]:
@@ -244,7 +248,7 @@ def _numbers(values: Sequence[str]) -> str:
 
 
 def main(code: Code, frame: str) -> str:
-    """Return a program that runs the test vectors."""
+    """Return the text of a program that runs the test vectors."""
     return framed("check.c", checks="".join(_check(code, function, frame) for function in code.functions))
 
 

@@ -1,8 +1,8 @@
 """Check an exported file: compile or import it, and run its test vectors.
 
-The check runs the file as code. A file from another person therefore needs the same care as any other
-program. The check runs a copy in a separate folder, so that it does not run other files from the original
-folder.
+The check runs the file as code. Before you check a file from another person, consider whether you would run
+that person's programs. The check runs a copy of the file in a separate folder. A file such as `math.py` in
+the original folder can therefore not be imported by accident.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from urdfkin.export.seal import is_sealed
 from urdfkin.system.files import read_text
 from urdfkin.system.processes import own_python
 
-#: Text in the first lines of every exported file.
+#: Text that the first lines of every exported file contain.
 _MARK = "straight-line code for this robot and frame"
 _MAIN = re.compile(r"^#ifdef (\w+)_MAIN$", re.MULTILINE)
 _FUNCTION = re.compile(r"^function f = ([A-Za-z]\w*)\(\)", re.MULTILINE | re.ASCII)
@@ -36,9 +36,9 @@ class Checked:
     """The result of a check.
 
     Attributes:
-        lines: One line for each function and precision.
+        lines: One line of text for each function and precision.
         good: Whether all functions agree with their test vectors.
-        doubts: Reasons why the file is not verified; empty for a verified one.
+        doubts: Reasons why the file is not verified; empty if it is verified.
     """
 
     lines: tuple[str, ...]
@@ -52,7 +52,7 @@ class Checked:
 
 
 def check(file: Path) -> Checked:
-    """Compile or import a file that `export` wrote, and run its test vectors.
+    """Compile or import a file that the command `export` wrote, and run the test vectors in the file.
 
     Raises:
         InputError: the file is not an export, or it does not run here; the message names what is missing.
@@ -93,7 +93,10 @@ def _doubts(text: str) -> Iterator[str]:
 
 
 def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
-    """Compile and run the file in both precisions, with the system's compiler and all warnings as errors."""
+    """Compile and run a C or C++ file, in single and in double precision.
+
+    The system's compiler treats all warnings as errors.
+    """
     found = _MAIN.search(text)
     if found is None:
         raise InputError("the file has no test vectors", where=str(file))
@@ -127,7 +130,7 @@ def _run_octave(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
 
 
 def _copy(text: str, place: Path) -> Path:
-    """Write the text to a separate folder under a fixed name, so that no other file is run."""
+    """Write the text to a new file with the path `place`, and return this path."""
     place.write_text(text, encoding="utf-8")
     return place
 
@@ -139,7 +142,7 @@ def _program(name: str, file: Path) -> str:
 
 
 def _run(command: Sequence[str], file: Path, cwd: Path | None = None) -> list[str]:
-    """Run a command, and return the lines with verdicts that it prints."""
+    """Run a command, and return the lines of its output that begin with "good" or "WRONG"."""
     try:
         done = subprocess.run(
             command,

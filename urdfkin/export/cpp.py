@@ -1,4 +1,7 @@
-"""Write a C++11 header of templates on the number type: `double`, `float`, automatic differentiation."""
+"""Write a C++11 header with function templates for any number type.
+
+Examples are `double`, `float`, and the types of libraries for automatic differentiation.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ from urdfkin.export.function import Function
 
 
 def write(code: Code, to: str = "cpp") -> str:
-    """Return a header; if `NAME_MAIN` is defined, it is a program that checks the header."""
+    """Return the text of a header. If `NAME_MAIN` is defined, it is a program that checks itself."""
     name, up = code.name, code.name.upper()
     first = code.functions[0]
     head = [

@@ -1,9 +1,12 @@
-"""Define symbolic numbers; arithmetic on these numbers builds a graph of expressions for code generation.
+"""Define symbolic numbers.
+
+Arithmetic with these numbers builds a graph of expressions, from which code is written.
 
 The textbook's equations (`urdfkin.kinematics.equations`) run on these numbers as on any others. The graph
 simplifies each expression when it is made. Constants are Python floats, and operations on constants are
-computed. Products with 0 and 1 and sums with 0 are removed. A minus sign is moved out of products, and turns
-a sum into a difference. Equal expressions are one node, so each joint's sine and cosine occur once.
+computed at once. Products with 0 and 1 and sums with 0 are removed. A minus sign is moved out of products,
+and turns a sum into a difference. Equal expressions are the same node, so the sine and the cosine of each
+joint occur once.
 
 >>> graph = Graph()
 >>> x, y = graph.input("q", 0), graph.input("q", 1)
@@ -31,7 +34,7 @@ class Node:
 
     Attributes:
         op: "q", "v" or "a" for an input; "+", "-", "*", "/", "neg", "sin", "cos" or "sqrt".
-        of: The operands, nodes and constants; for an input its index.
+        of: The operands, which are nodes and constants. For an input it is the input's index in q, v or a.
         index: Order of creation; operands have smaller indices.
         place: Index of the step of the recursion that created it.
         equation: Numbers of the equation that created it; "" if it has none.
@@ -70,7 +73,7 @@ class Node:
 
     @property
     def operands(self) -> list[Node]:
-        """The operands that are expressions."""
+        """The operands that are expressions, without the constants."""
         return [x for x in self.of if isinstance(x, Node)]
 
 
@@ -80,8 +83,8 @@ class Graph:
     Attributes:
         place: Index of the current step of the recursion.
         equation: Numbers of the current equation.
-        chapter: The textbook's equations. Each equation records its equation numbers in the nodes that it
-            creates.
+        chapter: The textbook's equations as functions. Each function records its equation numbers in the
+            nodes that it creates.
     """
 
     def __init__(self) -> None:
@@ -94,20 +97,20 @@ class Graph:
         return self.made(letter, place)
 
     def made(self, op: str, *of: Any) -> Node:
-        """Return the node of an operation; equal operations are one node."""
+        """Return the node of an operation. Equal operations with equal operands have the same node."""
         key = (op, *of)
         if (node := self._made.get(key)) is None:
             node = self._made[key] = Node(self, op, of, len(self._made))
         return node
 
     def sine_cosine(self, x: Number) -> tuple[Number, Number]:
-        """Return sine and cosine of an angle, which may be a constant."""
+        """Return the sine and the cosine of an angle, which may be a constant."""
         if not isinstance(x, Node):
             return math.sin(x), math.cos(x)
         return self.made("sin", x), self.made("cos", x)
 
     def root(self, x: Number) -> Number:
-        """Return the square root."""
+        """Return the square root of x."""
         return self.made("sqrt", x) if isinstance(x, Node) else math.sqrt(x)
 
     def sum(self, x: Number, y: Number) -> Number:
@@ -146,9 +149,9 @@ class Graph:
         return self.made("*", *_in_order(x, y))
 
     def _record_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
-        """Return an equation that records its equation numbers in new nodes.
+        """Return a copy of an equation's function that records its equation numbers in the nodes it creates.
 
-        If another equation calls it, the numbers of the outer equation are recorded.
+        If another equation calls this function, the numbers of the calling equation are recorded.
         """
         found = _EQUATIONS.match(equation.__doc__ or "")
         if found is None:
@@ -186,7 +189,7 @@ def _in_order(x: Number, y: Number) -> tuple[Number, Number]:
 
 
 def needed(results: Sequence[Number]) -> list[Node]:
-    """Return all expressions in some results, including their operands, in order of creation."""
+    """Return all expressions that some results need, in the order in which they were created."""
     waiting, seen = [x for x in results if isinstance(x, Node)], set[Node]()
     while waiting:
         if (node := waiting.pop()) not in seen:

@@ -1,7 +1,9 @@
-"""Define one quantity of one frame as a function with inputs, statements and results.
+"""Define a function of the exported code: its inputs, its statements and its results.
 
-An expression becomes a statement with a name if it is used more than once or is a number of a link's state.
-Sines, cosines, roots and quotients also become statements. A long expression is split into several
+A function computes one quantity of one frame.
+
+An expression becomes a statement with a name if it is used more than once, or if it is a number of a link's
+state. Sines, cosines, roots and quotients also become statements. A long expression is split into several
 statements. All other expressions are written where they are used.
 """
 
@@ -24,9 +26,9 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.quantities import Quantity
 
 _INPUTS = ("q", "v", "a")
-#: Operations that are always statements.
+#: Operations that always become statements of their own.
 _ALWAYS = ("sin", "cos", "sqrt", "/")
-#: Largest number of operations in a line.
+#: Largest number of operations in a statement.
 _LONGEST = 12
 
 
@@ -38,7 +40,7 @@ class Function:
         quantity: The quantity's row in the table of quantities.
         reference: The reference frame.
         plan: The compiled tree of the path.
-        results: The results, constants and expressions, row by row.
+        results: The numbers of the result, row by row. Each is a constant or an expression.
     """
 
     quantity: Quantity
@@ -63,7 +65,7 @@ class Function:
 
     @cached_property
     def nodes(self) -> list[Node]:
-        """All needed expressions, in an order in which they can be computed."""
+        """All expressions that the results need, in an order in which they can be computed."""
         return needed(self.results)
 
     @cached_property
@@ -79,7 +81,7 @@ class Function:
 
     @cached_property
     def statements(self) -> list[Node]:
-        """The nodes that are statements, in order."""
+        """The expressions that are statements, in the order of computation."""
         uses = Counter[Node]()
         for value in self.results:
             if isinstance(value, Node):
@@ -98,7 +100,10 @@ class Function:
         return found
 
     def within(self, leaves: Collection[str]) -> set[Node]:
-        """Return the nodes that the results need, without the operands of the operations in `leaves`."""
+        """Return the expressions that the results need.
+
+        The operands of the operations in `leaves` are left out.
+        """
         waiting, found = [x for x in self.results if isinstance(x, Node)], set[Node]()
         while waiting:
             if (node := waiting.pop()) not in found:
@@ -134,12 +139,15 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
 
 
 def _without_minus(node: Node) -> Node:
-    """Return the node without its minus sign, because -x is written where it is used."""
+    """Return the operand x of a node -x; return other nodes unchanged.
+
+    The code contains -x only where it is used, so -x is never a statement.
+    """
     return node.of[0] if node.op == "neg" else node
 
 
 def function_of(plan: CompiledTree, quantity: Quantity, reference: Reference) -> Function:
-    """Make the function of a quantity for the compiled tree's only frame.
+    """Return the function that computes a quantity for the only frame of a compiled tree.
 
     Args:
         plan: The compiled tree of the path.
@@ -163,7 +171,7 @@ def function_of(plan: CompiledTree, quantity: Quantity, reference: Reference) ->
 
 
 def _name(place: int, state: State) -> None:
-    """Name the numbers of a link's state with the textbook's symbols."""
+    """Give names to the numbers of a link's state, from the textbook's symbols."""
     named = {f"R{place + 1}_{r}{c}": x for r, row in enumerate(state.R) for c, x in enumerate(row)}
     for letter in ("p", "w", "vel", "alpha", "acc"):
         vector = getattr(state, letter)

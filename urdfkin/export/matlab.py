@@ -1,4 +1,7 @@
-"""Write a MATLAB and Octave file: one function that returns the others, including the check."""
+"""Write a file for MATLAB and Octave.
+
+The file has one main function, which returns all other functions, including the check.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
-"""Convert names of a URDF to identifiers and to text in comments, safe in every language.
+"""Convert names of a URDF to identifiers and to text for comments that are valid in every language.
 
-Identifiers are short, ASCII and unique. The code adds a prefix (`s_`, `q_`), so that none is a keyword.
+Identifiers are short, ASCII and unique. The exported code adds a prefix such as `s_` or `q_`, so that no
+identifier is a keyword.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ def safe(name: str) -> str:
 
 
 def all_safe(names: Iterable[str]) -> list[str]:
-    """Return a safe name for each name; all are different even in a language that ignores case.
+    """Return a safe name for each name. The safe names differ even in a language that ignores case.
 
     >>> all_safe(["a b", "a/b", "A_b_2"])
     ['a_b', 'a_b_2', 'A_b_2_2']
@@ -44,7 +45,7 @@ def all_safe(names: Iterable[str]) -> list[str]:
 
 
 def title(robot: str, frame: str) -> str:
-    """Return the name of a frame's code; it begins with a letter, and the code adds a suffix.
+    """Return the name of the exported code for a frame. It begins with a letter; callers add a suffix.
 
     >>> title("panda", "panda_hand"), title("ur5", "tool0"), title("2", "x"), title("", "my arm")
     ('panda_hand', 'ur5_tool0', 'robot_2_x', 'my_arm')
@@ -55,12 +56,14 @@ def title(robot: str, frame: str) -> str:
 
 
 def shown(name: str) -> str:
-    """Return a name for a comment in any language, shortened to 80 characters."""
+    """Return a name as text for a comment in any language, shortened to 80 characters."""
     return quiet(name if len(name) <= _LONGEST_SHOWN else f"{name[:_LONGEST_SHOWN]}...")
 
 
 def quiet(text: str) -> str:
-    r"""Return the text as printable ASCII that cannot end a comment in any language, even with C's trigraphs.
+    r"""Return the text as printable ASCII that cannot end a comment in any language.
+
+    C's trigraphs, such as ??/, are removed too.
 
     >>> quiet("*/ int x; ??/")
     '_/ int x; __/'

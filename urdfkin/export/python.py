@@ -1,4 +1,7 @@
-"""Write Python code for NumPy, Numba, JAX, CasADi and SymPy; the expressions are the same for all."""
+"""Write Python code for NumPy, Numba, JAX, CasADi or SymPy.
+
+The expressions are the same for all libraries.
+"""
 
 from __future__ import annotations
 
@@ -13,17 +16,20 @@ from urdfkin.export.function import Function
 
 @dataclass(frozen=True)
 class Dialect:
-    """The parts of a file that depend on the library.
+    """The parts of a file that are different for each library.
 
     Attributes:
         about: Description of a function's inputs and results.
-        imports: Import lines, with a placeholder for those of `cos`, `sin` and `sqrt` that are used.
-        result: Function that yields the lines that return numbers in a shape.
-        values: Body of `_values(function, inputs)`, which returns the results for a list of configurations.
-        decorator: Line before each function; "" for none.
-        entering: Function that returns the first lines of a function from its inputs.
-        index: Format of an element of an input.
-        before: First line of the check in the file; "" for none.
+        imports: Import lines. A placeholder stands for the functions among `cos`, `sin` and `sqrt` that the
+            code uses.
+        result: Function that yields the lines of code that return the results in an array of a given shape.
+        values: Body of the written function `_values(function, inputs)`, which returns the results for a list
+            of configurations.
+        decorator: The decorator's line before each written function; "" if there is none.
+        entering: Function that returns the first lines of a written function, given the inputs of that
+            function.
+        index: Format of the text for an element of an input.
+        before: First line of the written check; "" if there is none.
     """
 
     about: str
@@ -41,7 +47,7 @@ def _rows(values: Sequence[str], width: int) -> list[Sequence[str]]:
 
 
 def _in_array(create: str, index: str) -> Callable[[list[str], tuple[int, ...]], Iterator[str]]:
-    """Return the writer of results into an array, element by element."""
+    """Return a function that yields code which writes the results into an array, element by element."""
 
     def result(values: list[str], shape: tuple[int, ...]) -> Iterator[str]:
         yield f"out = {create.format(shape, ', '.join(map(str, shape)))}"
@@ -55,9 +61,10 @@ def _in_array(create: str, index: str) -> Callable[[list[str], tuple[int, ...]],
 def _nested(
     opening: str, closing: str, row: str = "[{}]", deeper: str = ""
 ) -> Callable[[list[str], tuple[int, ...]], Iterator[str]]:
-    """Return the writer of results in one call, row by row.
+    """Return a function that yields code which creates the array of results in one call, row by row.
 
-    The rows of a Hessian are written as one matrix unless `deeper` reshapes them.
+    The rows of a Hessian (6, nv, nv) are written as one matrix, unless the code in `deeper` gives the array
+    its three axes.
     """
 
     def result(values: list[str], shape: tuple[int, ...]) -> Iterator[str]:
@@ -130,7 +137,10 @@ DIALECTS = {
 
 
 def write(code: Code, to: str) -> str:
-    """Return a module with a function for each quantity and a check, which `python FILE` runs."""
+    """Return the text of a Python module with a function for each quantity.
+
+    The module also contains a check, which `python FILE` runs.
+    """
     dialect = DIALECTS[to]
     about = dialect.about.format(nq=code.nq, nv=code.nv)
     lines = [

@@ -3,7 +3,7 @@
 The compiled tree of a frame is a sequence of steps. Each step is a translation along a rigid link, a constant
 rotation and the motion of a joint about or along z. Placements and Jacobians are computed in the axes of the
 world frame, as in the textbook. Velocities and accelerations are computed in the axes of each link's frame,
-where joint axes are (0, 0, 1) and link vectors are constant. To express a result in the axes of the world
+where joint axes are (0, 0, 1) and link vectors are constant. If a result is needed in the axes of the world
 frame, it is then rotated joint by joint. This takes a third fewer operations than a computation of the
 rotation matrix R.
 
@@ -33,8 +33,10 @@ class Kind:
         chapter: The textbook's equations for this kind of number.
         sine_cosine: Function that returns sine and cosine of an angle.
         root: Function that returns the square root.
-        entering: Callback before each step, before the frame (after the last step) and before its results.
-        reached: Callback for each state, with the number of steps.
+        entering: Function that is called before each step, before the frame after the last step, and before
+            the frame's results. Its argument is the index of the step.
+        reached: Function that is called for each new state. Its arguments are the number of steps so far and
+            the state.
     """
 
     chapter: Any
@@ -51,12 +53,13 @@ class TreeRecursion(Recursion):
         plan: The compiled tree of one frame.
         kind: The kind of number.
         inputs: q, v and a; zeros where they are not needed.
-        own: Whether to compute the motion of each link in the axes of the link's frame.
+        own: Whether the motion of each link is computed in the axes of the link's own frame.
 
     Attributes:
         states: The state after each step.
         end: The state of the frame.
-        turns: The rotations from each frame's axes to the previous frame's axes, from the base.
+        turns: The rotations from the axes of each frame to the axes of the previous frame, in order from the
+            base.
     """
 
     def __init__(
@@ -78,7 +81,7 @@ class TreeRecursion(Recursion):
         kind.entering(len(self.states) + 1)
 
     def turned(self, s: State, S: Matrix) -> State:
-        """Rotate a state, and store the rotation."""
+        """Return a state for a rotated frame, and store the rotation in `turns`."""
         self.turns.append(S)
         return super().turned(s, S)
 
@@ -108,7 +111,7 @@ class TreeRecursion(Recursion):
 
     @property
     def columns(self) -> list[Column]:
-        """The columns of the Jacobian."""
+        """The columns of the frame's Jacobian."""
         found = []
         for row, factor in zip(self.plan.columns.tolist(), self.plan.multipliers.tolist(), strict=True):
             s = self.states[row[ColumnField.STEP]]
@@ -120,10 +123,11 @@ class TreeRecursion(Recursion):
 
 
 def _without_rounding(x: Sequence[float]) -> Vector:
-    """Return a constant vector; entries below the rounding of its largest entry become 0.
+    """Return a constant vector in which entries below the rounding of the largest entry are replaced by 0.
 
-    For example, the cosine of the double nearest to pi/2 is 6e-17, and would only add useless products. The
-    bound of `urdfkin.kinematics.roundings` includes the error of this change.
+    For example, the cosine of the double nearest to pi/2 is 6e-17. Without this function, the exported code
+    would contain useless products with such numbers. The bound of `urdfkin.kinematics.roundings` includes the
+    error of this change.
     """
     least = EPS / 2.0 * max(map(abs, x))
     first, second, third = (c if abs(c) > least else 0.0 for c in x)
@@ -165,7 +169,10 @@ def jacobian_rate(plan: CompiledTree, kind: Kind, inputs: Any, reference: Refere
 
 
 def hessian(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
-    """Return the derivative of each Jacobian entry by each coordinate: 7.126 before its sum."""
+    """Return the derivative of each Jacobian entry with respect to each coordinate.
+
+    These are the terms whose sum is 7.126.
+    """
     path, nv = TreeRecursion(plan, kind, inputs, own=False), plan.nv
     out: list[Number] = [0.0] * (6 * nv**2)
     for of, by, factor, six in path.hessian(path.end, path.columns, reference):

@@ -1,7 +1,7 @@
-"""Write and test the seal of an exported file: a digest of the whole text in the file's header.
+"""Write and test the seal of an exported file. The seal is a digest of the whole text, in the file's header.
 
-It detects changes of the file's numbers, test vectors and statements. It is a digest, not a signature: it
-does not prove who wrote the file.
+The seal shows whether numbers, test vectors or statements of the file were changed. It is a digest and not a
+signature, so it does not prove who wrote the file.
 """
 
 from __future__ import annotations
@@ -10,18 +10,21 @@ import hashlib
 import re
 
 _ZEROS = "0" * 64
-#: The line of a file's header that `seal` completes.
+#: The line in a file's header in which `seal` replaces zeros by the digest.
 SEAL = f"Seal sha256 {_ZEROS}"
 _LINE = re.compile(r"^([ %*]*Seal sha256 )([0-9a-f]{64})$", re.MULTILINE)
 
 
 def seal(text: str) -> str:
-    """Return a file's text with its digest instead of the zeros."""
+    """Return a file's text with its digest in place of the zeros."""
     return _LINE.sub(lambda found: found[1] + _digest(text), text, count=1)
 
 
 def is_sealed(text: str) -> bool | None:
-    """Return whether a file's text is unchanged, except for line ends; None if the text has no seal."""
+    """Return whether a file's text agrees with its seal; None if the text has no seal.
+
+    Different line ends count as equal.
+    """
     text = text.replace("\r\n", "\n")
     if (found := _LINE.search(text)) is None:
         return None
