@@ -132,7 +132,7 @@ def _function(code: Code, function: Function) -> str:
 
 
 def spare(code: Code, function: Function) -> int:
-    """Return how many rows make up at least eight numbers, in every input and in the result."""
+    """Return the smallest number of rows with at least eight numbers in each input and the result."""
     widths = (*code.widths(function).values(), len(function.results))
     return max(-(-8 // width) if width else 0 for width in widths)
 

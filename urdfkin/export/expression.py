@@ -183,7 +183,10 @@ def _without_minus(x: Number) -> Number:
 
 
 def _in_order(x: Number, y: Number) -> tuple[Number, Number]:
-    """Return two operands in a fixed order: a constant first, then the older node."""
+    """Return two operands in a fixed order, so that x + y and y + x are the same node.
+
+    A constant comes before a node, and an older node comes before a newer one.
+    """
     first, second = sorted((x, y), key=lambda z: z.index if isinstance(z, Node) else -1)
     return first, second
 

@@ -1,17 +1,18 @@
 """Analytical Jacobians from a rotation matrix and a velocity Jacobian, without computing any angle.
 
-This is an independent computation of eq. 7.122, for the check. It shares no code with
+This is a second computation of eq. 7.122, with which results are compared. It shares no code with
 `urdfkin.kinematics.rotation` and `urdfkin.kinematics.bodies`.
 
-An Euler sequence rotates about i, then j, then k, so that R = R_i R_j R_k. The first axis is e_i and the
-third is R e_k. The middle axis, the line of nodes, is perpendicular to both of these axes. It is +- n / |n|
-with n = e_i x R e_k. The range of the middle angle b determines the sign:
+An Euler sequence rotates about the coordinate axes i, then j, then k, so that R = R_i R_j R_k. The first axis
+of rotation is e_i and the third is R e_k. The middle axis, the line of nodes, is perpendicular to the first
+and to the third axis. It is +- n / |n| with n = e_i x R e_k. The range of the middle angle b determines the
+sign:
 
 - k = i: b is in [0, pi], the sign is +1, and |n| = |sin b|.
 - k != i: b is in [-pi/2, pi/2], the sign is (e_j x e_i) . e_k, and |n| = |cos b|.
 
-The angle derivatives are the products of w with the reciprocal basis of the three axes. The functions also
-accept arrays of fifty-digit numbers, which the accuracy study uses.
+The time derivatives of the angles are the dot products of the angular velocity w with the reciprocal basis of
+the three axes. The functions also accept arrays of fifty-digit numbers, which the accuracy study uses.
 """
 
 from __future__ import annotations
@@ -21,20 +22,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-#: Floats, or the fifty-digit numbers of the accuracy study.
+#: Arrays of floats, or of the fifty-digit numbers of the accuracy study.
 Numbers = NDArray[Any]
 
 
 def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Numbers]:
-    """Return the derivatives of position and three Euler angles, and the distance from the singularity.
+    """Return the analytical Jacobian for three Euler angles, and the distance from the singularity.
+
+    The Jacobian contains the derivatives of the position and of the angles.
 
     Args:
-        name: Sequence by SciPy's name. Capital letters are body axes, small letters fixed axes.
+        name: SciPy's name of the sequence. Capital letters are body axes, small letters are fixed axes.
         R: (..., 3, 3) rotation from body axes to world axes.
         J_v: (..., 6, n) velocity Jacobian, [linear; angular], in world axes.
 
     Returns:
-        (..., 6, n) and (...) |sin b| or |cos b| of the middle angle.
+        The Jacobian (..., 6, n), and the distance (...): |sin b| or |cos b| of the middle angle b.
     """
     letters = name.lower()[::-1] if name.islower() else name.lower()
     i, j, k = ("xyz".index(letter) for letter in letters)
@@ -51,9 +54,12 @@ def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Number
 
 
 def quaternion_jacobian(quat: Numbers, J_v: Numbers) -> Numbers:
-    """Return the derivatives of position and unit quaternion.
+    """Return the analytical Jacobian for a unit quaternion.
 
-    The derivative of the quaternion is half of the quaternion product (w, 0) times `quat`.
+    It contains the derivatives of the position and of the quaternion.
+
+    The derivative of the quaternion is half of the quaternion product of (w, 0) and `quat`, where w is the
+    angular velocity.
 
     Args:
         quat: (..., 4) unit quaternion, scalar last.

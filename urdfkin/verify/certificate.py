@@ -24,9 +24,9 @@ from urdfkin.verify.comparison import worst_of_each
 from urdfkin.verify.oracles import versions
 from urdfkin.verify.quantities import QUANTITIES
 
-#: Reason in certificates for results of calls with verify=False.
+#: The reason that a certificate states for results of calls with verify=False.
 NOT_ASKED_FOR = "the check was turned off by verify=False"
-#: Lock for all ledgers.
+#: A lock for the entries of all ledgers.
 _entering = lock_over_forks()
 
 
@@ -38,10 +38,10 @@ class VerificationError(UrdfkinError):
         frame: Name of the frame.
         reference: Reference frame; for an analytical Jacobian, the representation.
         index: Index of the worst sample in the batch.
-        ours: urdfkin's value of that sample.
-        theirs: The oracle's value.
-        bound: Largest allowed difference of each number.
-        units: The difference in multiples of eps * scale.
+        ours: urdfkin's result for that sample.
+        theirs: The oracle's result for that sample.
+        bound: Largest allowed difference between `ours` and `theirs`, for each number of the result.
+        units: The difference between `ours` and `theirs` in multiples of eps * scale.
         reproduce: A command or a line of Python that computes the case again.
 
     >>> import urdfkin
@@ -79,13 +79,13 @@ class VerificationError(UrdfkinError):
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Comparison of one batch of results with the oracle's.
+    """Comparison of a batch of urdfkin's results with the oracle's results.
 
     Attributes:
         results: Number of results (matrices or six-vectors).
-        worst: Largest difference, in multiples of eps * scale.
+        worst: Largest difference between a number of urdfkin and the oracle's, in multiples of eps * scale.
         share: Largest ratio of a difference to its bound; above 1 is a failure.
-        index: Index of the largest ratio in the results' leading axes.
+        index: Index of the sample with the largest ratio, in the leading axes of the results.
     """
 
     results: int
@@ -95,11 +95,11 @@ class Comparison:
 
     @classmethod
     def of_nothing(cls) -> Comparison:
-        """Return the comparison of no results, which agrees."""
+        """Return the comparison of an empty batch, which counts as agreement."""
         return cls(0, 0.0, 0.0, ())
 
     def __add__(self, other: Comparison) -> Comparison:
-        """Return the comparison of both batches; `index` is that of the larger ratio."""
+        """Return the comparison of two batches together; `index` is that of the larger ratio."""
         first, second = (self, other) if self.share >= other.share else (other, self)
         return Comparison(
             self.results + other.results,
@@ -110,7 +110,7 @@ class Comparison:
 
     @property
     def agrees(self) -> bool:
-        """True if every number is within its bound."""
+        """Whether every difference is within its bound."""
         return self.share <= 1.0
 
 
@@ -120,7 +120,7 @@ def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> Co
     Args:
         ours: urdfkin's results. The first `axes` axes count results, the others belong to one result.
         theirs: The oracle's results, of the same shape.
-        bound: Bound of the difference; its arrays `scale` and `k` broadcast against the results.
+        bound: Bound on the difference. Its arrays `scale` and `k` broadcast against the results.
         axes: Number of leading axes that count results.
     """
     units = worst_of_each(ours, theirs, bound.scale, axes)
@@ -133,12 +133,12 @@ def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> Co
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A quantity's line in a certificate.
+    """The line of a certificate about one quantity.
 
     Attributes:
         quantity: Name of the quantity.
         checked: Number of results that the oracle confirmed.
-        worst: Largest difference among them, in eps * scale.
+        worst: Largest difference between these results and the oracle's, in multiples of eps * scale.
         share: Largest ratio of a difference to its bound.
         unchecked: Number of results that were returned without a check.
     """
@@ -151,7 +151,7 @@ class Line:
 
 
 class LineEntry(TypedDict):
-    """The results of one quantity."""
+    """The line of a saved certificate about one quantity, as plain data."""
 
     quantity: Annotated[str, says("Name of the quantity.")]
     checked: Annotated[Count, says("Number of results that the oracle confirmed.")]
@@ -180,7 +180,7 @@ class CertificateDocument(Header):
     ]
 
 
-#: The layout of a saved certificate.
+#: The version number of the layout of a saved certificate.
 CERTIFICATE = Layout(
     "urdfkin-certificate/1",
     CertificateDocument,
@@ -196,9 +196,10 @@ class Certificate(Displayable):
     Attributes:
         robot: The robot's name.
         oracle: Name and version of the oracle: "Pinocchio 4.1.0".
-        lines: One entry for each computed quantity.
+        lines: One line for each quantity that was computed.
         not_verified: Reasons why results were not checked; empty if all were checked.
-        reading: Result of the check of a conversion from another format to URDF; empty for a URDF.
+        reading: If the robot was converted from another format to URDF, the result of the check of this
+            conversion; empty for a URDF.
         source: Source of the robot: a path, a catalogue name or "<text>".
         sha256: Digest of the URDF text as UTF-8, or of the MJCF file.
         urdfkin: Version of urdfkin.
@@ -305,13 +306,13 @@ class Certificate(Displayable):
 
 @dataclass(slots=True)
 class Account:
-    """The entries of a ledger about one quantity.
+    """The entries of a ledger for one quantity.
 
     Attributes:
-        checked: Comparison of all results that the oracle confirmed, combined into one.
+        checked: One comparison for all results that the oracle confirmed.
         unchecked: Number of results that the oracle could not check, or that `verify="sample"` left out.
         not_asked_for: Number of results of calls with verify=False.
-        counters: Arrays and indices of additional counters of unchecked results, which fast evaluators use.
+        counters: Arrays and indices of the counters in which fast evaluators count their unchecked results.
     """
 
     checked: Comparison = field(default_factory=Comparison.of_nothing)
@@ -321,24 +322,24 @@ class Account:
 
     @property
     def unwanted(self) -> int:
-        """Number of all results of calls with verify=False, including those in the counters."""
+        """Number of all results of calls with verify=False, including the results in `counters`."""
         return self.not_asked_for + sum(int(counts[place]) for counts, place in self.counters)
 
     def line(self, quantity: str) -> Line:
-        """Return the certificate's line of these entries."""
+        """Return the certificate's line for these entries."""
         found = self.checked
         return Line(quantity, found.results, found.worst, found.share, self.unchecked + self.unwanted)
 
 
 @dataclass
 class Ledger:
-    """Counts the checked and unchecked results of a robot; safe to use from several threads."""
+    """Counts the checked and the unchecked results of a robot. Several threads may use the same ledger."""
 
     _accounts: dict[str, Account] = field(default_factory=dict)
     _reasons: dict[str, None] = field(default_factory=dict)
 
     def account(self, quantity: str) -> Account:
-        """Return the account of a quantity, for code that counts often."""
+        """Return the account of a quantity. Code that counts results often can store and reuse it."""
         with _entering:
             return self._accounts.setdefault(quantity, Account())
 
@@ -349,7 +350,10 @@ class Ledger:
             account.checked += comparison
 
     def unchecked(self, quantity: str, results: int, reason: str | None = None) -> None:
-        """Add results without a check, with the reason; None for calls with verify=False."""
+        """Count results that were not checked.
+
+        The reason is None for calls with verify=False.
+        """
         account = self.account(quantity)
         with _entering:
             if reason is None:
@@ -374,5 +378,5 @@ class Ledger:
             )
 
     def __reduce__(self) -> tuple[type[Ledger], tuple[()]]:
-        # A copy in another process starts with an empty ledger.
+        # A copy of a ledger in another process starts without entries.
         return type(self), ()

@@ -1,7 +1,8 @@
-"""Add the columns of mimic joints to those of the mimicked joints.
+"""Add the Jacobian columns of mimic joints to the columns of the mimicked joints.
 
-For large batches a kernel does so in one pass: NumPy reads all Jacobians from memory once for each column,
-which takes longer than Pinocchio's own computation on robots with mimic joints. The numbers are equal.
+For large batches, a compiled kernel reads all Jacobians from memory only once. NumPy reads them once for each
+column. For robots with mimic joints, this takes longer than Pinocchio's computation of the Jacobians. The
+kernel and NumPy return equal numbers.
 """
 
 from __future__ import annotations
@@ -16,18 +17,18 @@ from urdfkin.compiled import preload
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.comparison import KERNELS
 
-#: Index in v of each of Pinocchio's joint velocities.
+#: For each of Pinocchio's joint velocities, the index in urdfkin's v.
 Places = np.ndarray[Any, np.dtype[np.int64]]
 
 
 def coupled(full: FloatArray, columns: Places, index: Places, factor: FloatArray, nv: int) -> FloatArray:
-    """Return J_full G, the columns for the robot's own joint velocities.
+    """Return the product J_full G, the Jacobian columns for urdfkin's joint velocities v.
 
     Args:
         full: (..., Pinocchio's nv) columns for all joints.
-        columns: Pinocchio's columns to use, in the order of summation.
-        index: (Pinocchio's nv,) index in v of each column.
-        factor: (Pinocchio's nv,) factor of each column in G.
+        columns: Indices of the columns of J_full that are added, in the order of summation.
+        index: (Pinocchio's nv,) index in v for each column of J_full.
+        factor: (Pinocchio's nv,) the number in G by which each column of J_full is multiplied.
         nv: Length of v.
 
     Returns:

@@ -1,10 +1,10 @@
-"""Read an MJCF file in a confined process, and compare the resulting robot with MuJoCo's model of the file.
+"""Read an MJCF file in a process with limits on time and memory, and compare the robot with MuJoCo's model.
 
-Pinocchio checks every result with the URDF text that urdfkin writes for the tree. Such a check does not cover
-the conversion from the MJCF file to the tree. Therefore `load` compares the tree with MuJoCo's own model: the
-placements of bodies and sites, and the equalities that became mimic rules. The placements by Pinocchio's MJCF
-reader are compared too. This reader is known to read some files differently, so a difference is reported and
-is not an error.
+Pinocchio checks every result with the URDF text that urdfkin writes for the tree. This check does not include
+the conversion from the MJCF file to the tree. Therefore `load` compares the tree with MuJoCo's own model of
+the file. It compares the placements of bodies and sites, and the equalities that became mimic rules. It also
+compares the placements with those of Pinocchio's MJCF reader. That reader is known to read some files
+differently, so a difference from it is reported but is not an error.
 """
 
 from __future__ import annotations
@@ -35,28 +35,28 @@ from urdfkin.verify.mjcf_process import TOO_MUCH, unpacked
 from urdfkin.verify.quantities import PLACEMENT
 from urdfkin.verify.verifier import Verifier
 
-#: Random configurations for the comparison, besides the zero configuration.
+#: Number of random configurations that are compared, in addition to the zero configuration.
 _SAMPLES = 8
-#: Time limit for reading, seconds.
+#: Time limit for reading a file, seconds.
 PATIENCE = 60.0
-#: Longest quotation of a MuJoCo error in a certificate, characters.
+#: Largest number of characters that a certificate quotes from a MuJoCo error.
 _QUOTED = 300
-#: Largest answer of the process, bytes.
+#: Largest accepted size of the process's output, bytes.
 MOST = 400_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class MjcfReading:
-    """The result of the confined process for an MJCF file, as plain data.
+    """The result of reading an MJCF file in a separate process, as plain data.
 
     Attributes:
         urdf: The tree as a URDF text.
         listed: Elements of the file that the tree does not contain.
         path: The file; None for a text.
-        answer: The process's answer about the robot: frames, and MuJoCo's results.
+        answer: The process's answer about the robot, with its frames and MuJoCo's results.
         not_whole: Reason why MuJoCo compiled the file without shapes and inertias; None if MuJoCo compiled
             the complete file.
-        pinocchio: The answer about Pinocchio's reader; None if there is none.
+        pinocchio: The process's answer about Pinocchio's reader; None if there is no such answer.
     """
 
     urdf: str
@@ -74,7 +74,7 @@ def read_mjcf(
 
     Args:
         source: A path, a text or its bytes; included files are read too.
-        check: Also compute placements with MuJoCo, for `check_mjcf_source`.
+        check: Whether to compute placements with MuJoCo too, for `check_mjcf_source`.
         patience: Time limit, seconds.
 
     Raises:
@@ -123,7 +123,7 @@ def _text(source: str | bytes | os.PathLike[str], name: str) -> str:
 
 
 def _ask(request: Mapping[str, Any], patience: float) -> tuple[list[dict[str, Any]], str]:
-    """Return the answers of the process, and the reason why there are no further ones."""
+    """Return the answers of the process, and the reason why further answers are missing."""
     command = own_python(
         "from urdfkin.verify.mjcf_process import serve; serve()", options=("-B", "-X", "utf8")
     )
@@ -137,7 +137,7 @@ def _ask(request: Mapping[str, Any], patience: float) -> tuple[list[dict[str, An
 
 
 def _is_answer(line: bytes) -> bool:
-    """Return whether a line is a complete answer.
+    """Return whether a line of the process's output is a complete answer.
 
     Other lines are text that a library printed, or the first part of an answer of a killed process.
     """
@@ -145,14 +145,14 @@ def _is_answer(line: bytes) -> bool:
 
 
 def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
-    """Compare a robot with MuJoCo's model of the MJCF file that it was made of.
+    """Compare a robot with MuJoCo's model of the MJCF file from which the robot was read.
 
     Args:
         verifier: Verifier of the robot.
         read: The result of `read_mjcf`.
 
     Returns:
-        A line about the result, for the certificate.
+        A line of text about the result, for the certificate.
 
     Raises:
         OracleError: MuJoCo's placement of a body or site differs by more than the bound, or MuJoCo couples
@@ -163,7 +163,8 @@ def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
     frames = [LinkFrame.of(name) for name, _ in answer["frames"]]
     plan = compile_tree(tree, [tree.frame_link(frame) for frame in frames])
     ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
-    # Both computations round, and the URDF's angles are rounded too. So the bound is twice MuJoCo's.
+    # urdfkin and MuJoCo round, and the angles in the URDF text are rounded too. The bound is therefore twice
+    # the bound for a comparison with MuJoCo.
     size = about_the_root(magnitudes(plan, q, None, None, STILL_STATE))
     bound = PLACEMENT.bound(plan, size, None)
     bound = Bound(bound.scale, 2.0 * bound.k)
@@ -187,7 +188,10 @@ def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
 
 
 def _demand_the_rules(name: str, answer: Mapping[str, Any]) -> float | None:
-    """Check the mimic rules with MuJoCo's equalities; return the worst ratio to the bound, or None."""
+    """Check the mimic rules with the equalities of MuJoCo's model.
+
+    Return the largest ratio of a difference to its bound, or None.
+    """
     rules = {int(i): str(joint) for i, joint in answer["rules"]}
     residuals, sizes = unpacked(answer["residuals"]), unpacked(answer["rule_sizes"])
     active = set(np.flatnonzero(~np.isnan(residuals).all(axis=0)).tolist())
@@ -221,7 +225,7 @@ def _error(where: str, found: str) -> OracleError:
 
 
 def _whole(found: Mapping[str, Any]) -> FloatArray:
-    """Return matrices (n, frames, 4, 4) from the upper three rows, which an answer contains."""
+    """Return matrices (n, frames, 4, 4) from their upper three rows; an answer contains only these rows."""
     rows = unpacked(found)
     T = np.zeros((*rows.shape[:2], 4, 4))
     T[..., :3, :], T[..., 3, 3] = rows, 1.0
@@ -235,7 +239,7 @@ def _shares(ours: FloatArray, theirs: FloatArray, bound: Bound) -> FloatArray:
 
 
 def _pinocchios(read: MjcfReading, ours: FloatArray, bound: Bound) -> str:
-    """Return a phrase about the placements by Pinocchio's MJCF reader."""
+    """Return a phrase about the comparison with the placements by Pinocchio's MJCF reader."""
     if read.path is None:
         return "not compared with Pinocchio's MJCF reader, which needs a file"
     found = read.pinocchio or {"error": "the process of the reader ended"}

@@ -1,13 +1,12 @@
-"""Program of the confined process that compiles an MJCF file with MuJoCo and with Pinocchio's MJCF reader.
+"""Program that compiles an MJCF file with MuJoCo, and with Pinocchio's MJCF reader, in a separate process.
 
-A few lines of MJCF can require any time and memory (nested `<replicate>`, `nuser_body`), and a defect of a
-parser can crash the process. Therefore a separate process compiles the file, and the caller's process
-receives only plain data from it. The request comes on standard input. Each answer is a line of JSON on
-standard output:
+A few lines of MJCF, such as nested `<replicate>` or `nuser_body`, can require any amount of time and memory.
+A defect of a parser can crash the process. Therefore a separate process compiles the file, and the caller's
+process receives only plain data from it. The request comes on standard input. Each answer is a line of JSON
+on standard output:
 
-1. the robot without its shapes
-2. the robot of the complete file
-3. the placements of the bodies by Pinocchio's reader
+1. the robot, compiled without its shapes 2. the robot, compiled from the complete file 3. the placements of
+the bodies by Pinocchio's reader
 
 If the process ends early, the answers that it has already written remain valid.
 """
@@ -37,7 +36,7 @@ from urdfkin.verify.sampling import sample
 
 #: Number of coordinates of a free joint.
 _CARTESIAN = 7
-#: Largest number of names that an error lists.
+#: Largest number of names that an error message lists.
 _NAMED = 5
 
 TOO_MUCH = f"it takes more than {MEMORY / 1024**3:g} GiB of memory"
@@ -47,7 +46,8 @@ def serve() -> None:
     """Read a request from standard input and write the answers to standard output."""
     request = json.load(sys.stdin)
     try:
-        library().set_mju_user_warning(lambda message: None)  # without it MuJoCo writes a log file
+        # without this function, MuJoCo writes a log file
+        library().set_mju_user_warning(lambda message: None)
         if request["path"] is not None and request["samples"]:
             with suppress(InstallationError):
                 pinocchio()
@@ -62,11 +62,14 @@ def serve() -> None:
     except Exception as error:
         message = f"{type(error).__name__}: {error}"
         _say({"error": {"what": "MuJoCo cannot compile this MJCF", "found": message[:2000]}})
-    os._exit(0)  # skip the exit handlers of libraries
+    os._exit(0)  # end the process without the exit handlers of the libraries
 
 
 def _plain(found: str | None) -> str | None:
-    """Return MuJoCo's message; add a hint to "unknown exception", which it reports when memory runs out."""
+    """Return MuJoCo's message.
+
+    When memory runs out, MuJoCo reports only "unknown exception". A hint is then added.
+    """
     return f"{found} Perhaps {TOO_MUCH}" if found and found.endswith("unknown exception!") else found
 
 
@@ -103,7 +106,10 @@ def answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
 
 
 def _configurations(read: Mjcf, samples: int) -> FloatArray:
-    """Return (n, nq): the zero configuration and `samples` random ones, or none if `samples` is 0."""
+    """Return configurations (n, nq): the zero configuration and `samples` random ones.
+
+    If `samples` is 0, there are no configurations.
+    """
     if not samples:
         return np.empty((0, read.tree.nq))
     drawn = sample(read.tree, samples, np.random.default_rng(0))
@@ -132,13 +138,13 @@ def _answer(read: Mjcf, q: FloatArray) -> dict[str, Any]:
 
 
 def packed(numbers: FloatArray) -> dict[str, Any]:
-    """Return an array as plain data for JSON."""
+    """Return an array in the form in which an answer contains it, as plain data for JSON."""
     data = np.ascontiguousarray(numbers, dtype="<f8")
     return {"shape": data.shape, "base64": base64.b64encode(data.tobytes()).decode("ascii")}
 
 
 def unpacked(found: Mapping[str, Any]) -> FloatArray:
-    """Return the array of `packed`."""
+    """Return the array from the data that `packed` returned."""
     numbers = np.frombuffer(base64.b64decode(found["base64"]), dtype="<f8")
     return numbers.reshape([int(n) for n in found["shape"]]).astype(np.float64)
 
@@ -155,11 +161,13 @@ def _pinocchios(path: str, read: Mjcf, q: FloatArray) -> dict[str, Any]:
 def _pinocchio_placements(
     path: str, qpos: FloatArray, coordinates: Mapping[str, int], bodies: Sequence[str]
 ) -> FloatArray:
-    """Return placements (n, bodies, 4, 4) by Pinocchio's MJCF reader; joints and bodies match by name.
+    """Return placements (n, bodies, 4, 4) that Pinocchio computes from the MJCF file.
+
+    The joints and bodies of Pinocchio and MuJoCo are matched by name.
 
     Args:
         path: The file.
-        qpos: (n, MuJoCo's nq) configurations.
+        qpos: (n, nq of MuJoCo) configurations.
         coordinates: Index of each joint's first number in `qpos`.
         bodies: Names of bodies.
 
@@ -169,7 +177,7 @@ def _pinocchio_placements(
     pin = pinocchio()
     try:
         model = pin.buildModelFromMJCF(path)
-    except Exception as error:  # the exceptions of its parsers
+    except Exception as error:  # the exceptions that Pinocchio's parsers raise
         raise OracleError("the reader does not accept the file", found=str(error).strip()) from error
     joints = dict(_numbered(model, list(coordinates)))
     if joints.keys() != coordinates.keys():
@@ -187,7 +195,7 @@ def _pinocchio_placements(
                 q[first : first + 7] = [*numbers[at : at + 3], *np.roll(numbers[at + 3 : at + 7], -1)]
             elif count == 1:
                 q[first] = x
-            else:  # a revolute joint without limits
+            else:  # Pinocchio stores a revolute joint without limits as cosine and sine
                 q[first : first + 2] = np.cos(x), np.sin(x)
         pin.framesForwardKinematics(model, data, q)
         out[k] = [data.oMf[i].homogeneous for i in ids]
@@ -197,8 +205,8 @@ def _pinocchio_placements(
 def _numbered(model: Any, names: Sequence[str]) -> Iterator[tuple[str, tuple[int, int]]]:
     """Yield the name of each joint with its index in q and its number of coordinates.
 
-    Pinocchio combines several joints of a body into one with the name `Composite_` plus the first joint's
-    name. This joint has one coordinate for each of the combined joints.
+    Pinocchio combines several joints of a body into one joint. Its name is `Composite_` followed by the first
+    joint's name. It has one coordinate for each of the combined joints.
     """
     for j, name in list(enumerate(map(str, model.names)))[1:]:
         joint, first = model.joints[j], name.removeprefix("Composite_")

@@ -1,4 +1,4 @@
-"""Check a robot that was made of a `pinocchio.Model`: compare the placements of both."""
+"""Check a robot that was made from a `pinocchio.Model`: compare the placements of the robot and the model."""
 
 from __future__ import annotations
 
@@ -21,33 +21,34 @@ from urdfkin.verify.quantities import PLACEMENT
 from urdfkin.verify.sampling import sample
 from urdfkin.verify.verifier import Verifier
 
-#: Random configurations for the comparison, besides the zero configuration.
+#: Number of random configurations that are compared, in addition to the zero configuration.
 _SAMPLES = 8
 
 
 def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
-    """Compare the placements of a robot with those of the model it was made of.
+    """Compare the placements of a robot with those of the Pinocchio model from which it was made.
 
     Args:
         verifier: Verifier of the robot.
-        made: The tree that was read from the model, with the model's index of each link.
-        source: The model, or a RobotWrapper of it.
+        made: The tree that was read from the model, with the index in the model for each link.
+        source: The Pinocchio model, or a RobotWrapper that contains it.
 
     Returns:
-        A line about the result, for the certificate.
+        A line of text about the result, for the certificate.
 
     Raises:
         OracleError: a placement differs by more than the bound.
     """
     model, tree = getattr(source, "model", source), verifier.tree
-    if model.nv > MOST_RATES:  # Pinocchio's memory grows with the cube of nv
+    if model.nv > MOST_RATES:  # the memory that Pinocchio needs grows with the cube of nv
         return f"not compared with the model itself: nv is {model.nv}, more than {MOST_RATES}"
     q = np.vstack((neutral(tree), sample(tree, _SAMPLES, np.random.default_rng(0))))
     names = [*made.joints, *made.frames]
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in names])
     ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
     theirs = _placements(model, _configurations(model, tree, q), made)
-    # Both computations round, and the URDF's angles are rounded too. So twice the bound is allowed.
+    # urdfkin and Pinocchio round, and the angles in the URDF text are rounded too. Twice the bound is
+    # therefore allowed.
     bound = PLACEMENT.bound(plan, magnitudes(plan, q, None, None, STILL_STATE), None)
     found = compare(ours, theirs, Bound(bound.scale, 2.0 * bound.k), 2)
     if not found.agrees:
@@ -64,7 +65,7 @@ def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
 
 
 def _placements(model: Any, q: FloatArray, made: Modelled) -> FloatArray:
-    """Return the model's placements (n, links, 4, 4), first of joints, then of frames."""
+    """Return the model's placements (n, links, 4, 4). Those of joints come first, then those of frames."""
     pin = pinocchio()
     data = model.createData()
     out = np.empty((len(q), len(made.joints) + len(made.frames), 4, 4))
@@ -76,7 +77,10 @@ def _placements(model: Any, q: FloatArray, made: Modelled) -> FloatArray:
 
 
 def _configurations(model: Any, tree: KinematicTree, q: FloatArray) -> FloatArray:
-    """Return the model's configurations (n, model.nq); joints are matched by name."""
+    """Return configurations (n, model.nq) of the model for the tree's q.
+
+    Joints are matched by name.
+    """
     full = np.zeros((len(q), int(model.nq)))
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         if not joint.nq:

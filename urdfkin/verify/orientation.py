@@ -1,7 +1,7 @@
-"""Check roll-pitch-yaw angles and quaternions: Pinocchio converts them back to rotation matrices.
+"""Check roll-pitch-yaw angles and quaternions by converting them back to rotation matrices with Pinocchio.
 
-The matrices are compared, not the numbers. Two correct programs may return different numbers for the same
-rotation: at gimbal lock, or if their quaternions have opposite signs.
+The comparison uses the matrices and not the angles or quaternions. Two correct programs may return different
+angles for the same rotation at gimbal lock. They may also return quaternions of opposite signs.
 """
 
 from __future__ import annotations
@@ -15,23 +15,23 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.certificate import VerificationError
 from urdfkin.verify.pinocchio_module import pinocchio
 
-#: Rounding error of both sides in eps, less than 8 eps each, counted as for a joint in `roundings`. For
-#: angles, the operations are arctan2, sines, cosines and products of three numbers. For quaternions, they are
-#: a square root, a quotient and products of two numbers.
+#: Rounding errors of urdfkin and of Pinocchio together, in eps; each is less than 8 eps. They are counted as
+#: for a joint in `roundings`. For angles, the operations are arctan2, sines, cosines and products of three
+#: numbers. For quaternions, they are a square root, a quotient and products of two numbers.
 _ROUNDINGS = 16.0
 
 
 def check_orientations(numbers: FloatArray, R: FloatArray, frame: str, again: Callable[[int], str]) -> None:
-    """Compare Pinocchio's rotations of some numbers with the rotations they were computed from.
+    """Compare rotations that Pinocchio computes from angles or quaternions with the original rotations.
 
-    The bound includes the distance of `R` from the nearest rotation matrix. Angles and quaternions can only
-    represent exact rotations, so they cannot be closer to `R` than that.
+    The bound includes the distance of `R` from the nearest rotation matrix. Angles and quaternions represent
+    exact rotations only, so Pinocchio's rotation cannot be closer to `R` than that.
 
     Args:
         numbers: (n, 3) roll, pitch, yaw in rad, or (n, 4) quaternions, scalar last.
-        R: (n, 3, 3) checked rotations.
+        R: (n, 3, 3) rotations from which the numbers were computed; they were checked before.
         frame: Name of the frame, for the message.
-        again: Function that returns the line that reproduces a sample.
+        again: Function that returns a command or lines of Python that reproduce a sample.
 
     Raises:
         VerificationError: a rotation differs by more than the bound.

@@ -21,7 +21,8 @@ def pinocchio() -> Any:
     """Return the module of Pinocchio.
 
     Raises:
-        InstallationError: it is not installed, has an unsupported version, or is a different project.
+        InstallationError: Pinocchio is not installed, has an unsupported version, or is a different project
+            of the same name.
     """
     try:
         import pinocchio as found  # noqa: PLC0415  slow to import, needed for checks only
@@ -46,7 +47,7 @@ def pinocchio() -> Any:
 
 
 def version() -> str:
-    """Return the version of Pinocchio; "not installed" if there is no supported one."""
+    """Return the version of Pinocchio; "not installed" if no supported version is installed."""
     try:
         return str(pinocchio().__version__)
     except InstallationError:
@@ -54,7 +55,7 @@ def version() -> str:
 
 
 def _impostor(found: Any) -> InstallationError:
-    """Return the error about a different project under Pinocchio's name, with the remedy."""
+    """Return the error for a different project with Pinocchio's name; its message states the remedy."""
     file = found.__file__ or next(iter(found.__path__), "a folder without modules")
     owner = _owner(Path(file))
     cure = f"pip uninstall {owner[0]}" if owner else f"rename or remove {file}"
@@ -69,7 +70,7 @@ def _impostor(found: Any) -> InstallationError:
 
 
 def _owner(file: Path) -> tuple[str, str] | None:
-    """Return name and version of the installed project that contains a file."""
+    """Return the name and the version of the installed project that contains a file."""
     from importlib import metadata  # noqa: PLC0415  for an error only
 
     for project in metadata.distributions():

@@ -1,4 +1,4 @@
-"""The command that computes one case again, for error messages and reports."""
+"""The shell command that computes one case again, for error messages and reports."""
 
 from __future__ import annotations
 
@@ -11,14 +11,16 @@ from urdfkin.urdf.sources import Origin
 def replay_line(
     origin: Origin, command: str, frame: str, reference: str | None, values: Mapping[str, Sequence[float]]
 ) -> str:
-    """Return the command that computes one case again. Its numbers have enough digits to be exact.
+    """Return the shell command that computes one case again.
+
+    The numbers in the command have enough digits to be exact.
 
     Args:
         origin: Source of the robot. A robot given as text must be passed on standard input.
-        command: Command of the quantity.
+        command: Name of the urdfkin command that computes the quantity.
         frame: Name of a link or joint.
         reference: Reference frame; None for a placement.
-        values: The numbers of q, v and a that the command takes.
+        values: The numbers of q, v and a, as far as the command takes them.
 
     >>> replay_line(Origin("ur5"), "velocity", "tool 0", "local", {"q": [0.5, 0.1], "v": []})
     "urdfkin velocity ur5 --frame 'tool 0' --reference local --q 0.5,0.1 --v neutral"

@@ -1,1 +1,1 @@
-"""Reference values: the same quantities with fifty digits, or with intervals that contain the true value."""
+"""Reference values: quantities computed with fifty digits, or as intervals that contain the true value."""

@@ -37,7 +37,8 @@ from urdfkin.verify.quantities import (
 )
 from urdfkin.verify.verifier import Verifier, theirs_of, urdfkins
 
-#: Smallest and largest accepted number of digits. A double has 15 digits; more than 10,000 take too long.
+#: Smallest and largest accepted number of decimal digits. A double has 15 digits. A computation with more
+#: than 10,000 digits takes too long.
 LEAST_DIGITS, MOST_DIGITS = 15, 10_000
 
 _ENDS = np.vectorize(ends, otypes=[float, float])
@@ -45,12 +46,12 @@ _ENDS = np.vectorize(ends, otypes=[float, float])
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Enclosure:
-    """Bounds of the true values of one quantity, number by number.
+    """Lower and upper bounds of the true values of one quantity, for each number of the result.
 
     Attributes:
         quantity: Name of the quantity.
-        lower: Lower bounds, in the shape that the method of `Robot` returns.
-        upper: Upper bounds.
+        lower: Lower bounds. The shape is that of the result of the method of `Robot`.
+        upper: Upper bounds, in the same shape.
         urdfkin: urdfkin's result.
         pinocchio: Pinocchio's result; None if Pinocchio cannot compute it.
     """
@@ -63,14 +64,14 @@ class Enclosure:
 
     @property
     def width(self) -> FloatArray:
-        """The difference upper - lower. It is 0 where the true value is a double.
+        """The difference `upper - lower`. It is 0 for each number whose true value is a double.
 
-        Elsewhere it is at least the distance of two neighbouring doubles.
+        For all other numbers, it is at least the distance between two neighbouring doubles.
         """
         return self.upper - self.lower
 
     def contains(self, x: ArrayLike) -> NDArray[np.bool_]:
-        """Return a bool array: True where the number of `x` lies between `lower` and `upper`.
+        """Return a bool array. It is True for each number of `x` that lies between `lower` and `upper`.
 
         Args:
             x: Values, of the quantity's shape.
@@ -82,7 +83,7 @@ class Enclosure:
         return (self.lower <= x) & (x <= self.upper)
 
     def error(self, x: ArrayLike) -> FloatArray:
-        """Return an upper bound of the error of each number of `x`.
+        """Return an upper bound on the difference between each number of `x` and the true value.
 
         Args:
             x: Values, of the quantity's shape.
@@ -117,8 +118,8 @@ class Enclosures:
     Attributes:
         frame: Name of the frame.
         reference: Reference frame of velocity, acceleration and Jacobians.
-        digits: Decimal digits of the interval arithmetic. The ends of the resulting intervals are rounded
-            outward to doubles.
+        digits: Number of decimal digits of the interval arithmetic. The ends of the resulting intervals are
+            rounded outward to doubles.
         placement: (4, 4) m.
         velocity: (6,) [linear; angular], m/s, rad/s.
         acceleration: (6,) [linear; angular], classical, m/s^2, rad/s^2.
@@ -158,7 +159,7 @@ def enclose(
     *,
     hessian: bool = False,
 ) -> Enclosures:
-    """Return the enclosures of one frame for one sample; the arguments are those of `Robot.enclose`.
+    """Return the enclosures of one frame for one sample. Most arguments are those of `Robot.enclose`.
 
     Args:
         verifier: Verifier of the robot.
@@ -168,7 +169,7 @@ def enclose(
         reference: Reference frame.
         base: Motion of the root link; None: fixed at the world origin.
         digits: Decimal digits, or None for the default.
-        hessian: Also enclose the Hessian.
+        hessian: Whether to enclose the Hessian too.
 
     Raises:
         InputError: a batch, a wrong length, or an invalid number of digits.

@@ -1,4 +1,4 @@
-"""The forward recursion of section 7.7 on balls that contain the true values.
+"""The forward recursion of section 7.7 with balls. A ball is an interval that contains the true value.
 
 The equations are those of `urdfkin.kinematics.equations`, in world axes as in the textbook. The inputs are
 the URDF's decimals and the exact values of q, v and a. The results are reference values that measure rounding
@@ -29,7 +29,8 @@ from urdfkin.verify.pinocchio_inputs import BaseNumbers
 
 _RECURSION = Recursion(equations)
 
-#: Axis of the child link, and whether the rate is a rotation, of each rate of a planar or floating joint.
+#: For each joint velocity of a planar or floating joint: the index of its axis of the child link, and whether
+#: the motion is a rotation.
 _FREE_AXES = {
     JointKind.PLANAR: ((0, False), (1, False), (2, True)),
     JointKind.FLOATING: tuple((k, turns) for turns in (False, True) for k in range(3)),
@@ -37,11 +38,11 @@ _FREE_AXES = {
 
 
 def on_base(base: BaseNumbers) -> State:
-    """Return the state of a moving root link, from the user's numbers.
+    """Return the state of a moving root link from the numbers of the base's motion.
 
     Args:
-        base: (4, 4) placement, (6,) velocity and acceleration. The placement's matrix is a rotation to nine
-            digits; the rotation nearest to it is used.
+        base: (4, 4) placement, (6,) velocity and acceleration. The rotation matrix of the placement is
+            correct to nine digits. The nearest exact rotation replaces it.
     """
 
     def vector(x: FloatArray) -> Vector:
@@ -54,11 +55,11 @@ def on_base(base: BaseNumbers) -> State:
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """The motion of the robot in one sample.
+    """The motion of all links of the robot in one sample.
 
     Attributes:
-        states: Position, velocity and acceleration of each link, by index.
-        columns: Columns of each link's Jacobian, by index.
+        states: Position, velocity and acceleration of each link, by the link's index.
+        columns: Columns of each link's Jacobian, by the link's index.
         nv: Length of v.
     """
 
@@ -76,11 +77,12 @@ def move(
     *,
     base: State | None = None,
 ) -> Motion:
-    """Return the motion of the root and of the child link of each joint, for one sample.
+    """Return the motion, in one sample, of the root link and of the child link of each joint.
 
     Args:
         tree: The robot.
-        joints: Exact numbers of the joints, by index. A joint comes after all joints on its path to the root.
+        joints: The exact numbers of the joints, by joint index. A joint comes after all joints on its path to
+            the root.
         q: (nq,) coordinates, as doubles or balls.
         v: (nv,) joint velocities.
         a: (nv,) joint accelerations.
@@ -159,7 +161,8 @@ def hessian_values(motion: Motion, link: int, reference: Reference) -> NDArray[n
     """Return the Hessian (6, nv, nv)."""
     out = np.zeros((motion.nv, motion.nv, 6), dtype=object)
     for of, by, factor, six in _RECURSION.hessian(motion.states[link], motion.columns[link], reference):
-        out[of, by] += _array([factor * x for x in six])  # an interval times an array is not defined
+        # the product of an interval and an array is not defined
+        out[of, by] += _array([factor * x for x in six])
     return out.transpose(2, 0, 1)
 
 
