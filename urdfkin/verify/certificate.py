@@ -1,4 +1,6 @@
-"""Certificates: the checked results of a robot, their agreement with the oracle, and the unchecked results.
+"""Certificates, which record the checked and the unchecked results of a robot.
+
+For the checked results, a certificate also records the agreement with the oracle.
 
 The module also compares results within a bound, and defines the exception `VerificationError`.
 """
@@ -166,7 +168,7 @@ class LineEntry(TypedDict):
 
 
 class CertificateDocument(Header):
-    """The checked results of a robot, their agreement with the oracle, and the unchecked results."""
+    """A saved certificate as plain data: the checked and the unchecked results of a robot."""
 
     robot: Annotated[str, says("The robot's name.")]
     source: Annotated[str, says("Source of the robot: a path, a catalogue name, or <text>.")]
@@ -180,7 +182,7 @@ class CertificateDocument(Header):
     ]
 
 
-#: The version number of the layout of a saved certificate.
+#: The name, the version and the fields of a saved certificate.
 CERTIFICATE = Layout(
     "urdfkin-certificate/1",
     CertificateDocument,

@@ -17,7 +17,7 @@ from urdfkin.compiled import preload
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.comparison import KERNELS
 
-#: For each of Pinocchio's joint velocities, the index in urdfkin's v.
+#: An array of indices, for example the index in urdfkin's v for each of Pinocchio's joint velocities.
 Places = np.ndarray[Any, np.dtype[np.int64]]
 
 

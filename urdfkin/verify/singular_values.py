@@ -1,17 +1,18 @@
-"""Singular values of Jacobians with guaranteed lower and upper bounds; condition and manipulability.
+"""Singular values of Jacobians with guaranteed bounds, and from them the condition number and manipulability.
 
-By Weyl's inequality, |s_k(J + E) - s_k(J)| <= |E|. It holds for every norm that is at least the spectral
-norm; this module uses the Frobenius norm. E has two parts: the error of J (its bound,
-`urdfkin.verify.bounds`) and the residual of the decomposition, J - U S V^T.
+Let s_k be the k-th singular value. By Weyl's inequality, |s_k(J + E) - s_k(J)| <= |E|. The inequality holds
+for every norm that is at least the spectral norm; this module uses the Frobenius norm. E is the sum of two
+errors. One is the error of J, whose bound is computed in `urdfkin.verify.bounds`. The other is the residual
+of the decomposition, J - U S V^T.
 
-U and V are not assumed to be orthogonal. Let |U^T U - I| <= a and |V^T V - I| <= b. By Ostrowski's theorem
-the singular values of U S V^T are those of S times a factor between (1 - a)^(1/2) (1 - b)^(1/2) and
-(1 + a)^(1/2) (1 + b)^(1/2).
+The computed U and V are not exactly orthogonal. Let |U^T U - I| <= a and |V^T V - I| <= b. By Ostrowski's
+theorem, each singular value of U S V^T is that of S times a factor between (1 - a)^(1/2) (1 - b)^(1/2) and (1
++ a)^(1/2) (1 + b)^(1/2).
 
-The residuals themselves have rounding errors. The error of a sum of m products is at most m eps times the sum
-of the absolute values of the products. Two measures keep every intermediate value in the range of doubles.
-Norms are computed after division by the largest number, and products are computed with mantissas and
-exponents separated.
+The computed residuals have rounding errors too. The error of a sum of m products is at most m eps times the
+sum of the absolute values of the products. Two measures keep every intermediate value in the range of
+doubles. For a norm, all numbers are first divided by the largest one. For a product, mantissas and exponents
+are computed separately.
 """
 
 from __future__ import annotations
@@ -31,12 +32,12 @@ from urdfkin.verify.singularity import FrameColumns, Singularity, explain
 
 #: Bound on the relative rounding of a few dozen sums and products of positive numbers.
 _OUTWARD = 256.0 * EPS
-#: Number of samples of a batch that `print` shows.
+#: Number of samples of a batch that `print` displays.
 _SHOWN = 10
 
 
 class Between(NamedTuple):
-    """A computed value with guaranteed bounds of the true value; three arrays of the same shape.
+    """A computed value and guaranteed bounds on the true value, as three arrays of the same shape.
 
     Attributes:
         value: The computed value.
@@ -51,16 +52,19 @@ class Between(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SingularValues(Displayable):
-    """The singular values of some rows of a Jacobian. Columns that are always 0 are left out.
+    """The singular values of some rows of a Jacobian. Columns that are 0 in every configuration are left out.
 
-    `print` and notebooks show them as a table, and explain a singularity.
+    `print` and notebooks display the singular values as a table, and explain a singularity.
 
     Attributes:
-        rows: The rows of the Jacobian.
-        values: (..., k), largest first; k is the smaller of the numbers of rows and columns.
-        U: (..., rows, k) left singular vectors, directions of the frame's velocity.
-        V: (..., nv, k) right singular vectors, directions of v; 0 for joints that do not move the frame.
-        columns: The Jacobian, its frame and joints; None for another matrix.
+        rows: Names or indices of the rows of the Jacobian that are used.
+        values: (..., k) the singular values, largest first; k is the number of rows or of columns, whichever
+            is smaller.
+        U: (..., rows, k) left singular vectors, which are directions of the frame's velocity.
+        V: (..., nv, k) right singular vectors, which are directions of v; their numbers are 0 for joints that
+            do not move the frame.
+        columns: The Jacobian with the names of its frame and joints; None if the matrix is not a robot's
+            Jacobian.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
@@ -108,10 +112,12 @@ class SingularValues(Displayable):
         return TextDocument(title, [table, *(str(found).splitlines() if found else [])])
 
     def singularity(self, *sample: int) -> Singularity:
-        """Return the rank in one configuration, the lost directions, and the joints that cause a loss.
+        """Return the rank in one configuration, and explain a loss of rank.
+
+        The explanation consists of the lost directions and the joints that cause the loss.
 
         Args:
-            sample: Indices of the configuration in a batch; none for a single configuration.
+            sample: Indices of the configuration in the batch; no indices for a single configuration.
 
         Raises:
             InputError: the wrong number of indices, or an index that does not exist.
@@ -132,7 +138,9 @@ class SingularValues(Displayable):
 
     @cached_property
     def manipulability(self) -> Between:
-        """(...) product of the singular values: sqrt(det J J^T) (Yoshikawa), or sqrt(det J^T J) if J is tall.
+        """Product of the singular values, (...).
+
+        It is Yoshikawa's manipulability sqrt(det J J^T), or sqrt(det J^T J) if J has more rows than columns.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -148,7 +156,9 @@ class SingularValues(Displayable):
 
     @cached_property
     def condition(self) -> Between:
-        """(...) largest singular value divided by the smallest; the upper bound is inf if that may be 0.
+        """Condition number (...): the largest singular value divided by the smallest.
+
+        If the smallest singular value may be 0, the upper bound is inf.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -172,11 +182,12 @@ class SingularValues(Displayable):
         return Between(middle, np.maximum(_down(least), 1.0), _up(most))
 
     def manipulability_gradient(self, H: FloatArray) -> FloatArray:
-        """Return the gradient of the manipulability (..., nv), from the frame's Hessian.
+        """Return the gradient (..., nv) of the manipulability with respect to q, from the frame's Hessian.
 
-        The derivative of a singular value is u^T J' v, with its singular vectors u and v. The product rule
-        gives the derivative of the product of all singular values without a division. If the smallest
-        singular value may be 0, the manipulability may not be differentiable. The gradient is then NaN.
+        The derivative of a singular value is u^T J' v, where u and v are the singular vectors of this value.
+        The product rule gives the derivative of the product of all singular values without a division. If the
+        smallest singular value may be 0, the manipulability may not be differentiable. The gradient is then
+        NaN.
 
         Args:
             H: (..., 6, nv, nv) Hessian of the frame, from `Robot.hessian`.
@@ -208,14 +219,15 @@ def singular_values(
     rows: slice = slice(None),
     columns: FrameColumns | None = None,
 ) -> SingularValues:
-    """Return the singular values of some rows of matrices, with guaranteed bounds.
+    """Return the singular values of some rows of Jacobians or other matrices, with guaranteed bounds.
 
     Args:
         J: (..., m, nv) finite matrices.
         error: (..., m, nv) bound on the error of each number of J.
-        moving: (nv,) bool, False for columns that are always 0.
+        moving: (nv,) bool, False for columns that are 0 in every configuration.
         rows: The rows to use.
-        columns: The Jacobian, its frame and joints; None for another matrix.
+        columns: The Jacobian with the names of its frame and joints; None if the matrix is not a robot's
+            Jacobian.
 
     >>> found = singular_values(np.array([[3.0, 0.0], [0.0, 4.0]]), np.zeros((2, 2)), np.array([True, True]))
     >>> found.values.value.tolist(), bool(found.values.upper[0] - found.values.lower[0] < 1e-12)
@@ -233,29 +245,33 @@ def singular_values(
         skew = _skew(U) + _skew(Vt.swapaxes(-1, -2))
         lower = s * _down(1.0 - skew)[..., np.newaxis] - residual[..., np.newaxis]
         upper = s * _up(1.0 + skew)[..., np.newaxis] + residual[..., np.newaxis]
-    # A bound that is not finite becomes 0 (lower) or inf (upper).
+    # A lower bound that is not finite is replaced by 0, and an upper bound that is not finite by inf.
     lower, upper = np.nan_to_num(_down(lower), nan=0.0), np.nan_to_num(_up(upper), nan=np.inf, posinf=np.inf)
     return SingularValues(rows, Between(s, np.maximum(lower, 0.0), upper), U, V, columns)
 
 
 def _skew(U: FloatArray) -> FloatArray:
-    """Return an upper bound (...) of |U^T U - I| for U (..., m, k)."""
+    """Return an upper bound (...) on the Frobenius norm |U^T U - I| for U (..., m, k)."""
     back = U.swapaxes(-1, -2)
     rounding = (U.shape[-2] + 2) * EPS * (np.abs(back) @ np.abs(U))
     return _norm(np.abs(back @ U - np.eye(U.shape[-1])) + rounding)
 
 
 def _norm(E: FloatArray) -> FloatArray:
-    """Return an upper bound (...) of the Frobenius norm of non-negative matrices (..., m, n)."""
+    """Return an upper bound (...) on the Frobenius norm of non-negative matrices (..., m, n)."""
     largest = E.max(axis=(-2, -1), initial=0.0)
-    unit = np.where((largest > 0.0) & np.isfinite(largest), largest, 1.0)  # the norm of inf is inf
+    # a matrix that contains inf has the norm inf
+    unit = np.where((largest > 0.0) & np.isfinite(largest), largest, 1.0)
     with np.errstate(over="ignore", under="ignore"):
         norm: FloatArray = unit * np.linalg.norm(E / unit[..., np.newaxis, np.newaxis], axis=(-2, -1))
     return _up(norm)
 
 
 def _product(x: FloatArray) -> FloatArray:
-    """Return the product (...) of numbers (..., k); partial products do not overflow or underflow."""
+    """Return the product (...) of k numbers (..., k).
+
+    Products of some of them cannot overflow or underflow.
+    """
     mantissas, exponents = np.frexp(x)
     with np.errstate(over="ignore", under="ignore"):
         product: FloatArray = np.ldexp(mantissas.prod(axis=-1), exponents.sum(axis=-1))

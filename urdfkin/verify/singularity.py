@@ -1,9 +1,10 @@
-"""Explain a singular Jacobian: its rank, the lost directions, and the joints that cause the loss.
+"""Explain a singular Jacobian by its rank, the lost directions, and the joints that cause the loss of rank.
 
-A left null vector u of J is a direction without velocity: u^T J v = 0 for every v. A right null vector is a
-null motion: joint velocities that do not move the frame. A smallest set of linearly dependent columns shows
-which joints cause the loss. A geometric reason, such as parallel axes, is stated only if the columns satisfy
-its condition within the error bound of J.
+A left null vector u of J is a lost direction. The frame has no velocity along it: u^T J v = 0 for every v. A
+right null vector is a null motion, which consists of joint velocities that do not move the frame. A set of
+linearly dependent columns shows which joints cause the loss, if each proper subset of it is independent. Such
+a set is called a smallest dependent set. A geometric reason, such as parallel axes, is stated only if the
+columns satisfy its condition within the error bound of J.
 
 A column of a revolute joint is [a x z; z], where z is the axis and a leads from the frame's origin to a point
 of the axis. So two axes are collinear if their columns are equal up to sign, and an axis passes through the
@@ -23,13 +24,13 @@ from urdfkin.errors.display import Displayable, TextDocument, six_digits
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import FloatArray, KinematicTree
 
-#: Largest size of the sets in the search for dependent columns, and the largest number of columns for which
-#: this search is done.
+#: Limits of the search for dependent columns: the largest number of columns in a set, and the largest number
+#: of columns of a Jacobian for which the search is made.
 _LARGEST_SET, _MOST_COLUMNS = 4, 16
 #: Rounding error of the decomposition of a small matrix, in eps for each row or column.
 _ROUNDINGS = 16.0
-#: A singular value counts as 0 at a random configuration if it is smaller than this, relative to the size of
-#: the Jacobian.
+#: At a random configuration, a singular value counts as 0 if it is smaller than this fraction of the
+#: Jacobian's size.
 _USUAL = 1e-9
 
 
@@ -42,12 +43,12 @@ class FrameColumns:
         error: (..., 6, nv) bound on the error of each number of J.
         frame: Name of the frame.
         joints: (nv,) name of each column.
-        turns: (nv,) True for the axis of a revolute joint, False for that of a prismatic joint; None for a
-            column that is not the axis of a single joint.
-        active: (6, nv) False for numbers that are 0 for every q.
-        samples: Return (n, 6, nv) Jacobians at random configurations on a fixed base.
-        moving_base: Whether the user gives the base's motion. Then directions at the samples, which have a
-            fixed base, cannot be compared with those of the result.
+        turns: (nv,) True for the column of a revolute joint, False for that of a prismatic joint; None for a
+            column that does not belong to a single joint axis.
+        active: (6, nv) False for numbers of the Jacobian that are 0 for every q.
+        samples: Function that returns Jacobians (n, 6, nv) at random configurations on a fixed base.
+        moving_base: Whether the user gives the base's motion. The samples have a fixed base, so lost
+            directions at the samples cannot be compared with those on a moving base.
     """
 
     J: FloatArray
@@ -79,9 +80,9 @@ def columns_of(
         error: (..., 6, nv) bound on the error of each number of J.
         frame: Name of the frame.
         joints: (nv,) name of each column.
-        active: (6, nv) False for numbers that are 0 for every q.
-        samples: Return (n, 6, nv) Jacobians at random configurations on a fixed base.
-        moving_base: Whether the base is given.
+        active: (6, nv) False for numbers of the Jacobian that are 0 for every q.
+        samples: Function that returns Jacobians (n, 6, nv) at random configurations on a fixed base.
+        moving_base: Whether the user gives the base's motion.
     """
     turns: list[bool | None] = [None] * len(joints)
     moving = [(i, joint) for i, joint in enumerate(tree.joints) if joint.kind.nv]
@@ -94,15 +95,15 @@ def columns_of(
 
 @dataclass(frozen=True, eq=False)
 class Singularity(Displayable):
-    """The rank of a Jacobian in one configuration, and the reason for a loss.
+    """The rank of a Jacobian in one configuration, and the reasons for a loss of rank.
 
     Attributes:
         rank: Number of singular values with a lower bound above 0.
-        full: Largest possible rank: the smaller of the numbers of rows and columns.
+        full: Largest possible rank, which is the number of rows or of columns, whichever is smaller.
         least: Upper bound of the smallest singular value.
         lost: (d, 6) lost directions [linear; angular] in world axes, at the frame's origin; empty if the
             Jacobian has more rows than columns.
-        motions: (e, nv) joint velocities that do not move the frame.
+        motions: (e, nv) null motions: joint velocities that do not move the frame.
         reasons: The lost directions and their reasons, one sentence each.
 
     >>> import urdfkin
@@ -137,10 +138,10 @@ class Singularity(Displayable):
 def explain(
     columns: FrameColumns, sample: tuple[int, ...], rows: slice, lower: FloatArray, upper: FloatArray
 ) -> Singularity:
-    """Return the rank of some rows of a Jacobian, and the reason for a loss.
+    """Return the rank of some rows of a Jacobian, and the reasons for a loss of rank.
 
     Args:
-        columns: The Jacobian, its frame and joints.
+        columns: The Jacobian with the names of its frame and joints.
         sample: Indices of the configuration in the batch.
         rows: The rows to use.
         lower: (k,) lower bounds of the singular values.
@@ -157,7 +158,7 @@ class _Explanation:
     """The reasons for the loss of rank of one matrix.
 
     Args:
-        columns: The Jacobian, its frame and joints.
+        columns: The Jacobian with the names of its frame and joints.
         sample: Indices of the configuration in the batch.
         rows: The rows to use.
         rank: The rank of these rows.
@@ -176,7 +177,7 @@ class _Explanation:
         self._names = [columns.joints[i] for i in self._moving]
 
     def result(self, full: int, least: float) -> Singularity:
-        """Return the explanation.
+        """Return the rank with the lost directions and the reasons.
 
         Args:
             full: The largest possible rank.
@@ -193,8 +194,8 @@ class _Explanation:
         usual, never = self._of_samples()
         directions = U[:, self._rank :].T
         directions = _basis(directions - directions @ never @ never.T)
-        # An arm with fewer joints than rows has unreachable directions in every configuration. They differ
-        # from one configuration to another.
+        # If an arm has fewer joints than the Jacobian has rows, some directions are lost in every
+        # configuration. These directions depend on the configuration.
         known = len(directions) == usual - self._rank and not (self._columns.moving_base and never.size)
         lost = np.zeros((len(directions) if known else 0, 6))
         if known:
@@ -313,7 +314,10 @@ class _Explanation:
         return None
 
     def _of_revolute_axes(self, one: tuple[int, ...]) -> str | None:
-        """Return the reason why the axes of a smallest dependent set are dependent; None if it is unknown."""
+        """Return the geometric reason why the revolute axes of a smallest dependent set are dependent.
+
+        If the reason is unknown, the result is None.
+        """
         indices = self._moving[list(one)]
         z, v = self._J[3:, indices].T, self._J[:3, indices].T
         size = 1.0 + float(np.abs(v).max())
@@ -324,10 +328,11 @@ class _Explanation:
         signs = np.sign(z @ z[0])[:, None]
         if parallel and np.abs(v - signs * v[0]).max() <= off:
             return f"{axes} are collinear."
-        if parallel:  # 3 dependent ones lie in a plane; 4 always depend
+        # three linearly dependent directions lie in a plane; four directions are always dependent
+        if parallel:
             return f"{axes} are parallel{' and lie in one plane' if len(one) == 3 else ''}."
-        # If all axes pass through one point a, each satisfies a x z = v with its direction z and its linear
-        # rows v.
+        # If all axes pass through one point a, each axis satisfies a x z = v. Here z is the direction of the
+        # axis, and v contains the linear rows of its column.
         crosses = np.concatenate([_cross_matrix(-axis) for axis in z])
         a, *_ = np.linalg.lstsq(crosses, v.ravel(), rcond=None)
         if np.abs(crosses @ a - v.ravel()).max() > off * float(np.linalg.cond(crosses)):
@@ -336,7 +341,7 @@ class _Explanation:
         return f"{axes} intersect in one point{' and lie in one plane' if len(one) == 3 else ''}."
 
     def _line(self, u: FloatArray) -> str | None:
-        """Return the line that all axes intersect, if the lost direction defines one; None otherwise."""
+        """Return the line that all axes intersect, if the lost direction defines such a line; else None."""
         f, m = u[:3], u[3:]
         if self._linear_only or self._angular_only or not f.any():
             return None
@@ -372,7 +377,7 @@ class _Explanation:
 
 
 def _sparse(rows: FloatArray) -> FloatArray:
-    """Return another basis of the space of some rows, with many zeros, by elimination."""
+    """Return a basis with many zeros for the space that some rows span, computed by elimination."""
     basis, n = rows.copy(), len(rows)
     free = list(range(basis.shape[1])) if n > 1 else []
     for i in range(n if n > 1 else 0):
@@ -386,9 +391,12 @@ def _sparse(rows: FloatArray) -> FloatArray:
 
 
 def _basis(rows: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of the space of some rows, which are projected orthonormal rows."""
+    """Return an orthonormal basis for the space that some rows span.
+
+    The rows are orthogonal projections of orthonormal rows onto coordinate axes or onto a complement.
+    """
     _, s, Vt = np.linalg.svd(rows, full_matrices=False)
-    return Vt[: int((s > 0.5).sum())]  # each singular value is 1 or 0
+    return Vt[: int((s > 0.5).sum())]  # each singular value of such rows is 1 or 0
 
 
 def _cross_matrix(z: FloatArray) -> FloatArray:
