@@ -1,1 +1,1 @@
-"""The textbook's kinematics: each equation is written once, for every kind of number."""
+"""The textbook's kinematics. Each equation is written once and works for every kind of number."""

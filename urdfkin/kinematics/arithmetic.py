@@ -1,7 +1,8 @@
-"""Copies of the equations with other basic operations, for compilers, NumPy arrays, lengths or LaTeX.
+"""Copies of the equations that use different basic operations, for example for NumPy arrays or LaTeX.
 
-The functions of `urdfkin.kinematics.equations` compute with triples of numbers. `bound` copies these
-functions and replaces their basic operations, such as `plus` and `cross`. This module needs no NumPy.
+The functions of `urdfkin.kinematics.equations` compute with vectors that are triples of numbers. `bound`
+copies these functions and replaces their basic operations, such as `plus` and `cross`. The copies can then
+compute with arrays, with LaTeX expressions or with the lengths of vectors. This module does not import NumPy.
 """
 
 from __future__ import annotations
@@ -19,11 +20,11 @@ VECTORS = ("plus", "minus", "times", "dot", "cross", "rotate", "transposed", "pr
 def bound(
     *, made: Callable[[Callable[..., Any]], Any] = lambda function: function, **vectors: Any
 ) -> SimpleNamespace:
-    """Return a namespace with a copy of every function of `equations` that uses other basic operations.
+    """Return a namespace with a copy of each function of `equations`; the copies use other basic operations.
 
     Args:
-        made: A decorator for each copied function, for example the decorator of a compiler.
-        vectors: Basic operations to use instead of those of `equations`.
+        made: A decorator that is applied to each copied function, for example the decorator of a compiler.
+        vectors: Basic operations that replace those of `equations`, by name.
 
     >>> lengths = bound(plus=lambda x, y: x + y, cross=lambda x, y: x * y)
     >>> lengths.point_velocity(1.0, 2.0, 3.0)
@@ -35,12 +36,14 @@ def bound(
 def rebound(
     *modules: ModuleType, made: Callable[[Callable[..., Any]], Any], others: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return a copy of each function of some modules, by name; the copies use other functions and each other.
+    """Return copies of the functions of some modules, by name.
+
+    A copy calls other copies instead of the original functions.
 
     Args:
-        modules: The modules; each may use functions of those before it.
-        made: A decorator for each copied function, for example a compiler's.
-        others: Functions and modules to use instead of those that a module imports or defines.
+        modules: The modules. A module may use functions of the modules before it in this argument.
+        made: A decorator that is applied to each copied function, for example the decorator of a compiler.
+        others: Functions and modules that replace those which a module imports or defines, by name.
     """
     copies: dict[str, Any] = {}
     for module in modules:

@@ -1,4 +1,4 @@
-"""Moving bodies: planar links, points and frames in moving frames, joints, tools and analytical Jacobians.
+"""Motion of bodies: planar links, points and frames in moving frames, joints, tools, analytical Jacobians.
 
 | Subject | Section of the textbook | Equations |
 |---|---|---|
@@ -44,9 +44,9 @@ class MovingFrame:
         R_0_1: (..., 3, 3) orientation.
         d_0_1: (..., 3) interorigin vector from O_0 to O_1, metres.
         w_0_1: (..., 3) angular velocity, rad/s.
-        v_0_1: (..., 3) rate of `d_0_1`, m/s.
+        v_0_1: (..., 3) time derivative of `d_0_1`, m/s.
         alpha_0_1: (..., 3) angular acceleration, rad/s^2.
-        a_0_1: (..., 3) rate of `v_0_1`, m/s^2.
+        a_0_1: (..., 3) time derivative of `v_0_1`, m/s^2.
 
     Raises:
         InputError: a wrong shape, a value that is not finite, or `R_0_1` is not a rotation.
@@ -73,18 +73,21 @@ def turned(R: FloatArray, p: FloatArray) -> FloatArray:
 
 
 def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
-    """Return the motion of frame 2 in frame 0, from frame 1 in frame 0 and frame 2 in frame 1 (7.60, 7.61).
+    """Return the motion of frame 2 relative to frame 0 (7.60, 7.61).
+
+    It is computed from the motion of frame 1 relative to frame 0 and that of frame 2 relative to frame 1.
 
     The origin O_2 is a point that moves in frame 1. Its motion follows from 7.58, 7.124 and 7.125. The
     angular velocity of frame 2 is w_01 + w_12 (7.49). The time derivative of this sum contains the term w_01
     x w_12.
 
     Args:
-        outer: Frame 1 in frame 0.
-        inner: Frame 2 in frame 1. Its attributes `..._0_1` are those of frame 2 in frame 1.
+        outer: Motion of frame 1 relative to frame 0.
+        inner: Motion of frame 2 relative to frame 1, expressed in frame 1. Here the attributes `..._0_1`
+            belong to frame 2 relative to frame 1.
 
     Returns:
-        Frame 2 in frame 0.
+        Motion of frame 2 relative to frame 0.
     """
     R, w = outer.R_0_1, outer.w_0_1
     d_12, v_12, a_12 = (turned(R, x) for x in (inner.d_0_1, inner.v_0_1, inner.a_0_1))
@@ -100,21 +103,27 @@ def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
 
 
 def compose_all(frames: Iterable[MovingFrame]) -> MovingFrame:
-    """Return the motion of the last frame in frame 0, from frames that are each given in the previous one.
+    """Return the motion of the last frame relative to frame 0.
+
+    The motion of each frame is given relative to the previous frame.
 
     The equations are 7.50 and 7.61.
 
     Args:
-        frames: Frame i + 1 in frame i, for i = 0, 1, ...; without frames the result is frame 0 itself.
+        frames: Motion of frame i + 1 relative to frame i, for i = 0, 1, ...; without frames the result is
+            frame 0 itself.
 
     Returns:
-        The last frame in frame 0.
+        Motion of the last frame relative to frame 0.
     """
     return reduce(compose, frames, MovingFrame(np.eye(3), np.zeros(3)))
 
 
 def seen_from(T_0_1: FloatArray, T_0_2: FloatArray, out: FloatArray | None = None) -> FloatArray:
-    """Return T_1_2 = T_0_1^-1 T_0_2 (..., 4, 4), frame 2 in frame 1; both are given in frame 0 (7.77)."""
+    """Return T_1_2 = T_0_1^-1 T_0_2 (..., 4, 4), the pose of frame 2 in frame 1 (7.77).
+
+    The poses of frames 1 and 2 are given in frame 0.
+    """
     T = np.empty(np.broadcast_shapes(T_0_1.shape, T_0_2.shape)) if out is None else out
     back = T_0_1[..., :3, :3].swapaxes(-1, -2)
     T[..., :3, :3] = back @ T_0_2[..., :3, :3]
@@ -132,7 +141,7 @@ class VelocityParts:
 
     Attributes:
         rotation: w x p, from the rotation of the frame.
-        relative: R v_1, from the point's velocity in the frame.
+        relative: R v_1, from the velocity of the point relative to the frame.
         origin: d-dot, the velocity of the frame's origin.
     """
 
@@ -154,7 +163,7 @@ class AccelerationParts:
         transverse: alpha x p.
         centripetal: w x (w x p), towards the axis of rotation.
         coriolis: 2 w x R v_1, perpendicular to w and to R v_1.
-        relative: R a_1, from the point's acceleration in the frame.
+        relative: R a_1, from the acceleration of the point relative to the frame.
         origin: d-dot-dot, the acceleration of the frame's origin.
     """
 
@@ -235,7 +244,7 @@ def point_acceleration(
 
 
 def interorigin_vector(d: ArrayLike, z: ArrayLike, a: ArrayLike, x: ArrayLike) -> FloatArray:
-    """Return d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
+    """Return the interorigin vector d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
 
     Args:
         d: (...) offset d_i along the joint's axis, metres.
@@ -260,7 +269,9 @@ def interorigin_vector(d: ArrayLike, z: ArrayLike, a: ArrayLike, x: ArrayLike) -
 
 
 def joint_angular_velocity(z: ArrayLike, rate: ArrayLike, turns: bool) -> FloatArray:
-    """Return w_{i-1,i}: theta-dot z for a rotary joint (7.62), zero for a prismatic one (7.63).
+    """Return a joint's angular velocity w_{i-1,i}.
+
+    It is theta-dot z for a rotary joint (7.62), and zero for a prismatic joint (7.63).
 
     Args:
         z: (..., 3) unit axis z_{i-1} in frame 0.
@@ -280,7 +291,9 @@ def joint_angular_velocity(z: ArrayLike, rate: ArrayLike, turns: bool) -> FloatA
 def interorigin_velocity(
     w_0_i: ArrayLike, d_vector: ArrayLike, z: ArrayLike, rate: ArrayLike, turns: bool
 ) -> FloatArray:
-    """Return d-dot_{i-1,i} = w_0i x d_{i-1,i}, plus d-dot_i z for a prismatic joint (7.73, 7.74).
+    """Return the time derivative of an interorigin vector (7.73, 7.74).
+
+    It is d-dot_{i-1,i} = w_0i x d_{i-1,i}, plus d-dot_i z for a prismatic joint.
 
     If only joint i moves, w_0i is w_{i-1,i}, and the equations are 7.66 and 7.67.
 
@@ -292,7 +305,7 @@ def interorigin_velocity(
         turns: Whether the joint is rotary.
 
     Returns:
-        (..., 3) m/s, the rate of the vector in frame 0.
+        (..., 3) time derivative of the vector in frame 0, m/s.
 
     Raises:
         InputError: a wrong shape, or an axis that is not a unit vector.
@@ -303,7 +316,9 @@ def interorigin_velocity(
 
 
 def jacobian_column(z: ArrayLike, arm: ArrayLike, turns: bool) -> FloatArray:
-    """Return a joint's column of the velocity Jacobian: [z x d_{i-1,n}; z] or [z; 0] (7.80, 7.85).
+    """Return a joint's column of the velocity Jacobian (7.80, 7.85).
+
+    It is [z x d_{i-1,n}; z] for a rotary joint and [z; 0] for a prismatic joint.
 
     Args:
         z: (..., 3) unit axis z_{i-1} in frame 0.
@@ -339,7 +354,9 @@ def planar_rotation(theta: ArrayLike) -> FloatArray:
 
 
 def planar_rotation_derivative(theta: ArrayLike) -> FloatArray:
-    """Return dR/dtheta; its columns y1 and -x1 are x1 and y1 turned by 90 degrees (7.4, figure 7.2).
+    """Return dR/dtheta of the rotation matrix in the plane (7.4, figure 7.2).
+
+    Its columns are y1 and -x1, which are the axes x1 and y1 turned by 90 degrees.
 
     Args:
         theta: (...) radians.
@@ -376,7 +393,9 @@ def link_endpoint(theta: ArrayLike, length: ArrayLike) -> FloatArray:
 
 
 def link_endpoint_velocity(theta: ArrayLike, rate: ArrayLike, length: ArrayLike) -> FloatArray:
-    """Return d-dot_01 = a theta-dot y1, tangential to the circle, with the speed v = r w (7.2, 7.4, 7.7).
+    """Return the velocity d-dot_01 = a theta-dot y1 of a link's endpoint (7.2, 7.4, 7.7).
+
+    The velocity is tangential to the endpoint's circle, and its size is v = r w.
 
     Args:
         theta: (...) joint angle, radians.
@@ -399,7 +418,9 @@ def link_endpoint_velocity(theta: ArrayLike, rate: ArrayLike, length: ArrayLike)
 
 
 def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
-    """Return the velocity of the tool from that of frame n: d-dot_{0,tool} = d-dot_0n + w x d_{n,tool}.
+    """Return the velocity of the tool frame from the velocity of frame n.
+
+    The linear velocity is d-dot_{0,tool} = d-dot_0n + w x d_{n,tool}. The angular velocities are equal.
 
     Args:
         velocity: (..., 6) velocity of frame n, m/s and rad/s, in frame 0.
@@ -418,7 +439,9 @@ def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
 
 
 def frame_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
-    """Return the velocity of frame n from the tool's: d-dot_0n = d-dot_{0,tool} - w x d_{n,tool} (7.115).
+    """Return the velocity of frame n from the velocity of the tool frame (7.115).
+
+    The linear velocity is d-dot_0n = d-dot_{0,tool} - w x d_{n,tool}. The angular velocities are equal.
 
     Args:
         velocity: (..., 6) velocity of the tool frame, m/s and rad/s, in frame 0.
@@ -441,7 +464,9 @@ QUATERNION = "quaternion"
 
 
 def orientation_of(representation: str, R: ArrayLike) -> FloatArray:
-    """Return the Euler angles or the quaternion of a rotation, the last entries of the textbook's x.
+    """Return the Euler angles or the quaternion of a rotation.
+
+    These are the last entries of the textbook's x = (position, orientation).
 
     Args:
         representation: SciPy's name of an Euler sequence, or "quaternion".
@@ -458,7 +483,7 @@ def orientation_of(representation: str, R: ArrayLike) -> FloatArray:
 
 
 def representation_matrix(representation: str, R: ArrayLike) -> FloatArray:
-    """Return the matrix C with [d-dot; w] = C x-dot (7.119, 7.120).
+    """Return the matrix C in [d-dot; w] = C x-dot (7.119, 7.120).
 
     C is block diagonal; its blocks are the identity and Omega. For a quaternion, Omega is 4 E^T (3 by 4),
     with the matrix E of 7.57.
@@ -482,8 +507,8 @@ def representation_matrix(representation: str, R: ArrayLike) -> FloatArray:
 def representation_inverse(representation: str, R: ArrayLike, nearest: float = NEAREST) -> FloatArray:
     """Return C^-1 with x-dot = C^-1 [d-dot; w] (7.122).
 
-    For a quaternion, C^-1 is the right inverse of C whose x-dot keeps the quaternion's length constant. This
-    inverse has no singularity.
+    For a quaternion, C has several right inverses. The function returns the one for which x-dot does not
+    change the quaternion's length. It has no singularity.
 
     Args:
         representation: SciPy's name of an Euler sequence, or "quaternion".
@@ -529,7 +554,9 @@ def analytical_jacobian(
 
 
 def velocity_jacobian(representation: str, R: ArrayLike, J: ArrayLike) -> FloatArray:
-    """Return J_v = C J, the velocity Jacobian from the manipulator Jacobian (7.121), for every orientation.
+    """Return the velocity Jacobian J_v = C J from the manipulator Jacobian J (7.121).
+
+    Unlike the inverse conversion, this one works for every orientation.
 
     Args:
         representation: SciPy's name of an Euler sequence, or "quaternion".

@@ -144,7 +144,7 @@ def coriolis(w, u):
 
 
 def angular_acceleration(alpha, w, z, v, a):
-    """7.129, rotary: angular acceleration behind a joint; w of the link before the joint turns its axis."""
+    """7.129, rotary: angular acceleration behind a joint, whose axis turns with w of the link before it."""
     return plus(plus(alpha, times(a, z)), times(v, cross(w, z)))
 
 
@@ -154,7 +154,7 @@ def point_acceleration(acc, alpha, w, d):
 
 
 def sliding_acceleration(acc, w, z, v, a):
-    """7.130, prismatic: acceleration behind a joint that slides along z; the links before it turn z."""
+    """7.130, prismatic: acceleration behind a joint that slides along z; z turns with the link before it."""
     return plus(plus(acc, times(a, z)), coriolis(w, times(v, z)))
 
 

@@ -1,4 +1,4 @@
-"""Validation of vectors, matrices and rotations, as float64 arrays with leading batch axes.
+"""Validation of vectors, matrices and rotations, and conversion to float64 arrays with leading batch axes.
 
 Every function accepts any leading batch shape, and arguments broadcast.
 """
@@ -15,19 +15,23 @@ from urdfkin.system.lazy_import import is_a
 FloatArray = NDArray[np.float64]
 
 #: Largest deviation of a unit vector's norm from 1. A vector that is normalised in double precision deviates
-#: by 4e-16 at most. A vector typed with six digits deviates by more and would not give a rotation matrix.
+#: by 4e-16 at most. A vector that is typed with six digits deviates by more. A rotation about such a vector
+#: would not be a rotation matrix.
 UNIT_TOLERANCE = 1e-12
 #: Largest deviation of R R^T from the identity for a rotation. If the entries of R are rounded to nine
 #: decimals, each has an error of 5e-10 at most. R R^T then deviates by 1e-9 times the sum of the absolute
 #: values of a row at most, and this sum is at most sqrt(3).
 ROTATION_TOLERANCE = 2e-9
-#: Kinds of NumPy types that convert to floats without an error: complex, bytes, text, timedelta, datetime,
-#: void.
+#: Kinds of NumPy types that NumPy converts to floats without an error, although they are not real numbers:
+#: complex, bytes, text, timedelta, datetime, void.
 _NOT_NUMBERS = "cSUmMV"
 
 
 def floats(value: ArrayLike, name: str) -> FloatArray:
-    """Return `value` as float64 of any shape, NaN and inf included; raise InputError if not real numbers."""
+    """Return `value` as float64 of any shape, where NaN and inf are allowed.
+
+    Raise InputError if it does not consist of real numbers.
+    """
     if _is_masked(value):
         raise InputError(f"{name} must be real numbers", found="a masked value")
     try:
@@ -43,7 +47,7 @@ def floats(value: ArrayLike, name: str) -> FloatArray:
 
 
 def _is_masked(value: object) -> bool:
-    """Return whether a number is masked; NumPy would ignore the mask without an error."""
+    """Return whether a number of a masked array is masked. NumPy would ignore the mask without an error."""
     if is_a(value, "numpy.ma:MaskedArray"):
         return bool(np.ma.is_masked(value))
     return isinstance(value, list | tuple) and any(map(_is_masked, value))
@@ -104,17 +108,17 @@ def rotations(value: ArrayLike, name: str) -> FloatArray:
 
 
 def rotation_defect(R: FloatArray) -> FloatArray:
-    """Return the largest entry (...,) of R R^T - I for matrices (..., 3, 3); inf for a reflection.
+    """Return the largest absolute entry (...,) of R R^T - I for matrices (..., 3, 3); inf for a reflection.
 
     The result is 0 for an exact rotation. Each caller compares it with a tolerance of its own, which depends
     on the number of digits with which its matrix was written.
     """
-    with np.errstate(over="ignore", invalid="ignore"):  # a matrix that overflows is no rotation
+    with np.errstate(over="ignore", invalid="ignore"):  # a matrix whose product overflows is not a rotation
         defect = np.abs(R @ R.swapaxes(-1, -2) - np.eye(3)).max(axis=(-2, -1))
         return np.where((defect >= 0.0) & (determinant(R) > 0.0), defect, np.inf)
 
 
 def determinant(matrix: FloatArray) -> FloatArray:
-    """Return the determinant of (..., 3, 3), computed as the triple product of the rows."""
+    """Return the determinant of matrices (..., 3, 3), computed as the triple product of the rows."""
     triple: FloatArray = (np.cross(matrix[..., 0, :], matrix[..., 1, :]) * matrix[..., 2, :]).sum(axis=-1)
     return triple

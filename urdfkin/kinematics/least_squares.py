@@ -13,16 +13,15 @@ from urdfkin.kinematics.roundings import EPS, FloatArray
 State = TypeVar("State")
 
 _ROUNDS = 100
-#: Damping relative to the largest singular value: the initial, the smallest and the largest damping.
+#: The initial, the smallest and the largest damping, relative to the largest singular value.
 _DAMPING, _LEAST, _MOST = 1e-3, 1e-14, 1e3
-#: Factors by which the damping is multiplied after a step that reduces the error, and after one that does
-#: not.
+#: Two factors for the damping: one for a step that reduces the error, and one for a step that does not.
 _EASING, _HARDER = 0.03, 10.0
 #: A step is slow if the error after the step is more than this fraction of the error before it.
 _SLOW = 0.99
 #: The iteration ends if a full step can reduce the squared error by at most this fraction.
 _NOTHING = 1e-13
-#: Rounding error of the sum of squares, in multiples of eps for each residual.
+#: Rounding error of the sum of squares: the number of eps for each residual.
 _ROUNDED = 4.0
 
 
@@ -35,14 +34,14 @@ def least_squares(
     longest: float = math.inf,
     patience: int = 0,
 ) -> tuple[State, float]:
-    """Return a state with the smallest residuals near the start, and the norm of its residuals.
+    """Return the state with the smallest residuals near the initial state, and the norm of these residuals.
 
     Args:
         start: The state from which the iteration starts.
         linearized: Returns the residuals (rows,) of a state and the negative derivatives (rows, parameters)
             of the residuals by the parameters.
-        size: Returns the norm of the residuals of a state.
-        moved: Returns the state after a step (parameters,).
+        size: Returns the norm of a state's residuals.
+        moved: Returns the new state for a state and a step (parameters,).
         longest: Largest component of a step.
         patience: The iteration ends after this many slow steps; 0 means no limit.
     """

@@ -57,7 +57,7 @@ class SingularValues(Displayable):
     `print` and notebooks display the singular values as a table, and explain a singularity.
 
     Attributes:
-        rows: Names or indices of the rows of the Jacobian that are used.
+        rows: The slice of the Jacobian's rows that is used.
         values: (..., k) the singular values, largest first; k is the number of rows or of columns, whichever
             is smaller.
         U: (..., rows, k) left singular vectors, which are directions of the frame's velocity.

@@ -100,7 +100,7 @@ class Singularity(Displayable):
     Attributes:
         rank: Number of singular values with a lower bound above 0.
         full: Largest possible rank, which is the number of rows or of columns, whichever is smaller.
-        least: Upper bound of the smallest singular value.
+        least: Upper bound on the smallest singular value.
         lost: (d, 6) lost directions [linear; angular] in world axes, at the frame's origin; empty if the
             Jacobian has more rows than columns.
         motions: (e, nv) null motions: joint velocities that do not move the frame.
@@ -181,7 +181,7 @@ class _Explanation:
 
         Args:
             full: The largest possible rank.
-            least: Upper bound of the smallest singular value.
+            least: Upper bound on the smallest singular value.
         """
         U, s, Vt = np.linalg.svd(self._A)
         self._noise = (
@@ -212,14 +212,17 @@ class _Explanation:
         return Singularity(self._rank, full, least, lost, motions, tuple(reasons))
 
     def _of_samples(self) -> tuple[int, FloatArray]:
-        """Return the rank at random configurations, and an orthonormal basis of their lost directions."""
+        """Return the rank at random configurations, and the directions that are lost in all of them.
+
+        The directions are an orthonormal basis.
+        """
         samples = self._columns.samples()[:, self._rows[:, None], self._moving]
         usual = max(int(np.linalg.matrix_rank(one, tol=_USUAL * np.linalg.norm(one))) for one in samples)
         U, s, _ = np.linalg.svd(np.concatenate(list(samples), axis=1))
         return usual, U[:, int((s > _USUAL * s[0]).sum()) :]
 
     def _without_noise(self, rows: FloatArray) -> FloatArray:
-        """Return vectors with 0 for each number that is not larger than the error of the Jacobian."""
+        """Return vectors in which numbers up to the size of the Jacobian's error are replaced by 0."""
         return np.where(np.abs(rows) <= self._noise, 0.0, rows)
 
     def _directions(self, lost: FloatArray) -> Iterator[str]:
@@ -268,7 +271,10 @@ class _Explanation:
                     yield one
 
     def _joined(self, sets: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
-        """Join pairs of dependent columns that have a column in common, such as those of parallel axes."""
+        """Join pairs of dependent columns that have a column in common.
+
+        An example are the columns of three parallel prismatic joints.
+        """
         joined: list[set[int]] = []
         if self._linear_only:
             return sets
@@ -393,7 +399,7 @@ def _sparse(rows: FloatArray) -> FloatArray:
 def _basis(rows: FloatArray) -> FloatArray:
     """Return an orthonormal basis for the space that some rows span.
 
-    The rows are orthogonal projections of orthonormal rows onto coordinate axes or onto a complement.
+    The rows are orthogonal projections of orthonormal vectors.
     """
     _, s, Vt = np.linalg.svd(rows, full_matrices=False)
     return Vt[: int((s > 0.5).sum())]  # each singular value of such rows is 1 or 0

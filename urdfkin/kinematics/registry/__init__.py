@@ -1,4 +1,6 @@
-"""The textbook's equations as data: the statement, meaning, functions and tests of each equation.
+"""The textbook's equations as data.
+
+Each equation has its statement, its meaning, its functions and its tests.
 
 The TOML files in `data` are the only source. This module generates `docs/equations.md` and the output of
 `urdfkin explain 7.130` from them. Tests check that every function and test exists.
@@ -43,7 +45,7 @@ class Equation:
     """One numbered equation.
 
     Attributes:
-        number: The printed number, "7.130".
+        number: The printed number, for example "7.130".
         statement: The equation in urdfkin's notation, in plain characters.
         latex: The statement in LaTeX.
         meaning: One or two sentences.
@@ -68,7 +70,7 @@ class Section:
     """A section of the chapter.
 
     Attributes:
-        number: The printed number; "7.2.4, 7.2.5" for several sections.
+        number: The printed number; for several sections, a list such as "7.2.4, 7.2.5".
         title: The title.
         equations: The equations in order.
     """
@@ -83,7 +85,7 @@ class Misprint:
     """A wrong or incomplete statement in the chapter.
 
     Attributes:
-        where: Its location in the chapter.
+        where: The place of the misprint in the chapter.
         printed: The printed statement.
         correct: The correct statement.
         proof: The reason why the printed statement is wrong, in one sentence.
@@ -105,7 +107,7 @@ def sections() -> tuple[Section, ...]:
 
 @cache
 def equations() -> dict[str, Equation]:
-    """Return every equation by its number, in order."""
+    """Return all equations by their numbers, in the order of the chapter."""
     return {equation.number: equation for section in sections() for equation in section.equations}
 
 
@@ -254,7 +256,7 @@ def _page(equation: Equation) -> str:
 
 
 def _source(name: str) -> list[str]:
-    """Return the source code of an equation's function, with a title."""
+    """Return the source code of an equation's function, below a title."""
     source = textwrap.indent(inspect.getsource(getattr(chapter, name)).rstrip(), "    ")
     return ["code in urdfkin/kinematics/equations.py, and LaTeX", "", source]
 

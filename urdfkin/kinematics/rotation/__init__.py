@@ -1,4 +1,4 @@
-"""Rotations of rigid bodies and the rates of their representations.
+"""Rotations of rigid bodies, and the time derivatives of rotation matrices, Euler angles and quaternions.
 
 Section 7.2 of the textbook, equations 7.11 to 7.57. Every function accepts any leading batch shape.
 """
