@@ -57,7 +57,7 @@ class Word:
     kind: int = _ATOM
 
     def inside(self, kind: int) -> str:
-        """Return the text; add brackets if its outermost operation is `kind` or binds less tightly."""
+        """Return the text, in brackets if its outermost operation is `kind` or binds less tightly."""
         return f"({self.text})" if self.kind >= kind else self.text
 
     def __neg__(self) -> Word:

@@ -1,4 +1,4 @@
-"""Error bounds of two correct computations, as numbers of roundings: the source of all tolerances.
+"""Bounds on the difference of two correct computations, in numbers of roundings; all tolerances use them.
 
 The unit is eps = 2^-52 times the rounded number. Each operation has an error of half an eps at most. Errors
 are counted to first order. A tolerance is a count of this module times a scale. The scales are computed
@@ -16,8 +16,8 @@ for each joint by
 | constant rotation from roll, pitch, yaw; Pinocchio: by a normalised quaternion | 3.1 | 12.5 |
 | all of a joint about a coordinate axis | 5.7 | 16.8 |
 
-The worst cases of the parts do not occur together, so a sum is smaller than its parts. The two errors may
-have opposite signs, so the bound for the difference is 5.7 + 16.8 = 22.5.
+The worst cases of the parts do not occur together, so the error of the whole joint is smaller than the sum of
+the parts. The two errors may have opposite signs, so the bound for the difference is 5.7 + 16.8 = 22.5.
 `tests/kinematics/test_roundings.py` computes these counts: it runs the same equations on numbers that record
 each of their roundings.
 
@@ -32,17 +32,18 @@ joints before it. A term of link k is rotated by the joints up to the frame, and
 joints. For w x (w x d) these are at most three times the joints of the path, as for the three factors in the
 world's axes.
 
-A joint about an axis that is **not a coordinate axis** needs two more products before its rotation: the
-constant rotation times the rotation that turns z to the axis, and the inverse of that rotation for the
-previous joint. Pinocchio uses Rodrigues' formula. The length of the axis enters in both. If all 340 roundings
-add up, the error is 41. The bound does not allow for this. If each rounding is uniformly distributed in its
-half unit, the standard deviation is 3.3. `ROUNDINGS` is seven standard deviations for a single joint.
+A joint about an axis that is **not a coordinate axis** needs two more products before its rotation. One is
+the constant rotation times the rotation that turns z to the axis. The other is the product with the inverse
+of that rotation, for the previous joint. Pinocchio uses Rodrigues' formula. In urdfkin and in Pinocchio, the
+result depends on the length of the axis. If all 340 roundings add up, the error is 41. The bound does not
+allow for this. If each rounding is uniformly distributed in its half unit, the standard deviation is 3.3.
+`ROUNDINGS` is seven standard deviations for a single joint.
 
-Pinocchio replaces an axis within 1e-12 of a coordinate axis by that coordinate axis. Let Q be the rotation by
-the tilt t that turns one axis to the other. Then |Q R Q^T - R| <= 2 |Q - 1| <= 2 t. A vector that the joint
-rotates, or moves along its axis, has an error of 2 t at most, and so has each later factor. A tilt larger
-than eps is a finding (URDF514). It adds 2 t / eps to the roundings of each factor, for the frames after that
-joint only.
+Pinocchio replaces an axis within 1e-12 of a coordinate axis by that coordinate axis. Let Q be the rotation
+that turns the file's axis to the coordinate axis, and let t be its angle (the tilt). Then |Q R Q^T - R| <= 2
+|Q - 1| <= 2 t. A vector that the joint rotates, or moves along its axis, has an error of 2 t at most. Each
+later factor also has an error of 2 t at most. A tilt larger than eps is a finding (URDF514). It adds 2 t /
+eps to the roundings of each factor, for the frames after that joint only.
 
 **An export** (`urdfkin.export`) writes the same equations without products with 0 and 1. A number of a
 constant's row or of an offset is omitted if it is less than half an eps of the largest number there. This
@@ -150,9 +151,9 @@ FloatArray = NDArray[np.float64]
 EPS = sys.float_info.epsilon
 #: The smallest normal number.
 SMALLEST = sys.float_info.min
-#: The smallest unit: eps times the smallest normal number. It is the smallest subnormal number.
+#: The smallest unit of rounding: eps times the smallest normal number. It is the smallest subnormal number.
 LEAST_UNIT = EPS * SMALLEST
-#: Replaces a divisor 0 if the dividend is 0 too. It is smaller than every measured number.
+#: This number replaces a divisor 0 if the dividend is 0 too. It is smaller than every measured number.
 NOT_ZERO = 1e-300
 
 #: Roundings for each joint and each factor, of urdfkin and Pinocchio together; derived above.
@@ -200,11 +201,14 @@ FOLLOWER = 4.0
 
 
 def of_joints(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
-    """Return the roundings for each factor, between two parsers of a URDF.
+    """Return the number of roundings for each factor of a term.
+
+    It is for a comparison of two programs that read the same URDF.
 
     Args:
-        joints: (...,) numbers of joints on the path.
-        tilt: (...,) radians, the sum of the angles between Pinocchio's axes and the file's on the path.
+        joints: (...,) number of joints on the path.
+        tilt: (...,) radians, the sum over the path's joints of the angle between Pinocchio's axis and the
+            file's axis.
 
     >>> of_joints([7, 8]).tolist()
     [168.0, 192.0]
@@ -213,21 +217,24 @@ def of_joints(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
 
 
 def of_rows(rows: int) -> float:
-    """Return the roundings of a table's pose with its tool, without half an eps of q for the angles."""
+    """Return the number of roundings of the pose that a table and its tool give.
+
+    It does not contain the half eps of q, which is counted with the angles.
+    """
     return ROW * (rows + 1)
 
 
 def of_rows_read_back(rows: int) -> float:
-    """Return the roundings between a table and the URDF that was written from it.
+    """Return the number of roundings in a comparison of a table with the URDF that was written from it.
 
-    Pinocchio's computation has as many roundings as the table's; the conversion to roll, pitch and yaw has
-    twice as many.
+    Pinocchio's computation has as many roundings as the computation with the table. The conversion to roll,
+    pitch and yaw has twice as many.
     """
     return 4.0 * of_rows(rows)
 
 
 def of_two_texts(joints: int) -> float:
-    """Return the roundings of a pose after `joints` joints, between two texts of the same robot.
+    """Return the number of roundings of a pose after `joints` joints, for two URDF texts of the same robot.
 
     The parser and the writer round each joint's constant transform and its axis. If fixed joints are merged,
     the writer rounds the product of their constants, which adds no more roundings.
@@ -236,5 +243,8 @@ def of_two_texts(joints: int) -> float:
 
 
 def of_a_fit(rows: int) -> float:
-    """Return the roundings between a table and a URDF after a fit; a fit ends within 12.5 times `of_rows`."""
+    """Return the number of roundings in a comparison of a URDF with a table that was fitted to it.
+
+    A fit ends within 12.5 times `of_rows`.
+    """
     return 12.5 * of_rows(rows)

@@ -1,4 +1,4 @@
-"""Rotations about an axis by an angle, and their inverse: the axis and the angle of a rotation.
+"""Conversion of an axis and an angle to a rotation matrix, and of a rotation matrix to its axis and angle.
 
 Section 7.2.1 of the textbook, equations 7.18 to 7.34. A *rotation vector* is the unit axis times the angle.
 """
@@ -34,14 +34,14 @@ def rotation_about(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
     """
     axis = unit_vectors(axis, "axis")
     angle = scalars(angle, "angle")[..., np.newaxis, np.newaxis]
-    # 1 - cos(phi), without the cancellation at small angles.
+    # This is 1 - cos(phi), computed without cancellation at small angles.
     versine = 2.0 * np.sin(angle / 2.0) ** 2
     outer = axis[..., :, np.newaxis] * axis[..., np.newaxis, :]
     return np.eye(3) * np.cos(angle) + outer * versine + skew(axis) * np.sin(angle)
 
 
 def rotation_about_derivative(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
-    """Return dR_k(phi)/dphi = S(k) R_k(phi), per radian (7.33; term by term in 7.29).
+    """Return the derivative dR_k(phi)/dphi = S(k) R_k(phi), per radian (7.33; 7.29 states its terms).
 
     Args:
         axis: (..., 3) unit axis k.
@@ -91,7 +91,7 @@ def circular_velocity(axis: ArrayLike, rate: ArrayLike, p: ArrayLike) -> FloatAr
 
 
 def split_along(axis: ArrayLike, p: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Split p = k (k . p) + r into the part along the axis and the radial part r (7.18).
+    """Split a vector p = k (k . p) + r into the part along the axis k and the radial part r (7.18).
 
     Args:
         axis: (..., 3) unit axis k.
@@ -109,7 +109,7 @@ def split_along(axis: ArrayLike, p: ArrayLike) -> tuple[FloatArray, FloatArray]:
 
 
 def exp_rotation(rotation_vector: ArrayLike) -> FloatArray:
-    """Return R_k(phi) of the rotation vector phi k, without a division by phi.
+    """Return the rotation R_k(phi) of the rotation vector phi k, without a division by phi.
 
     Args:
         rotation_vector: (..., 3), radians.
@@ -130,7 +130,9 @@ def exp_rotation(rotation_vector: ArrayLike) -> FloatArray:
 
 
 def log_rotation(R: ArrayLike) -> FloatArray:
-    """Return the rotation vector phi k of a rotation, with phi in [0, pi]; accurate near 0 and near pi too.
+    """Return the rotation vector phi k of a rotation, with phi in [0, pi].
+
+    The result is accurate for every angle, also near 0 and near pi.
 
     At phi = pi both k and -k are correct; the function returns either of them.
 
@@ -147,7 +149,7 @@ def log_rotation(R: ArrayLike) -> FloatArray:
     vector, scalar = quat[..., :3], quat[..., 3:]
     sine = np.sqrt((vector * vector).sum(axis=-1, keepdims=True))
     angle = 2.0 * np.arctan2(sine, scalar)
-    small = sine < 1e-150  # the angle is twice the sine here, and the quotient would lose its digits
+    small = sine < 1e-150  # for a small angle, phi is twice this sine; the quotient would lose digits
     log: FloatArray = np.where(small, 2.0 * vector, vector * (angle / np.where(small, 1.0, sine)))
     return log
 

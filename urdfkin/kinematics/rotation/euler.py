@@ -18,9 +18,9 @@ from urdfkin.errors.validators import as_str
 from urdfkin.kinematics.inputs import FloatArray, rotations, vectors
 
 _AXES = "xyz"
-#: Triples of axes in which two neighbouring axes always differ.
+#: All triples of axes in which neighbouring axes differ.
 _TRIPLES = [a + b + c for a in _AXES for b in _AXES for c in _AXES if a != b != c]
-#: Names of all sequences: twelve with turning axes and twelve with fixed axes.
+#: Names of all sequences: twelve with axes that turn with the body, and twelve with fixed axes.
 SEQUENCES = (*(triple.upper() for triple in _TRIPLES), *_TRIPLES)
 
 
@@ -30,12 +30,12 @@ class Sequence:
 
     Attributes:
         name: SciPy's name.
-        first: Index of the first turning axis (0 is x).
-        second: Index of the second.
-        third: Index of the third, equal to the first in a proper Euler sequence.
+        first: Index of the first turning axis: 0 is x, 1 is y, 2 is z.
+        second: Index of the second turning axis.
+        third: Index of the third turning axis; in a proper Euler sequence it is equal to `first`.
         other: The index that is neither the first nor the second.
         sign: +1 if (first, second, other) is right-handed, else -1.
-        fixed: Whether the axes are fixed; the angles are then in reverse order.
+        fixed: Whether the axes are fixed. The angles are then in the reverse order of the turning axes.
     """
 
     name: str
@@ -48,16 +48,19 @@ class Sequence:
 
     @property
     def proper(self) -> bool:
-        """Whether the first and the third axis are equal, as in ZYZ."""
+        """Whether the first and the third axis have the same index, as in ZYZ."""
         return self.first == self.third
 
     def turning(self, values: FloatArray) -> FloatArray:
-        """Return angles or rates in the order of the turning axes; a second call restores the first order."""
+        """Return angles or their rates in the order of the turning axes.
+
+        A second call with the result returns the original order.
+        """
         return values[..., ::-1] if self.fixed else values
 
 
 def sequence(name: str) -> Sequence:
-    """Return the sequence of a name.
+    """Return the Euler sequence with a given name.
 
     Args:
         name: Three letters as in SciPy: "ZYZ" for axes that turn with the body, "xyz" for fixed axes.
@@ -81,7 +84,10 @@ def _sequence(name: str) -> Sequence:
 
 
 def coordinate_rotation(axis: int, angle: FloatArray) -> FloatArray:
-    """Return Rx, Ry or Rz (axis 0, 1, 2) of `angle` (...), rad; constant entries are exactly 0 and 1."""
+    """Return the rotation Rx, Ry or Rz (axis 0, 1 or 2) by `angle` (...), rad.
+
+    The entries that do not depend on the angle are exactly 0 and 1.
+    """
     angle = np.asarray(angle)
     R = np.zeros((*angle.shape, 3, 3))
     j, k = (axis + 1) % 3, (axis + 2) % 3
@@ -117,11 +123,12 @@ def rotation_from_euler(name: str, angles: ArrayLike) -> FloatArray:
 
 
 def euler_of(name: str, R: ArrayLike) -> FloatArray:
-    """Return the angles of a rotation, the inverse of `rotation_from_euler` up to rounding.
+    """Return the Euler angles of a rotation. Up to rounding, it is the inverse of `rotation_from_euler`.
 
     The middle angle is in [0, pi] for a proper sequence and in [-pi/2, pi/2] for the others. At the
-    representational singularity only a combination of the two outer angles is determined. The third angle is
-    then computed from the first, so the product of the rotations is correct there too.
+    representational singularity, only the sum or the difference of the first and the third angle is
+    determined. The third angle is then computed from the first angle, so that the product of the three
+    rotations is correct there too.
 
     Args:
         name: SciPy's name of the sequence.
@@ -135,7 +142,7 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
         InputError: a wrong shape, or `R` is not a rotation.
     """
     axes = sequence(name)
-    R = rotations(R, "R") + 0.0  # turns -0 into 0; arctan2(0, -0) is pi
+    R = rotations(R, "R") + 0.0  # adding 0 turns -0 into 0, because arctan2(0, -0) would be pi
     i, j, m, sign = axes.first, axes.second, axes.other, axes.sign
     if axes.proper:
         first = np.arctan2(R[..., j, i], -sign * R[..., m, i] + 0.0)
@@ -143,12 +150,12 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     else:
         first = np.arctan2(-sign * R[..., j, m], R[..., m, m])
         second = np.arctan2(sign * R[..., i, m], np.hypot(R[..., j, m], R[..., m, m]))
-    # R_first^T R = R_second R_third. The row of this product for the second axis depends on the third angle
+    # R_first^T R = R_second R_third. In this product, the row of the second axis depends on the third angle
     # only.
     cosine, sine = np.cos(first), np.sin(first)
     row = cosine[..., np.newaxis] * R[..., j, :] + (sign * sine)[..., np.newaxis] * R[..., m, :]
-    # R_third turns the plane of the second axis and of one more axis: the axis `other` in a proper sequence,
-    # else the first axis.
+    # R_third rotates in the plane of the second axis and one more axis. In a proper sequence this is the axis
+    # `other`, else it is the first axis.
     rest, sense = (m, sign) if axes.proper else (i, -sign)
     third = np.arctan2(-sense * row[..., rest], row[..., j])
     return axes.turning(np.stack((first, second, third), axis=-1)).copy()
@@ -170,7 +177,7 @@ def rotation_from_rpy(rpy: ArrayLike) -> FloatArray:
 
 
 def rpy_of(R: ArrayLike) -> FloatArray:
-    """Return roll, pitch and yaw of a rotation, accurate also at a pitch of +-pi/2 (see `euler_of`).
+    """Return roll, pitch and yaw of a rotation; they are accurate at a pitch of +-pi/2 too (see `euler_of`).
 
     Args:
         R: (..., 3, 3) rotation.
@@ -184,12 +191,15 @@ def rpy_of(R: ArrayLike) -> FloatArray:
     return euler_of("xyz", R)
 
 
-#: Least allowed distance from the singularity, radians. At a smaller distance the rates lose too many digits.
+#: Least allowed distance from the singularity, radians. At a smaller distance, computed rates of the angles
+#: lose too many digits.
 NEAREST = 1e-9
 
 
 def euler_rate_matrix(name: str, angles: ArrayLike) -> FloatArray:
-    """Return Omega with w = Omega (phi-dot, theta-dot, psi-dot); its columns are the axes (7.51 to 7.55).
+    """Return the matrix Omega in w = Omega (phi-dot, theta-dot, psi-dot) (7.51 to 7.55).
+
+    Its columns are the axes of the three rotations.
 
     Args:
         name: SciPy's name of the sequence; the textbook's is "ZYZ".
@@ -237,7 +247,9 @@ def angular_velocity_from_euler_rates(name: str, angles: ArrayLike, rates: Array
 
 
 def euler_rates(name: str, angles: ArrayLike, w: ArrayLike, nearest: float = NEAREST) -> FloatArray:
-    """Return the angle rates Omega^-1 w of a body with angular velocity w, in closed form (7.56).
+    """Return the rates Omega^-1 w of a body's Euler angles from its angular velocity w (7.56).
+
+    They are computed in closed form.
 
     Args:
         name: SciPy's name of the sequence.
@@ -257,10 +269,10 @@ def euler_rates(name: str, angles: ArrayLike, w: ArrayLike, nearest: float = NEA
 
 
 def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -> FloatArray:
-    """Return Omega^-1, computed from the geometry of the axes instead of elimination (7.56).
+    """Return the matrix Omega^-1, computed from the geometry of the axes and not by elimination (7.56).
 
-    In the frame after the first turn, two of the axes are coordinate axes and the third is in a coordinate
-    plane. Each rate then follows from one component of w.
+    In the frame after the first rotation, the first and the second axis are coordinate axes, and the third
+    axis lies in a coordinate plane. The rates then follow from the components of w one after the other.
 
     Args:
         name: SciPy's name of the sequence.
@@ -280,8 +292,8 @@ def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -
     axes = sequence(name)
     turns = axes.turning(angles)
     cosine, sine = np.cos(turns[..., 1]), np.sin(turns[..., 1])
-    # Components of the third axis in the frame after the first turn: `along` is the component along the first
-    # axis, `across` the component along the axis `other`.
+    # Components of the third axis in the frame after the first rotation: `along` is the component along the
+    # first axis, `across` the component along the axis `other`.
     if axes.proper:
         along, across = cosine, -axes.sign * sine
     else:
@@ -299,7 +311,7 @@ def singularity_distance(name: str, angles: ArrayLike) -> FloatArray:
     """Return the distance of the middle angle from the representational singularity (gimbal lock).
 
     A proper Euler sequence such as ZYZ is singular if the middle angle is a multiple of pi (the textbook
-    names only 0). The other sequences are singular if it is an odd multiple of pi/2.
+    names only 0). The other sequences are singular if the middle angle is an odd multiple of pi/2.
 
     Args:
         name: SciPy's name of the sequence.
@@ -319,18 +331,20 @@ def singularity_distance(name: str, angles: ArrayLike) -> FloatArray:
 
 
 def euler_condition(name: str, angles: ArrayLike) -> FloatArray:
-    """Return the condition number of Omega: the largest factor by which a relative error of w grows.
+    """Return the condition number of Omega.
+
+    It is the largest factor by which the relative error of the rates exceeds that of the angular velocity w.
 
     The middle axis is perpendicular to the first and to the third axis. Let d be the angle between the first
-    and the third axis. The singular values are then 1 and sqrt(1 +- cos d), and the condition number is cot(d
-    / 2).
+    and the third axis. The singular values of Omega are then 1 and sqrt(1 +- cos d), and its condition number
+    is cot(d / 2).
 
     Args:
         name: SciPy's name of the sequence.
         angles: (..., 3) radians, in the order of the name.
 
     Returns:
-        (...); 1 if the axes are perpendicular.
+        (...) condition number; it is 1 if the three axes are perpendicular to each other.
 
     Raises:
         RepresentationSingularityError: a sample is at the singularity, where no condition number exists.

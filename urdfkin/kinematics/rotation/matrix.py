@@ -1,4 +1,4 @@
-"""Rotation matrices: skew-symmetric matrices, nearest rotations, rates and sums of angular velocities.
+"""Rotation matrices: skew-symmetric matrices, nearest rotations, time derivatives and angular velocities.
 
 | Functions | Section and equations of the textbook |
 |---|---|
@@ -9,11 +9,11 @@
 
 `w_0_1` is the angular velocity of frame 1 relative to frame 0.
 
-A user's matrix is often printed with a few digits only, so its columns are orthogonal only to these digits.
-There are several ways to convert such a matrix to a rotation (by a quaternion, by angles, column by column).
-Their results differ in the last printed digit. `nearest_rotation` and `polar_factor` return the rotation that
-is nearest to the matrix in the Frobenius norm. This rotation is unique: it is the orthogonal factor U of the
-polar decomposition M = U H.
+A user's matrix often has only a few digits, so its columns are only approximately orthogonal. Such a matrix
+can be converted to a rotation by a quaternion, by angles or column by column. The results differ in the last
+digit of the given matrix. `nearest_rotation` and `polar_factor` return the rotation that is nearest to the
+matrix in the Frobenius norm. This rotation is unique: it is the orthogonal factor U of the polar
+decomposition M = U H.
 
 The textbook's joint i turns about the axis z_{i-1} of a frame. A URDF joint turns about any axis of its
 frame. `axis_aligning` returns the rotation between the two frames.
@@ -61,7 +61,7 @@ def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
 
     Args:
         S: (..., 3, 3).
-        tolerance: Largest allowed symmetric part, relative to the largest entry of S.
+        tolerance: Largest allowed entry of the symmetric part, relative to the largest entry of S.
 
     Returns:
         (..., 3), in the unit and frame of `S`.
@@ -101,16 +101,17 @@ def rotate_skew(R_0_1: ArrayLike, S_1: ArrayLike) -> FloatArray:
     return R_0_1 @ matrices(S_1, "S_1") @ R_0_1.swapaxes(-1, -2)
 
 
-#: A matrix whose entries differ from those of the nearest rotation by at most this is a rotation up to
-#: rounding, and is not changed.
+#: If no entry of a matrix differs from that of the nearest rotation by more than this number, the matrix is a
+#: rotation up to rounding and is not changed.
 ROUNDED = 1e-15
 
 
 def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
-    """Return the nearest rotation, up to rounding.
+    """Return the rotation that is nearest to a matrix M, up to rounding.
 
-    The method is one Newton step (Bjorck and Bowie): M - M (M^T M - I)/2. With M = U (I + E) the result is
-    U (I - 3/2 E^2). Here |E| is 3e-9 at most, so the error is 1.4e-17 at most, an eighth of a rounding error.
+    The method is one Newton step (Bjorck and Bowie): M - M (M^T M - I)/2. With M = U (I + E) the result is U
+    (I - 3/2 E^2). Here |E| is 3e-9 at most, so the error of the result is 1.4e-17 at most, an eighth of a
+    rounding error.
 
     Args:
         M: (..., 3, 3), a rotation whose entries are rounded to nine decimals.
@@ -129,10 +130,12 @@ def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
 
 
 def polar_factor(M: FloatArray) -> FloatArray:
-    """Return the rotation nearest to a matrix with larger errors, for example one printed with few digits.
+    """Return the rotation nearest to a matrix that has larger errors than `nearest_rotation` allows.
+
+    An example is a matrix that is printed with few digits.
 
     Args:
-        M: (3, 3), of positive determinant.
+        M: (3, 3) matrix with a positive determinant.
 
     Example:
         >>> polar_factor(np.diag([1.0, 1.001, 0.999])).tolist()
@@ -147,8 +150,9 @@ def axis_aligning(axis: ArrayLike) -> FloatArray:
 
     If the axis does not point down (its z component is not negative), the result is the shortest rotation
     from z to the axis. If the axis points down, the result is half a turn about x, followed by the shortest
-    rotation from -z to the axis. No axis is therefore near a singular case (Duff and others, "Building an
-    Orthonormal Basis, Revisited", 2017). For a coordinate axis the entries are exactly 0 and +-1.
+    rotation from -z to the axis. The computation therefore has no singularity near any axis (Duff and others,
+    "Building an Orthonormal Basis, Revisited", 2017). For a coordinate axis the entries are exactly 0 and
+    +-1.
 
     Args:
         axis: (..., 3) unit axis.
@@ -172,12 +176,12 @@ def axis_aligning(axis: ArrayLike) -> FloatArray:
     first = (1.0 + sign * x * x * scale, sign * x * y * scale, -sign * x)
     second = (x * y * scale, sign + y * y * scale, -y)
     columns = [np.stack(column, axis=-1) for column in (first, second)]
-    # Adding zero turns -0 into 0, which is easier to read.
+    # Adding zero turns -0 into 0, so that printed matrices are easier to read.
     return np.stack([*columns, axis], axis=-1) + 0.0
 
 
 def rotation_rate(R_0_1: ArrayLike, w_0_1: ArrayLike) -> FloatArray:
-    """Return R-dot = S(w) R (7.38, 7.42).
+    """Return the time derivative R-dot = S(w) R of a rotation matrix (7.38, 7.42).
 
     Args:
         R_0_1: (..., 3, 3) orientation of frame 1 in frame 0.
@@ -193,12 +197,15 @@ def rotation_rate(R_0_1: ArrayLike, w_0_1: ArrayLike) -> FloatArray:
 
 
 def angular_velocity_of(R_0_1: ArrayLike, R_rate: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
-    """Return w with S(w) = R-dot R^T (7.38); 7.35 to 7.37 show that such a w exists.
+    """Return the angular velocity w, for which S(w) = R-dot R^T (7.38).
+
+    Equations 7.35 to 7.37 show that such a w exists.
 
     Args:
         R_0_1: (..., 3, 3) orientation of frame 1 in frame 0.
         R_rate: (..., 3, 3) time derivative of `R_0_1`, 1/s.
-        tolerance: Largest allowed symmetric part of R-dot R^T, relative to its largest entry.
+        tolerance: Largest allowed entry of the symmetric part of R-dot R^T, relative to the largest entry of
+            R-dot R^T.
 
     Returns:
         (..., 3) angular velocity of frame 1, rad/s, expressed in frame 0.
@@ -216,14 +223,14 @@ def angular_velocity_of(R_0_1: ArrayLike, R_rate: ArrayLike, tolerance: float = 
 
 
 def turning_vector_rate(w_0_1: ArrayLike, p_0: ArrayLike) -> FloatArray:
-    """Return w x p, the rate of a vector that is fixed in a turning frame (7.39 to 7.41).
+    """Return the time derivative w x p of a vector p that is fixed in a turning frame (7.39 to 7.41).
 
     Args:
         w_0_1: (..., 3) angular velocity of the frame, rad/s, expressed in frame 0.
         p_0: (..., 3) vector, metres, expressed in frame 0.
 
     Returns:
-        (..., 3) rate of the vector in frame 0, m/s.
+        (..., 3) time derivative of the vector in frame 0, m/s.
 
     Raises:
         InputError: a wrong shape, or a value that is not finite.
@@ -232,18 +239,21 @@ def turning_vector_rate(w_0_1: ArrayLike, p_0: ArrayLike) -> FloatArray:
 
 
 def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
-    """Return w_0n, the sum of relative angular velocities, each expressed in frame 0 (7.43 to 7.50).
+    """Return the angular velocity w_0n of the last frame (7.43 to 7.50).
+
+    It is the sum of the angular velocities of each frame relative to the previous frame, after each is
+    expressed in frame 0.
 
     Args:
-        Rs: (..., n, 3, 3); row i is the orientation of frame i + 1 in frame i.
-        ws: (..., n, 3); row i is the angular velocity of frame i + 1 relative to frame i, rad/s, expressed
+        Rs: (..., n, 3, 3); entry i is the orientation of frame i + 1 in frame i.
+        ws: (..., n, 3); entry i is the angular velocity of frame i + 1 relative to frame i, rad/s, expressed
             in frame i.
 
     Returns:
         (..., 3) angular velocity of frame n relative to frame 0, rad/s, expressed in frame 0.
 
     Raises:
-        InputError: a wrong shape, different numbers of frames, or a matrix that is not a rotation.
+        InputError: a wrong shape, different numbers n in `Rs` and `ws`, or a matrix that is not a rotation.
     """
     Rs, ws = rotations(Rs, "Rs"), vectors(ws, "ws")
     if Rs.ndim < 3 or ws.ndim < 2 or Rs.shape[-3] != ws.shape[-2]:

@@ -1,4 +1,4 @@
-"""Unit quaternions, their rates, and the integration of an angular velocity.
+"""Unit quaternions, their time derivatives, and the integration of an angular velocity.
 
 Section 7.2.5 of the textbook, equation 7.57. A quaternion is (qx, qy, qz, qw), with the scalar last as in a
 configuration; qw is the textbook's q0. A quaternion and its negative are the same rotation.
@@ -7,7 +7,7 @@ The angular velocity is expressed in the fixed frame 0, as in the textbook (`fra
 frame of the turning body (`frame="body"`). Quaternion rates have no singularity.
 
 `integrate_orientation` integrates the rates of a quaternion and normalises the quaternion after each step. It
-does not integrate the angular velocity itself: that integral is not an orientation (example 7.3).
+does not integrate the angular velocity itself, because that integral is not an orientation (example 7.3).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ NORM_TOLERANCE = 1e-6
 
 
 def unit_quaternions(value: ArrayLike, name: str = "quat") -> FloatArray:
-    """Return `value` as (..., 4) quaternions, normalised to unit length up to rounding.
+    """Return `value` as quaternions (..., 4) that are normalised to unit length, up to rounding.
 
     Args:
         value: (..., 4), scalar last.
@@ -71,9 +71,10 @@ def rotation_of(quat: ArrayLike) -> FloatArray:
 
 
 def quaternion_of(R: ArrayLike) -> FloatArray:
-    """Return the unit quaternion of a rotation, with qw >= 0.
+    """Return the unit quaternion with qw >= 0 of a rotation.
 
-    Shepperd's method divides by the largest component, which avoids cancellation.
+    The function uses Shepperd's method: it divides by the component with the largest absolute value, which
+    avoids cancellation.
 
     Args:
         R: (..., 3, 3) rotation.
@@ -139,7 +140,7 @@ ExpressedIn = Literal["fixed", "body"]
 
 
 def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> FloatArray:
-    """Return the matrix E with (q-dot, q0-dot) = E w (7.57).
+    """Return the matrix E in (q-dot, q0-dot) = E w (7.57).
 
     For w in the fixed frame, E = 1/2 [q0 I - S(q); -q^T]. For w in the body's frame, the sign of S(q)
     changes. The columns of E have length 1/2. They are perpendicular to each other and to the quaternion, so
@@ -166,7 +167,7 @@ def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> Flo
 
 
 def quaternion_rates(quat: ArrayLike, w: ArrayLike, frame: ExpressedIn = "fixed") -> FloatArray:
-    """Return the rate of the quaternion of a body with angular velocity w (7.57).
+    """Return the time derivative of a body's quaternion from the body's angular velocity w (7.57).
 
     Args:
         quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
@@ -191,8 +192,8 @@ def angular_velocity_from_quaternion_rates(
 ) -> FloatArray:
     """Return the angular velocity w = 4 E^T (q-dot, q0-dot), the inverse of 7.57.
 
-    The component of the rates along the quaternion would only change the quaternion's length. It belongs to
-    no rotation, so the function ignores this component.
+    The component of the rates along the quaternion changes only the quaternion's length. No rotation causes
+    this component, so the function ignores it.
 
     Args:
         quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
@@ -213,10 +214,13 @@ def angular_velocity_from_quaternion_rates(
 def integrate_orientation(
     w: Callable[[float], ArrayLike], quat: ArrayLike, times: ArrayLike, frame: ExpressedIn = "fixed"
 ) -> FloatArray:
-    """Integrate an angular velocity w(t) to quaternions, by the fourth-order Runge-Kutta method on 7.57.
+    """Integrate 7.57 with an angular velocity w(t), by the fourth-order Runge-Kutta method.
+
+    The results are orientations as quaternions.
 
     The exact quaternion has constant length. Rounding and truncation errors change the length, so the
-    quaternion is normalised after each step. Halving the step divides the error by 16.
+    quaternion is normalised after each step. If the step is halved, the truncation error is divided by about
+    16.
 
     Args:
         w: Function of the time in s that returns the angular velocity, (..., 3) rad/s. It must be smooth
@@ -246,7 +250,7 @@ def integrate_orientation(
 def _step(
     w: Callable[[float], ArrayLike], quat: FloatArray, start: float, end: float, frame: ExpressedIn
 ) -> FloatArray:
-    """Return the quaternion after one Runge-Kutta step, normalised."""
+    """Return the normalised quaternion after one Runge-Kutta step."""
     step = end - start
     first, middle, last = (
         vectors(w(t), "w") for t in (np.nextafter(start, end), (start + end) / 2.0, np.nextafter(end, start))
@@ -261,7 +265,10 @@ def _step(
 
 
 def _rates(quat: FloatArray, w: FloatArray, frame: ExpressedIn) -> FloatArray:
-    """Return the rates of a quaternion of any length; equation 7.57 is linear in the quaternion."""
+    """Return the rates of a quaternion of any length.
+
+    Equation 7.57 is linear in the quaternion, so it needs no unit quaternion.
+    """
     length = np.sqrt((quat * quat).sum(axis=-1, keepdims=True))
     rates: FloatArray = length * quaternion_rates(quat / length, w, frame)
     return rates
