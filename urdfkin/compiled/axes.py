@@ -1,4 +1,4 @@
-"""Selection of the axes in which the recursion expresses vectors: world axes or each link's own axes.
+"""Functions with which the recursion expresses vectors in world axes or in each link's own axes.
 
 The textbook uses world axes.
 

@@ -29,7 +29,10 @@ Compute = Callable[[Sequence[FloatArray], FloatArray], int]
 
 
 def default_threads(n: int) -> int:
-    """Return the default number of threads: 1 for a small batch, else all processors this process may use."""
+    """Return the default number of threads for n configurations.
+
+    It is 1 for a small batch, else the number of processors that this process may use.
+    """
     return _processors() if n >= _WORTH_THREADS else 1
 
 

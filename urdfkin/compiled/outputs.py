@@ -33,12 +33,12 @@ def _unused_vector():
 
 
 def follow_place(state):
-    """Keep R and p."""
+    """Keep R and p of a link's state, which is all that a placement needs."""
     return state[0], state[1], _unused_vector(), _unused_vector(), _unused_vector(), _unused_vector()
 
 
 def follow_velocity(state):
-    """Keep R, p, w and vel."""
+    """Keep R, p, w and vel of a link's state, which is all that a velocity needs."""
     return state[0], state[1], state[2], state[3], _unused_vector(), _unused_vector()
 
 
@@ -55,7 +55,7 @@ def _no_vector():
 
 
 def emit_place(m, s, program, place, sources, b, reference, state, to):
-    """Write the 4 by 4 pose of a frame."""
+    """Write the 4 by 4 pose of a frame to the output."""
     R, p = state[0], state[1]
     _pose_row(s, OUT_ROW, R[0], p[0])
     _pose_row(s, OUT_ROW + 4, R[1], p[1])
@@ -65,7 +65,7 @@ def emit_place(m, s, program, place, sources, b, reference, state, to):
 
 
 def _pose_row(s, row, x, last):
-    """Write a row of a pose."""
+    """Write a row of a 4 by 4 pose, which consists of the vector x and the number `last`."""
     put_vector(s, row, x)
     put(s, row + 3, last)
 
@@ -108,11 +108,11 @@ def emit_matrix(m, s, program, place, sources, b, reference, state, to):
 
 
 def keep_none(s, row, axis, state):
-    """Do nothing: the output has no columns."""
+    """Do nothing, because this output has no Jacobian columns."""
 
 
 def column_none(s, row, to, how, g, c, reference, state):
-    """Do nothing: the output has no columns."""
+    """Do nothing, because this output has no Jacobian columns."""
 
 
 def keep_axis(s, row, axis, state):
@@ -169,7 +169,10 @@ def column_rate(s, row, to, how, g, c, reference, state):
 
 
 def _end(reference, x):
-    """Return the reference point of a column: the frame's origin x, or for WORLD the world's origin."""
+    """Return the reference point of a Jacobian column.
+
+    It is the frame's origin x; for the reference frame WORLD it is the world's origin.
+    """
     if reference == _WORLD:
         nil = same(0.0)
         x = nil, nil, nil
@@ -177,7 +180,7 @@ def _end(reference, x):
 
 
 def _put_column(s, to, how, g, c, reference, R, linear, angular):
-    """Write a column in the axes of the reference frame.
+    """Write a Jacobian column, expressed in the axes of the reference frame.
 
     The column of a mimic joint is scaled and added to the column of the mimicked joint.
     """

@@ -112,7 +112,10 @@ def _turned_about_z(axes, state, s, row):
 
 
 def revolute(axes, state, s, row, v, a):
-    """Compute the state after a revolute joint: 7.129, then 7.127, then the rotation itself."""
+    """Compute the state after a revolute joint.
+
+    Equation 7.129 is applied first, then 7.127, then the rotation of the frame.
+    """
     R, p, w, vel, alpha, acc = state
     z = seen(axes, R, (zero(), zero(), one()))
     alpha = eq.angular_acceleration(alpha, w, z, v, a)
@@ -120,7 +123,10 @@ def revolute(axes, state, s, row, v, a):
 
 
 def prismatic(axes, state, slide, v, a):
-    """Compute the state after a prismatic joint: 7.64 for its displacement, then 7.130 and 7.128."""
+    """Compute the state after a prismatic joint.
+
+    Equation 7.64 gives the displacement; then 7.130 and 7.128 are applied.
+    """
     R, p, w, vel, alpha, acc = carried(axes, state, (zero(), zero(), slide))
     z = seen(axes, R, (zero(), zero(), one()))
     return R, p, w, eq.sliding_velocity(vel, z, v), alpha, eq.sliding_acceleration(acc, w, z, v, a)
@@ -355,7 +361,7 @@ def _rows_are_ordinary(m, x, b, width, stride):
 
 
 def _block(axes, m, task, program, g, s, b, reference, orders, follow, keep, column, emit):
-    """Run the recursion for `m` configurations, starting at `b`."""
+    """Run the recursion for the `m` configurations from index `b` on."""
     _read_inputs(m, task, program, s, b, orders)
     _sines_and_cosines(s, program, g)
     state = follow(_start(axes, m, s, task, program[_ROW_BASE], b))

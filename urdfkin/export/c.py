@@ -54,7 +54,7 @@ def literal(x: float) -> str:
 
 
 def comment(lines: Sequence[str]) -> str:
-    """Return lines as a C comment."""
+    """Return lines of text as one C comment."""
     return "/* " + "\n".join(f" * {line}".rstrip() for line in lines)[3:] + "\n */"
 
 
@@ -158,7 +158,7 @@ class Layout:
         self.room = max(1, self.first + 3 * len(self.angles))
 
     def place(self, node: Node) -> int:
-        """Return the index of an input, an angle, a sine or a cosine."""
+        """Return the index in the array `in` of an input, an angle, a sine or a cosine."""
         if node.op in ("sin", "cos"):
             return self.place(node.of[0]) + len(self.angles) * (1 if node.op == "sin" else 2)
         if node in self.angles:
@@ -184,7 +184,7 @@ def _sines(writer: Writer, layout: Layout) -> Iterator[str]:
 
 
 def _computed_angles(writer: Writer, layout: Layout, at: str) -> Iterator[str]:
-    """Yield C code for the angles that are not inputs."""
+    """Yield C code that computes the angles which are not inputs themselves."""
     for node in layout.made:
         value = writer.whole(node, lambda x: at.format(layout.place(x)))
         yield f"{at.format(layout.place(node))} = {value}"
@@ -217,7 +217,7 @@ def _lane_sines(writer: Writer, layout: Layout) -> Iterator[str]:
 
 
 def vectors(code: Code) -> Iterator[str]:
-    """Yield the test vectors as C arrays: inputs, true values and tolerances."""
+    """Yield C arrays with the test vectors: their inputs, the true values and the tolerances."""
     found, n = code.proof.vectors, len(code.proof.vectors)
     yield "/* True values at fifty digits, and the tolerance of each number, in eps of its precision. */"
     for k, (letter, width) in enumerate(
@@ -237,7 +237,7 @@ def _array(declared: str, rows: Sequence[Sequence[str]]) -> str:
 
 
 def _numbers(values: Sequence[str]) -> str:
-    """Return a list of numbers, wrapped over several lines."""
+    """Return numbers as the text of a C list, wrapped over several lines."""
     lines, line = list[str](), "       "
     for value in values:
         if len(line) + len(value) > 108:

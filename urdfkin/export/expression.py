@@ -93,7 +93,7 @@ class Graph:
         self.chapter: Any = bound(made=self._record_numbers)
 
     def input(self, letter: str, place: int) -> Node:
-        """Return the node of coordinate `place` of q, v or a."""
+        """Return the node of element `place` of q, v or a."""
         return self.made(letter, place)
 
     def made(self, op: str, *of: Any) -> Node:

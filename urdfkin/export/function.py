@@ -70,12 +70,12 @@ class Function:
 
     @cached_property
     def operations(self) -> int:
-        """The number of operations; a change of sign does not count."""
+        """The number of arithmetic operations in the function; a change of sign does not count."""
         return sum(node.op not in (*_INPUTS, "neg") for node in self.nodes)
 
     @cached_property
     def angles(self) -> list[Node]:
-        """The angles with a sine or cosine in the function."""
+        """The angles whose sine or cosine the function computes."""
         found = (node.of[0] for node in self.nodes if node.op in ("sin", "cos"))
         return list(dict.fromkeys(found))
 
@@ -112,7 +112,7 @@ class Function:
         return found
 
     def evaluated(self, inputs: Sequence[FloatArray]) -> FloatArray:
-        """Evaluate the expressions with NumPy: results (n, ...) for q (n, nq), v and a (n, nv)."""
+        """Return the results (n, ...) for q (n, nq), v and a (n, nv), computed with NumPy."""
         value: dict[Node, Any] = {}
         given = dict(zip(_INPUTS, inputs, strict=False))
         for node in self.nodes:

@@ -138,32 +138,32 @@ def _without_rounding(x: Sequence[float]) -> Vector:
 
 
 def placement(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
-    """Return T_world_frame, row by row."""
+    """Return the numbers of the placement T_world_frame, row by row."""
     end = TreeRecursion(plan, kind, inputs, own=False).end
     rows = [[*row, x] for row, x in zip(end.R, end.p, strict=True)]
     return [*(x for row in rows for x in row), 0.0, 0.0, 0.0, 1.0]
 
 
 def velocity(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
-    """Return the velocity [linear; angular]: 7.127, 7.128."""
+    """Return the velocity [linear; angular] of the frame (7.127, 7.128)."""
     path = _recursion(plan, kind, inputs, reference)
     return _six_vector(path, reference, *path.velocity(path.end, reference))
 
 
 def acceleration(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
-    """Return the classical acceleration [linear; angular]: 7.129, 7.130."""
+    """Return the classical acceleration [linear; angular] of the frame (7.129, 7.130)."""
     path = _recursion(plan, kind, inputs, reference)
     return _six_vector(path, reference, *path.acceleration(path.end, reference))
 
 
 def jacobian(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
-    """Return the Jacobian row by row: 7.85."""
+    """Return the numbers of the frame's Jacobian (7.85), row by row."""
     path = TreeRecursion(plan, kind, inputs, own=False)
     return _by_row(path.jacobian(path.end, path.columns, plan.nv, reference))
 
 
 def jacobian_rate(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
-    """Return the time derivative of the Jacobian row by row: 7.126."""
+    """Return the numbers of the Jacobian's time derivative (7.126), row by row."""
     path = TreeRecursion(plan, kind, inputs, own=False)
     return _by_row(path.jacobian_rate(path.end, path.columns, plan.nv, reference))
 

@@ -104,7 +104,7 @@ _words = bound(
 
 
 def latex(name: str) -> str:
-    r"""Return an equation in LaTeX.
+    r"""Return the LaTeX text of an equation of the textbook.
 
     Args:
         name: Name of a function of `urdfkin.kinematics.equations`.
@@ -118,7 +118,7 @@ def latex(name: str) -> str:
 
 
 def _latex_of(value: Any) -> str:
-    """Return the LaTeX of a word, of a column of words, or of a matrix."""
+    """Return the LaTeX text of a `Word`, of a column of them, or of a matrix of them."""
     if isinstance(value, Word):
         return value.text
     rows = [" & ".join(map(_latex_of, row)) if isinstance(row, tuple) else _latex_of(row) for row in value]

@@ -1,4 +1,7 @@
-"""Frame names with a prefix, `link:` or `joint:`, which makes an ambiguous name unique."""
+"""Frame names with the prefix `link:` or `joint:`.
+
+The prefix is needed if a link and a joint have equal names.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,7 @@ class FrameName(str):
 
     @classmethod
     def of(cls, own: str) -> Self:
-        """Return the frame name of a link or joint, given its own name."""
+        """Return the frame name, with the prefix, of the link or joint with the name `own`."""
         return cls(f"{cls.prefix}{own}")
 
     @property
@@ -31,14 +34,14 @@ class FrameName(str):
 
 
 class LinkFrame(FrameName):
-    """`link:NAME`: the frame of a link."""
+    """The name `link:NAME` of a link's frame."""
 
     __slots__ = ()
     prefix = "link:"
 
 
 class JointFrame(FrameName):
-    """`joint:NAME`: the frame of a joint, which is the frame of its child link."""
+    """The name `joint:NAME` of a joint's frame, which is the frame of the joint's child link."""
 
     __slots__ = ()
     prefix = "joint:"

@@ -45,7 +45,7 @@ def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
 def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> FloatArray:
     """Return the joint velocities (..., nv) that lead from `start` to `end` (..., nq) in one second.
 
-    For an angle without limits, the result is the shorter of the two rotations from `start` to `end`.
+    For the angle of a revolute joint without limits, the result is the shorter of the two rotations.
     """
     shape = _common_shape(start, end)
     start, end = (np.broadcast_to(q, (*shape, tree.nq)) for q in (start, end))
@@ -100,7 +100,7 @@ def _pose(joint: Joint, own: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _screw(joint: Joint, step: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the linear and the angular part of a joint velocity, (..., 3) each."""
+    """Return the linear and the angular part, each (..., 3), of a planar or floating joint's velocity."""
     if joint.kind is JointKind.FLOATING:
         return step[..., :3], step[..., 3:]
     if joint.kind is not JointKind.PLANAR:

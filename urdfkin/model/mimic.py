@@ -41,7 +41,7 @@ class Coupling:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names of the coordinates: the independent joints, in path order."""
+        """Names of the coordinates, which are the independent joints, in path order."""
         leaders = (
             mimic.leader if mimic else joint for joint, mimic in zip(self.joints, self.mimics, strict=True)
         )
@@ -49,14 +49,17 @@ class Coupling:
 
     @cached_property
     def matrix(self) -> FloatArray:
-        """G, (joints, coordinates): the velocity of each joint for unit velocity of each coordinate."""
+        """The matrix G (joints, coordinates).
+
+        Column k contains the joint velocities if coordinate k has velocity 1.
+        """
         G = np.zeros((len(self.joints), len(self.names)))
         G[np.arange(len(self.joints)), self._leader_index] = self._multiplier
         return frozen(G)
 
     @cached_property
     def offset(self) -> FloatArray:
-        """g, (joints,): the value of each joint when every coordinate is zero."""
+        """The vector g (joints,), which contains the value of each joint if every coordinate is zero."""
         return frozen([mimic.offset if mimic else 0.0 for mimic in self.mimics])
 
     def places(self, what: str = "q") -> CoordinateLayout:
@@ -120,11 +123,11 @@ class Coupling:
         return frozen([mimic.multiplier if mimic else 1.0 for mimic in self.mimics])
 
     def q_index(self, tree: KinematicTree) -> tuple[int, ...]:
-        """Return the index of each coordinate of the path in the configuration `q` of the whole robot."""
+        """For each coordinate of the path, return the index in the robot's configuration `q`."""
         return tuple(tree.q_index[tree.joint_index(name)] for name in self.names)
 
     def v_index(self, tree: KinematicTree) -> tuple[int, ...]:
-        """Return the index of each joint velocity of the path in `v` of the whole robot."""
+        """For each joint velocity of the path, return the index in the robot's joint velocities `v`."""
         return tuple(tree.v_index[tree.joint_index(name)] for name in self.names)
 
     def select(self, tree: KinematicTree, q: Given) -> FloatArray:

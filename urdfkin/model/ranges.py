@@ -69,7 +69,10 @@ def values_within(ranges: Sequence[tuple[float, float]], count: int, seed: int =
 
 
 def own_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Return the range of each joint with one coordinate of its own, from that joint's limits alone."""
+    """Return the range of each joint that has exactly one coordinate.
+
+    Only the joint's own limits are used, and not those of joints that mimic it.
+    """
     return {joint.name: _own_range(joint) for joint in tree.joints if joint.nq == 1}
 
 
@@ -84,7 +87,7 @@ def coordinate_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
 
 
 def narrowed_ranges(tree: KinematicTree) -> tuple[NarrowedRange, ...]:
-    """Return the ranges that the limits of mimic joints narrow."""
+    """Return the ranges of mimicked joints that the limits of mimic joints make smaller."""
     followers: dict[str, list[Joint]] = {}
     for joint in tree.joints:
         if joint.mimic is not None and joint.limit is not None:

@@ -25,7 +25,7 @@ IDENTITY: Matrix = (1, 0, 0), (0, 1, 0), (0, 0, 1)
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """State of a link's frame.
+    """The position, velocity and acceleration of a link's frame.
 
     R and p are expressed in world axes. The vectors w, vel, alpha and acc are expressed in the link's own
     axes if `Recursion.own` is True, else in world axes.
@@ -94,13 +94,19 @@ class Recursion:
         return State(R, s.p, *(self.eq.rotate(back, x) for x in (s.w, s.vel, s.alpha, s.acc)))
 
     def revolute(self, s: State, axis: Vector, S: Matrix, v: Number, a: Number) -> State:
-        """Return the state after a revolute joint: 7.129, then 7.127, then the rotation itself."""
+        """Return the state after a revolute joint.
+
+        Equation 7.129 is applied first, then 7.127, then the rotation S of the frame.
+        """
         z = self.seen(s, axis)
         alpha = self.eq.angular_acceleration(s.alpha, s.w, z, v, a)
         return self.turned(replace(s, alpha=alpha, w=self.eq.angular_velocity(s.w, z, v)), S)
 
     def prismatic(self, s: State, axis: Vector, x: Number, v: Number, a: Number) -> State:
-        """Return the state after a prismatic joint: 7.64 for its displacement, then 7.130 and 7.128."""
+        """Return the state after a prismatic joint.
+
+        Equation 7.64 gives the displacement; then 7.130 and 7.128 are applied.
+        """
         s = self.carried(s, self.eq.times(x, axis))
         z = self.seen(s, axis)
         acc = self.eq.sliding_acceleration(s.acc, s.w, z, v, a)
@@ -134,13 +140,13 @@ class Recursion:
     # -- quantities of a frame; columns are in the world's axes --------------------------------------
 
     def velocity(self, s: State, reference: Reference) -> tuple[Vector, Vector]:
-        """Return the linear and the angular velocity: 7.127, 7.128."""
+        """Return the linear and the angular velocity of a frame (7.127, 7.128)."""
         if not reference.at_world:
             return s.vel, s.w
         return self.eq.point_velocity(s.vel, s.w, self.eq.minus(ZERO, s.p)), s.w
 
     def acceleration(self, s: State, reference: Reference) -> tuple[Vector, Vector]:
-        """Return the linear and the angular classical acceleration: 7.129, 7.130."""
+        """Return the linear and the angular classical acceleration of a frame (7.129, 7.130)."""
         if not reference.at_world:
             return s.acc, s.alpha
         return self.eq.point_acceleration(s.acc, s.alpha, s.w, self.eq.minus(ZERO, s.p)), s.alpha

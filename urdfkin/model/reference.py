@@ -40,7 +40,9 @@ class Reference(IntEnum):
 
     @classmethod
     def of(cls, value: Reference | str) -> Reference:
-        """Return the member for a member or a name; raises UnknownNameError for an unknown name.
+        """Return the member with the given name; a member is returned as it is.
+
+        An unknown name raises UnknownNameError.
 
         >>> Reference.of("local").name
         'LOCAL'

@@ -237,7 +237,7 @@ class Certificate(Displayable):
         )
 
     def as_dict(self) -> CertificateDocument:
-        """Return plain data for JSON; a value that is not finite becomes null.
+        """Return the certificate as plain data for JSON. A number that is not finite becomes null.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -346,7 +346,7 @@ class Ledger:
             return self._accounts.setdefault(quantity, Account())
 
     def checked(self, quantity: str, comparison: Comparison) -> None:
-        """Add results that the oracle confirmed."""
+        """Count results that the oracle confirmed."""
         account = self.account(quantity)
         with _entering:
             account.checked += comparison
@@ -365,7 +365,7 @@ class Ledger:
                 self._reasons[reason] = None
 
     def certificate(self, robot: str, oracle: str) -> Certificate:
-        """Return a certificate of the current entries."""
+        """Return a certificate with the current entries of the ledger."""
         with _entering:
             found = [
                 (quantity, self._accounts[quantity]) for quantity in QUANTITIES if quantity in self._accounts

@@ -279,13 +279,16 @@ def _product(x: FloatArray) -> FloatArray:
 
 
 def _up(x: FloatArray) -> FloatArray:
-    """Return an upper bound of the exact value that was rounded to `x`."""
+    """Return an upper bound on the exact number whose rounded value is `x`."""
     with np.errstate(over="ignore", under="ignore"):
         return np.nextafter(x + np.abs(x) * _OUTWARD, np.inf)
 
 
 def _down(x: FloatArray) -> FloatArray:
-    """Return a lower bound of the exact value that was rounded to `x`; the largest double for inf."""
+    """Return a lower bound on the exact number whose rounded value is `x`.
+
+    If `x` is inf, the result is the largest double.
+    """
     with np.errstate(under="ignore", invalid="ignore"):
         inside = np.nextafter(x - np.abs(x) * _OUTWARD, -np.inf)
     return np.where(np.isposinf(x), np.finfo(np.float64).max, inside)

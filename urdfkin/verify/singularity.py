@@ -256,7 +256,10 @@ class _Explanation:
             yield f"{len(motions)} independent joint motions of {joints} do not move {self._columns.frame}."
 
     def _dependent_sets(self) -> Iterator[tuple[int, ...]]:
-        """Yield the smallest sets of dependent columns, as indices into the moving columns."""
+        """Yield the smallest dependent sets of columns.
+
+        Each set consists of indices into the columns of the joints that move the frame.
+        """
         if self._A.shape[1] > _MOST_COLUMNS:
             return
         found: list[set[int]] = []

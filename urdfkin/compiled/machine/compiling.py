@@ -105,7 +105,7 @@ class _Part(_Library):  # type: ignore[misc]
 
     @property
     def all(self) -> list[Any]:
-        """This library and the libraries of all functions that the part calls."""
+        """The compiled code (LLVM library) of this part, and that of all functions which the part calls."""
         return [self, *dict.fromkeys(self._linking_libraries)]
 
 
@@ -196,7 +196,7 @@ def _skip_blas_check() -> None:
 
 
 def jitted(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Return Numba's decorator with the options of this package and the given options."""
+    """Return Numba's decorator for compiled functions, with this package's options and the given options."""
 
     def decorate(function: Callable[..., Any]) -> Any:
         with compiling_allowed():

@@ -171,7 +171,7 @@ def _plus(builder: Any, number: Any, constant: int) -> Any:
 
 
 def _make_reader(width: int) -> Any:
-    """Return a function that reads `width` numbers of each of eight configurations into rows."""
+    """Return a function that reads `width` numbers for each of eight configurations into scratch rows."""
 
     @intrinsic
     def read(context: Any, x: Any, at: Any, stride: Any, s: Any, row: Any) -> Any:
@@ -194,7 +194,10 @@ def _make_reader(width: int) -> Any:
 
 
 def _make_writer(width: int) -> Any:
-    """Return a function that writes `width` rows, with arbitrary indices, for eight configurations."""
+    """Return a function that writes `width` scratch rows to an array, for eight configurations.
+
+    The rows may have any indices.
+    """
 
     @intrinsic
     def write(context: Any, s: Any, rows: Any, first: Any, to: Any, at: Any, stride: Any) -> Any:

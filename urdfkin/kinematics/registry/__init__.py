@@ -145,7 +145,7 @@ def _equation(entry: dict[str, Any]) -> Equation:
 
 
 def table() -> str:
-    """Return the page docs/equations.md in Markdown."""
+    """Return the text of the page docs/equations.md in Markdown."""
     parts = [_head()]
     for section in sections():
         parts += [
@@ -210,7 +210,9 @@ _NUMBER = re.compile(r"^\(?(?:eq\.?|equation)?\s*(7\.\d{1,3})\)?$", re.IGNORECAS
 
 
 def explain(number: str) -> str | None:
-    """Return a page about an equation: its meaning, functions and tests; None if there is no such equation.
+    """Return a page about an equation, with its meaning, functions and tests, or None.
+
+    The result is None if there is no equation with this number.
 
     Args:
         number: "7.130", "(7.130)" or "eq. 7.130".

@@ -167,7 +167,7 @@ class Alignment:
 
     @property
     def size(self) -> float:
-        """Length (m) that converts angles to distances."""
+        """The robot's size: the length (m) by which angles are multiplied to compare them with distances."""
         return size_of(self.a, self.b)
 
     @property

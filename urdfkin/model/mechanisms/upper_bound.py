@@ -61,7 +61,10 @@ class Grid:
 
     @property
     def points(self) -> FloatArray:
-        """The grid points (n, 3); the largest coordinate of each is 1."""
+        """The grid points (n, 3) on the cube's surface.
+
+        The largest absolute coordinate of each point is 1.
+        """
         return _points(self.cells)
 
     @property
@@ -87,7 +90,10 @@ def _points(cells: int) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Support:
-    """An upper bound on a support function, metres: its values at the grid points."""
+    """An upper bound on the support function of a set of points, in metres.
+
+    It is stored as values at the grid points.
+    """
 
     grid: Grid
     values: FloatArray
@@ -122,7 +128,7 @@ class Support:
         return np.where(largest > 0.0, found, 0.0).reshape(u.shape[:-1])
 
     def turned(self, screw: Screw, low: float, high: float) -> Support:
-        """Return the support of the set rotated about a screw by any angle of a range."""
+        """Return the support function of the set after rotations about a screw by all angles of a range."""
         angles, factors = np.array(_corners(low, high, self.grid.segments)).T
         G = self.grid.points
         centred = Support(self.grid, self.values - G @ screw.point)
@@ -150,7 +156,7 @@ class Support:
         return Support(self.grid, self.values + ways)
 
     def moved(self, T: FloatArray) -> Support:
-        """Return the support of the set after a rigid motion."""
+        """Return the support function of the set after a rigid motion T."""
         return Support(self.grid, self.at(self.grid.points @ T[:3, :3]) + self.grid.points @ T[:3, 3])
 
     def radius(self, screw: Screw) -> float:

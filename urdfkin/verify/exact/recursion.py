@@ -128,37 +128,37 @@ def move(
 
 
 def placement_values(motion: Motion, link: int) -> NDArray[np.object_]:
-    """Return T_world_link (4, 4)."""
+    """Return the placement T_world_link (4, 4) of a link."""
     s = motion.states[link]
     return _array([*((*row, place) for row, place in zip(s.R, s.p, strict=True)), (0, 0, 0, 1)])
 
 
 def velocity_values(motion: Motion, link: int, reference: Reference) -> NDArray[np.object_]:
-    """Return the velocity (6,), [linear; angular]."""
+    """Return the velocity (6,) of a link, [linear; angular]."""
     s = motion.states[link]
     return _array(_RECURSION.in_reference(s, reference, *_RECURSION.velocity(s, reference)))
 
 
 def acceleration_values(motion: Motion, link: int, reference: Reference) -> NDArray[np.object_]:
-    """Return the classical acceleration (6,), [linear; angular]."""
+    """Return the classical acceleration (6,) of a link, [linear; angular]."""
     s = motion.states[link]
     return _array(_RECURSION.in_reference(s, reference, *_RECURSION.acceleration(s, reference)))
 
 
 def jacobian_values(motion: Motion, link: int, reference: Reference) -> NDArray[np.object_]:
-    """Return the Jacobian (6, nv)."""
+    """Return the Jacobian (6, nv) of a link."""
     found = _RECURSION.jacobian(motion.states[link], motion.columns[link], motion.nv, reference)
     return _array(found).reshape(motion.nv, 6).T
 
 
 def jacobian_rate_values(motion: Motion, link: int, reference: Reference) -> NDArray[np.object_]:
-    """Return J-dot (6, nv)."""
+    """Return the time derivative (6, nv) of a link's Jacobian."""
     found = _RECURSION.jacobian_rate(motion.states[link], motion.columns[link], motion.nv, reference)
     return _array(found).reshape(motion.nv, 6).T
 
 
 def hessian_values(motion: Motion, link: int, reference: Reference) -> NDArray[np.object_]:
-    """Return the Hessian (6, nv, nv)."""
+    """Return the Hessian (6, nv, nv) of a link."""
     out = np.zeros((motion.nv, motion.nv, 6), dtype=object)
     for of, by, factor, six in _RECURSION.hessian(motion.states[link], motion.columns[link], reference):
         # the product of an interval and an array is not defined
