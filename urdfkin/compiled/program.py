@@ -239,7 +239,10 @@ class _Writer:
         return 0 if (multiplier, constant) == (1.0, 0.0) else self._constants(multiplier, constant)
 
     def _angles(self) -> list[int]:
-        """Return the list of angles: one entry (`ANGLE_WIDTH` numbers) for each step with a rotation."""
+        """Return the list of joint angles.
+
+        It has an entry of `ANGLE_WIDTH` numbers for each step with a rotation.
+        """
         angles = []
         for i, step in enumerate(self.plan.steps):
             kind, q = Motion(step[Step.KIND]), self.q + int(step[Step.Q])

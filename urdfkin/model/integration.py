@@ -23,7 +23,10 @@ _SERIES_BELOW = 0.25
 
 
 def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
-    """Return the configuration (..., nq) after one second at the joint velocities `v` (..., nv) from `q`."""
+    """Return the configuration (..., nq) that is reached from `q` in one second.
+
+    The joint velocities `v` (..., nv) are constant during this second.
+    """
     shape = _common_shape(q, v)
     out = np.array(np.broadcast_to(q, (*shape, tree.nq)))
     for joint, at, to in _coordinate_joints(tree):

@@ -149,7 +149,10 @@ class Support:
         return self.at(along + across)
 
     def slid(self, direction: FloatArray, low: float, high: float) -> Support:
-        """Return the support of the set translated along a direction by any distance of a range."""
+        """Return the support function of the set after translations along a direction.
+
+        The distances are all distances of a range.
+        """
         c = self.grid.points @ direction
         with np.errstate(invalid="ignore"):
             ways = np.where(c == 0.0, 0.0, np.maximum(low * c, high * c))
