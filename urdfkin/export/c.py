@@ -212,8 +212,7 @@ def _lane_sines(writer: Writer, layout: Layout) -> Iterator[str]:
         yield f"sines_cosines({', '.join(places)}, {count});"
 
 
-# -- the function's test vectors
-# --------------------------------------------------------------------------------------
+# -- the test vectors of a function ------------------------------------------------------------------------
 
 
 def vectors(code: Code) -> Iterator[str]:

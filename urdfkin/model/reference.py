@@ -25,8 +25,8 @@ class Reference(IntEnum):
     """
 
     own_axes: bool  #: The axes of the results: the frame's axes if True, the world's axes if False.
-    # The point of the results: the point at the world's origin if True, the frame's origin if False.
-    at_world: bool  #:
+    #: The point of the results: the point at the world's origin if True, the frame's origin if False.
+    at_world: bool
 
     def __new__(cls, number: int, own_axes: bool, at_world: bool) -> Reference:
         """Create a member from its number, its axes and its point; all three are required."""
