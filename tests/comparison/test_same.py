@@ -96,6 +96,21 @@ def test_a_joint_that_is_fixed_in_one_model_is_named_and_its_effect_bounded() ->
     assert found.worst.lower <= found.worst.upper <= 1.05 * found.worst.lower
 
 
+def test_a_mimic_joint_with_multiplier_zero_and_a_fixed_joint_have_a_bounded_distance() -> None:
+    limit = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
+    links = "".join(f'<link name="{name}"/>' for name in "abc")
+    first = f'<joint name="j" type="revolute"><parent link="a"/><child link="b"/>{limit}</joint>'
+    ends = '<parent link="b"/><child link="c"/><origin xyz="1 0 0"/>'
+    rest = f'{limit}<mimic joint="j" multiplier="0" offset="0.3"/>'
+    at_rest = f'{links}{first}<joint name="k" type="revolute">{ends}<axis xyz="0 1 0"/>{rest}</joint>'
+    fixed = f'{links}{first}<joint name="k" type="fixed">{ends}</joint>'
+    models = [urdfkin.load(f'<robot name="r">{text}</robot>', verify=False) for text in (at_rest, fixed)]
+    for a, b in (models, models[::-1]):
+        found = urdfkin.same(a, b)
+        assert found.verdict is Verdict.DIFFERS
+        assert str(found).startswith("DIFFERS by up to 300 mrad")
+
+
 def test_another_tool_is_something_to_be_done_not_a_difference() -> None:
     tree = urdfkin.load("panda").tree
     at = tree.joint_index("panda_hand_tcp_joint")

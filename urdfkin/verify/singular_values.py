@@ -196,7 +196,7 @@ class SingularValues(Displayable):
         >>> arm, q = urdfkin.load("planar_two_link"), [0.3, 1.0]
         >>> found = arm.singular_values(q, "tip", "linear")  # manipulability 0.5 * 0.4 * |sin q2|
         >>> found.manipulability_gradient(arm.hessian(q, "tip")).round(4).tolist()  # 0.2 cos q2
-        [-0.0, 0.1081]
+        [0.0, 0.1081]
         """
         value = self.values.value
         count = value.shape[-1]

@@ -100,6 +100,12 @@ CASES = [
         [("URDF527", 7)],
     ),
     Case("mimic-beyond-its-limits", arm(follow='<mimic joint="j1" offset="1"/>'), WARN, [("URDF527", 7)]),
+    Case(
+        "mimic-at-rest-outside-its-limits",
+        arm(follow='<mimic joint="j1" multiplier="0" offset="5"/>'),
+        WARN,
+        [("URDF523", 7), ("URDF527", 7)],
+    ),
     Case("mimic-nowhere-within", arm(follow='<mimic joint="j1" offset="5"/>'), WARN, [("URDF527", 7)]),
     Case("mimic-mirrored-within", arm(follow='<mimic joint="j1" multiplier="-1"/>'), ACCEPT),
     Case("mimic-beyond-by-a-digit", arm(follow='<mimic joint="j1" multiplier="1.0005"/>'), ACCEPT),

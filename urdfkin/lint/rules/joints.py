@@ -504,7 +504,9 @@ class _MimicChecker:
         if leader is None or moving is None or limits is None or joint.kind == "continuous":
             return
         low, high = kept_range(rule, Limit(*limits, math.inf, math.inf), *moving)
-        if rule.multiplier == 0.0 or high - low >= (1.0 - LEAST_LOST) * (moving[1] - moving[0]):
+        if low <= high and (
+            rule.multiplier == 0.0 or high - low >= (1.0 - LEAST_LOST) * (moving[1] - moving[0])
+        ):
             return
         allowed = f"only {range_words((low, high))}" if low < high else "no value"
         message = f"the mimic joint leaves its limits: {leader.name!r} moves from {range_words(moving)}, "

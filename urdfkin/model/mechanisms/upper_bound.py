@@ -363,7 +363,7 @@ def _values(pair: Pair, variables: Variables, grid: Grid) -> FloatArray | None:
     """
     if (name := pair.variable) is None:
         return None
-    low, high = variables.ranges[name]
+    low, high = variables.ranges.get(name, (0.0, 0.0))  # no variable: both joints stay where they are
     fastest = max(abs(pair.a.slope), abs(pair.b.slope))
     if math.isinf(high - low):
         if {abs(pair.a.slope), abs(pair.b.slope)} - {0.0, 1.0}:
