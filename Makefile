@@ -42,6 +42,7 @@ docs:  ## the pages that are generated from the code, then the site
 	python scripts/make_conventions.py
 	python scripts/make_judge.py
 	python scripts/make_enclosures.py
+	python scripts/make_libraries.py --page
 	python scripts/check_exports.py --sizes
 	python scripts/measure_size.py
 	python scripts/measure_start.py

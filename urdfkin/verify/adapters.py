@@ -1,0 +1,428 @@
+"""How other libraries read a robot file: one adapter for each library, used in the library's own way.
+
+The module needs NumPy and the library only. `urdfkin readers` imports it; `scripts/make_libraries.py` runs it
+as a program by the Python of an environment that contains one library:
+
+    python -I urdfkin/verify/adapters.py kinpy < cases.json
+
+The program reads a list of cases `{"name", "text", "configurations"}` and prints one line of JSON for each.
+A configuration gives values by the names of the independent joints: one number (rad or m), three for a planar
+joint (x, y, angle), seven for a floating joint (x, y, z, qx, qy, qz, qw).
+
+An adapter gives a library all that its documentation asks for. It sets no mimic joint: the file states the
+rule. It does not hide a wrong pose.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.metadata
+import io
+import json
+import logging
+import math
+import os
+import sys
+import tempfile
+import warnings
+import xml.etree.ElementTree as ET
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+#: Value of a joint, or the values of a planar or floating joint.
+Value = Any
+Poses = dict[str, Any]
+#: Numbers of values of a planar and of a floating joint.
+_PLANAR, _FLOATING = 3, 7
+#: Suffixes of the three joints that MuJoCo makes of a planar joint.
+_MUJOCO_PLANAR = ("_TX", "_TY", "_RZ")
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A robot as a library read it.
+
+    Attributes:
+        joints: Names of the joints that have a coordinate, in the library's order.
+        poses: Returns the pose (4, 4) of each link in the root link, from values by joint. Links that the
+            library merges into others are missing.
+    """
+
+    joints: list[str]
+    poses: Callable[[Mapping[str, Value]], Poses]
+
+    def unset(self, values: Mapping[str, Value]) -> list[str]:
+        """Return the joints with a value that have no coordinate in the library."""
+        return [name for name in values if name not in self.joints]
+
+
+def _root(text: str) -> str:
+    robot = ET.fromstring(text)
+    children = {child.get("link") for child in robot.iterfind("joint/child")}
+    return next(name for link in robot.iterfind("link") if (name := link.get("name", "")) not in children)
+
+
+def _children(text: str) -> dict[str, str]:
+    """Return the child link of each joint."""
+    return {
+        joint.get("name", ""): child.get("link", "")
+        for joint in ET.fromstring(text).iterfind("joint")
+        if (child := joint.find("child")) is not None
+    }
+
+
+@contextlib.contextmanager
+def _file(text: str) -> Any:
+    """Write a text to a temporary file, for libraries that read files only."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "robot.urdf")
+        path.write_text(text, "utf-8")
+        yield str(path)
+
+
+def _scalar(value: Value) -> float:
+    if np.ndim(value):
+        raise TypeError("the library has no joints of several coordinates")
+    return float(value)
+
+
+def _rigid(R: Any, p: Any) -> Any:
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = np.reshape(R, (3, 3)), p
+    return T
+
+
+def _relative(poses: Poses, root: str) -> Poses:
+    """Return poses in the root link; a root that was merged into the world is at the origin."""
+    inverse = np.linalg.inv(poses.get(root, np.eye(4)))
+    return {root: np.eye(4)} | {link: inverse @ T for link, T in poses.items()}
+
+
+def read_pinocchio(text: str) -> Reading:
+    """Read with Pinocchio; mimic joints are coupled by `mimic=True`."""
+    import pinocchio as pin  # noqa: PLC0415
+
+    if text.lstrip().startswith("<mujoco"):
+        with _file(text) as path:
+            model = pin.buildModelFromMJCF(path)
+        root = "universe"
+    else:
+        model, root = pin.buildModelFromXML(text, mimic=True), _root(text)
+    data = model.createData()
+
+    def poses(values: Mapping[str, Value]) -> Poses:
+        q = pin.neutral(model)
+        for name, value in values.items():
+            if not model.existJointName(name):
+                continue
+            joint = model.joints[model.getJointId(name)]
+            at = joint.idx_q
+            if joint.nq == 2:  # a continuous joint
+                q[at : at + 2] = math.cos(value), math.sin(value)
+            elif joint.nq == 4 and len(value) == _PLANAR:
+                q[at : at + 4] = value[0], value[1], math.cos(value[2]), math.sin(value[2])
+            elif joint.nq:
+                q[at : at + joint.nq] = value
+        pin.framesForwardKinematics(model, data, q)
+        return _relative(
+            {f.name: data.oMf[i].homogeneous for i, f in enumerate(model.frames) if f.type == pin.BODY}, root
+        )
+
+    return Reading([n for n, j in zip(model.names, model.joints, strict=True) if j.nq], poses)
+
+
+def read_mujoco(text: str) -> Reading:
+    """Read with MuJoCo, without merging fixed links, and with a lower limit on masses."""
+    import mujoco  # noqa: PLC0415
+
+    root = "world"
+    if not text.lstrip().startswith("<mujoco"):
+        root, robot = _root(text), ET.fromstring(text)
+        options = {
+            "fusestatic": "false",
+            "boundmass": "0.001",
+            "boundinertia": "0.001",
+            "balanceinertia": "true",
+        }
+        robot.insert(0, extension := ET.Element("mujoco"))
+        ET.SubElement(extension, "compiler", options)
+        text = ET.tostring(robot, "unicode")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    names = [model.joint(i).name for i in range(model.njnt)]
+
+    def poses(values: Mapping[str, Value]) -> Poses:
+        data.qpos[:] = model.qpos0
+        given = {own: x for name, value in values.items() for own, x in _mujocos(name, value, names)}
+        for name, value in given.items():
+            at = model.jnt_qposadr[names.index(name)]
+            if model.jnt_type[names.index(name)] == mujoco.mjtJoint.mjJNT_FREE:
+                data.qpos[at : at + 7] = np.r_[value[:3], value[6], value[3:6]]
+            else:
+                data.qpos[at] = _scalar(value)
+        mujoco.mj_kinematics(model, data)
+        return _relative(
+            {model.body(i).name: _rigid(data.xmat[i], data.xpos[i]) for i in range(model.nbody)}, root
+        )
+
+    planar = {name.removesuffix(_MUJOCO_PLANAR[0]) for name in names if name.endswith(_MUJOCO_PLANAR[0])}
+    found = [name for name in names if name[: -len(_MUJOCO_PLANAR[0])] not in planar]
+    return Reading([*found, *sorted(planar)], poses)
+
+
+def _mujocos(name: str, value: Value, names: list[str]) -> Iterator[tuple[str, Value]]:
+    """Yield MuJoCo's joints of a joint, with their values: a planar joint becomes two slides and a hinge."""
+    if name in names:
+        yield name, value
+    elif name + _MUJOCO_PLANAR[0] in names:
+        yield from zip((name + suffix for suffix in _MUJOCO_PLANAR), value, strict=True)
+
+
+def read_drake(text: str) -> Reading:
+    """Read with Drake: a discrete plant with the contact solver that mimic elements ask for."""
+    from pydrake.multibody.parsing import Parser  # noqa: PLC0415
+    from pydrake.multibody.plant import DiscreteContactApproximation, MultibodyPlant  # noqa: PLC0415
+
+    root, plant = _root(text), MultibodyPlant(0.001)
+    plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
+    Parser(plant).AddModelsFromString(text, "urdf")
+    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(root))
+    plant.Finalize()
+    context = plant.CreateDefaultContext()
+    carried = {child: joint for joint, child in _children(text).items()}  # Drake calls a floating joint so
+    moving = [j for i in plant.GetJointIndices() if (j := plant.get_joint(i)).num_positions()]
+    joints = {carried.get(j.name(), j.name()): j for j in moving}
+    bodies = [plant.get_body(i) for i in plant.GetBodyIndices(plant.GetModelInstanceByName(_name(text)))]
+
+    def poses(values: Mapping[str, Value]) -> Poses:
+        q = plant.GetPositions(context).copy()
+        for name, value in values.items():
+            if name in joints:
+                at, many = joints[name].position_start(), joints[name].num_positions()
+                own = np.r_[value[6], value[3:6], value[:3]] if many == _FLOATING else value
+                q[at : at + many] = own
+        plant.SetPositions(context, q)
+        return {b.name(): plant.EvalBodyPoseInWorld(context, b).GetAsMatrix4() for b in bodies}
+
+    return Reading(list(joints), poses)
+
+
+def _name(text: str) -> str:
+    return ET.fromstring(text).get("name", "")
+
+
+def read_idyntree(text: str) -> Reading:
+    """Read with iDynTree."""
+    import idyntree.bindings as idt  # noqa: PLC0415
+
+    root, loader, computed = _root(text), idt.ModelLoader(), idt.KinDynComputations()
+    if not loader.loadModelFromString(text) or not computed.loadRobotModel(loader.model()):
+        raise ValueError("the model loader returns False")
+    model = loader.model()
+    places = {
+        model.getJointName(i): model.getJoint(i).getPosCoordsOffset()
+        for i in range(model.getNrOfJoints())
+        if model.getJoint(i).getNrOfPosCoords()
+    }
+    computed.setFloatingBase(root)
+
+    def poses(values: Mapping[str, Value], _owner: Any = loader) -> Poses:  # the loader owns the model
+        q = np.zeros(model.getNrOfPosCoords())
+        for name in places.keys() & values.keys():
+            q[places[name]] = _scalar(values[name])
+        if not computed.setJointPos(idt.VectorDynSize(q)):
+            raise ValueError("the joint positions are refused")
+        links = [model.getLinkName(i) for i in range(model.getNrOfLinks())]
+        relative = computed.getRelativeTransform
+        return {link: relative(root, link).asHomogeneousTransform().toNumPy() for link in links}
+
+    return Reading(sorted(places, key=places.__getitem__), poses)
+
+
+def read_yourdfpy(text: str) -> Reading:
+    """Read with yourdfpy; no mesh is read."""
+    import yourdfpy  # noqa: PLC0415
+
+    logging.getLogger("yourdfpy.urdf").disabled = True
+    model = yourdfpy.URDF.load(io.BytesIO(text.encode()), load_meshes=False, build_scene_graph=True)
+    root = model.base_link
+
+    def poses(values: Mapping[str, Value]) -> Poses:
+        model.update_cfg({name: values[name] for name in model.actuated_joint_names if name in values})
+        return {link: model.get_transform(link, root) for link in model.link_map}
+
+    return Reading(list(model.actuated_joint_names), poses)
+
+
+def read_urchin(text: str) -> Reading:
+    """Read with urchin; no mesh is read."""
+    import urchin  # noqa: PLC0415
+
+    with _file(text) as path:
+        model = urchin.URDF.load(path, lazy_load_meshes=True)
+    names = [joint.name for joint in model.actuated_joints]
+
+    def poses(values: Mapping[str, Value]) -> Poses:
+        own = {name: _urchins(model.joint_map[name], values[name]) for name in names if name in values}
+        return dict(model.link_fk(cfg=own, use_names=True))
+
+    return Reading(names, poses)
+
+
+def _urchins(joint: Any, value: Value) -> Value:
+    """Return a value in urchin's layout: a floating joint takes x, y, z, roll, pitch, yaw or a matrix."""
+    if joint.joint_type != "floating":
+        return value
+    x, y, z, w = value[3:]
+    R = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return _rigid(R, value[:3])
+
+
+def read_kinpy(text: str) -> Reading:
+    """Read with kinpy."""
+    import kinpy  # noqa: PLC0415
+
+    chain = kinpy.build_chain_from_urdf(text.encode())
+    names = list(chain.get_joint_parameter_names())
+
+    def poses(values: Mapping[str, Value]) -> Poses:
+        found = chain.forward_kinematics({name: _scalar(values.get(name, 0.0)) for name in names})
+        return _relative({link: pose.matrix() for link, pose in found.items()}, _root(text))
+
+    return Reading(names, poses)
+
+
+def read_ikpy(text: str) -> Reading:
+    """Read with ikpy, which follows one path from the root."""
+    from ikpy.chain import Chain  # noqa: PLC0415
+
+    root, children = _root(text), _children(text)
+    with _file(text) as path, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        chain = Chain.from_urdf_file(path, base_elements=[root])
+
+    def poses(values: Mapping[str, Value]) -> Poses:
+        q = [_scalar(values.get(link.name, 0.0)) for link in chain.links]
+        found = chain.forward_kinematics(q, full_kinematics=True)
+        names = [children.get(link.name, root) for link in chain.links]
+        return dict(zip(names, found, strict=True))
+
+    moving = [link.name for link in chain.links if link.name in children and link.joint_type != "fixed"]
+    return Reading(moving, poses)
+
+
+def read_roboticstoolbox(text: str) -> Reading:
+    """Read with the Robotics Toolbox for Python."""
+    import roboticstoolbox as rtb  # noqa: PLC0415
+
+    joints = {child: joint for joint, child in _children(text).items()}
+    with _file(text) as path:
+        robot = rtb.Robot.URDF(path, gripper=None)
+    moving = {joints[link.name]: link.jindex for link in robot.links if link.isjoint}
+
+    def poses(values: Mapping[str, Value]) -> Poses:
+        q = np.zeros(robot.n)
+        for name in moving.keys() & values.keys():
+            q[moving[name]] = _scalar(values[name])
+        return {link.name: robot.fkine(q, end=link.name).A for link in robot.links}
+
+    return Reading(sorted(moving, key=moving.__getitem__), poses)
+
+
+def read_skrobot(text: str) -> Reading:
+    """Read with scikit-robot."""
+    from skrobot.models.urdf import RobotModelFromURDF  # noqa: PLC0415
+
+    with _file(text) as path:
+        robot = RobotModelFromURDF(urdf_file=path)
+    joints = {joint.name: joint for joint in robot.joint_list}
+
+    def poses(values: Mapping[str, Value]) -> Poses:
+        for name in joints.keys() & values.keys():
+            joints[name].joint_angle(_scalar(values[name]))
+        return _relative({link.name: link.worldcoords().T() for link in robot.link_list}, _root(text))
+
+    return Reading(list(joints), poses)
+
+
+@dataclass(frozen=True)
+class Library:
+    """A library that reads robot files.
+
+    Attributes:
+        title: Its name in tables.
+        package: The name that pip installs.
+        module: The module that is imported.
+        read: Its adapter.
+        forms: The formats that it reads.
+    """
+
+    title: str
+    package: str
+    module: str
+    read: Callable[[str], Reading]
+    forms: tuple[str, ...] = ("urdf",)
+
+
+#: The libraries by the names of the command line.
+LIBRARIES: dict[str, Library] = {
+    "pinocchio": Library("Pinocchio", "pin", "pinocchio", read_pinocchio, ("urdf", "mjcf")),
+    "mujoco": Library("MuJoCo", "mujoco", "mujoco", read_mujoco, ("urdf", "mjcf")),
+    "drake": Library("Drake", "drake", "pydrake", read_drake),
+    "idyntree": Library("iDynTree", "idyntree", "idyntree", read_idyntree),
+    "yourdfpy": Library("yourdfpy", "yourdfpy", "yourdfpy", read_yourdfpy),
+    "urchin": Library("urchin", "urchin", "urchin", read_urchin),
+    "kinpy": Library("kinpy", "kinpy", "kinpy", read_kinpy),
+    "ikpy": Library("ikpy", "ikpy", "ikpy", read_ikpy),
+    "roboticstoolbox": Library(
+        "Robotics Toolbox", "roboticstoolbox-python", "roboticstoolbox", read_roboticstoolbox
+    ),
+    "skrobot": Library("scikit-robot", "scikit-robot", "skrobot", read_skrobot),
+}
+
+
+def version(name: str) -> str | None:
+    """Return the version of a library in this environment; None if it is not installed."""
+    with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+        return importlib.metadata.version(LIBRARIES[name].package)
+    return None
+
+
+def answer(name: str, case: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a library's joints and poses for a case, or the error that it raises."""
+    try:
+        reading = LIBRARIES[name].read(case["text"])
+        found = [reading.poses(values) for values in case["configurations"]]
+    except Exception as error:  # each library has its own exceptions
+        words = " ".join(str(error).split())
+        return {"error": f"{type(error).__name__}: {words}" if words else type(error).__name__}
+    poses = [{link: np.asarray(T, float).tolist() for link, T in one.items()} for one in found]
+    return {
+        "joints": reading.joints,
+        "unset": reading.unset(case["configurations"][0] if case["configurations"] else {}),
+        "poses": poses,
+    }
+
+
+def _lines(name: str, cases: Iterable[Mapping[str, Any]]) -> Iterable[str]:
+    for case in cases:
+        yield json.dumps({"name": case["name"], "version": version(name), **answer(name, case)})
+
+
+if __name__ == "__main__":
+    logging.disable(logging.CRITICAL)
+    warnings.simplefilter("ignore")
+    own = os.dup(1)  # libraries print to standard output
+    os.dup2(2, 1)
+    for line in _lines(sys.argv[1], json.load(sys.stdin)):
+        os.write(own, f"{line}\n".encode())
