@@ -29,6 +29,7 @@ import platformdirs
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 
 import urdfkin
+from urdfkin.comparison.readers import values_of
 from urdfkin.verify import adapters
 from urdfkin.verify.adapters import LIBRARIES
 
@@ -69,6 +70,17 @@ _FOOT = """
 `python scripts/make_libraries.py` installs the libraries, each in an environment of its own, and writes this
 page and `docs/libraries.json`. [Defects of other libraries](upstream.md) has programs that show some of these
 differences.
+
+## How do libraries read your file?
+
+`urdfkin readers ROBOT` makes the same comparison for your robot, with the libraries that are installed beside
+urdfkin. For each joint that a library reads differently, it names the element of the file:
+
+```console
+$ urdfkin readers talos --with mujoco,yourdfpy
+```
+
+In Python, `urdfkin.comparison.readers.compare_readers(robot)` returns the same result.
 """
 
 
@@ -83,13 +95,7 @@ def text_of(feature: Mapping[str, Any]) -> str:
 
 def configurations(robot: urdfkin.Robot) -> list[dict[str, Any]]:
     """Return random values within limits, by the names of the independent joints."""
-    found = []
-    for q in robot.sample(CONFIGURATIONS, seed=0):
-        values: dict[str, Any] = {}
-        for name, value in zip(robot.coordinate_names, q.tolist(), strict=True):
-            values.setdefault(name.partition(".")[0], []).append(value)
-        found.append({name: one[0] if len(one) == 1 else one for name, one in values.items()})
-    return found
+    return [values_of(robot, q) for q in robot.sample(CONFIGURATIONS, seed=0)]
 
 
 def expected(robot: urdfkin.Robot) -> list[dict[str, Any]]:

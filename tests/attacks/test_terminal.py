@@ -27,6 +27,10 @@ FILE = "\x1b[31m\n::error::forged\u202e ##vso[x]"
 ROBOT = {
     "info": [[], ["--format", "json"]],
     "order": [[], ["--format", "csv"], ["--from", "isaaclab", "--format", "json"], ["--to", FILE]],
+    "readers": [
+        ["--with", "yourdfpy"], ["--with", "yourdfpy", "--format", "json"],
+        ["--with", "yourdfpy", "--format", "csv"], ["--with", FILE],
+    ],
     "placement": [
         [], ["--format", "json"], ["--format", "csv"], ["--frame", "FRAME"], ["--relative-to", "FRAME"],
         ["--as", "rpy"], ["--base-placement", FILE], ["--trajectory", FILE], ["--convention", FILE],

@@ -94,6 +94,10 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
             "urdfkin.cli.verify",
             "Check a function or a program of yours against the same numbers and bounds.",
         ),
+        "readers": (
+            "urdfkin.cli.readers",
+            "Compare how MuJoCo, yourdfpy and other installed libraries read a robot file.",
+        ),
         "report": ("urdfkin.cli.reports", "Show, convert, compare or merge the results of validations."),
     },
     "Check files": {

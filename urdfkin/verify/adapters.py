@@ -60,6 +60,11 @@ class Reading:
         return [name for name in values if name not in self.joints]
 
 
+def _is_path(source: str) -> bool:
+    """Return whether a source is the path of an MJCF file; other sources are URDF texts."""
+    return not source.lstrip().startswith("<")
+
+
 def _root(text: str) -> str:
     robot = ET.fromstring(text)
     children = {child.get("link") for child in robot.iterfind("joint/child")}
@@ -106,10 +111,8 @@ def read_pinocchio(text: str) -> Reading:
     """Read with Pinocchio; mimic joints are coupled by `mimic=True`."""
     import pinocchio as pin  # noqa: PLC0415
 
-    if text.lstrip().startswith("<mujoco"):
-        with _file(text) as path:
-            model = pin.buildModelFromMJCF(path)
-        root = "universe"
+    if _is_path(text):
+        model, root = pin.buildModelFromMJCF(text), "universe"
     else:
         model, root = pin.buildModelFromXML(text, mimic=True), _root(text)
     data = model.createData()
@@ -132,7 +135,7 @@ def read_pinocchio(text: str) -> Reading:
             {f.name: data.oMf[i].homogeneous for i, f in enumerate(model.frames) if f.type == pin.BODY}, root
         )
 
-    return Reading([n for n, j in zip(model.names, model.joints, strict=True) if j.nq], poses)
+    return Reading([n for n, j in zip(model.names, model.joints, strict=True) if j.nq > 0], poses)
 
 
 def read_mujoco(text: str) -> Reading:
@@ -140,7 +143,7 @@ def read_mujoco(text: str) -> Reading:
     import mujoco  # noqa: PLC0415
 
     root = "world"
-    if not text.lstrip().startswith("<mujoco"):
+    if not _is_path(text):
         root, robot = _root(text), ET.fromstring(text)
         options = {
             "fusestatic": "false",
@@ -153,7 +156,7 @@ def read_mujoco(text: str) -> Reading:
         text = ET.tostring(robot, "unicode")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        model = mujoco.MjModel.from_xml_string(text)
+        model = (mujoco.MjModel.from_xml_path if _is_path(text) else mujoco.MjModel.from_xml_string)(text)
     data = mujoco.MjData(model)
     names = [model.joint(i).name for i in range(model.njnt)]
 
@@ -419,10 +422,15 @@ def _lines(name: str, cases: Iterable[Mapping[str, Any]]) -> Iterable[str]:
         yield json.dumps({"name": case["name"], "version": version(name), **answer(name, case)})
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Answer the cases on standard input with the library of the first argument."""
     logging.disable(logging.CRITICAL)
     warnings.simplefilter("ignore")
     own = os.dup(1)  # libraries print to standard output
     os.dup2(2, 1)
     for line in _lines(sys.argv[1], json.load(sys.stdin)):
         os.write(own, f"{line}\n".encode())
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,106 @@
+"""How other libraries read a file: each planted difference is explained by its element."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import urdfkin
+from scripts.make_libraries import DATA, text_of
+from tests.cli.running import urdfkin as run
+from urdfkin.comparison import readers
+from urdfkin.comparison.readers import compare_readers
+
+pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
+pytest.importorskip("mujoco")
+TEXTS = {feature["name"]: text_of(feature) for feature in DATA["feature"]}
+
+
+@pytest.mark.parametrize(
+    ("feature", "library", "joint", "element", "words"),
+    [
+        ("mimic", "mujoco", "j2", "mimic", "MuJoCo leaves it free"),
+        ("mimic of a mimic", "yourdfpy", "j3", "mimic", "yourdfpy applies another rule"),
+        ("prismatic, axis of length 2", "yourdfpy", "j2", "axis", "yourdfpy moves it 2 times as far"),
+        ("quat_xyzw (URDF 1.1)", "mujoco", "j2", "origin quat_xyzw", "MuJoCo has another rotation at q = 0"),
+    ],
+)
+def test_the_element_that_explains_a_difference_is_named(
+    feature: str, library: str, joint: str, element: str, words: str
+) -> None:
+    (found,) = compare_readers(urdfkin.load(TEXTS[feature]), [library])
+    assert found.refused is None
+    assert [(one.joint, one.element, one.words) for one in found.differences] == [(joint, element, words)]
+    assert not found.agrees
+    assert found.worst > 0.1
+
+
+@pytest.mark.parametrize(
+    ("change", "element", "words"),
+    [
+        (('xyz="0 1 0"', 'xyz="0 -1 0"'), "axis", "X turns it the other way"),
+        (('xyz="0 1 0"', 'xyz="0.6 0 0.8"'), "axis", "X moves it along another axis: 0.6 0 0.8"),
+        (('type="revolute">\n  <parent link="a"', 'type="prismatic">\n  <parent link="a"'), "axis", None),
+        (('3"/><axis xyz="0 1 0"', '4"/><axis xyz="0 1 0"'), "origin rpy", None),
+        (
+            ('.3" rpy="0.1 0.2 0.3"/><axis xyz="0 1', '.4" rpy="0.1 0.2 0.3"/><axis xyz="0 1'),
+            "origin xyz",
+            None,
+        ),
+    ],
+)  # fmt: skip
+def test_a_changed_element_is_named(
+    change: tuple[str, str], element: str, words: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = TEXTS["two revolute"]
+    assert text.count(change[0]) == 1
+    monkeypatch.setattr(readers, "_source", lambda _: (text.replace(*change), "urdf"))
+    (found,) = compare_readers(urdfkin.load(text), ["pinocchio"])
+    (one,) = found.differences
+    assert (one.joint, one.element) == ("j2", element)
+    assert words is None or one.words == words.replace("X", "Pinocchio")
+
+
+@pytest.mark.parametrize("library", ["pinocchio", "mujoco", "yourdfpy"])
+@pytest.mark.parametrize("robot", ["a1", "ur5"])
+def test_libraries_agree_on_robots_without_special_features(robot: str, library: str) -> None:
+    (found,) = compare_readers(urdfkin.load(robot), [library])
+    assert found.agrees, found
+
+
+def test_an_mjcf_file_is_read_by_mujoco_and_by_no_reader_of_urdf(tmp_path: Path) -> None:
+    path = tmp_path / "robot.xml"
+    path.write_text(
+        '<mujoco><worldbody><body name="a" pos="0 0 1"><joint name="j" axis="0 0 1"/><geom size="0.1"/>'
+        '<body name="b" pos="1 0 0" euler="10 20 30"><joint name="k" type="slide" axis="0 1 0"/>'
+        '<geom size="0.1"/></body></body></worldbody></mujoco>'
+    )
+    mujoco, yourdfpy = compare_readers(urdfkin.load(str(path)), ["mujoco", "yourdfpy"])
+    assert mujoco.agrees, mujoco
+    assert mujoco.joints == ("j", "k")
+    assert yourdfpy.refused == "the library has no reader of MJCF"
+
+
+def test_a_library_that_hangs_or_dies_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = urdfkin.load(TEXTS["mimic"])
+    monkeypatch.setattr(readers, "own_python", lambda _: ["/bin/sh", "-c", "kill -11 $$"])
+    assert compare_readers(robot, ["yourdfpy"])[0].refused == "its process ended with -11"
+    monkeypatch.setattr(readers, "own_python", lambda _: ["/bin/sh", "-c", "sleep 20"])
+    monkeypatch.setattr(readers, "_PATIENCE", 0.2)
+    assert compare_readers(robot, ["yourdfpy"])[0].refused == "no answer in 0.2 s"
+
+
+def test_the_command_prints_and_writes_every_format(tmp_path: Path) -> None:
+    path = tmp_path / "robot.urdf"
+    path.write_text(TEXTS["mimic"])
+    done = run("readers", str(path), "--with", "mujoco,yourdfpy")
+    assert done.code == 1
+    assert "MuJoCo leaves it free" in done.text
+    data = run("readers", str(path), "--with", "mujoco,yourdfpy", "--format", "json").data
+    assert [one["library"] for one in data["readers"]] == ["MuJoCo", "yourdfpy"]
+    assert json.dumps(data)
+    assert run("readers", str(path), "--with", "mujoco", "--format", "csv").text.count("\n") == 2
+    assert run("readers", str(path), "--with", "yourdfpy").code == 0
+    assert "did you mean" in run("readers", str(path), "--with", "mujocco").err

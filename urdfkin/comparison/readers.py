@@ -1,0 +1,281 @@
+"""Compare how other libraries read a robot file: joints, their order, and the poses of all links.
+
+Each library runs in a process of its own, with its adapter in `urdfkin/verify/adapters.py`. The differences
+of poses are attributed to joints: a joint differs if the pose of its child link in its parent link differs.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+from xml.parsers.expat import ExpatError
+
+import numpy as np
+
+from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.errors.escape import printable
+from urdfkin.model.tree import FloatArray, Joint, JointKind
+from urdfkin.system.processes import ask_python, own_python
+from urdfkin.urdf.mjcf import is_mjcf, is_text
+from urdfkin.urdf.plain_xml import plain_xml
+from urdfkin.verify.adapters import LIBRARIES, version
+
+if TYPE_CHECKING:
+    from urdfkin.robot import Robot
+
+#: Largest difference of a pose that counts as equal, for positions of at most 1 m; a multiple of it for
+#: larger ones. Libraries in double precision differ by rounding, below 1e-13; a misread element by more.
+_EQUAL = 1e-9
+#: Time limit of a library, in seconds.
+_PATIENCE = 60.0
+#: Largest answer of a library, in bytes.
+_MOST = 400_000_000
+#: Longest quotation of a library's message, in characters.
+_QUOTED = 200
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """A joint that a library reads differently.
+
+    Attributes:
+        joint: Name of the joint.
+        element: Element of the file that explains the difference.
+        words: The difference in words.
+        size: Largest difference of the child's pose in the parent link (m, and entries of a rotation).
+    """
+
+    joint: str
+    element: str
+    words: str
+    size: float
+
+
+@dataclass(frozen=True, slots=True)
+class LibraryReading:
+    """How a library reads a robot file.
+
+    Attributes:
+        library: Its name.
+        version: Its version.
+        refused: Why it does not read the file; None if it does.
+        joints: Its joints with a coordinate, in its order.
+        same_order: Whether its joints are urdfkin's, in the same order.
+        missing: Links that its model does not have.
+        worst: Largest difference of a link's pose in the root link; 0 if all are equal to rounding.
+        differences: The joints that it reads differently.
+    """
+
+    library: str
+    version: str
+    refused: str | None = None
+    joints: tuple[str, ...] = ()
+    same_order: bool = False
+    missing: tuple[str, ...] = ()
+    worst: float = 0.0
+    differences: tuple[Difference, ...] = ()
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the library reads the file and all poses agree."""
+        return self.refused is None and not self.differences and self.worst == 0.0
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain data for JSON."""
+        return asdict(self)
+
+
+def installed() -> tuple[str, ...]:
+    """Return the names of the libraries of this environment that have an adapter."""
+    return tuple(name for name in LIBRARIES if version(name) is not None)
+
+
+def compare_readers(
+    robot: Robot, libraries: Iterable[str] | None = None, *, samples: int = 5, seed: int = 0
+) -> tuple[LibraryReading, ...]:
+    """Compare how libraries read a robot's file with how urdfkin reads it.
+
+    Args:
+        robot: The robot. All its links are compared at q = 0 and at random configurations.
+        libraries: Names of libraries (`installed`). By default all that are installed.
+        samples: Number of random configurations.
+        seed: Seed of the configurations.
+
+    Raises:
+        UnknownNameError: a library has no adapter.
+        InputError: a library is not installed, or a text of MJCF is not in a file.
+
+    >>> import urdfkin
+    >>> from urdfkin.comparison.readers import compare_readers
+    >>> reading, = compare_readers(urdfkin.load("planar_two_link"), ["pinocchio"])
+    >>> reading.agrees, reading.joints
+    (True, ('joint1', 'joint2'))
+    """
+    names = installed() if libraries is None else tuple(libraries)
+    for name in names:
+        if name not in LIBRARIES:
+            raise UnknownNameError("library", name, LIBRARIES)
+        if version(name) is None:
+            package = LIBRARIES[name].package
+            raise InputError(f"{LIBRARIES[name].title} is not installed", remedy=f"pip install {package}")
+    q = np.concatenate((np.asarray(robot.neutral())[None], robot.sample(samples, seed=seed)))
+    ours = np.asarray(robot.placement(q, list(robot.link_names)))
+    return tuple(_reading(robot, name, q, ours) for name in names)
+
+
+def values_of(robot: Robot, q: FloatArray) -> dict[str, Any]:
+    """Return the values of one configuration by joint: a number, or a list for planar and floating joints."""
+    left, values = q.tolist(), dict[str, Any]()
+    for joint in robot.tree.joints:
+        if joint.kind is JointKind.FIXED or joint.mimic is not None:
+            continue
+        many = {JointKind.PLANAR: 3, JointKind.FLOATING: 7}.get(joint.kind, 1)
+        own, left = left[:many], left[many:]
+        values[joint.name] = own[0] if many == 1 else own
+    return values
+
+
+def _reading(robot: Robot, name: str, q: FloatArray, ours: FloatArray) -> LibraryReading:
+    """Return how one library reads the robot, from its process."""
+    title, number = LIBRARIES[name].title, version(name) or ""
+    source, form = _source(robot)
+    if form not in LIBRARIES[name].forms:
+        return LibraryReading(title, number, "the library has no reader of MJCF")
+    values = [values_of(robot, one) for one in q]
+    command = own_python("from urdfkin.verify.adapters import main; main()")
+    case = {"name": robot.name, "text": source, "configurations": values}
+    output, status = ask_python([*command, name], json.dumps([case]).encode(), _PATIENCE, _MOST)
+    if status != 0 or not output:
+        how = f"no answer in {_PATIENCE:g} s" if status is None else f"its process ended with {status}"
+        return LibraryReading(title, number, how)
+    answer = json.loads(output)
+    if "error" in answer:
+        return LibraryReading(title, number, printable(answer["error"])[:_QUOTED])
+    theirs = [{link: np.array(T) for link, T in one.items()} for one in answer["poses"]]
+    links = robot.link_names
+    equal = _EQUAL * max(1.0, float(np.abs(ours).max()))
+    shared = [i for i, link in enumerate(links) if all(link in one for one in theirs)]
+    both = np.array([[one[links[i]] for i in shared] for one in theirs])
+    worst = float(np.abs(both - ours[:, shared]).max()) if shared else 0.0
+    poses = dict(zip(shared, both.swapaxes(0, 1), strict=True))
+    elements = _elements(source) if form == "urdf" else {}
+    own = [joint for joint in answer["joints"] if joint in values[0]]
+    return LibraryReading(
+        title,
+        number,
+        joints=tuple(answer["joints"]),
+        same_order=tuple(answer["joints"]) == tuple(values[0]),
+        missing=tuple(link for i, link in enumerate(links) if i not in shared),
+        worst=worst if worst > equal else 0.0,
+        differences=tuple(_differences(robot, title, ours, poses, elements, own, equal)),
+    )
+
+
+def _source(robot: Robot) -> tuple[str, str]:
+    """Return what a library reads: the URDF text without shapes, or an MJCF file's path; and the format."""
+    source = robot.origin.source
+    if is_mjcf(source):
+        if is_text(source):
+            raise InputError("a text of MJCF cannot be given to other libraries", remedy="write it to a file")
+        return str(source), "mjcf"
+    return _without_shapes(robot.urdf), "urdf"
+
+
+def _without_shapes(text: str) -> str:
+    """Return a URDF text without meshes and other shapes, which some libraries look for on disk."""
+    from xml.etree.ElementTree import tostring  # noqa: PLC0415
+
+    robot = plain_xml(text)
+    for link in robot.iterfind("link"):
+        for shape in [*link.iterfind("visual"), *link.iterfind("collision")]:
+            link.remove(shape)
+    return tostring(robot, "unicode")
+
+
+def _elements(text: str) -> dict[str, Any]:
+    """Return the element of each joint."""
+    try:
+        return {joint.get("name", ""): joint for joint in plain_xml(text).iterfind("joint")}
+    except ExpatError:
+        return {}
+
+
+def _differences(
+    robot: Robot,
+    title: str,
+    ours: FloatArray,
+    theirs: Mapping[int, FloatArray],
+    elements: Mapping[str, Any],
+    own: Sequence[str],
+    equal: float,
+) -> Iterator[Difference]:
+    """Yield the joints whose child link has another pose in its parent link."""
+    for i, joint in enumerate(robot.tree.joints, 1):
+        if i not in theirs or joint.parent not in theirs:
+            continue
+        T = np.linalg.inv(ours[:, joint.parent]) @ ours[:, i]
+        found = np.linalg.inv(theirs[joint.parent]) @ theirs[i]
+        size = float(np.abs(T - found).max())
+        if size > equal:
+            element, words = _explained(joint, title, T, found, elements.get(joint.name), own, equal)
+            yield Difference(joint.name, element, words, size)
+
+
+def _explained(
+    joint: Joint, title: str, T: FloatArray, found: FloatArray, element: Any, own: Sequence[str], equal: float
+) -> tuple[str, str]:
+    """Return the element that explains a difference, and the difference in words.
+
+    T and found are the poses of the child link in the parent link, first at q = 0.
+    """
+    off = np.abs(T - found)
+    name, words = f"type {joint.kind.value}", "has no coordinate for it"
+    if joint.mimic is not None:
+        free = np.abs(found - joint.T_parent_joint).max() <= equal
+        name, words = "mimic", "leaves it free" if free else "applies another rule"
+    elif off[0, :3, :3].max() > equal:
+        origin = None if element is None else element.find("origin")
+        quaternion = origin is not None and origin.get("quat_xyzw") is not None
+        name, words = f"origin {'quat_xyzw' if quaternion else 'rpy'}", "has another rotation at q = 0"
+    elif off[0].max() > equal:
+        name, words = "origin xyz", "has another position at q = 0"
+    elif joint.name in own and joint.kind.has_axis:
+        name, words = "axis", _motion(joint, T, found, equal)
+    elif joint.name in own:
+        words = "moves it differently"
+    return name, f"{title} {words}"
+
+
+def _motion(joint: Joint, T: FloatArray, found: FloatArray, equal: float) -> str:
+    """Return how a joint's motion differs, from its motions from q = 0."""
+    start = np.linalg.inv(T[0])
+    mine, theirs = start @ T[1:], start @ found[1:]
+    if joint.kind is JointKind.PRISMATIC:
+        d = theirs[:, :3, 3] @ joint.axis
+        k = float(d @ (mine[:, :3, 3] @ joint.axis) / np.sum((mine[:, :3, 3] @ joint.axis) ** 2))
+        if np.abs(theirs[:, :3, 3] - k * mine[:, :3, 3]).max() <= equal:
+            return f"moves it {k:.6g} times as far"
+    elif np.abs(theirs - np.linalg.inv(mine)).max() <= equal:
+        return "turns it the other way"
+    elif np.abs(theirs[:, :3, :3] @ theirs[:, :3, :3].swapaxes(-1, -2) - np.eye(3)).max() > equal:
+        return "returns a matrix that is no rotation"
+    direction = theirs[0, :3, 3]
+    if joint.kind is not JointKind.PRISMATIC:
+        S = theirs[0, :3, :3] - theirs[0, :3, :3].T
+        direction = np.array([S[2, 1], S[0, 2], S[1, 0]])
+    if (length := math.hypot(*direction)) <= equal:
+        return "does not move it"
+    direction = np.round(direction / length * _sense(joint, mine[0]), 6) + 0.0
+    x, y, z = (f"{number:.4g}" for number in direction)
+    return f"moves it along another axis: {x} {y} {z}"
+
+
+def _sense(joint: Joint, mine: FloatArray) -> float:
+    """Return the sign of the joint's first motion about or along its axis, so that the axis has its sense."""
+    own = mine[:3, 3]
+    if joint.kind is not JointKind.PRISMATIC:
+        own = np.array([mine[2, 1] - mine[1, 2], mine[0, 2] - mine[2, 0], mine[1, 0] - mine[0, 1]])
+    return 1.0 if own @ joint.axis >= 0.0 else -1.0
