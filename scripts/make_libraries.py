@@ -123,9 +123,9 @@ def cell(
     if worst <= RIGHT:
         return {"verdict": "right"}
     found: dict[str, Any] = {"verdict": "wrong", "difference": float(f"{worst:.3g}")}
-    followers = [name for name in answer["joints"] if name not in configurations(robot)[0]]
+    free = [name for name in answer["joints"] if name not in configurations(robot)[0]]
     notes = [f"{name} has no coordinate" for name in answer["unset"]]
-    notes += [f"{name} is free" for name in followers]
+    notes += [f"{name} is free" for name in free]
     if notes:
         found["note"] = "; ".join(notes)
     if any(

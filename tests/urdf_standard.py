@@ -92,8 +92,9 @@ def poses(text: str, values: Mapping[str, Any]) -> dict[str, np.ndarray]:
         if link not in above:
             return mp.eye(4)
         joint = joints[above[link]]
-        parent = joint.find("parent").get("link")  # type: ignore[union-attr]
-        return pose(parent) * _origin(joint) * _motion(joint, value(above[link]))
+        parent = joint.find("parent")
+        assert parent is not None
+        return pose(parent.get("link", "")) * _origin(joint) * _motion(joint, value(above[link]))
 
     links = [link.get("name", "") for link in ET.fromstring(text).iterfind("link")]
     return {link: np.array(pose(link).tolist(), dtype=np.float64) for link in links}
