@@ -70,6 +70,15 @@ def test_libraries_agree_on_robots_without_special_features(robot: str, library:
     assert found.agrees, found
 
 
+def test_an_added_root_joint_is_no_difference_and_a_locked_joint_is_an_error() -> None:
+    robot = urdfkin.load(TEXTS["two revolute"], root_joint="floating")
+    (found,) = compare_readers(robot, ["yourdfpy"])
+    assert found.agrees, found
+    assert (found.same_order, found.missing) == (True, ())
+    with pytest.raises(urdfkin.InputError, match="no locked joints"):
+        compare_readers(urdfkin.load(TEXTS["two revolute"]).locked({"j1": 0.1}), ["yourdfpy"])
+
+
 def test_an_mjcf_file_is_read_by_mujoco_and_by_no_reader_of_urdf(tmp_path: Path) -> None:
     path = tmp_path / "robot.xml"
     path.write_text(

@@ -106,13 +106,13 @@ def compare_readers(
 
     Raises:
         UnknownNameError: a library has no adapter.
-        InputError: a library is not installed, or a text of MJCF is not in a file.
+        InputError: a library is not installed, a joint is locked, or a text of MJCF is not in a file.
 
     >>> import urdfkin
     >>> from urdfkin.comparison.readers import compare_readers
     >>> reading, = compare_readers(urdfkin.load("planar_two_link"), ["pinocchio"])
     >>> reading.agrees, reading.joints
-    (True, ('joint1', 'joint2'))
+    (True, ('joint_1', 'joint_2'))
     """
     names = installed() if libraries is None else tuple(libraries)
     for name in names:
@@ -121,6 +121,12 @@ def compare_readers(
         if version(name) is None:
             package = LIBRARIES[name].package
             raise InputError(f"{LIBRARIES[name].title} is not installed", remedy=f"pip install {package}")
+    if any(joint.lock is not None for joint in robot.tree.joints):
+        raise InputError(
+            "other libraries read the file, which has no locked joints",
+            where=robot.name,
+            remedy="load the robot without locks",
+        )
     q = np.concatenate((np.asarray(robot.neutral())[None], robot.sample(samples, seed=seed)))
     ours = np.asarray(robot.placement(q, list(robot.link_names)))
     return tuple(_reading(robot, name, q, ours) for name in names)
@@ -130,11 +136,10 @@ def values_of(robot: Robot, q: FloatArray) -> dict[str, Any]:
     """Return the values of one configuration by joint: a number, or a list for planar and floating joints."""
     left, values = q.tolist(), dict[str, Any]()
     for joint in robot.tree.joints:
-        if joint.kind is JointKind.FIXED or joint.mimic is not None:
+        if not joint.nq:
             continue
-        many = {JointKind.PLANAR: 3, JointKind.FLOATING: 7}.get(joint.kind, 1)
-        own, left = left[:many], left[many:]
-        values[joint.name] = own[0] if many == 1 else own
+        own, left = left[: joint.nq], left[joint.nq :]
+        values[joint.name] = own[0] if joint.nq == 1 else own
     return values
 
 
@@ -158,17 +163,24 @@ def _reading(robot: Robot, name: str, q: FloatArray, ours: FloatArray) -> Librar
     links = robot.link_names
     equal = _EQUAL * max(1.0, float(np.abs(ours).max()))
     shared = [i for i, link in enumerate(links) if all(link in one for one in theirs)]
+    if not shared:
+        return LibraryReading(title, number, "its model has none of the links", tuple(answer["joints"]))
     both = np.array([[one[links[i]] for i in shared] for one in theirs])
-    worst = float(np.abs(both - ours[:, shared]).max()) if shared else 0.0
+    # The text has no root joint that `load` added, so poses are compared in the first link that both have.
+    both = np.linalg.inv(both[:, :1]) @ both
+    ours = np.linalg.inv(ours[:, shared[:1]]) @ ours
+    worst = float(np.abs(both - ours[:, shared]).max())
     poses = dict(zip(shared, both.swapaxes(0, 1), strict=True))
     elements = _elements(source) if form == "urdf" else {}
     own = [joint for joint in answer["joints"] if joint in values[0]]
+    added = next((joint.name for joint in robot.tree.joints if joint.name not in elements), None)
+    added = added if form == "urdf" else None
     return LibraryReading(
         title,
         number,
         joints=tuple(answer["joints"]),
-        same_order=tuple(answer["joints"]) == tuple(values[0]),
-        missing=tuple(link for i, link in enumerate(links) if i not in shared),
+        same_order=answer["joints"] == [name for name in values[0] if name != added],
+        missing=tuple(link for i, link in enumerate(links) if i not in shared and (i or not added)),
         worst=worst if worst > equal else 0.0,
         differences=tuple(_differences(robot, title, ours, poses, elements, own, equal)),
     )

@@ -135,7 +135,8 @@ def read_pinocchio(text: str) -> Reading:
             {f.name: data.oMf[i].homogeneous for i, f in enumerate(model.frames) if f.type == pin.BODY}, root
         )
 
-    return Reading([n for n, j in zip(model.names, model.joints, strict=True) if j.nq > 0], poses)
+    moving = [model.names[i] for i in range(1, model.njoints) if model.joints[i].nq]  # 0 is the world
+    return Reading(moving, poses)
 
 
 def read_mujoco(text: str) -> Reading:
