@@ -37,7 +37,7 @@ LIBRARY: dict[str, tuple[str, str, str]] = {
         "Configurations",
         "Joint values `q`: named poses, samples, limits, integration, and the conversion to other tools.",
         "neutral poses sample limit_violations integrate difference to_pinocchio from_pinocchio "
-        "pinocchio_model convention with_convention",
+        "pinocchio_model convention with_convention locked",
     ),
     "api/kinematics.md": (
         "Kinematics",
@@ -84,7 +84,7 @@ LIBRARY: dict[str, tuple[str, str, str]] = {
         "Errors",
         "All exceptions derive from `UrdfkinError`; a message has a location, the value found and a remedy.",
         "UrdfkinError InputError UnknownNameError SourceError UrdfError TableError "
-        "VerificationError NotVerifiedWarning UrdfWarning",
+        "VerificationError NotVerifiedWarning UrdfWarning DegreesWarning",
     ),
 }
 _FORMULA = re.compile(r"(?:<p>)?\$<code>(.*?)</code>\$(?:</p>)?", re.DOTALL)
