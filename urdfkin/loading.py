@@ -23,7 +23,7 @@ from urdfkin.urdf.parser import NEWER_VERSION
 from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.sources import Origin, Source, Text, as_word, entry_of, is_urdf_path, read_source
 from urdfkin.urdf.writer import to_urdf as write_urdf
-from urdfkin.verify.oracles import WitnessName, witness_of
+from urdfkin.verify.oracles import OracleName, oracle_library
 from urdfkin.verify.sampling import Verify, checked_choice
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ class How(TypedDict):
     verify: Verify
     mimic: bool | None
     root_joint: str | None
-    oracle: WitnessName
+    oracle: OracleName
     lock: str | Mapping[str, ArrayLike]
     joints: Sequence[str] | None
 
@@ -54,7 +54,7 @@ def load(
     mimic: bool | None = None,
     root_joint: str | None = None,
     xacro_args: Mapping[str, object] | None = None,
-    oracle: WitnessName = "pinocchio",
+    oracle: OracleName = "pinocchio",
     lock: str | Mapping[str, ArrayLike] = MappingProxyType({}),
     joints: Sequence[str] | None = None,
 ) -> Robot:
@@ -256,7 +256,7 @@ def robot_of(
     verify: Verify = True,
     mimic: bool | None = None,
     root_joint: str | None = None,
-    oracle: WitnessName = "pinocchio",
+    oracle: OracleName = "pinocchio",
     lock: str | Mapping[str, ArrayLike] = MappingProxyType({}),
     joints: Sequence[str] | None = None,
     listed: tuple[Finding, ...] = (),
@@ -280,7 +280,7 @@ def robot_of(
     Raises:
         UrdfError: the text has errors.
     """
-    witness_of(oracle)
+    oracle_library(oracle)
     other = None if oracle == "pinocchio" else oracle
     origin = Origin(text.source, mimic, root_joint, text.xacro_args, other, table, text.sha256)
     if mimic is None:

@@ -52,7 +52,7 @@ from urdfkin.urdf.sources import Origin, entry_of
 from urdfkin.verify.bounds import magnitudes, movable, nearest_singularity
 from urdfkin.verify.call import Call
 from urdfkin.verify.certificate import Certificate
-from urdfkin.verify.oracles import WitnessName
+from urdfkin.verify.oracles import OracleName
 from urdfkin.verify.quantities import (
     ACCELERATION_BREAKDOWN,
     ANALYTICAL_JACOBIAN,
@@ -153,7 +153,7 @@ class Robot(Displayable):
         mimic: bool = True,
         findings: Sequence[Finding] = (),
         unverifiable: str | None = None,
-        oracle: WitnessName = "pinocchio",
+        oracle: OracleName = "pinocchio",
         base_frame: str | None = None,
         tip_frame: str | None = None,
     ) -> None:

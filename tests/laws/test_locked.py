@@ -24,7 +24,7 @@ from urdfkin.robot import Robot
 from urdfkin.urdf.writer import to_urdf
 from urdfkin.verify.bounds import magnitudes
 from urdfkin.verify.certificate import VerificationError
-from urdfkin.verify.oracles import MUJOCO, PINOCCHIO, Witness
+from urdfkin.verify.oracles import MUJOCO, PINOCCHIO, OracleLibrary
 from urdfkin.verify.pinocchio import OracleError
 from urdfkin.verify.quantities import QUANTITIES, walked
 
@@ -109,7 +109,7 @@ def test_both_oracles_agree_with_a_locked_robot(name: str, oracle: str) -> None:
     robot = robot_of(name)
     names = list(LOCKS[name] or lockable(robot)[::2])
     locked = robot.locked(values_at(robot, robot.sample(1)[0], names))
-    locked.verifier.witness = {"pinocchio": PINOCCHIO, "mujoco": MUJOCO}[oracle]
+    locked.verifier.library = {"pinocchio": PINOCCHIO, "mujoco": MUJOCO}[oracle]
     q, v, a = state(locked, 4, 3)
     for reference in Reference:
         locked.acceleration(q, v, a, locked.link_frames, reference, verify=True)
@@ -183,9 +183,9 @@ def test_pinocchio_reads_the_whole_text_and_reduces_its_model() -> None:
 
 @pytest.mark.parametrize("oracle", [PINOCCHIO, MUJOCO])
 @pytest.mark.parametrize("slip", ["value", "mimic", "sense", "free"])
-def test_the_oracle_finds_a_wrongly_locked_tree(slip: str, oracle: Witness) -> None:
+def test_the_oracle_finds_a_wrongly_locked_tree(slip: str, oracle: OracleLibrary) -> None:
     robot = robot_of("panda").locked({"panda_finger_joint1": 0.03, "panda_joint7": 0.5})
-    robot.verifier.witness = oracle
+    robot.verifier.library = oracle
     other = {
         "value": {"panda_finger_joint1": 0.03, "panda_joint7": 0.5000001},
         "mimic": {"panda_finger_joint1": 0.0300001, "panda_joint7": 0.5},

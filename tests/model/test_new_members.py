@@ -28,7 +28,7 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import JointKind
 from urdfkin.verify.bounds import magnitudes, movable
 from urdfkin.verify.oracle import QueryBatch
-from urdfkin.verify.oracles import WITNESSES
+from urdfkin.verify.oracles import ORACLES
 from urdfkin.verify.quantities import QUANTITIES, Quantity
 
 REFUSED = (AttributeError, KeyError, AssertionError, NotImplementedError)
@@ -116,7 +116,7 @@ def test_the_bound_of_a_hessian_refuses_a_new_reference_frame(
         QUANTITIES["hessian"].bound(plan, magnitudes(plan, x, x, x, STILL_STATE), reference)
 
 
-@pytest.mark.parametrize("oracle", WITNESSES)
+@pytest.mark.parametrize("oracle", ORACLES)
 @pytest.mark.parametrize("row", REFERRED, ids=lambda row: row.name)
 def test_the_oracles_refuse_a_new_reference_frame(
     robot: urdfkin.Robot, reference: Reference, row: Quantity, oracle: str
@@ -126,7 +126,7 @@ def test_the_oracles_refuse_a_new_reference_frame(
         if row.name == "hessian":
             return
     x = np.zeros((1, robot.nq))
-    model = WITNESSES[oracle].oracle(robot.urdf, robot.tree)
+    model = ORACLES[oracle].oracle(robot.urdf, robot.tree)
     joints = row.of == "joints"
     frame = f"joint:{robot.joint_names[0]}" if joints else robot.tip_frame
     with pytest.raises(REFUSED):

@@ -1,4 +1,4 @@
-"""A second witness: three answers to each question, and it is found who stands alone."""
+"""A second oracle: three answers to each question, and it is found who stands alone."""
 
 import itertools
 from typing import Any
@@ -26,8 +26,8 @@ FIRST = Bound(np.ones((1, 1, 1)), np.full((1, 1, 1), 4.0))
 SECOND = Bound(np.full((1, 1, 1), 2.0), np.full((1, 1, 1), 8.0))
 
 
-def asked(ours: float, pinocchios: float, witness: float) -> ThreeSides:
-    one: list[FloatArray] = [np.full((1, 1, 1), 1.0 + x * EPS) for x in (ours, pinocchios, witness)]
+def asked(ours: float, pinocchios: float, second_oracle: float) -> ThreeSides:
+    one: list[FloatArray] = [np.full((1, 1, 1), 1.0 + x * EPS) for x in (ours, pinocchios, second_oracle)]
     return three_sides("mujoco", one[0], one[1], one[2], FIRST, SECOND)
 
 
@@ -66,7 +66,7 @@ def test_sums_add_up_in_any_order() -> None:
     assert total.urdfkin.failed == 2
 
 
-#: urdfkin and Pinocchio: 4 eps. urdfkin and the witness: 16 eps. Pinocchio and the witness: the sum, 20 eps.
+#: Bounds: urdfkin and Pinocchio 4 eps, urdfkin and the second oracle 16 eps, the two oracles 20 eps.
 @pytest.mark.parametrize(
     ("answers", "agree"),
     [
@@ -82,12 +82,12 @@ def test_sums_add_up_in_any_order() -> None:
 def test_two_answers_agree_up_to_their_bound_and_no_further(
     answers: tuple[float, float, float], agree: tuple[bool, bool, bool]
 ) -> None:
-    found, (ours, pinocchios, witness) = asked(*answers), answers
-    ours_theirs, ours_witness, theirs_witness = agree
-    assert (found.urdfkin.failed, found.pinocchio.failed) == (not ours_witness, not theirs_witness)
-    assert found.urdfkin.share_of_bound == abs(ours - witness) / 16
-    assert found.pinocchio.share_of_bound == abs(pinocchios - witness) / 20
-    assert found.urdfkin.worst == abs(ours - witness) / 2
+    found, (ours, pinocchios, second_oracle) = asked(*answers), answers
+    ours_theirs, ours_second, theirs_second = agree
+    assert (found.urdfkin.failed, found.pinocchio.failed) == (not ours_second, not theirs_second)
+    assert found.urdfkin.share_of_bound == abs(ours - second_oracle) / 16
+    assert found.pinocchio.share_of_bound == abs(pinocchios - second_oracle) / 20
+    assert found.urdfkin.worst == abs(ours - second_oracle) / 2
     others = {
         (True, True, True): ((0, 0, 0), 0),
         (True, False, False): ((0, 0, 1), 0),
@@ -95,7 +95,7 @@ def test_two_answers_agree_up_to_their_bound_and_no_further(
         (False, False, True): ((1, 0, 0), 0),
     }
     assert (found.alone, found.undecided) == others.get(
-        (ours_theirs, ours_witness, theirs_witness), ((0, 0, 0), 1)
+        (ours_theirs, ours_second, theirs_second), ((0, 0, 0), 1)
     )
 
 
@@ -146,9 +146,11 @@ def test_three_that_agree_are_told_side_by_side_in_every_form() -> None:
     assert robot["verdict"] == "verified"
     assert "mujoco" in document["versions"]
     assert "--oracle mujoco" in (document["command"] or "")
-    witnessed = [check for check in robot["checks"] if "witness" in check]
-    assert {check["subjects"] for check in witnessed} == {"frames", "joints"}
-    assert {check["quantity"] for check in robot["checks"]} - {check["quantity"] for check in witnessed} == {
+    second_oracle_rows = [check for check in robot["checks"] if "second_oracle" in check]
+    assert {check["subjects"] for check in second_oracle_rows} == {"frames", "joints"}
+    assert {check["quantity"] for check in robot["checks"]} - {
+        check["quantity"] for check in second_oracle_rows
+    } == {
         "screws"  # Pinocchio's own data.J
     }
     for text in (as_markdown(document), as_html(document), as_junit(document).decode()):
@@ -168,11 +170,11 @@ def test_one_that_errs_stands_alone_in_the_report(
     robot = document["robots"][0]
     assert robot["verdict"] == "disagrees"
     assert list(contradictions(document)) == []
-    key = "pinocchio" if who == "Pinocchio" else "witness"
+    key = "pinocchio" if who == "Pinocchio" else "second_oracle"
     counts = {
-        check["quantity"]: check["witness"]["alone"][key]  # type: ignore[literal-required]
+        check["quantity"]: check["second_oracle"]["alone"][key]  # type: ignore[literal-required]
         for check in robot["checks"]
-        if "witness" in check
+        if "second_oracle" in check
     }
     assert counts.pop("velocity") > 0
     assert set(counts.values()) == {0}
@@ -181,15 +183,15 @@ def test_one_that_errs_stands_alone_in_the_report(
         assert "urdfkin differs from the two others in 0, Pinocchio in 0" in (robot["reason"] or "")
 
 
-def test_a_witness_that_cannot_read_the_robot_leaves_it_unverified() -> None:
+def test_a_second_oracle_that_cannot_read_the_robot_leaves_it_unverified() -> None:
     text = arm(robot='name="r" version="1.1"', origin='<origin quat_xyzw="0 0 1 0"/>')
     report = validate(text, samples=0, oracle="mujoco")
     assert report.exit_code == 3
     assert "MuJoCo does not know quat_xyzw" in (report.robots[0].reason or "")
 
 
-def test_without_a_second_witness_nothing_is_said_of_one() -> None:
+def test_without_a_second_oracle_nothing_is_said_of_one() -> None:
     document = validate(arm(), samples=0).as_dict()
-    assert "witness" not in str(document)
+    assert "second_oracle" not in str(document)
     assert "mujoco" not in document["versions"]
     assert urdfkin.load(arm()).origin.oracle is None

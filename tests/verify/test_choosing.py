@@ -70,7 +70,7 @@ def fresh(panda: Robot) -> Robot:
 @pytest.fixture
 def lies(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pinocchio is off by a millionth where the finger stands at the mark, and by more where it is beyond."""
-    right = verifier.theirs_of
+    right = verifier.oracle_results
 
     def wrong(quantity: Quantity, oracle: Oracle, asked: QueryBatch) -> FloatArray:
         theirs, finger = right(quantity, oracle, asked), asked.inputs[0][:, 7]
@@ -80,7 +80,7 @@ def lies(monkeypatch: pytest.MonkeyPatch) -> None:
         rows *= 1.0 + size.reshape(-1, *[1] * (theirs.ndim - 1))
         return theirs
 
-    monkeypatch.setattr(verifier, "theirs_of", wrong)
+    monkeypatch.setattr(verifier, "oracle_results", wrong)
 
 
 BATCHES = [

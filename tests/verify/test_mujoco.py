@@ -1,4 +1,4 @@
-"""MuJoCo as a witness: it computes the same from its own reading, and says so, or why it cannot."""
+"""MuJoCo as the oracle: it reads the robot itself and computes the same, or states why it cannot."""
 
 import warnings
 from typing import Any
@@ -157,7 +157,7 @@ def test_an_oracle_that_nobody_knows_is_an_error() -> None:
         urdfkin.load(arm(), oracle="mujuco")  # type: ignore[arg-type]
 
 
-def test_a_witness_that_is_not_installed_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_oracle_that_is_not_installed_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("urdfkin.urdf.mujoco.installed_version", lambda _: None)
     with pytest.raises(urdfkin.InputError, match=r"MuJoCo is not installed; pip install 'urdfkin\[mujoco\]'"):
         urdfkin.load(arm(), oracle="mujoco")

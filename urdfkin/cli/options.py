@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from urdfkin.model.tree import FloatArray
     from urdfkin.motion.trajectory import Trajectory
     from urdfkin.robot import Robot
-    from urdfkin.verify.oracles import WitnessName
+    from urdfkin.verify.oracles import OracleName
 
 
 class Whole(click.IntRange):
@@ -400,7 +400,7 @@ class Inputs:
         return replace(self, said={**self.said, **more})
 
 
-def load_robot(source: str, *, verify: bool = True, oracle: WitnessName = "pinocchio", **how: Any) -> Robot:
+def load_robot(source: str, *, verify: bool = True, oracle: OracleName = "pinocchio", **how: Any) -> Robot:
     """Load a command's robot with the command's options or `how`; write each warning to stderr as a line."""
     from urdfkin.loading import load  # noqa: PLC0415  keeps --help fast
     from urdfkin.urdf.findings import UrdfWarning  # noqa: PLC0415

@@ -147,7 +147,7 @@ class Search:
 
     def poses(self, z: FloatArray, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
         """Return poses (n, frames, 4, 4) of A and of B in A's root frame, at values (n, variables)."""
-        return self.poses_at(*self.configurations(z), frames, urdfkins)
+        return self.poses_at(*self.configurations(z), frames, own_results)
 
     def poses_at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
@@ -267,7 +267,7 @@ def _distances(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.norm(a[..., :3, 3] - b[..., :3, 3], axis=-1))
 
 
-def urdfkins(robot: Robot, q: FloatArray, frames: Sequence[str]) -> FloatArray:
+def own_results(robot: Robot, q: FloatArray, frames: Sequence[str]) -> FloatArray:
     """Return poses (n, frames, 4, 4) computed by urdfkin's forward recursion."""
     return robot.placement(q, frames, verify=False)
 
@@ -394,7 +394,7 @@ class Boxes:
         # B's robot and frame are expressed in A's root frame.
         q = search.configurations(self.middle[np.newaxis])[1]
         base = trees[1].link_frames[search.found.base[1]]
-        self.seen = search.hold @ inverse(urdfkins(search.robots[1], q, [base])[0, 0])
+        self.seen = search.hold @ inverse(own_results(search.robots[1], q, [base])[0, 0])
         self.tool = inverse(frame.tool)[:3, 3]
         #: (nv, variables) derivatives of each robot's joint values by the variables.
         self.rates = [np.zeros((tree.nv, len(names))) for tree in trees]
@@ -426,7 +426,7 @@ class Boxes:
         self, robot: Robot, q: FloatArray, frame: str, tool: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Return the position (n, 3) of a frame's point, and its Jacobian (n, 3, nv)."""
-        T, J = urdfkins(robot, q, [frame])[:, 0], robot.jacobian(q, frame, verify=False)
+        T, J = own_results(robot, q, [frame])[:, 0], robot.jacobian(q, frame, verify=False)
         if not tool.any():
             return T[:, :3, 3], J[:, :3]
         lever = T[:, :3, :3] @ tool

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, TypedDict, cast
 
 import numpy as np
 
-from urdfkin.comparison.bounds import Search, pinocchios, tightened, urdfkins
+from urdfkin.comparison.bounds import Search, own_results, pinocchios, tightened
 from urdfkin.comparison.result import REASONS, Confirmation, Difference, Sameness, Verdict
 from urdfkin.comparison.verdict import CONFIRMED, Comparator
 from urdfkin.errors import InputError, UnknownNameError
@@ -510,7 +510,7 @@ def _not_attained(
     if not search.belong_together(q_a, q_b):
         yield f"{place}: its configurations do not correspond to each other, or leave the limits"
         return
-    for computed, by in ((urdfkins, "urdfkin"), (pinocchios, "Pinocchio")):
+    for computed, by in ((own_results, "urdfkin"), (pinocchios, "Pinocchio")):
         turned, off = apart(*(Ts[0, 0] for Ts in search.poses_at(q_a, q_b, [frame], computed)))
         if off < claim["lower"] - rounding[0]:
             yield f"{place}: {by} finds {off:.6g} m at its configuration, not {claim['lower']:.6g} m"

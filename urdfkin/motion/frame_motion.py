@@ -24,7 +24,7 @@ from urdfkin.verify.bounds import movable, result_k
 from urdfkin.verify.call import Call
 from urdfkin.verify.comparison import worst_of_each
 from urdfkin.verify.quantities import ACCELERATION, JACOBIAN, PLACEMENT, VELOCITY, Quantity, validated
-from urdfkin.verify.verifier import held_against
+from urdfkin.verify.verifier import oracle_results_with_bound
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +192,9 @@ def frame_motion(
 
 
 def _check(row: Quantity, robot: Robot, call: Call, ours: FloatArray) -> Check:
-    theirs, bound = held_against(row, robot.verifier.oracle(call.base), call.part(slice(0, call.n)), ours)
+    theirs, bound = oracle_results_with_bound(
+        row, robot.verifier.oracle(call.base), call.part(slice(0, call.n)), ours
+    )
     units = worst_of_each(ours, theirs, bound.scale, 2)
     k = np.broadcast_to(result_k(bound, units.shape), units.shape)
     return Check(units[:, 0], (units / k)[:, 0], k[:, 0])

@@ -27,14 +27,14 @@ from urdfkin.report.words import (
     judged_on,
     percent,
     pinocchio,
+    second_oracle_cells,
+    second_oracle_heads,
+    second_oracle_title,
     second_reader_words,
     share_of,
     summary,
     units,
     verdict_counts,
-    witness_cells,
-    witness_heads,
-    witness_title,
     worst,
 )
 from urdfkin.validation.document import Document, Robot, outcome_of
@@ -250,12 +250,12 @@ def _robot(robot: Robot, index: int, document: Document) -> dict[str, Any]:
         "failures": pages.failures(robot),
         "has_problems": any(finding["severity"] != "note" for finding in robot["findings"]),
         "second_reader": second_reader_words(robot),
-        "witness": (title := witness_title([robot])),
-        "witness_heads": witness_heads(title) if title else [],
-        "witnessed": [
-            [check_name(check), *witness_cells([check], title)]
+        "second_oracle": (title := second_oracle_title([robot])),
+        "second_oracle_heads": second_oracle_heads(title) if title else [],
+        "second_oracle_rows": [
+            [check_name(check), *second_oracle_cells([check], title)]
             for check in in_order(robot)
-            if title and "witness" in check
+            if title and "second_oracle" in check
         ],
         "judged": pages.judged_rows(robot["judge"]) if robot["judge"] else [],
         "judged_on": judged_on(robot["judge"]) if robot["judge"] else "",

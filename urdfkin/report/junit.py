@@ -14,10 +14,10 @@ from urdfkin.report.words import (
     check_name,
     in_order,
     percent,
+    second_oracle_cells,
+    second_oracle_heads,
+    second_oracle_title,
     units,
-    witness_cells,
-    witness_heads,
-    witness_title,
 )
 from urdfkin.validation.document import Case, Check, Document, Robot, outcome_of
 
@@ -130,8 +130,8 @@ def _text(check: Check, robot: Robot) -> str:
     ]
     if tightest is not None and widest is not None:
         lines.append(f"bounds: {tightest:.0f} to {widest:.0f} eps*scale")
-    if "witness" in check and (title := witness_title([robot])) is not None:
-        cells = zip(witness_heads(title), witness_cells([check], title), strict=True)
+    if "second_oracle" in check and (title := second_oracle_title([robot])) is not None:
+        cells = zip(second_oracle_heads(title), second_oracle_cells([check], title), strict=True)
         lines += [f"{head}: {cell}" for head, cell in list(cells)[1:]]
     if case is not None:
         lines += [f"worst case: sample {case['sample']}, {case['frame']}", f"replay: {case['replay']}"]

@@ -13,12 +13,12 @@ from urdfkin.report.words import (
     columns,
     counted,
     percent,
+    second_oracle_heads,
+    second_oracle_rows,
+    second_oracle_title,
     share_of,
     summary,
     units,
-    witness_heads,
-    witness_rows,
-    witness_title,
     worst_of,
 )
 from urdfkin.validation.document import Document, Robot, outcome_of
@@ -65,9 +65,9 @@ def _three_sides(robots: list[Robot]) -> list[str]:
 
     It has one row for each quantity, over all robots.
     """
-    if (title := witness_title(robots)) is None:
+    if (title := second_oracle_title(robots)) is None:
         return []
-    heads = ["quantity", *map(text, witness_heads(title))]
+    heads = ["quantity", *map(text, second_oracle_heads(title))]
     lines = [
         f"Comparison of urdfkin, Pinocchio and {text(title)}: the largest ratio of a disagreement to its"
         " bound, for each pair of libraries:",
@@ -75,7 +75,7 @@ def _three_sides(robots: list[Robot]) -> list[str]:
         _row(heads),
         _row(["---", *["---:"] * (len(heads) - 2), "---"]),
     ]
-    lines += (_row(map(text, (name, *cells))) for name, cells in witness_rows(robots, title))
+    lines += (_row(map(text, (name, *cells))) for name, cells in second_oracle_rows(robots, title))
     return [*lines, ""]
 
 

@@ -198,7 +198,7 @@ def _verdict(robot: Robot, samples: int) -> Iterator[str]:
     """Yield contradictions of the verdict. A robot that is not verified needs a reason."""
     verdict, reason = Verdict(robot["verdict"]), robot["reason"]
     second_differs = any(
-        check["witness"]["urdfkin"]["failed"] for check in robot["checks"] if "witness" in check
+        check["second_oracle"]["urdfkin"]["failed"] for check in robot["checks"] if "second_oracle" in check
     )
     reading = robot["second_reader"]
     outside = (

@@ -24,13 +24,13 @@ from urdfkin.report.words import (
     pinocchio,
     quantities,
     quantity_name,
+    second_oracle_heads,
+    second_oracle_rows,
+    second_oracle_title,
     second_reader_words,
     share_of,
     summary,
     units,
-    witness_heads,
-    witness_rows,
-    witness_title,
     worst,
     worst_of,
 )
@@ -63,7 +63,7 @@ def print_report(document: Document, out: Console, *, cases: bool = False) -> No
     else:
         _print_robots(robots, out)
         _print_quantities(robots, out)
-    if (title := witness_title(robots)) is not None:
+    if (title := second_oracle_title(robots)) is not None:
         out.print(
             f"urdfkin, Pinocchio and {title}: the largest ratio of a disagreement to its bound, for each"
             " pair of libraries",
@@ -124,8 +124,8 @@ def _print_quantities(robots: Sequence[Robot], out: Console) -> None:
 
 def _three_sides(robots: Sequence[Robot], title: str) -> Table:
     """Return one row for each quantity, over all robots and reference frames."""
-    rows = ([quantity_name(name), *cells] for name, cells in witness_rows(robots, title))
-    heads = [head.replace(", ", ",\n") for head in witness_heads(title)]
+    rows = ([quantity_name(name), *cells] for name, cells in second_oracle_rows(robots, title))
+    heads = [head.replace(", ", ",\n") for head in second_oracle_heads(title)]
     return Table(["quantity", *heads], list(rows), left=(0, 5))
 
 

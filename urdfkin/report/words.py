@@ -6,9 +6,9 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Literal
 
-from urdfkin.validation.document import Check, Document, Judged, Judgement, Robot, Units, Witness
+from urdfkin.validation.document import Check, Document, Judged, Judgement, Robot, SecondOracle, Units
 from urdfkin.validation.outcome import Verdict
-from urdfkin.verify.oracles import WITNESSES
+from urdfkin.verify.oracles import ORACLES
 from urdfkin.verify.quantities import QUANTITIES
 
 SIDES: tuple[Literal["urdfkin"], Literal["pinocchio"]] = ("urdfkin", "pinocchio")
@@ -145,47 +145,52 @@ def judged_on(judgement: Judgement) -> str:
     return f"{counted(judgement['samples'], 'sample')}{moving}; {nearer_counts(judgement['lines'])}"
 
 
-def witness_title(robots: Sequence[Robot]) -> str | None:
+def second_oracle_title(robots: Sequence[Robot]) -> str | None:
     """Return the displayed name of the second oracle; None if there was none."""
-    names = (check["witness"]["by"] for robot in robots for check in robot["checks"] if "witness" in check)
+    names = (
+        check["second_oracle"]["by"]
+        for robot in robots
+        for check in robot["checks"]
+        if "second_oracle" in check
+    )
     name = next(names, None)
-    return next((one.title for one in WITNESSES.values() if one.name == name), name)
+    return next((one.title for one in ORACLES.values() if one.name == name), name)
 
 
-def witness_heads(title: str) -> list[str]:
+def second_oracle_heads(title: str) -> list[str]:
     """Return the columns of the table with a second oracle: the three pairs, and the outlier."""
     return ["results", "urdfkin, Pinocchio", f"urdfkin, {title}", f"Pinocchio, {title}", "outlier"]
 
 
-def witness_rows(robots: Sequence[Robot], title: str) -> Iterator[tuple[str, list[str]]]:
-    """Yield each quantity with its cells under `witness_heads`, over all robots and reference frames."""
+def second_oracle_rows(robots: Sequence[Robot], title: str) -> Iterator[tuple[str, list[str]]]:
+    """Yield each quantity and its cells under `second_oracle_heads`, over all robots."""
     for name in quantities(robots):
-        checks = [check for robot in robots for check in of_quantity(robot, name) if "witness" in check]
+        checks = [check for robot in robots for check in of_quantity(robot, name) if "second_oracle" in check]
         if checks:
-            yield name, witness_cells(checks, title)
+            yield name, second_oracle_cells(checks, title)
 
 
-def witness_cells(checks: Sequence[Check], title: str) -> list[str]:
-    """Return the cells under `witness_heads` for several checks.
+def second_oracle_cells(checks: Sequence[Check], title: str) -> list[str]:
+    """Return the cells under `second_oracle_heads` for several checks.
 
     The cell of a pair of libraries is the largest ratio of their disagreement to its bound.
     """
-    found = [(check, check["witness"]) for check in checks if "witness" in check]
+    found = [(check, check["second_oracle"]) for check in checks if "second_oracle" in check]
     return [
         f"{sum(check['results'] for check, _ in found):,}",
         percent(worst(check["share_of_bound"] for check, _ in found)),
-        percent(worst(witness["urdfkin"]["share_of_bound"] for _, witness in found)),
-        percent(worst(witness["pinocchio"]["share_of_bound"] for _, witness in found)),
-        _alone([witness for _, witness in found], title),
+        percent(worst(second_oracle["urdfkin"]["share_of_bound"] for _, second_oracle in found)),
+        percent(worst(second_oracle["pinocchio"]["share_of_bound"] for _, second_oracle in found)),
+        _alone([second_oracle for _, second_oracle in found], title),
     ]
 
 
-def _alone(found: Sequence[Witness], title: str) -> str:
+def _alone(found: Sequence[SecondOracle], title: str) -> str:
     counts = {
-        "urdfkin": sum(witness["alone"]["urdfkin"] for witness in found),
-        "Pinocchio": sum(witness["alone"]["pinocchio"] for witness in found),
-        title: sum(witness["alone"]["witness"] for witness in found),
-        "undecided": sum(witness["undecided"] for witness in found),
+        "urdfkin": sum(second_oracle["alone"]["urdfkin"] for second_oracle in found),
+        "Pinocchio": sum(second_oracle["alone"]["pinocchio"] for second_oracle in found),
+        title: sum(second_oracle["alone"]["second_oracle"] for second_oracle in found),
+        "undecided": sum(second_oracle["undecided"] for second_oracle in found),
     }
     return ", ".join(f"{who} ({count:,})" for who, count in counts.items() if count) or "none"
 

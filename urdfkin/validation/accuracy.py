@@ -41,7 +41,7 @@ from urdfkin.verify.oracle import BaseRows
 from urdfkin.verify.pinocchio_inputs import BaseNumbers, davenport
 from urdfkin.verify.quantities import ANALYTICAL_JACOBIAN, JACOBIAN, PLACEMENT, Quantity, validated
 from urdfkin.verify.sampling import Samples, draw
-from urdfkin.verify.verifier import bound_of, theirs_of, urdfkins
+from urdfkin.verify.verifier import bound_of, oracle_results, own_results
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _BALLS = np.vectorize(exact, otypes=[object])
@@ -196,12 +196,12 @@ class _Work:
         reference = _ALIGNED if reference is None else reference
         asked = self.part.asked._replace(reference=reference)
         part = self.part._replace(reference=reference, asked=asked)
-        ours, theirs = urdfkins(row, part), theirs_of(row, self.oracle, asked)
+        ours, theirs = own_results(row, part), oracle_results(row, self.oracle, asked)
         scale = np.broadcast_to(bound_of(row, part).scale, ours.shape)
         return _Compared(ours, theirs, self._true(row, reference).reshape(ours.shape), scale)
 
     def _true(self, row: Quantity, reference: Reference) -> NDArray[np.object_]:
-        """Return the values at 50 digits (n, links, ...), in the order of `urdfkins`."""
+        """Return the values at 50 digits (n, links, ...), in the order of `own_results`."""
         return np.array(
             [[row.truth(motion, link, reference) for link in self.links] for motion in self.motions],
             dtype=object,

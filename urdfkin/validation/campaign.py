@@ -32,7 +32,7 @@ from urdfkin.validation.robot_input import Given, RobotInput, subjects
 from urdfkin.validation.store import Store, opened
 from urdfkin.validation.worker_processes import ProcessEngine
 from urdfkin.verify.ahead import load_kernels
-from urdfkin.verify.oracles import PINOCCHIO, WitnessName, witness_of
+from urdfkin.verify.oracles import PINOCCHIO, OracleName, oracle_library
 from urdfkin.verify.pinocchio_module import pinocchio
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def validate(
     xacro_args: Mapping[str, object] | None = None,
     lock: str | Mapping[str, ArrayLike] = MappingProxyType({}),
     joints: Sequence[str] | None = None,
-    oracle: WitnessName = "pinocchio",
+    oracle: OracleName = "pinocchio",
     isolate: bool = False,
     executor: Executor | Engine | None = None,
     store: str | os.PathLike[str] | None = None,
@@ -120,7 +120,7 @@ def validate(
     started = datetime.datetime.now(datetime.UTC)
     pinocchio()  # once, before the work, so that a missing Pinocchio is an error at once
     found, unread = subjects(given, mimic, root_joint, xacro_args, lock, joints)
-    if witness_of(oracle) is not PINOCCHIO:
+    if oracle_library(oracle) is not PINOCCHIO:
         found = [replace(one, origin=replace(one.origin, oracle=oracle)) for one in found]
     cut = Cut(samples)
     collector = ResultCollector(found, cut, shares(len(found), cut, shard), progress)

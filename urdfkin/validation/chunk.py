@@ -161,7 +161,7 @@ def _loaded(chunk: Chunk) -> tuple[Robot, Oracle, SecondWitness | None]:
     most = memory.share() if chunk.memory is None else chunk.memory
     memory.demand(robot.tree, chunk.samples + SPECIAL, most)  # the first chunk is the largest
     second = None
-    if (by := robot.verifier.witness) is not PINOCCHIO:
+    if (by := robot.verifier.library) is not PINOCCHIO:
         second = SecondWitness(by, robot.verifier.oracle(by=by))
     found = robot, robot.verifier.oracle(), second
     _cache[chunk.subject] = found

@@ -20,7 +20,7 @@ from urdfkin.validation.outcome import Verdict
 from urdfkin.validation.results import RobotReport
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.validation.robot_summary import NO_PORTRAIT, RobotSummary
-from urdfkin.verify.oracles import WITNESSES
+from urdfkin.verify.oracles import ORACLES
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,9 +223,9 @@ def _outside(tallies: dict[Key, Tally]) -> Iterator[str]:
         yield f"{failed:,} of {results:,} results lie outside their bound"
     found = reduce(plus, (tally.three_sides for tally in tallies.values()), None)
     if found is not None and found.urdfkin.failed:
-        ours, theirs, witness = found.alone
-        title = WITNESSES[found.by].title
+        ours, theirs, second_oracle = found.alone
+        title = ORACLES[found.by].title
         yield (
             f"{found.urdfkin.failed:,} results disagree with {title}'s: urdfkin differs from the two others"
-            f" in {ours:,}, Pinocchio in {theirs:,}, {title} in {witness:,}"
+            f" in {ours:,}, Pinocchio in {theirs:,}, {title} in {second_oracle:,}"
         )

@@ -24,7 +24,7 @@ from urdfkin.validation.error_stats import Inputs, Key, Tally, ThreeSides, tally
 from urdfkin.validation.timings import Clock
 from urdfkin.verify.bounds import Bound, magnitudes
 from urdfkin.verify.oracle import Oracle, QueryBatch
-from urdfkin.verify.oracles import Witness
+from urdfkin.verify.oracles import OracleLibrary
 from urdfkin.verify.quantities import SCREWS, Quantity, validated
 from urdfkin.verify.sampling import Samples
 
@@ -36,20 +36,20 @@ BLOCK_BYTES = 32 * 2**20
 class SecondWitness:
     """A second oracle besides Pinocchio, and its model of the robot."""
 
-    witness: Witness
+    library: OracleLibrary
     oracle: Oracle
 
     def three_sides(
         self, block: _Block, row: Quantity, reference: Reference | None, ours: FloatArray, theirs: FloatArray
     ) -> ThreeSides:
         """Compare its results with those of urdfkin and Pinocchio, for the frames or joints of the block."""
-        answers = block.clock.witness(row.ask, self.oracle, block.asked(row, reference))
+        answers = block.clock.second_oracle(row.ask, self.oracle, block.asked(row, reference))
         bounds = (
-            row.bound(block.plan, size, reference) for size in (block.size, self.witness.size(block.size))
+            row.bound(block.plan, size, reference) for size in (block.size, self.library.size(block.size))
         )
         if row.of == "joints":
             bounds = (block.part(one) for one in bounds)
-        return three_sides(self.witness.name, ours, theirs, answers, *bounds)
+        return three_sides(self.library.name, ours, theirs, answers, *bounds)
 
 
 def tallies(

@@ -289,10 +289,10 @@ class Alone(TypedDict):
 
     urdfkin: Annotated[Count, says("Number of results in which only urdfkin differs.")]
     pinocchio: Annotated[Count, says("Number of results in which only Pinocchio differs.")]
-    witness: Annotated[Count, says("Number of results in which only the second oracle differs.")]
+    second_oracle: Annotated[Count, says("Number of results in which only the second oracle differs.")]
 
 
-class Witness(TypedDict):
+class SecondOracle(TypedDict):
     """Comparison of the same results with a second oracle; missing without one."""
 
     by: Annotated[str, says("Name of the second oracle: mujoco.")]
@@ -348,7 +348,7 @@ class Check(TypedDict):
         Case | None,
         says("The sample with the largest ratio of disagreement to bound; null if nothing was compared."),
     ]
-    witness: NotRequired[Witness]
+    second_oracle: NotRequired[SecondOracle]
 
 
 class Timings(TypedDict):
@@ -363,7 +363,9 @@ class Timings(TypedDict):
     urdfkin: Annotated[float, says("Time of computing with urdfkin.")]
     pinocchio: Annotated[float, says("Time of computing with Pinocchio.")]
     compare: Annotated[float, says("Time of computing the bounds and of the comparison.")]
-    witness: NotRequired[Annotated[float, says("Time of computing with the second oracle, if there is one.")]]
+    second_oracle: NotRequired[
+        Annotated[float, says("Time of computing with the second oracle, if there is one.")]
+    ]
 
 
 class SecondReading(TypedDict):

@@ -24,7 +24,7 @@ from urdfkin.verify.bounds import Bound, result_k
 from urdfkin.verify.comparison import worst_of_each
 
 #: The three compared libraries, in the order of columns. The last is the second oracle.
-SIDES = ("urdfkin", "pinocchio", "witness")
+SIDES = ("urdfkin", "pinocchio", "second_oracle")
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,18 +108,18 @@ def three_sides(
     own, units_own = _shares(ours, second_oracles, second)
     other, units_other = _shares(pinocchios, second_oracles, both)
     agree = _shares(ours, pinocchios, first)[0] <= 1.0, own <= 1.0, other <= 1.0
-    ours_theirs, ours_witness, theirs_witness = agree
+    ours_theirs, ours_second, theirs_second = agree
     alone = (
-        theirs_witness & ~ours_theirs & ~ours_witness,
-        ours_witness & ~ours_theirs & ~theirs_witness,
-        ours_theirs & ~ours_witness & ~theirs_witness,
+        theirs_second & ~ours_theirs & ~ours_second,
+        ours_second & ~ours_theirs & ~theirs_second,
+        ours_theirs & ~ours_second & ~theirs_second,
     )
-    settled = np.logical_or.reduce((*alone, ours_theirs & ours_witness & theirs_witness))
+    settled = np.logical_or.reduce((*alone, ours_theirs & ours_second & theirs_second))
     first_alone, second_alone, third_alone = (int(one.sum()) for one in alone)
     return ThreeSides(
         by,
-        Pair(int((~ours_witness).sum()), float(units_own.max()), float(own.max())),
-        Pair(int((~theirs_witness).sum()), float(units_other.max()), float(other.max())),
+        Pair(int((~ours_second).sum()), float(units_own.max()), float(own.max())),
+        Pair(int((~theirs_second).sum()), float(units_other.max()), float(other.max())),
         (first_alone, second_alone, third_alone),
         int((~settled).sum()),
     )

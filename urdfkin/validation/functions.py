@@ -33,7 +33,7 @@ from urdfkin.verify.oracles import versions
 from urdfkin.verify.quantities import ACCELERATION_BREAKDOWN, Quantity
 from urdfkin.verify.quantities import quantity as quantity_of
 from urdfkin.verify.sampling import draw
-from urdfkin.verify.verifier import Verifier, bound_of, held_against
+from urdfkin.verify.verifier import Verifier, bound_of, oracle_results_with_bound
 
 if TYPE_CHECKING:
     from urdfkin.conventions import Conversion
@@ -389,7 +389,7 @@ class _Run:
         row, how, robot = self.how.row, self.how, self.robot
         drawn = draw(robot.tree, how.samples, np.random.default_rng(how.seed), with_special=True)
         total = _Total(row, how.factor, self._row_names(), self._column_names())
-        checked = robot.verifier.cannot(None, robot.verifier.witness) is None
+        checked = robot.verifier.cannot(None, robot.verifier.library) is None
         for first in range(0, len(drawn.q), _AT_A_TIME):
             part = slice(first, first + _AT_A_TIME)
             total.add(self._compared(first, (drawn.q[part], drawn.v[part], drawn.a[part]), total, checked))
@@ -450,8 +450,8 @@ class _Run:
         part = call.part(slice(0, call.n))
         theirs, bound = None, None
         if checked:
-            oracle = self.robot.verifier.oracle(call.base, self.robot.verifier.witness)
-            theirs, bound = held_against(row, oracle, part, flat, self.robot.verifier.witness)
+            oracle = self.robot.verifier.oracle(call.base, self.robot.verifier.library)
+            theirs, bound = oracle_results_with_bound(row, oracle, part, flat, self.robot.verifier.library)
         else:
             bound = bound_of(row, part)
         scale = np.broadcast_to(bound.scale, flat.shape)[:, 0]

@@ -169,7 +169,7 @@ class RobotReport:
                 "a": case.a,
                 "replay": self.replay(key),
             },
-        } | ({"witness": tally.three_sides.as_dict()} if tally.three_sides else {})
+        } | ({"second_oracle": tally.three_sides.as_dict()} if tally.three_sides else {})
 
 
 def replay(origin: Origin, quantity: str, reference: str, case: WorstCase) -> str:

@@ -40,7 +40,7 @@ class Clock:
         with self._add_time("pinocchio"):
             return function(*args, **kwargs)
 
-    def witness(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
+    def second_oracle(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
         """Call a function of the second oracle and add its time."""
         with self._add_time("second"):
             return function(*args, **kwargs)
@@ -64,7 +64,7 @@ class Clock:
             "urdfkin": round(self.urdfkin, 4),
             "pinocchio": round(self.pinocchio, 4),
             "compare": round(self.compare, 4),
-        } | ({"witness": round(self.second, 4)} if self.second else {})
+        } | ({"second_oracle": round(self.second, 4)} if self.second else {})
 
 
 def total(clocks: Iterable[Clock]) -> Clock:

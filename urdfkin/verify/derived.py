@@ -26,11 +26,11 @@ from urdfkin.verify.analytical_reference import euler_jacobian, quaternion_jacob
 from urdfkin.verify.bounds import Bound, bound_of, imu_scale, magnitudes
 from urdfkin.verify.call import Part
 from urdfkin.verify.oracle import Oracle
-from urdfkin.verify.oracles import Witness
+from urdfkin.verify.oracles import OracleLibrary
 
 
 def check_analytical_jacobian(
-    bound_of: Callable[..., Bound], oracle: Oracle, x: Part, ours: FloatArray, by: Witness
+    bound_of: Callable[..., Bound], oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
     """Return analytical Jacobians (n, frames, 6 or 7, nv) from an oracle, and their bound.
 
@@ -62,7 +62,7 @@ def check_analytical_jacobian(
 
 
 def check_relative_placement(
-    bound_of: Callable[..., Bound], oracle: Oracle, x: Part, ours: FloatArray, by: Witness
+    bound_of: Callable[..., Bound], oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
     """Return relative placements (n, frames, 4, 4) from an oracle, and their bound.
 
@@ -94,7 +94,7 @@ def check_relative_placement(
 _LOCAL = Reference.LOCAL
 
 
-def check_imu(oracle: Oracle, x: Part, ours: FloatArray, by: Witness) -> tuple[FloatArray, Bound]:
+def check_imu(oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary) -> tuple[FloatArray, Bound]:
     """Return IMU readings (n, frames, 6) from an oracle, and their bound.
 
     Args:

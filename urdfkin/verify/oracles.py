@@ -1,6 +1,6 @@
 """The oracles: Pinocchio, the default, and MuJoCo.
 
->>> witness_of("pinocchio").title
+>>> oracle_library("pinocchio").title
 'Pinocchio'
 """
 
@@ -16,11 +16,11 @@ from urdfkin.errors.validators import as_str
 from urdfkin.system.lazy_import import installed_version, lazy_import
 
 #: Name of an oracle in arguments.
-WitnessName = Literal["pinocchio", "mujoco"]
+OracleName = Literal["pinocchio", "mujoco"]
 
 
 @dataclass(frozen=True, slots=True)
-class Witness:
+class OracleLibrary:
     """An oracle: a library that reads the URDF text itself and computes the same quantities.
 
     Attributes:
@@ -34,7 +34,7 @@ class Witness:
             (`urdfkin.verify.bounds`).
     """
 
-    name: WitnessName
+    name: OracleName
     title: str
     package: str
     version: Callable[[], str]
@@ -50,7 +50,7 @@ class Witness:
         return f"{self.title} {self.version()}"
 
 
-PINOCCHIO = Witness(
+PINOCCHIO = OracleLibrary(
     "pinocchio",
     "Pinocchio",
     "pin",
@@ -58,7 +58,7 @@ PINOCCHIO = Witness(
     lazy_import("urdfkin.verify.pinocchio:PinocchioOracle"),
     lambda size: size,
 )
-MUJOCO = Witness(
+MUJOCO = OracleLibrary(
     "mujoco",
     "MuJoCo",
     "mujoco",
@@ -66,14 +66,14 @@ MUJOCO = Witness(
     lazy_import("urdfkin.verify.mujoco:MujocoOracle"),
     lazy_import("urdfkin.verify.bounds:about_the_root"),
 )
-WITNESSES: dict[str, Witness] = {oracle.name: oracle for oracle in (PINOCCHIO, MUJOCO)}
+ORACLES: dict[str, OracleLibrary] = {oracle.name: oracle for oracle in (PINOCCHIO, MUJOCO)}
 
 
-def _known(name: str) -> Witness:
-    return WITNESSES[name]
+def _known(name: str) -> OracleLibrary:
+    return ORACLES[name]
 
 
-def witness_of(name: object) -> Witness:
+def oracle_library(name: object) -> OracleLibrary:
     """Return the oracle of a name.
 
     Raises:
@@ -81,9 +81,9 @@ def witness_of(name: object) -> Witness:
         InputError: it is not installed.
     """
     wanted = as_str(name, "oracle")
-    oracle = next((one for one in WITNESSES.values() if one.name == wanted), None)
+    oracle = next((one for one in ORACLES.values() if one.name == wanted), None)
     if oracle is None:
-        raise UnknownNameError("oracle", wanted, WITNESSES)
+        raise UnknownNameError("oracle", wanted, ORACLES)
     if oracle is not PINOCCHIO:
         oracle.version()  # an error is raised now, not at the first check
     return oracle
@@ -94,9 +94,9 @@ def version(package: str) -> str:
     return installed_version(package) or ("a checkout" if package == "urdfkin" else "not installed")
 
 
-def versions(witnesses: Iterable[str | None] = ()) -> dict[str, str]:
+def versions(oracles: Iterable[str | None] = ()) -> dict[str, str]:
     """Return the versions of urdfkin, its libraries and all oracles."""
     packages = ["urdfkin", "numpy", "numba", "yourdfpy", "example-robot-data"]
-    packages += sorted({WITNESSES[name].package for name in witnesses if name in WITNESSES})
+    packages += sorted({ORACLES[name].package for name in oracles if name in ORACLES})
     found = {package: version(package) for package in packages}
     return {"python": platform.python_version(), "pin": PINOCCHIO.version()} | found

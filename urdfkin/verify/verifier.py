@@ -27,7 +27,7 @@ from urdfkin.verify.call import Call, Part
 from urdfkin.verify.certificate import Certificate, Comparison, Ledger, VerificationError, compare
 from urdfkin.verify.comparison import CHECKS, KERNELS
 from urdfkin.verify.oracle import Oracle, QueryBatch
-from urdfkin.verify.oracles import PINOCCHIO, Witness, WitnessName, witness_of
+from urdfkin.verify.oracles import PINOCCHIO, OracleLibrary, OracleName, oracle_library
 from urdfkin.verify.pinocchio import OracleError, build_model
 from urdfkin.verify.pinocchio_module import pinocchio, version
 from urdfkin.verify.quantities import QUANTITIES, Quantity
@@ -79,11 +79,11 @@ class Verifier:
         policy: Verify = True,
         mimic: bool = True,
         unverifiable: str | None = None,
-        oracle: WitnessName = "pinocchio",
+        oracle: OracleName = "pinocchio",
     ) -> None:
         self.text, self.tree, self.origin = text, tree, origin
         self.policy, self.mimic, self.unverifiable = checked_choice(policy), mimic, unverifiable
-        self.witness = witness_of(oracle)
+        self.library = oracle_library(oracle)
         self.ledger, self.reading = Ledger(), ""
         self._oracles: dict[tuple[str, bool], Oracle] = {}
         self._refusals: dict[str, str] = {}
@@ -93,7 +93,7 @@ class Verifier:
         # results yet, so its ledger is empty.
         return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
 
-    def oracle(self, base: BaseMotion | None = None, by: Witness = PINOCCHIO) -> Oracle:
+    def oracle(self, base: BaseMotion | None = None, by: OracleLibrary = PINOCCHIO) -> Oracle:
         """Return the oracle's model of the robot, which is built once.
 
         If the base moves, the model's root is on a free-flyer.
@@ -147,12 +147,12 @@ class Verifier:
             policy=self.policy,
             mimic=self.mimic,
             unverifiable=known,
-            oracle=self.witness.name,
+            oracle=self.library.name,
         )
         found.reading = self.reading
         return found
 
-    def cannot(self, base: BaseMotion | None = None, by: Witness = PINOCCHIO) -> str | None:
+    def cannot(self, base: BaseMotion | None = None, by: OracleLibrary = PINOCCHIO) -> str | None:
         """Return the reason why an oracle cannot check this robot; None if it can."""
         if by is PINOCCHIO and self.unverifiable is not None:
             return self.unverifiable
@@ -175,13 +175,13 @@ class Verifier:
         Raises:
             InstallationError: Pinocchio is missing, or a different project has its name.
         """
-        if self.wanted(verify) is not False and self.unverifiable is None and self.witness is PINOCCHIO:
+        if self.wanted(verify) is not False and self.unverifiable is None and self.library is PINOCCHIO:
             pinocchio()
 
     def certificate(self) -> Certificate:
         """Return the record of all checks so far: the oracle, the agreement, and the unchecked results."""
         return replace(
-            self.ledger.certificate(self.tree.name, self.witness.words),
+            self.ledger.certificate(self.tree.name, self.library.words),
             reading="; ".join(filter(None, (self.reading, self.origin.lock_words))),
             source=self.origin.source,
             sha256=self.sha256,
@@ -208,7 +208,7 @@ class Verifier:
         if wanted is False:
             ledger.unchecked(quantity.name, call.results)
             return
-        if (reason := self.cannot(call.base, self.witness)) is not None:
+        if (reason := self.cannot(call.base, self.library)) is not None:
             _warn(reason)
             ledger.unchecked(quantity.name, call.results, reason)
             return
@@ -244,7 +244,7 @@ class Verifier:
             frame: Name of the frame, as the user gave it.
             reference: Reference frame of the results.
         """
-        quantity, by, frames = QUANTITIES[name], self.witness, (frame,)
+        quantity, by, frames = QUANTITIES[name], self.library, (frame,)
         if self.cannot(None, by) is not None:
             return lambda *given: None
         for kernel in CHECKS:  # Numba is imported already
@@ -258,7 +258,7 @@ class Verifier:
             asked = QueryBatch(frames, rows, reference)
             x = Part(plan, reference, rows[0], rows[1:], STILL_STATE, asked)
             ours = result[np.newaxis, np.newaxis]
-            theirs, bound = held_against(quantity, self.oracle(None, by), x, ours, by)
+            theirs, bound = oracle_results_with_bound(quantity, self.oracle(None, by), x, ours, by)
             comparison = compare(ours, theirs, bound, 2)
             if comparison.agrees:
                 self.ledger.checked(name, comparison)
@@ -277,7 +277,9 @@ class Verifier:
         Also return the error to raise for the worst result, if that result exceeds its bound.
         """
         x = call.part(part)
-        theirs, bound = held_against(quantity, self.oracle(call.base, self.witness), x, ours, self.witness)
+        theirs, bound = oracle_results_with_bound(
+            quantity, self.oracle(call.base, self.library), x, ours, self.library
+        )
         comparison = compare(ours, theirs, bound, 2)
         if comparison.agrees:
             return comparison, None
@@ -300,7 +302,7 @@ class Verifier:
             bound=EPS * bound.k * bound.scale,
             units=float(bounds.disagreement(ours[i, f], theirs[i, f], bound).max()),
             reproduce=self._replay(quantity, call, k, call.frames[f]),
-            oracle=self.witness.title,
+            oracle=self.library.title,
         )
 
     def _replay(self, quantity: Quantity, call: Call, k: int, frame: str) -> str:
@@ -386,16 +388,16 @@ class Verifier:
         return line
 
 
-def held_against(
-    quantity: Quantity, oracle: Oracle, x: Part, ours: FloatArray, by: Witness = PINOCCHIO
+def oracle_results_with_bound(
+    quantity: Quantity, oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary = PINOCCHIO
 ) -> tuple[FloatArray, Bound]:
     """Return an oracle's results (n, frames, ...) for some configurations, and the bound."""
     if quantity.against is not None:
         return quantity.against(oracle, x, ours, by)
-    return theirs_of(quantity, oracle, x.asked), bound_of(quantity, x, by)
+    return oracle_results(quantity, oracle, x.asked), bound_of(quantity, x, by)
 
 
-def bound_of(quantity: Quantity, x: Part, by: Witness = PINOCCHIO) -> Bound:
+def bound_of(quantity: Quantity, x: Part, by: OracleLibrary = PINOCCHIO) -> Bound:
     """Return the bound between urdfkin's and the oracle's results; it broadcasts against the results.
 
     Lengths of paths without sliding joints are the same in every configuration. On a fixed base, the bound of
@@ -413,7 +415,7 @@ def bound_of(quantity: Quantity, x: Part, by: Witness = PINOCCHIO) -> Bound:
     return bound
 
 
-def urdfkins(quantity: Quantity, x: Part) -> FloatArray:
+def own_results(quantity: Quantity, x: Part) -> FloatArray:
     """Return urdfkin's results (n, frames, ...), by the forward recursion."""
     return quantity.ours(x.plan, (x.q, *x.rates), x.reference, base=x.state)
 
@@ -421,7 +423,7 @@ def urdfkins(quantity: Quantity, x: Part) -> FloatArray:
 @np.errstate(
     over="ignore", under="ignore", invalid="ignore"
 )  # a value that is not finite counts as a disagreement
-def theirs_of(quantity: Quantity, oracle: Oracle, asked: QueryBatch) -> FloatArray:
+def oracle_results(quantity: Quantity, oracle: Oracle, asked: QueryBatch) -> FloatArray:
     """Return an oracle's results (n, frames, ...) for the user's arguments."""
     return quantity.ask(oracle, asked)
 

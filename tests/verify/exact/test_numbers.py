@@ -1,4 +1,4 @@
-"""A ball holds the true value; fractions of whole numbers, and mpmath, are the witnesses."""
+"""A ball holds the true value; fractions of whole numbers, and mpmath, check it."""
 
 import math
 from fractions import Fraction
@@ -118,7 +118,7 @@ def nearest(M: FloatArray, digits: int) -> Matrix:
 def test_the_nearest_rotation_lies_in_its_intervals(digits: int, R: FloatArray, off: Any) -> None:
     M = R + off.uniform(-5e-10, 5e-10, (3, 3))
     found, expected = nearest(M, digits), orthogonal_factor(M)
-    room = Fraction(10) ** -57  # what the 60 digits of the witness may be off by
+    room = Fraction(10) ** -57  # what the 60 digits of mpmath may be off by
     for i in range(3):
         for j in range(3):
             low, high = true_ends(found[i][j])

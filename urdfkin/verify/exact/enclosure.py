@@ -35,7 +35,7 @@ from urdfkin.verify.quantities import (
     VELOCITY,
     Quantity,
 )
-from urdfkin.verify.verifier import Verifier, theirs_of, urdfkins
+from urdfkin.verify.verifier import Verifier, oracle_results, own_results
 
 #: Smallest and largest accepted number of decimal digits. A double has 15 digits. A computation with more
 #: than 10,000 digits takes too long.
@@ -202,8 +202,8 @@ def enclose(
     oracle = None if verifier.cannot(base) else verifier.oracle(base)
 
     def enclosed(row: Quantity, lower: FloatArray, upper: FloatArray) -> Enclosure:
-        ours = frozen(urdfkins(row, part)[0, 0])
-        theirs = None if oracle is None else frozen(theirs_of(row, oracle, part.asked)[0, 0])
+        ours = frozen(own_results(row, part)[0, 0])
+        theirs = None if oracle is None else frozen(oracle_results(row, oracle, part.asked)[0, 0])
         return Enclosure(row.name, frozen(lower), frozen(upper), ours, theirs)
 
     return Enclosures(frame, call.reference, digits, *(enclosed(*found) for found in bounds))
