@@ -37,7 +37,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.verify.call import Call
-from urdfkin.verify.quantities import Quantity, walked
+from urdfkin.verify.quantities import Quantity, recursive_quantities
 from urdfkin.verify.sampling import draw_base
 from urdfkin.verify.verifier import bound_of
 
@@ -80,7 +80,7 @@ class Subject:
 
     def results(self) -> Iterator[tuple[str, Quantity, Reference, tuple[FloatArray, ...]]]:
         """Yield (name, quantity, reference, inputs) of each result."""
-        for quantity in walked():
+        for quantity in recursive_quantities():
             for reference in Reference if quantity.referred else (_ALIGNED,):
                 what = f"{self.name}/{quantity.name}/{reference.name}"
                 yield what, quantity, reference, self.inputs[: len(quantity.inputs)]

@@ -61,7 +61,7 @@ from urdfkin.verify.quantities import (
     QUANTITIES,
     RELATIVE_PLACEMENT,
     quantity,
-    walked,
+    recursive_quantities,
 )
 from urdfkin.verify.sampling import Verify, sample
 from urdfkin.verify.singular_values import SingularValues, singular_values
@@ -740,7 +740,7 @@ class Robot(Displayable):
         [0.0, 0.9, 0.0, 0.0, 0.0, 1.0]
         """
         row = quantity(as_str(name, "name"))
-        if row not in walked():
+        if row not in recursive_quantities():
             raise InputError(f"the {name} has a method of its own", remedy=f"call {row.method}")
         if not isinstance(inputs, tuple | list) or len(inputs) != len(row.inputs):
             raise InputError(f"the {name} takes ({', '.join(row.inputs)})", found=safe_repr(inputs))

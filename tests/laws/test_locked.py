@@ -26,7 +26,7 @@ from urdfkin.verify.bounds import magnitudes
 from urdfkin.verify.certificate import VerificationError
 from urdfkin.verify.oracles import MUJOCO, PINOCCHIO, OracleLibrary
 from urdfkin.verify.pinocchio import OracleError
-from urdfkin.verify.quantities import QUANTITIES, walked
+from urdfkin.verify.quantities import QUANTITIES, recursive_quantities
 
 #: Robots, and the joints to lock; None: every second joint. There are mimic joints, slides, continuous
 #: joints, oblique axes, and planar and floating joints, which remain.
@@ -81,7 +81,7 @@ def demand_the_columns(robot: Robot, names: list[str], q: FloatArray, rng: np.ra
     whole, part = (q[None], v, a), (q[None, of_q], v[:, of_v], a[:, of_v])
     frames = robot.link_frames
     plan = robot.plan([robot.tree.frame_link(frame) for frame in frames])
-    for row in walked():
+    for row in recursive_quantities():
         for reference in row.references:
             inputs = [x[: len(row.inputs)] for x in (whole, part)]
             named = Reference.LOCAL_WORLD_ALIGNED if reference is None else reference

@@ -32,7 +32,7 @@ from urdfkin.verify.oracles import ORACLES
 from urdfkin.verify.quantities import QUANTITIES, Quantity
 
 REFUSED = (AttributeError, KeyError, AssertionError, NotImplementedError)
-REFERRED = [row for row in QUANTITIES.values() if row.referred and row.walked and row.of != "columns"]
+REFERRED = [row for row in QUANTITIES.values() if row.referred and row.recursive and row.of != "columns"]
 
 
 def new_reference(**properties: bool) -> Reference:

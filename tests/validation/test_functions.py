@@ -20,7 +20,7 @@ from tests.robots.odd_urdfs import random_tree
 from urdfkin.robot import Robot
 from urdfkin.validation.diagnosis import _HALVES
 from urdfkin.validation.functions import FunctionCheck, verify_function
-from urdfkin.verify.quantities import walked
+from urdfkin.verify.quantities import recursive_quantities
 
 #: Robots and frames: serial arms, a branched robot, a hand, and fingers that mimic.
 FRAMES = {
@@ -124,7 +124,7 @@ def test_another_reference_frame_is_named(name: str, quantity: str) -> None:
         assert any(f"is in {reference.upper()};" in words for words in found.diagnoses), found
 
 
-@pytest.mark.parametrize("quantity", [row.name for row in walked()])
+@pytest.mark.parametrize("quantity", [row.name for row in recursive_quantities()])
 @pytest.mark.parametrize("name", FRAMES)
 def test_the_frame_of_a_wrong_point_is_named(name: str, quantity: str) -> None:
     robot, frame = robot_of(name), FRAMES[name]
@@ -135,7 +135,7 @@ def test_the_frame_of_a_wrong_point_is_named(name: str, quantity: str) -> None:
     assert any(f"that of the frame {other!r}" in words for words in found.diagnoses), found
 
 
-@pytest.mark.parametrize("quantity", [row.name for row in walked()])
+@pytest.mark.parametrize("quantity", [row.name for row in recursive_quantities()])
 @pytest.mark.parametrize("name", FRAMES)
 def test_the_sign_and_the_exchange_of_joints_are_named(name: str, quantity: str) -> None:
     robot, frame = robot_of(name), FRAMES[name]
@@ -174,7 +174,7 @@ def test_the_sign_and_the_exchange_of_joints_are_named(name: str, quantity: str)
 
 
 def quantity_shape(name: str) -> tuple[object, ...]:
-    return next(row.shape for row in walked() if row.name == name)
+    return next(row.shape for row in recursive_quantities() if row.name == name)
 
 
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")  # an inertia of the PR2
@@ -328,7 +328,7 @@ def test_a_batch_is_one_call() -> None:
 
 
 @pytest.mark.parametrize("convention", ["drake", "mujoco", "rtb", "isaaclab"])
-@pytest.mark.parametrize("quantity", [row.name for row in walked()])
+@pytest.mark.parametrize("quantity", [row.name for row in recursive_quantities()])
 def test_a_function_in_a_convention_agrees_and_its_mistakes_are_named(convention: str, quantity: str) -> None:
     robot = urdfkin.load("a1", root_joint="floating")
     tool = robot.with_convention(convention)

@@ -16,7 +16,7 @@ from urdfkin.loading import load
 from urdfkin.robot import Robot
 from urdfkin.validation import accuracy
 from urdfkin.validation.accuracy import Judgement
-from urdfkin.validation.accuracy_store import AccuracyResult, Asked, NotJudged
+from urdfkin.validation.accuracy_store import AccuracyResult, NotJudged, StudySettings
 from urdfkin.validation.campaign import StoreWarning, stored, validate
 from urdfkin.validation.store import Store, opened
 
@@ -145,7 +145,9 @@ def test_a_text_that_changed_since_it_was_compared_is_not_judged(judge: Judge, t
     report = validate([str(robot)], samples=0, store=store)
     robot.write_text('<robot name="b"><link name="l"/></robot>')
     how = {"mimic": None, "root_joint": None, "xacro_args": None}
-    assert judge_all(report, [str(robot)], Asked(1, 0, False), store=store, how=how).judgements == (None,)
+    assert judge_all(report, [str(robot)], StudySettings(1, 0, False), store=store, how=how).judgements == (
+        None,
+    )
     assert judge.asked == []
     assert not list(store.glob("chunks/*/*.judged"))
 
@@ -153,7 +155,7 @@ def test_a_text_that_changed_since_it_was_compared_is_not_judged(judge: Judge, t
 def test_a_judgement_is_read_back_to_the_last_bit(tmp_path: Path) -> None:
     validate("planar_two_link", samples=0, store=tmp_path)
     with opened(tmp_path, Store.reading(tmp_path, pytest.fail).manifest, pytest.fail) as store:
-        kept = AccuracyResult(store, Asked(1, 0, False))
+        kept = AccuracyResult(store, StudySettings(1, 0, False))
         found = accuracy.judge(load("planar_two_link"), samples=1)
         for each in (found, NotJudged("why \ud800")):
             kept.keep(0, each)

@@ -26,7 +26,7 @@ from urdfkin.robot import Robot
 from urdfkin.verify import bounds
 from urdfkin.verify.bounds import Magnitudes
 from urdfkin.verify.oracle import Oracle, QueryBatch
-from urdfkin.verify.quantities import QUANTITIES, VELOCITY, Quantity, by_command, walked
+from urdfkin.verify.quantities import QUANTITIES, VELOCITY, Quantity, by_command, recursive_quantities
 
 # -- a made-up row: the angular velocity alone ---------------------------------------------------------
 
@@ -160,7 +160,7 @@ def test_a_rows_equations_are_the_chapters(row: Quantity) -> None:
     assert row.equations
 
 
-@pytest.mark.parametrize("row", walked(), ids=lambda row: row.name)
+@pytest.mark.parametrize("row", recursive_quantities(), ids=lambda row: row.name)
 def test_a_robot_has_a_method_for_each_row_that_takes_its_inputs(row: Quantity) -> None:
     parameters = list(inspect.signature(getattr(Robot, row.method)).parameters)
     takes = [*row.inputs, "frame", *(["reference"] if row.referred else [])]

@@ -32,7 +32,7 @@ from urdfkin.verify.quantities import compared, not_compared
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.validation.accuracy import Judgement
-    from urdfkin.validation.accuracy_store import AccuracyResult, Asked, NotJudged
+    from urdfkin.validation.accuracy_store import AccuracyResult, NotJudged, StudySettings
     from urdfkin.validation.engines import Engine
     from urdfkin.validation.results import ValidationReport
 
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 def judge_all(
     report: ValidationReport,
     given: Sequence[Robot | str],
-    asked: Asked,
+    settings: StudySettings,
     *,
     store: Path | None = None,
     shard: str | None = None,
@@ -55,7 +55,7 @@ def judge_all(
     Args:
         report: The report of `validate` on the given robots, in their order.
         given: Robots, or their sources.
-        asked: Settings of the study.
+        settings: Settings of the study.
         store: Folder of the campaign, which also stores the results of the study; None: no store.
         shard: Only the robots with their first chunk in that part. The report covers the same part.
         retry: Whether to repeat studies that failed before.
@@ -72,14 +72,14 @@ def judge_all(
     here = [i for i, part in enumerate(parts) if part]
     judgements: list[Judgement | None] = []
     try:
-        with _open_results(store, asked, shard) as results:
+        with _open_results(store, settings, shard) as results:
             for i, robot in zip(here, report.robots, strict=True):
                 if not robot.tallies or parts[i].start > 0:
                     continue
                 found = None if results is None else results.found(i)
                 if found is None or (retry and isinstance(found, NotJudged)):
                     found, is_lasting = _study(
-                        given[i], asked, None if results is None else results.stamp(i), how
+                        given[i], settings, None if results is None else results.stamp(i), how
                     )
                     if results is not None and is_lasting:
                         results.keep(i, found)
@@ -92,7 +92,9 @@ def judge_all(
 
 
 @contextmanager
-def _open_results(folder: Path | None, asked: Asked, shard: str | None) -> Iterator[AccuracyResult | None]:
+def _open_results(
+    folder: Path | None, settings: StudySettings, shard: str | None
+) -> Iterator[AccuracyResult | None]:
     """Open the accuracy results of a store, and lock the whole store or one part of it."""
     if folder is None:
         yield None
@@ -104,13 +106,13 @@ def _open_results(folder: Path | None, asked: Asked, shard: str | None) -> Itera
         say(f"urdfkin: warning: {message}", err=True)
 
     with opened(folder, Store.reading(folder, tell).manifest, tell, shard=shard) as store:
-        store_results = AccuracyResult(store, asked)
+        store_results = AccuracyResult(store, settings)
         store_results.begin()
         yield store_results
 
 
 def _study(
-    source: Robot | str, asked: Asked, stamp: str | None, how: Mapping[str, Any]
+    source: Robot | str, settings: StudySettings, stamp: str | None, how: Mapping[str, Any]
 ) -> tuple[Judgement | NotJudged, bool]:
     """Return the accuracy result of a robot, and whether another study would give the same."""
     import numpy as np  # noqa: PLC0415  keeps --help fast
@@ -124,9 +126,9 @@ def _study(
     try:
         robot = subject(source, **how)
         if is_same := stamp in (None, robot.stamp):
-            rng = np.random.default_rng([asked.seed, 1])
-            base = draw_base(asked.samples, rng) if asked.moving_base else None
-            return judge(robot.read(), samples=asked.samples, seed=asked.seed, base=base), True
+            rng = np.random.default_rng([settings.seed, 1])
+            base = draw_base(settings.samples, rng) if settings.moving_base else None
+            return judge(robot.read(), samples=settings.samples, seed=settings.seed, base=base), True
         raise InputError(
             "the robot file has changed since its results were compared",
             remedy="start the validation again when the file no longer changes",
@@ -249,7 +251,7 @@ def command(
         raise click.UsageError("a shard has no report; run `urdfkin report merge`, then `urdfkin report`")
     from urdfkin.report.terminal import print_report  # noqa: PLC0415
     from urdfkin.urdf.sources import is_xacro  # noqa: PLC0415
-    from urdfkin.validation.accuracy_store import Asked  # noqa: PLC0415
+    from urdfkin.validation.accuracy_store import StudySettings  # noqa: PLC0415
     from urdfkin.validation.campaign import validate  # noqa: PLC0415
 
     check_writable(*files.values())
@@ -260,7 +262,7 @@ def command(
     with stoppable() as stop, compiling(), _cluster(scheduler) as on, progress(as_json=json_progress) as tell:
         report = validate(given, executor=on, progress=tell, **options, **how)
         if judged and not report.interrupted:
-            of = Asked(judge_samples, options["seed"], judge_moving_base)
+            of = StudySettings(judge_samples, options["seed"], judge_moving_base)
             report = judge_all(report, given, of, store=store, shard=shard, retry=retry is not None, how=how)
     if shard:
         _say_shard(report, shard, store)

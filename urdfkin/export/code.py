@@ -18,7 +18,7 @@ from urdfkin.export.seal import SEAL
 from urdfkin.model.configuration import coordinate_names, rate_names
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import KinematicTree
-from urdfkin.verify.quantities import Quantity, quantity, walked
+from urdfkin.verify.quantities import Quantity, quantity, recursive_quantities
 from urdfkin.verify.verifier import Verifier
 
 #: Precedence levels: a sum, a change of sign, a product, and an operand that needs no brackets.
@@ -166,7 +166,7 @@ def bare(
 
 def exported() -> list[Quantity]:
     """Return the quantities that can be exported."""
-    return [row for row in walked() if row.name in recursion.QUANTITIES]
+    return [row for row in recursive_quantities() if row.name in recursion.QUANTITIES]
 
 
 def _rows(names: Collection[str]) -> list[Quantity]:

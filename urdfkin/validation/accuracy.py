@@ -171,12 +171,12 @@ class _Work:
             slice(0, len(x.q))
         )
         self.links = range(len(robot.tree.links))
-        joints, moves = read_exact(robot.urdf, robot.tree), self.part.asked.base
+        joints, moves = read_exact(robot.urdf, robot.tree), self.part.query.base
         self.motions = [
             move(
                 robot.tree,
                 joints,
-                *(batch[k] for batch in self.part.asked.inputs),
+                *(batch[k] for batch in self.part.query.inputs),
                 base=None if moves is None else on_base(_one(moves, k)),
             )
             for k in range(len(x.q))
@@ -194,9 +194,9 @@ class _Work:
 
     def _compared(self, row: Quantity, reference: Reference | None) -> _Compared:
         reference = _ALIGNED if reference is None else reference
-        asked = self.part.asked._replace(reference=reference)
-        part = self.part._replace(reference=reference, asked=asked)
-        ours, theirs = own_results(row, part), oracle_results(row, self.oracle, asked)
+        query = self.part.query._replace(reference=reference)
+        part = self.part._replace(reference=reference, query=query)
+        ours, theirs = own_results(row, part), oracle_results(row, self.oracle, query)
         scale = np.broadcast_to(bound_of(row, part).scale, ours.shape)
         return _Compared(ours, theirs, self._true(row, reference).reshape(ours.shape), scale)
 

@@ -30,7 +30,7 @@ class NotJudged:
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class StudySettings:
     """Settings of the accuracy study.
 
     Attributes:
@@ -55,11 +55,11 @@ class AccuracyResult:
 
     Args:
         store: The store.
-        asked: The settings of the study.
+        settings: The settings of the study.
     """
 
-    def __init__(self, store: Store, asked: Asked) -> None:
-        self._store, self._settings = store, asked
+    def __init__(self, store: Store, settings: StudySettings) -> None:
+        self._store, self._settings = store, settings
 
     @classmethod
     def merge(cls, store: Store, others: Sequence[Store]) -> None:
@@ -83,14 +83,14 @@ class AccuracyResult:
         try:
             if (content := read_if_there(store.folder / JUDGE)) is None:
                 return None
-            asked = typed(json.loads(content), Asked)
+            settings = typed(json.loads(content), StudySettings)
         except (OSError, ValueError, RecursionError) as error:
             store.tell(
                 f"{store.folder / JUDGE} cannot be read ({type(error).__name__}): the report has no"
                 " accuracy results"
             )
             return None
-        return cls(store, asked)
+        return cls(store, settings)
 
     def begin(self) -> None:
         """Write the settings into the store."""

@@ -35,7 +35,7 @@ class Part(NamedTuple):
         q: (n, nq).
         rates: (n, nv) v, or v and a, according to the quantity.
         state: (n or 1, 24) state of the moving base.
-        asked: The same configurations for the oracle, converted independently from the user's arguments.
+        query: The same configurations for the oracle, converted independently from the user's arguments.
         options: Other arguments of the method, by name.
     """
 
@@ -44,7 +44,7 @@ class Part(NamedTuple):
     q: FloatArray
     rates: tuple[FloatArray, ...]
     state: FloatArray
-    asked: QueryBatch
+    query: QueryBatch
     options: Mapping[str, object] = MappingProxyType({})
 
 
@@ -167,8 +167,8 @@ class Call:
         """Return some of the configurations, for the check."""
         state = self.state if len(self.state) == 1 else self.state[part]
         rates = tuple(x[part] for x in self.rates)
-        asked = self.question.rows(part)
-        return Part(self.plan, self.reference, self.q[part], rates, state, asked, self.options)
+        query = self.question.rows(part)
+        return Part(self.plan, self.reference, self.q[part], rates, state, query, self.options)
 
     def index(self, k: int) -> tuple[int, ...]:
         """Return the index of the flat sample `k` in the caller's batch."""

@@ -42,12 +42,12 @@ def check_analytical_jacobian(
         by: The oracle.
     """
     aligned = Reference.LOCAL_WORLD_ALIGNED
-    J_v = oracle.jacobians(x.asked._replace(reference=aligned))
+    J_v = oracle.jacobians(x.query._replace(reference=aligned))
     size = by.size(magnitudes(x.plan, x.q, None, None, x.state))
     bound = bound_of(x.plan, size, aligned)
     representation = str(x.options["representation"])
     if representation == "quaternion":
-        quat = oracle.quaternions(x.asked)
+        quat = oracle.quaternions(x.query)
         bound = bounds.quaternion_jacobian_bound(bound)
         theirs, hidden = quaternion_jacobian(quat, J_v), bounds.hidden_scalar(bound, quat.shape[:-1])
         # q and -q are the same rotation. The quaternion with qw >= 0 is used. If rounding hides the sign of
@@ -56,7 +56,7 @@ def check_analytical_jacobian(
         turned = with_other & (np.abs(quat[..., 3]) <= hidden)
         theirs[..., 3:, :] *= np.where(turned, -1.0, 1.0)[..., np.newaxis, np.newaxis]
         return theirs, bound
-    R = oracle.placements(x.asked)[..., :3, :3]
+    R = oracle.placements(x.query)[..., :3, :3]
     theirs, apart = euler_jacobian(representation, R, J_v)
     return theirs, bounds.euler_jacobian_bound(bound, size, apart)
 
@@ -80,7 +80,7 @@ def check_relative_placement(
         by: The oracle.
     """
     other = cast("str", x.options["relative_to"])
-    T = oracle.placements(x.asked._replace(frames=[*x.asked.frames, other]))
+    T = oracle.placements(x.query._replace(frames=[*x.query.frames, other]))
     back = T[:, -1:, :3, :3].swapaxes(-1, -2)
     theirs = np.zeros((*T.shape[:1], T.shape[1] - 1, 4, 4))
     theirs[..., :3, :] = back @ T[:, :-1, :3, :]
@@ -103,10 +103,10 @@ def check_imu(oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary) -> t
         ours: urdfkin's results; not used.
         by: The oracle.
     """
-    asked, (v_flat, a_flat) = x.asked._replace(reference=_LOCAL), x.rates
+    query, (v_flat, a_flat) = x.query._replace(reference=_LOCAL), x.rates
     gravity = np.asarray(x.options["gravity"], dtype=np.float64)
-    R = oracle.placements(asked)[..., :3, :3]
-    proper = oracle.accelerations(asked)[..., :3] - gravity @ R  # R^T g
-    w = oracle.velocities(asked)[..., 3:]
+    R = oracle.placements(query)[..., :3, :3]
+    proper = oracle.accelerations(query)[..., :3] - gravity @ R  # R^T g
+    w = oracle.velocities(query)[..., 3:]
     size = by.size(magnitudes(x.plan, x.q, v_flat, a_flat, x.state))
     return np.concatenate((proper, w), axis=-1), bound_of(imu_scale(size, gravity), 3, size, _LOCAL)

@@ -6,7 +6,7 @@ names and a page in docs.
 
 Functions are given by name and imported at first use, so that `--help` does not import NumPy.
 
->>> for quantity in walked():
+>>> for quantity in recursive_quantities():
 ...     print(quantity.name, quantity.inputs, quantity.shape)
 placement q (4, 4)
 velocity qv (6,)
@@ -64,14 +64,14 @@ class Quantity:
         shape: Shape of one result; "nv" stands for the robot's nv.
         equations: Equations of the textbook.
         compute: Function (plan, *inputs, reference, base=, out=, threads=) that returns (n, frames, ...). If
-            `walked` is False, a method of `Robot` calls it in another way.
+            `recursive` is False, a method of `Robot` calls it in another way.
         ask: Function (oracle, query) that returns the oracle's (n, frames, ...).
         scale: Function (plan, magnitudes, reference) for the size of its terms (`urdfkin.verify.bounds`).
         factors: Number of rotated vectors in each term of [linear; angular], in LOCAL_WORLD_ALIGNED.
         against: Function (oracle, part, ours, by) that returns the oracle's results and the bound, for
             quantities that need more than `ask` and `scale`.
         exact: Function (motion, link, reference) for exact values, for accuracy study and enclosures.
-        walked: True if the forward recursion computes it for any frames.
+        recursive: True if the forward recursion computes it for any frames.
         validated: True if `validate`, the accuracy study and plots include it. A Hessian is left out. It has
             nv times as many numbers as a Jacobian, and consists of products of the Jacobian's columns.
         referred: True if it depends on a reference frame; a placement does not. If False, `compute` takes
@@ -97,7 +97,7 @@ class Quantity:
     factors: int
     against: Against | None = None
     exact: Callable[..., Any] | None = None
-    walked: bool = True
+    recursive: bool = True
     validated: bool = True
     referred: bool = True
     of: Literal["frames", "joints", "columns"] = "frames"
@@ -181,7 +181,7 @@ RELATIVE_PLACEMENT = replace(
     name="relative placement",
     title="placement in another frame",
     against=partial(lazy_import("urdfkin.verify.derived:check_relative_placement"), PLACEMENT.bound),
-    walked=False,
+    recursive=False,
     command="",
 )
 VELOCITY = Quantity(
@@ -285,7 +285,7 @@ ANALYTICAL_JACOBIAN = replace(
     equations=("7.118", "7.122"),
     compute=lazy_import("urdfkin.kinematics.bodies:analytical_jacobian"),
     against=partial(lazy_import("urdfkin.verify.derived:check_analytical_jacobian"), JACOBIAN.bound),
-    walked=False,
+    recursive=False,
     referred=False,
     command="",
 )
@@ -295,7 +295,7 @@ ACCELERATION_BREAKDOWN = replace(
     title="acceleration by its parts",
     equations=("7.125", "7.130"),
     compute=lazy_import("urdfkin.compiled.breakdown:acceleration_breakdown"),
-    walked=False,
+    recursive=False,
     command="acceleration --breakdown",
 )
 IMU = replace(
@@ -305,7 +305,7 @@ IMU = replace(
     equations=("7.127", "7.129", "7.130"),
     compute=lazy_import("urdfkin.compiled.evaluate:imus"),
     against=lazy_import("urdfkin.verify.derived:check_imu"),
-    walked=False,
+    recursive=False,
     referred=False,
     labels=("ax", "ay", "az", "wx", "wy", "wz"),
     units={"proper acceleration": "m/s^2", "angular velocity": "rad/s"},
@@ -346,14 +346,14 @@ QUANTITIES = {
 }
 
 
-def walked(of: str = "frames") -> list[Quantity]:
+def recursive_quantities(of: str = "frames") -> list[Quantity]:
     """Return the quantities that the forward recursion computes for any frames, or for any joints."""
-    return [row for row in QUANTITIES.values() if row.walked and row.of == of]
+    return [row for row in QUANTITIES.values() if row.recursive and row.of == of]
 
 
 def validated(of: str = "frames") -> list[Quantity]:
     """Return the quantities that a validation compares."""
-    return [row for row in walked(of) if row.validated]
+    return [row for row in recursive_quantities(of) if row.validated]
 
 
 def compared() -> str:
@@ -374,7 +374,7 @@ def _listed(titles: Sequence[str]) -> str:
 
 def by_command() -> dict[str, Quantity]:
     """Return the quantities with a command of their own, by the command."""
-    return {row.command: row for row in walked() if row.command}
+    return {row.command: row for row in recursive_quantities() if row.command}
 
 
 def quantity(name: str) -> Quantity:

@@ -255,8 +255,8 @@ class Verifier:
             if result is None:
                 return None
             rows = tuple(x[np.newaxis] for x in given[:-1])
-            asked = QueryBatch(frames, rows, reference)
-            x = Part(plan, reference, rows[0], rows[1:], STILL_STATE, asked)
+            query = QueryBatch(frames, rows, reference)
+            x = Part(plan, reference, rows[0], rows[1:], STILL_STATE, query)
             ours = result[np.newaxis, np.newaxis]
             theirs, bound = oracle_results_with_bound(quantity, self.oracle(None, by), x, ours, by)
             comparison = compare(ours, theirs, bound, 2)
@@ -314,8 +314,8 @@ class Verifier:
             return replay_line(self.origin, quantity.command, frame, reference, values)
         options = call.options if reference is None else {"reference": reference, **call.options}
         words = [*map(repr, values.values()), repr(frame), *(f"{x}={y!r}" for x, y in options.items())]
-        if (asked := call.question.rows(np.array([k])).base) is not None:
-            fields = asked.placement, asked.velocity, asked.acceleration
+        if (query := call.question.rows(np.array([k])).base) is not None:
+            fields = query.placement, query.velocity, query.acceleration
             words.append(f"base=urdfkin.BaseMotion({', '.join(repr(x[0].tolist()) for x in fields)})")
         return f"{self.origin.python}.{quantity.method}({', '.join(words)})"
 
@@ -394,7 +394,7 @@ def oracle_results_with_bound(
     """Return an oracle's results (n, frames, ...) for some configurations, and the bound."""
     if quantity.against is not None:
         return quantity.against(oracle, x, ours, by)
-    return oracle_results(quantity, oracle, x.asked), bound_of(quantity, x, by)
+    return oracle_results(quantity, oracle, x.query), bound_of(quantity, x, by)
 
 
 def bound_of(quantity: Quantity, x: Part, by: OracleLibrary = PINOCCHIO) -> Bound:
@@ -423,9 +423,9 @@ def own_results(quantity: Quantity, x: Part) -> FloatArray:
 @np.errstate(
     over="ignore", under="ignore", invalid="ignore"
 )  # a value that is not finite counts as a disagreement
-def oracle_results(quantity: Quantity, oracle: Oracle, asked: QueryBatch) -> FloatArray:
+def oracle_results(quantity: Quantity, oracle: Oracle, query: QueryBatch) -> FloatArray:
     """Return an oracle's results (n, frames, ...) for the user's arguments."""
-    return quantity.ask(oracle, asked)
+    return quantity.ask(oracle, query)
 
 
 def _warn(reason: str) -> None:

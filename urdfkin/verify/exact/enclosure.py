@@ -194,7 +194,7 @@ def enclose(
         motion = move(
             tree,
             read_exact(verifier.text, tree, path),
-            *(batch[0] for batch in part.asked.inputs),
+            *(batch[0] for batch in part.query.inputs),
             base=None if base is None else on_base(base),
         )
         rows = (PLACEMENT, VELOCITY, ACCELERATION, JACOBIAN, JACOBIAN_RATE, *([HESSIAN] if hessian else []))
@@ -203,7 +203,7 @@ def enclose(
 
     def enclosed(row: Quantity, lower: FloatArray, upper: FloatArray) -> Enclosure:
         ours = frozen(own_results(row, part)[0, 0])
-        theirs = None if oracle is None else frozen(oracle_results(row, oracle, part.asked)[0, 0])
+        theirs = None if oracle is None else frozen(oracle_results(row, oracle, part.query)[0, 0])
         return Enclosure(row.name, frozen(lower), frozen(upper), ours, theirs)
 
     return Enclosures(frame, call.reference, digits, *(enclosed(*found) for found in bounds))
