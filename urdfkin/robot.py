@@ -47,6 +47,7 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.summary import Joints, described
 from urdfkin.model.tree import FloatArray, KinematicTree, with_locks
 from urdfkin.system.lazy_import import hook
+from urdfkin.system.locks import importing
 from urdfkin.urdf.findings import Finding, Findings
 from urdfkin.urdf.sources import Origin, entry_of
 from urdfkin.verify.bounds import magnitudes, movable, nearest_singularity
@@ -184,7 +185,8 @@ class Robot(Displayable):
         return [name for name in super().__dir__() if name not in _INSIDE]
 
     def _sheet(self) -> TextDocument:
-        from urdfkin.urdf.plain_xml import order_words  # noqa: PLC0415
+        with importing:
+            from urdfkin.urdf.plain_xml import order_words  # noqa: PLC0415
 
         order = order_words(self.urdf, self.joint_names)
         return described(self.tree, self.base_frame, self.tip_frame, order)
@@ -653,7 +655,8 @@ class Robot(Displayable):
         >>> isaaclab.to(a1.neutral()).shape
         (12,)
         """
-        from urdfkin.conventions import Conversion, find_convention  # noqa: PLC0415  nothing is paid without one
+        with importing:
+            from urdfkin.conventions import Conversion, find_convention  # noqa: PLC0415  nothing is paid without one
 
         return Conversion(self.tree, self.urdf, find_convention(name), joints)
 
@@ -669,7 +672,8 @@ class Robot(Displayable):
         >>> arm.velocity([0.0, 0.0], [1.0, 0.0], "tip").tolist()  # angular first
         [0.0, 0.0, 1.0, 0.0, 0.9, 0.0]
         """
-        from urdfkin.conventions import ConventionRobot  # noqa: PLC0415
+        with importing:
+            from urdfkin.conventions import ConventionRobot  # noqa: PLC0415
 
         return ConventionRobot(self, self.convention(name, joints))
 
@@ -798,7 +802,8 @@ class Robot(Displayable):
         >>> arm.relative_placement([0.0, 0.0], "tip", "link_2")[:3, 3].tolist()
         [0.4, 0.0, 0.0]
         """
-        from urdfkin.kinematics.bodies import seen_from  # noqa: PLC0415  few calls need these imports
+        with importing:
+            from urdfkin.kinematics.bodies import seen_from  # noqa: PLC0415  few calls need these imports
 
         name = as_str(relative_to, "relative_to")
         name = name if isinstance(name, FrameName) else str(name)  # a replay line prints plain strings
@@ -1166,7 +1171,8 @@ class Robot(Displayable):
         joint_1  centripetal   -0.9      0      0      0      0      0
         sum                    -0.9      0      0      0      0      0
         """
-        from urdfkin.compiled.breakdown import KINDS, AccelerationBreakdown, moving_joints  # noqa: PLC0415
+        with importing:
+            from urdfkin.compiled.breakdown import KINDS, AccelerationBreakdown, moving_joints  # noqa: PLC0415
 
         frame = self._default_frame() if frame is None else frame
         call = Call(self.tree, self.plan, as_str(frame, "frame"), reference, base, (q, v, a))
@@ -1225,7 +1231,8 @@ class Robot(Displayable):
         >>> bool((proof.jacobian.error(J) < 4e-16).all())
         True
         """
-        from urdfkin.verify.exact.enclosure import enclose  # noqa: PLC0415  loads python-flint
+        with importing:
+            from urdfkin.verify.exact.enclosure import enclose  # noqa: PLC0415  loads python-flint
 
         frame = self._default_frame() if frame is None else frame
         inputs, hessian = (q, v, a), as_bool(hessian, "hessian")
@@ -1281,7 +1288,8 @@ class Robot(Displayable):
         >>> tip.placement([0.0, 0.0])[:3, 3].tolist()
         [0.9, 0.0, 0.0]
         """
-        from urdfkin.export.compiled_frame import CompiledFrame  # noqa: PLC0415  rarely used
+        with importing:
+            from urdfkin.export.compiled_frame import CompiledFrame  # noqa: PLC0415  rarely used
 
         frame = self._default_frame() if frame is None else frame
         self.tree.frame_link(frame)
@@ -1429,8 +1437,9 @@ class Robot(Displayable):
             >>> urdfkin.load("ur5").dh("tool0", "base", snap=1e-6).rows[3].d
             0.10915
         """
-        from urdfkin.dh.make import dh_table  # noqa: PLC0415
-        from urdfkin.dh.table import DHTable  # noqa: PLC0415
+        with importing:
+            from urdfkin.dh.make import dh_table  # noqa: PLC0415
+            from urdfkin.dh.table import DHTable  # noqa: PLC0415
 
         if not isinstance(like, DHTable | None):
             raise InputError(
@@ -1475,8 +1484,9 @@ class Robot(Displayable):
             >>> urdfkin.load("planar_two_link").screws("tip", "base").space[1].tolist()  # [w; v]
             [0.0, 0.0, 1.0, 0.0, -0.5, 0.0]
         """
-        from urdfkin.dh.screws import screws_of  # noqa: PLC0415
-        from urdfkin.verify.chain_checks import check_screws  # noqa: PLC0415
+        with importing:
+            from urdfkin.dh.screws import screws_of  # noqa: PLC0415
+            from urdfkin.verify.chain_checks import check_screws  # noqa: PLC0415
 
         found = screws_of(self.chain(tip, base))
         if self.verifier.wanted(verify):
@@ -1497,7 +1507,8 @@ class Robot(Displayable):
         >>> [(row.joint, row.d) for row in urdfkin.load("planar_two_link").tree_parameters().rows]
         [('joint_1', 0.0), ('joint_2', 0.5), ('end', 0.4)]
         """
-        from urdfkin.dh.tree_parameters import tree_parameters  # noqa: PLC0415
+        with importing:
+            from urdfkin.dh.tree_parameters import tree_parameters  # noqa: PLC0415
 
         parameters = tree_parameters(self.tree)
         if self.verifier.wanted(verify):

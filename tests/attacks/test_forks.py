@@ -95,6 +95,17 @@ CASES = {
             assert checked.certificate().verified
         fork(child)
         """,
+    "a table, screws and a convention, while another thread asks for them first": """
+        def ask():
+            robot.dh("tool0")
+            robot.screws("tool0")
+            robot.convention("mujoco")
+        thread = threading.Thread(target=ask)
+        thread.start()
+        time.sleep(0.01)
+        fork(ask)
+        thread.join()
+        """,
     "a pool of processes": """
         import multiprocessing
         robot.jacobian(q, "tool0", threads=2)

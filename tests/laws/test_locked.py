@@ -4,6 +4,7 @@ import copy
 import math
 import pickle
 import warnings
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -399,3 +400,27 @@ def test_a_mimic_joint_outside_its_limits_is_refused_unless_no_value_satisfies_i
     with pytest.raises(urdfkin.InputError, match="joint y: -1 is outside"):
         good.locked({"x": -0.5})
     assert impossible.locked({"x": 0.5}).nq == 0
+
+
+@pytest.mark.parametrize("convention", ["isaaclab", "isaaclab3", "mujoco", "newton", "alphabetical"])
+@pytest.mark.parametrize("name", ["a1", "go2", "talos", "baxter"])
+def test_a_lock_only_removes_a_joint_from_the_order_of_another_tool(name: str, convention: str) -> None:
+    robot = urdfkin.load(name, verify=False, mimic=False)
+    order = robot.convention(convention).joint_names
+    middle = robot.sample(1)[0]
+    for joint in order[::3]:
+        locked = robot.locked({joint: middle[robot.coordinate_names.index(joint)]})
+        assert locked.convention(convention).joint_names == tuple(x for x in order if x != joint)
+
+
+def test_a_convention_that_lists_a_locked_joint_leaves_it_out(tmp_path: Path) -> None:
+    file = tmp_path / "map.toml"
+    file.write_text('joints = ["joint_2", "joint_1"]\n')
+    arm = urdfkin.load("planar_two_link", lock={"joint_1": 0.2})
+    assert arm.convention(file).joint_names == ("joint_2",)
+
+
+def test_the_code_of_a_locked_robots_table_names_the_lock() -> None:
+    arm = urdfkin.load("ur5", lock={"elbow_joint": 0.5})
+    for form in ("tree", "dh", "screws"):
+        assert "Joint elbow_joint is locked at 0.5" in arm.export("c", "tool0", ["placement"], form=form)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import subprocess
 import sys
@@ -368,6 +369,54 @@ def test_a_wrong_argument_is_one_error(arguments: dict[str, Any], words: str) ->
         verify_function(lambda q: q, robot_of("ur5"), **arguments)
 
 
+@pytest.mark.parametrize(
+    ("result", "words"),
+    [
+        (lambda J: J + 1j, "complex128, expected real numbers"),
+        (lambda J: J.astype(str), "expected real numbers"),
+        (lambda J: np.ma.masked_array(J, True), "a masked array"),
+    ],
+)
+def test_a_result_that_is_no_array_of_real_numbers_is_an_error(
+    result: Callable[..., Any], words: str
+) -> None:
+    robot = robot_of("ur5")
+    found = check("ur5", "jacobian", lambda q: result(robot.jacobian(q, "tool0", verify=False)))
+    assert not found.agrees
+    assert words in found.first_errors[0].message
+
+
+def test_a_function_that_ends_the_process_is_an_error() -> None:
+    def function(q: np.ndarray) -> np.ndarray:
+        raise SystemExit(0)
+
+    found = check("ur5", "jacobian", function)
+    assert not found.agrees
+    assert found.errors == found.samples
+
+
+def test_a_robot_without_a_moving_joint_is_compared() -> None:
+    text = (
+        '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="fixed"><parent link="a"/>'
+        '<child link="b"/><origin xyz="1 0 0"/></joint></robot>'
+    )
+    robot = urdfkin.load(text)
+    assert verify_function(lambda q: np.zeros((6, 0)), robot, "jacobian", samples=3).agrees
+    assert not verify_function(lambda q: np.eye(4), robot, "placement", samples=3).agrees
+
+
+def test_a_missing_mimic_column_of_a_locked_robot_is_named() -> None:
+    robot = urdfkin.load("panda", lock={"panda_joint3": 0.5})
+    free = urdfkin.load("panda", mimic=False, lock={"panda_joint3": 0.5}, verify=False)
+    own = [free.rate_names.index(x) for x in robot.rate_names]
+
+    def function(q: np.ndarray) -> np.ndarray:
+        return free.jacobian(np.r_[q, q[-1]], "panda_rightfinger")[:, own]
+
+    found = verify_function(function, robot, "jacobian", frame="panda_rightfinger", samples=30)
+    assert any("not added" in words for words in found.diagnoses), found
+
+
 # -- programs and the command ---------------------------------------------------------------------------
 
 ADAPTERS = Path(__file__).parents[2] / "examples" / "adapters"
@@ -414,6 +463,27 @@ def test_a_broken_program_is_reported_and_the_check_goes_on(fault: str, tmp_path
     assert data["compared"] >= 10 - 3
 
 
+def test_a_file_with_the_name_of_a_library_hides_no_library(tmp_path: Path) -> None:
+    file = tmp_path / "mujoco.py"
+    file.write_text("def jacobian(q):\n    return q\n")
+    pytest.importorskip("mujoco")
+    done = run("verify", f"{file}:jacobian", "planar_two_link", "--oracle", "mujoco", "--samples", "3")
+    assert done.code == 1, done.err
+    assert "shape (2,)" in done.text
+
+
+def test_a_program_is_told_of_locked_joints(tmp_path: Path) -> None:
+    kept = tmp_path / "request"
+    command = f"sed -u 's/.*/&/w {kept}'"
+    options = "--lock", "joint_1=1", "--samples", "0"
+    done = run("verify", command, "planar_two_link", "--program", *options)
+    assert done.code == 1
+    request = json.loads(kept.read_text().splitlines()[0])
+    assert request["coordinates"] == ["joint_2"]
+    assert request["lock"] == {"joint_1": 1.0}
+    assert run("verify", "a'b", "planar_two_link", "--program").code == 2
+
+
 @pytest.mark.long
 @pytest.mark.skipif(shutil.which("g++") is None, reason="no C++ compiler")
 def test_the_example_in_cpp_agrees(tmp_path: Path) -> None:
@@ -457,11 +527,12 @@ def test_all_functions_of_a_file_are_checked(tmp_path: Path) -> None:
         "def placement(q):\n    return robot.placement(q, 'tool0')\n"
         "def velocity(q, v):\n    return robot.velocity(q, -v, 'tool0')\n"
         "def helper():\n    pass\n"
+        "import functools\nacceleration = functools.partial(lambda q, v, a: [0.0] * 6)\n"
     )
     done = run("verify", str(file), "ur5", "--samples", "10", "--format", "json")
     assert done.code == 1
     found = {check["function"]: check["agrees"] for check in done.data["checks"]}
-    assert found == {"tool_jacobian": True, "placement": True, "velocity": False}
+    assert found == {"tool_jacobian": True, "placement": True, "velocity": False, "partial": False}
     text = run("verify", str(file), "ur5", "--samples", "10").text
     assert "tool_jacobian: agrees" in text
     assert "velocity: DISAGREES" in text
@@ -471,6 +542,7 @@ def test_a_bad_target_is_one_line(tmp_path: Path) -> None:
     file = tmp_path / "mine.py"
     file.write_text("def jacobian(q):\n    return q\n\n\ncompute = jacobian\n")
     (tmp_path / "empty.py").write_text("x = 1\n")
+    (tmp_path / "ends.py").write_text("raise SystemExit(0)\n")
     broken = tmp_path / "broken.py"
     broken.write_text("1 / 0\n")
     for target, words in (
@@ -479,6 +551,7 @@ def test_a_bad_target_is_one_line(tmp_path: Path) -> None:
         (f"{file}:jacobean", "jacobian"),
         (f"{file}:compute", "pass --quantity"),
         (str(tmp_path / "empty.py"), "no function of the file"),
+        (str(tmp_path / "ends.py"), "SystemExit"),
         (f"{broken}:jacobian", "ZeroDivisionError"),
     ):
         done = run("verify", target, "ur5")

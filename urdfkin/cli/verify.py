@@ -62,7 +62,7 @@ _QUANTITIES = ("placement", "velocity", "jacobian", "jacobian-rate", "hessian", 
 @click.option("--program", is_flag=True, help="TARGET is the command of a program that answers JSON lines.")
 @click.option(
     "--timeout",
-    type=NumberFrom(min=0, min_open=True),
+    type=NumberFrom(min=0, max=86400, min_open=True),
     default=10.0,
     show_default=True,
     help="Longest time for an answer of the program, in seconds.",
@@ -109,7 +109,11 @@ def verify_command(
             name = quantity or "jacobian"
             of = None if name in ("placement", "imu") else reference
             at = frame or loaded.tip_frame
-            command = Program(shlex.split(target), loaded.urdf, name.replace("-", " "), at, of, timeout)
+            try:
+                words = shlex.split(target)
+            except ValueError as error:
+                raise click.UsageError(f"the command of the program cannot be read: {error}") from None
+            command = Program(words, loaded, name.replace("-", " "), at, of, convention, timeout)
             functions = {name: stack.enter_context(command)}
         else:
             functions = _functions(target)
@@ -174,11 +178,7 @@ def _functions(target: str) -> dict[str, Callable[..., object]]:
             remedy="--program checks the command of a program",
         )
     module = _module(path)
-    own = {
-        key: value
-        for key, value in vars(module).items()
-        if callable(value) and not key.startswith("_") and getattr(value, "__module__", "") == module.__name__
-    }
+    own = {key: value for key, value in vars(module).items() if callable(value) and key[0] != "_"}
     if not name:
         found = {key: value for key, value in own.items() if _stated(key)}
         if not found:
@@ -199,18 +199,19 @@ def _module(path: str) -> ModuleType:
     file = Path(path).resolve()
     if not file.is_file():
         raise SourceError("no such file", where=path)
-    spec = importlib.util.spec_from_file_location(file.stem, file)
+    name = f"_urdfkin_checks_{file.stem}"  # a file may have the name of a library
+    spec = importlib.util.spec_from_file_location(name, file)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    sys.modules.setdefault(file.stem, module)
+    sys.modules[name] = module
     # The folder is the last one on the path, so that no file in it hides an installed module.
     sys.path.append(str(file.parent))
     try:
         spec.loader.exec_module(module)
     except UrdfkinError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise InputError(
             "the file raises an exception", where=path, found=f"{type(error).__name__}: {error}"
         ) from error

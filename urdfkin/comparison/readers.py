@@ -181,7 +181,7 @@ def _reading(robot: Robot, name: str, q: FloatArray, ours: FloatArray) -> Librar
         joints=tuple(answer["joints"]),
         same_order=answer["joints"] == [name for name in values[0] if name != added],
         missing=tuple(link for i, link in enumerate(links) if i not in shared and (i or not added)),
-        worst=worst if worst > equal else 0.0,
+        worst=0.0 if worst <= equal else worst,
         differences=tuple(_differences(robot, title, ours, poses, elements, own, equal)),
     )
 
@@ -231,7 +231,7 @@ def _differences(
         T = np.linalg.inv(ours[:, joint.parent]) @ ours[:, i]
         found = np.linalg.inv(theirs[joint.parent]) @ theirs[i]
         size = float(np.abs(T - found).max())
-        if size > equal:
+        if not size <= equal:
             element, words = _explained(joint, title, T, found, elements.get(joint.name), own, equal)
             yield Difference(joint.name, element, words, size)
 

@@ -178,8 +178,6 @@ class PreparedFrame:
         else:
             verifier.ledger.account(quantity).counters.append((task, KernelArgs.COUNT))
         setattr(self, f"_{quantity}", compute)
-        if (found := compute(q, *others)) is not None:
-            warn_of_degrees(
-                self._robot.tree, q
-            )  # the first configuration only: later calls cost nothing more
+        if (found := compute(q, *others)) is not None and not self.verify:
+            warn_of_degrees(self._robot.tree, q)  # the first configuration only: later calls cost nothing
         return found

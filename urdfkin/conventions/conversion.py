@@ -138,8 +138,10 @@ class Conversion:
                 " TOML file",
             )
         own = {rule.name: joint for joint, rule in how.rules.items() if rule.name is not None}
-        order = [self._index(own.get(name, name)) for name in how.joints]
-        for name, i in zip(how.joints, order, strict=True):
+        every = [(name, self._index(own.get(name, name))) for name in how.joints]
+        named = [(name, i) for name, i in every if self.tree.joints[i].lock is None]
+        order = [i for _, i in named]
+        for name, i in named:
             if i not in moving:
                 raise InputError("the order of joints contains a fixed joint", where=how.name, found=name)
         if len(set(order)) != len(order):
@@ -206,7 +208,8 @@ class Conversion:
             found, fixed = list[int](), [link]
             for one in fixed:  # the loop extends this list
                 for i in children.get(one, []):
-                    if self.tree.joints[i].kind.nv or not merged:
+                    # Locking a joint of this robot does not weld its links in the target program.
+                    if self.tree.joints[i].unlocked.kind.nv or not merged:
                         found.append(i)
                     else:
                         fixed.append(i + 1)

@@ -43,7 +43,8 @@ def code_of_robot(
     if form == "tree":
         return code_of(robot.verifier, robot.plan, frame, quantities, reference, name=name, verify=verify)
     chain = robot.dh(frame, verify=verify) if form == "dh" else robot.screws(frame, verify=verify)
-    return code_of_chain(chain, quantities, reference, name=name, verify=verify)
+    code = code_of_chain(chain, quantities, reference, name=name, verify=verify)
+    return replace(code, vouched=code.vouched and replace(code.vouched, lock=robot.origin.lock))
 
 
 def code_of_chain(

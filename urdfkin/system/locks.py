@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import threading
+from contextlib import suppress
 
 
 def lock_over_forks() -> threading.RLock:
@@ -19,7 +20,14 @@ def lock_over_forks() -> threading.RLock:
     deleted, until the process ends.
     """
     lock = threading.RLock()
-    os.register_at_fork(before=lock.acquire, after_in_parent=lock.release, after_in_child=lock.release)
+
+    def release() -> None:
+        with suppress(
+            RuntimeError
+        ):  # another thread made the lock during the fork, before which it was not taken
+            lock.release()
+
+    os.register_at_fork(before=lock.acquire, after_in_parent=release, after_in_child=release)
     return lock
 
 

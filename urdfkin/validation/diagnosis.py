@@ -306,7 +306,8 @@ class Mistakes:
             return
         from urdfkin.loading import load  # noqa: PLC0415  few robots need it
 
-        free = load(self.robot.urdf, mimic=False, root_joint=self.robot.root_joint, verify=False)
+        lock = dict(self.robot.origin.lock)
+        free = load(self.robot.urdf, mimic=False, root_joint=self.robot.root_joint, lock=lock, verify=False)
         own = [free.rate_names.index(name) for name in self.robot.rate_names]
         frame, method = self.frame, getattr(free, self.row.method)
         named = {} if self.reference is None else {"reference": self.reference}

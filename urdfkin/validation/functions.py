@@ -561,7 +561,7 @@ class _Run:
             if array is not None:
                 found.append(array)
                 good.append(k)
-        return np.array(found).reshape(-1, *shape)
+        return np.array(found).reshape(len(found), *shape)
 
     # -- explanations --------------------------------------------------------------------------------
 
@@ -643,16 +643,16 @@ class _Total:
             return
         self.compared += len(part.good)
         shares, units = part.shares(part.expected), part.units(part.expected)
-        self.eps_scale = max(self.eps_scale, float(units.max()))
+        self.eps_scale = max(self.eps_scale, float(units.max(initial=0.0)))
         own = tuple(range(1, shares.ndim))
         self.not_finite += int((~np.isfinite(part.found).all(axis=own)).sum())
-        of_each = shares.max(axis=own)
-        self.by_row = np.maximum(self.by_row, shares.max(axis=(0, *own[1:])))
+        of_each = shares.max(axis=own, initial=0.0)
+        self.by_row = np.maximum(self.by_row, shares.max(axis=(0, *own[1:]), initial=0.0))
         if len(self.by_column):
-            self.by_column = np.maximum(self.by_column, shares.max(axis=(0, 1, *own[2:])))
+            self.by_column = np.maximum(self.by_column, shares.max(axis=(0, 1, *own[2:]), initial=0.0))
         if self.kept is None:
             self.kept = part
-        if self.worst is None or of_each.max() > self.share:
+        if part.found[0].size and (self.worst is None or of_each.max() > self.share):
             k = int(of_each.argmax())
             self.worst = WorstResult(
                 part.first + part.good[k],
@@ -664,7 +664,7 @@ class _Total:
             )
         self.share = max(self.share, float(of_each.max()))
         if part.theirs is not None:
-            self.oracle_share = max(self.oracle_share, float(part.shares(part.theirs).max()))
+            self.oracle_share = max(self.oracle_share, float(part.shares(part.theirs).max(initial=0.0)))
 
     def for_diagnosis(self) -> tuple[tuple[FloatArray, ...], FloatArray, FloatArray, FloatArray]:
         """Return the data of some configurations for a diagnosis.
@@ -691,8 +691,13 @@ def _call(
     After an exception or a wrong shape, add it to `total` and return None.
     """
     try:
-        found = np.array(function(*inputs), dtype=np.float64)
-    except Exception as error:  # a fault of the user's code is a result of the check
+        given = np.asanyarray(function(*inputs))
+        if np.ma.isMaskedArray(given) or given.dtype.kind not in "fiu":
+            kind = "a masked array" if np.ma.isMaskedArray(given) else f"an array of {given.dtype}"
+            total.error(sample, f"{kind}, expected real numbers", configurations)
+            return None
+        found = np.array(given, dtype=np.float64)
+    except (Exception, SystemExit) as error:  # a fault of the user's code is a result of the check
         total.error(sample, f"{type(error).__name__}: {str(error)[:300]}", configurations)
         return None
     if found.shape != shape:

@@ -3,9 +3,12 @@
 Each request is one line on the program's standard input:
 
     {"robot": "/tmp/.../robot.urdf", "quantity": "jacobian", "frame": "tool0",
-     "reference": "local_world_aligned", "q": [...], "v": [...], "a": [...]}
+     "reference": "local_world_aligned", "coordinates": ["shoulder", ...],
+     "q": [...], "v": [...], "a": [...]}
 
-`v` and `a` are present if the quantity needs them, `reference` if it has one. The answer is one line:
+`coordinates` names the numbers of q. `v` and `a` are present if the quantity needs them, and `reference` if
+it has one. `lock` (values of locked joints), `root_joint` and `convention` are present if they were given.
+The file is the whole URDF without them. The answer is one line:
 
     {"result": [[...], ...]}    or    {"error": "a text"}
 
@@ -26,17 +29,21 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import IO
+from typing import IO, TYPE_CHECKING
 
 from urdfkin.errors import InputError, SourceError
 from urdfkin.errors.escape import json_text
 from urdfkin.model.tree import FloatArray
+
+if TYPE_CHECKING:
+    from urdfkin.robot import Robot
 
 #: Largest size of an answer in bytes, and largest number of bytes of standard error that a message quotes.
 _MOST = 64 * 2**20
 _TAIL = 300
 #: Number of failures in a row after which the program is not started again.
 _PATIENCE = 3
+_DAY = 86400.0
 
 
 class ProgramError(Exception):
@@ -48,11 +55,12 @@ class Program:
 
     Args:
         command: The program and its arguments. No shell is involved.
-        urdf: Text of the robot; the program receives the path of a file with it.
+        robot: The robot; the program receives the path of a file with its URDF, and the names of its joints.
         quantity: Name of the quantity.
         frame: Name of the frame.
         reference: Name of the reference frame; None for a placement.
-        timeout: Longest time for an answer, in seconds.
+        convention: Name of the convention of q, v, a and the result; None for urdfkin's.
+        timeout: Longest time for an answer, in seconds; at most a day.
 
     Raises:
         InputError: an empty command, or a timeout that is not positive.
@@ -61,7 +69,7 @@ class Program:
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
     >>> command = ["sed", "-u", 's/.*/{"result": [1]}/']  # the same answer to every request
-    >>> with Program(command, arm.urdf, "jacobian", "tip", "local_world_aligned") as program:
+    >>> with Program(command, arm, "jacobian", "tip", "local_world_aligned") as program:
     ...     program(arm.neutral())
     [1]
     """
@@ -69,22 +77,34 @@ class Program:
     def __init__(
         self,
         command: Sequence[str],
-        urdf: str,
+        robot: Robot,
         quantity: str,
         frame: str,
         reference: str | None,
+        convention: str | None = None,
         timeout: float = 10.0,
     ) -> None:
         if not command:
             raise InputError("a program needs a command")
-        if not timeout > 0.0:
-            raise InputError("the timeout must be positive", found=repr(timeout))
+        if not 0.0 < timeout <= _DAY:
+            raise InputError("the timeout must be positive, and at most a day", found=repr(timeout))
         self.command, self.timeout = list(command), timeout
         self.__name__ = Path(command[0]).name
-        self._fixed = {"quantity": quantity, "frame": frame}
+        names = robot if convention is None else robot.convention(convention)
+        self._fixed: dict[str, object] = {
+            "quantity": quantity,
+            "frame": frame,
+            "coordinates": list(names.coordinate_names),
+        }
+        if robot.origin.lock:
+            self._fixed["lock"] = dict(robot.origin.lock)
+        if robot.root_joint is not None:
+            self._fixed["root_joint"] = robot.root_joint
+        if convention is not None:
+            self._fixed["convention"] = convention
         if reference is not None:
             self._fixed["reference"] = reference
-        self._urdf, self._failures = urdf, 0
+        self._urdf, self._failures = robot.urdf, 0
         self._process: subprocess.Popen[bytes] | None = None
 
     def __enter__(self) -> Program:

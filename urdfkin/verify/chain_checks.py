@@ -116,9 +116,9 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
     joints = sum(len(verifier.tree.path(verifier.tree.frame_link(end))) for end in (path.base, path.tip))
     unit = EPS * (of_joints(joints) + np.abs(own).sum(axis=-1)) + left_out(path)
     allowed = screws.rounding(own) + unit * (lever + np.abs(own).sum(axis=-1))
-    share = float((off[..., 3].max(axis=-1) / allowed).max(initial=0.0))
+    share = float((off[..., 3].max(axis=-1) / (allowed + LEAST_UNIT)).max(initial=0.0))
     turn = float((off[..., :3].max(axis=(-1, -2)) / (unit + EPS * screws.roundings)).max())
-    if max(share, turn) > 1.0:
+    if not max(share, turn) <= 1.0:
         raise TableError(
             "the product of exponentials disagrees with Pinocchio",
             where=f"{screws.robot}, {screws.base_frame} to {screws.tip_frame}",

@@ -17,6 +17,7 @@ from urdfkin.compiled.plan import CompiledTree, IntArray
 from urdfkin.errors import RangeError, warn_caller
 from urdfkin.kinematics.roundings import EPS, NOT_ZERO, of_joints
 from urdfkin.model.base_motion import STILL_STATE, BaseMotion
+from urdfkin.model.configuration import warn_of_degrees
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.system.lazy_import import own_version
@@ -261,6 +262,7 @@ class Verifier:
             theirs, bound = oracle_results_with_bound(quantity, self.oracle(None, by), x, ours, by)
             comparison = compare(ours, theirs, bound, 2)
             if comparison.agrees:
+                warn_of_degrees(self.tree, given[0])
                 self.ledger.checked(name, comparison)
             else:  # this check raises the error
                 call = Call(self.tree, lambda _: plan, frame, reference, None, given[:-1])
