@@ -76,8 +76,8 @@ differences.
 `urdfkin readers ROBOT` makes the same comparison for your robot, with the libraries that are installed beside
 urdfkin. For each joint that a library reads differently, it names the element of the file:
 
-```console
-$ urdfkin readers talos --with mujoco,yourdfpy
+```sh
+urdfkin readers talos --with mujoco,yourdfpy
 ```
 
 In Python, `urdfkin.comparison.readers.compare_readers(robot)` returns the same result.

@@ -97,15 +97,15 @@ CASES: dict[str, tuple[Callable[[pytest.MonkeyPatch], Document], list[str], str,
     "tables": (
         _tables,
         ["disagrees"],
-        "the Denavit-Hartenberg tables from base_link to tool0 disagree: 2.5e+07 times the bound,"
-        " tip 0.0021 m off",
+        "the Denavit-Hartenberg tables from base_link to tool0 disagree with Pinocchio: 2.5e+07 times the"
+        " bound, tip 0.0021 m off",
         1,
         (1, 0),
     ),
     "tables, no number": (
         _tables_without_numbers,
         ["disagrees"],
-        "disagree: by an infinite amount",
+        "disagree with Pinocchio: by an infinite amount",
         1,
         (1, 0),
     ),

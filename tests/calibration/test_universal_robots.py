@@ -183,8 +183,8 @@ def test_an_arm_with_other_joints_is_refused(file: Path) -> None:
         ("kinematics: {shoulder: 1}", "no shoulder"),
         ("kinematics: {shoulder: {x: ten}}", "shoulder x"),
         ("kinematics: {shoulder: {x: .nan}}", "shoulder x"),
-        ("kinematics: {shoulder: {y: 0}}", "shoulder x: not a finite number: found NoneType"),
-        (BOMB, "shoulder x: not a finite number: found list"),
+        ("kinematics: {shoulder: {y: 0}}", "shoulder x: this is not a finite number: found NoneType"),
+        (BOMB, "shoulder x: this is not a finite number: found list"),
         ("kinematics: " + "[" * 5000, "this is not a YAML file"),
     ],
 )

@@ -47,7 +47,13 @@ def test_a_table_goes_by_the_ending_too(tmp_path: Path) -> None:
     rows = [read_table(tmp_path / f"t.{ending}").rows for ending in ("toml", "json", "csv")]
     assert rows[0] == rows[1] == rows[2]
     assert tomllib.loads((tmp_path / "t.toml").read_text())["convention"] == "standard"
-    starts = {"urdf": "<robot", "md": "**elbow: ", "tex": "\\begin{table}", "m": "function T", "c": "/*"}
+    starts = {
+        "urdf": "<robot",
+        "md": "**elbow: ",
+        "tex": "\\begin{table}",
+        "m": "% Kinematics of elbow",
+        "c": "/*",
+    }
     for ending, start in starts.items():
         assert (tmp_path / f"t.{ending}").read_text().startswith(start), ending
     assert urdfkin("dh", "elbow", "--format", "roboticstoolbox", "-o", str(tmp_path / "r.py")).code == 0

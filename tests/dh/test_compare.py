@@ -171,7 +171,9 @@ def test_another_robot_differs_and_says_so() -> None:
 
 
 def test_a_table_of_other_joints_is_refused() -> None:
-    with pytest.raises(InputError, match=r"found RRR in the table, RRRRRR in the URDF; choose base and tip"):
+    with pytest.raises(
+        InputError, match=r"found RRR in the table, RRRRRR in the URDF; choose a base and a tip"
+    ):
         compare(chain(elbow(), "tip"), table_from_rows([[0.1, 1.0, 0.2, 0.0]] * 3, "standard"))
 
 
