@@ -82,7 +82,7 @@ def passages(path: Path) -> Iterator[Passage]:
 
 
 def files(paths: list[Path]) -> Iterator[Path]:
-    """Yield the files below some paths whose text people read."""
+    """Yield the files that people read, in the given folders and files."""
     for path in paths:
         for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
             parts = file.relative_to(ROOT).parts

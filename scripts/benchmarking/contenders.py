@@ -118,7 +118,7 @@ def urdfkin_calls(subject: Subject, quantity: str) -> Iterator[Calls]:
 
 
 def checked_calls(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """Yield the calls of the robot's method and of a prepared frame, each with a check."""
+    """Yield two verified calls: the robot's method, and the same method of a prepared frame."""
     arguments = "q" if quantity == "jacobian" else "q, v, a"
     lines = f"robot.{quantity}({arguments}, frame, verify=True)", f"fast.{quantity}({arguments})"
     names = {"fast": subject.robot.prepare(subject.frame, verify=True)}

@@ -84,7 +84,7 @@ def count(results: Any) -> int:
 
 @dataclass
 class _Walk:
-    """The functions of the forward recursion and of `outputs` on counting numbers."""
+    """Write the forward recursion and `outputs` with numbers that count their operations."""
 
     written: list[Any] = field(default_factory=list)
 

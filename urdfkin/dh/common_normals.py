@@ -160,7 +160,9 @@ def _skew(A: FloatArray, sine: float, reach: float, noise: Noise) -> Step:
 
 
 def _parallel(A: FloatArray, reach: float, noise: Noise, phi_free: float, delta_each: bool) -> Step:
-    """Return the step of two parallel axes, along the perpendicular through the origin of this joint's frame.
+    """Return the step between two parallel axes.
+
+    The step follows the perpendicular through the origin of this joint's frame.
 
     If the axes coincide, every phi is correct, and the step takes `phi_free`.
     """

@@ -3,7 +3,7 @@
 A vector is a triple of numbers (x, y, z), and a rotation is a triple of rows. The module imports nothing: it
 uses the arithmetic of the numbers it is called with. For vectors that are not triples, the basic operations
 of the first part are replaced (`urdfkin.kinematics.number_kinds`). The same equations run on batches in
-vector registers, NumPy arrays, numbers with 50 digits, intervals, lengths and LaTeX expressions.
+vector registers, NumPy arrays, numbers with 50 digits, intervals, lengths of vectors and LaTeX expressions.
 
 All vectors of an equation are expressed in the same axes. These are the world's, as in the textbook, or the
 link's own, in which z is (0, 0, 1) and d is constant.

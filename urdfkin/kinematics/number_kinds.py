@@ -1,4 +1,4 @@
-"""The equations for NumPy arrays and for lengths (`urdfkin.kinematics.arithmetic.bound`).
+"""The textbook's equations on two more kinds of number: NumPy arrays, and the lengths of vectors.
 
 `array_equations` computes with NumPy arrays. The last axis of an array contains the three components of a
 vector, so one call computes a whole batch.

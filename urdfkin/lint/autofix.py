@@ -96,8 +96,8 @@ def mend(
 def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> Iterator[str]:
     """Yield the reasons against a fix."""
     code = fixable[0].code
-    # Skip kinds of findings that exceed the limit of completely stored findings. If some of their stored
-    # findings are fixed, further findings are stored instead, and look like new ones.
+    # Only a limited number of findings of a kind is stored. Skip a kind that exceeds this number, because
+    # after a fix other findings of the kind are stored, and these look new.
     many = {finding.code for finding in before.findings if finding.also}
     old, new = (
         Counter((f.code, f.element, f.name) for f in seen.findings if f.code not in many)

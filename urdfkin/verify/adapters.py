@@ -181,7 +181,10 @@ def read_mujoco(text: str) -> Reading:
 
 
 def _mujocos(name: str, value: Value, names: list[str]) -> Iterator[tuple[str, Value]]:
-    """Yield MuJoCo's joints of a joint, with their values: a planar joint becomes two slides and a hinge."""
+    """Yield the MuJoCo joints that stand for a joint of the URDF, with their values.
+
+    A planar joint becomes two slides and a hinge.
+    """
     if name in names:
         yield name, value
     elif name + _MUJOCO_PLANAR[0] in names:

@@ -286,8 +286,8 @@ def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) 
     """Return the bound between the tree made of an MJCF file and MuJoCo's model of that file.
 
     The tree contains sums that MuJoCo computes at each configuration: a body's position, the anchors of its
-    joints, a slide's reference value. The scale of positions is the length of these terms if it exceeds the
-    path's.
+    joints, a slide's reference value. If the sum of the lengths of these terms
+    exceeds the length of the path, the scale of positions is this sum.
 
     MuJoCo rotates a hinge by fl(q - ref), the tree by ref and by q. The difference is rounded once, by at
     most (eps/2) (|q| + |ref|) rad. That rotates everything after the hinge. A number of a rotation changes by

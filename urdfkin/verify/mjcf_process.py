@@ -138,7 +138,7 @@ def _answer(read: Mjcf, q: FloatArray) -> dict[str, Any]:
 
 
 def packed(numbers: FloatArray) -> dict[str, Any]:
-    """Return an array in the form in which an answer contains it, as plain data for JSON."""
+    """Return an array as plain data for the JSON of an answer."""
     data = np.ascontiguousarray(numbers, dtype="<f8")
     return {"shape": data.shape, "base64": base64.b64encode(data.tobytes()).decode("ascii")}
 

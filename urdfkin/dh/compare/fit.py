@@ -173,7 +173,10 @@ def columns(model: Model, wanted: TargetPoses) -> tuple[FloatArray, FloatArray, 
 
 
 def _end(poses: FloatArray, at: FloatArray, scale: float) -> FloatArray:
-    """Return the tip's twists (6 s, 6) if everything after a frame is translated or rotated."""
+    """Return the change of the tip's pose when all parts after a frame are translated or rotated.
+
+    The result (6 samples, 6) has a column for each translation and rotation along the axes of the frame.
+    """
     arm = poses[:, :3, 3] - at[:, :3, 3]
     out = np.zeros((len(poses), 6, 6))
     for k in range(3):
@@ -417,7 +420,10 @@ def _descend(model: Model, wanted: TargetPoses, ends: bool) -> tuple[Model, floa
 
 
 def _opposite_rotations(model: Model) -> list[Model]:
-    """Return models with opposite rotations of two consecutive offsets, for nearly coinciding axes."""
+    """Return models in which two consecutive joint offsets are rotated by opposite angles.
+
+    If two consecutive axes nearly coincide, such a change has little effect on the tip.
+    """
     found = []
     for i in range(len(model.cells) - 1):
         sense = math.copysign(1.0, math.cos(float(model.cells[i, 3])))

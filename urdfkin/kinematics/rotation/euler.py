@@ -154,8 +154,8 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     # only.
     cosine, sine = np.cos(first), np.sin(first)
     row = cosine[..., np.newaxis] * R[..., j, :] + (sign * sine)[..., np.newaxis] * R[..., m, :]
-    # R_third rotates in the plane of the second axis and one more axis. In a proper sequence this is the axis
-    # `other`, else it is the first axis.
+    # R_third rotates about the third axis, in the plane of the second axis and a remaining one. In a proper
+    # sequence the remaining axis is `other`, else it is the first axis.
     rest, sense = (m, sign) if axes.proper else (i, -sign)
     third = np.arctan2(-sense * row[..., rest], row[..., j])
     return axes.turning(np.stack((first, second, third), axis=-1)).copy()

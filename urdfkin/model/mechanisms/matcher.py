@@ -4,7 +4,8 @@ The alignment matches the joints of A and B. It chooses the base of B, the order
 and the zero of each joint.
 
 The matcher starts at a common body and goes outwards through A and B at the same time. At each joint it
-chooses the sense and the zero with which most links and axes behind the joint agree. `align` calls the
+chooses the sense and the zero of B's joint. With this choice, as many of the later links and axes of B as
+possible coincide with those of A. `align` calls the
 matcher for several starting bodies and joint orders, and returns the best result.
 
 Most joint zeros are determined by axes or link frames. If neither an axis nor a common link frame follows a
@@ -316,7 +317,7 @@ class MechanismMatcher:
         return pairs
 
     def _own_links(self, place: Place) -> tuple[list[int], list[int]]:
-        """Return the links of two bodies whose names exist only in their own model."""
+        """Return those links of two matched bodies that have no link of the same name in the other model."""
         names_a, names_b = self.a.tree.links, self.b.tree.links
         ours = [i for i in self.a.bodies[place.bodies[0]] if names_a[i] not in names_b]
         return ours, [j for j in self.b.bodies[place.bodies[1]] if names_b[j] not in names_a]
@@ -420,7 +421,7 @@ class MechanismMatcher:
     ) -> tuple[Step, Place, Score]:
         """Pass a joint that is revolute in A and B, or prismatic in A and B.
 
-        The method chooses the joint's sense and zero, and whether its axis differs.
+        The method chooses the sense and the zero of B's joint, and decides whether the two axes differ.
         """
         e, f = _both(there.via)
         s = _outwards(self.a.screw(e), backwards[0])
