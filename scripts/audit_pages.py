@@ -76,7 +76,8 @@ axe.run({ resultTypes: ["violations"] })
   ])), (error) => done([["critical", "axe failed: " + error, 1, []]]));
 """
 #: Tables that must fit every screen and do not: name, width, and width of the box around them.
-_CUT = """return [...document.querySelectorAll("#overview, .checks, #history, section > .scroll > table")]
+_CUT = """const own = "body:not(:has(#robots, #history)) section > .scroll > table";  // the page of `same`
+return [...document.querySelectorAll(`#overview, .checks, #history, ${own}`)]
   .filter((t) => t.checkVisibility() && t.scrollWidth > t.parentElement.clientWidth)
   .map((t) => [t.id || t.className, t.scrollWidth, t.parentElement.clientWidth]);"""
 #: The element with the focus: a description, and whether an outline, border or shadow shows the focus.

@@ -195,7 +195,7 @@ def test_a_difference_within_the_last_digit_is_told_from_one_beyond_it(
 
 def test_the_kinova_sheet_is_said_to_be_rounded() -> None:
     done = command("dh", "kinova", "--compare", "kinova")
-    assert "All within the last digit of the table (*)." in done.text
+    assert "All differ only within the last digit of the table (*)." in done.text
     data = json.loads(command("dh", "kinova", "--compare", "kinova", "--format", "json").text)
     assert [one["within_last_digit"] for one in data["differences"]] == [True]
 

@@ -92,7 +92,8 @@ FRAGMENTS = [
      "*at[rule.leader][::-1], rule.multiplier"),
     ("verify.pinocchio_inputs", "body, joint = self._bodies.get(name)",
      "body, joint = self._bodies.get(name[5:])"),
-    ("verify.oracle", "return spread[places]", "return spread[places][::-1]"),
+    ("verify.oracle", "return spread[np.unravel_index(numbers, self.shape)]",
+     "return spread[np.unravel_index(numbers, self.shape)][::-1]"),
     ("verify.oracle", "return result.reshape(self.n, len(self.frames), *own)",
      "return result.reshape(self.n, len(self.frames), *own)[::-1]"),
 ]  # fmt: skip

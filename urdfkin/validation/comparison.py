@@ -152,7 +152,7 @@ class _Block(_Work):
         frames = [JointFrame.of(name) for name in self.joint_names] if joints else self.frames
         inputs = self.x.q, self.x.v, self.x.a
         reference = Reference.LOCAL_WORLD_ALIGNED if reference is None else reference
-        return QueryBatch(frames, inputs, reference, joints=joints)
+        return QueryBatch(frames, inputs, reference, joints=joints, divided=True)
 
     def _compare(
         self,

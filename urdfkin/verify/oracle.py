@@ -111,6 +111,8 @@ class QueryBatch(NamedTuple):
         reference: The reference frame, as the user gave it. Placements ignore it.
         base: Motion of the base; None: fixed at the world origin.
         joints: True: use the library's functions for joints, if it has them. Each frame is a `JointFrame`.
+        divided: True: the frames are some of many. The library's functions are then those for many frames, so
+            that no number depends on the division.
 
     >>> x = QueryBatch(["tool0"], (np.zeros((1, 6)), np.ones((1, 6))))
     >>> x.q.shape, x.v.shape, x.reference.name
@@ -122,6 +124,7 @@ class QueryBatch(NamedTuple):
     reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
     base: BaseNumbers | None = None
     joints: bool = False
+    divided: bool = False
 
     @property
     def q(self) -> FloatArray:

@@ -229,7 +229,7 @@ class PinocchioOracle(Oracle):
         by `getFrameJacobian`, those of joints by `getJointJacobian`.
         """
         pin = self._pin
-        if len(x.frames) == 1 and not x.joints:
+        if len(x.frames) == 1 and not (x.joints or x.divided):
             (one,), wanted = self._ids(x), self._reference(x.reference)
             found = self._each(pin.computeFrameJacobian, self._inputs(x, 1), one, wanted)
             J = _stacked(lambda n: list(islice(found, n)), len(x.q), 1, 6, self._model.nv)
