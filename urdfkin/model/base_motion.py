@@ -20,8 +20,9 @@ class BaseMotion:
     fields store the numbers without changes, because Pinocchio receives the same numbers in a comparison.
 
     Attributes:
-        placement: (..., 4, 4) T_world_base. Its rotation may be rounded, with as few as one digit; the
-            computation uses the nearest rotation (`urdfkin.kinematics.rotation.nearest_rotation`).
+        placement: (..., 4, 4) T_world_base. Its rotation matrix may be rounded, even to one digit; the
+            computation uses the nearest exact rotation matrix
+            (`urdfkin.kinematics.rotation.nearest_rotation`).
         velocity: (..., 6) [linear; angular] of the base's origin, world axes, m/s and rad/s.
         acceleration: (..., 6) [linear; angular], classical, world axes, m/s^2 and rad/s^2.
 
@@ -76,9 +77,9 @@ class BaseMotion:
         )
 
     def state(self, batch_shape: tuple[int, ...]) -> FloatArray:
-        """Return rows [R, p, w, v, alpha, a], (n, 24), for the compiled kernels.
+        """Return the base motion as rows [R, p, w, v, alpha, a], (n, 24), for the compiled kernels.
 
-        Without batch axes, n is 1.
+        If the fields have no batch axes, n is 1.
 
         >>> BaseMotion().state(()).shape
         (1, 24)
@@ -102,7 +103,7 @@ STILL_STATE = frozen(STILL.state(()))
 
 
 def against_gravity(state: FloatArray, gravity: FloatArray) -> FloatArray:
-    """Return the base state (1 or n, 24) in a world that is accelerated by -gravity (3,).
+    """Subtract gravity (3,), m/s^2, from the linear acceleration of base states (1 or n, 24).
 
     An accelerometer on a fixed base under gravity has the same readings as an accelerometer on this
     accelerated base without gravity.

@@ -37,12 +37,12 @@ class ChainJoint:
     Attributes:
         name: Name in the URDF.
         kind: Revolute, continuous or prismatic.
-        backwards: Whether the path passes it from its child link to its parent link.
-        T_previous_joint: (4, 4) pose of the joint's frame before its own motion. Its z is the joint's axis,
-            reversed if `backwards`. The pose is relative to the previous joint's frame after that joint's
-            motion; for the first joint, relative to the base.
-        limit: Its limits; None without limits.
-        mimic: Its mimic rule; None if it has its own coordinate.
+        backwards: Whether the path passes the joint from the joint's child link to its parent link.
+        T_previous_joint: (4, 4) pose of the joint's frame before the joint's own motion. The z axis of this
+            frame is the joint's axis, reversed if `backwards`. The pose is relative to the previous joint's
+            frame after that joint's motion; for the first joint, relative to the base.
+        limit: Limits of the joint; None if the joint has no limits.
+        mimic: Mimic rule of the joint; None if the joint has its own coordinate.
     """
 
     name: str
@@ -55,7 +55,7 @@ class ChainJoint:
 
 @dataclass(frozen=True, repr=False)
 class FrameChain(Displayable):
-    """The joints between two frames, base to tip.
+    """The moving joints on the path from base to tip, and the constant poses between these joints.
 
     Placement:  T_base_tip(q) = A_0 M_1(q_1) A_1 M_2(q_2) ... M_n(q_n) A_n. The constants are A_{i-1} =
     `joints[i-1].T_previous_joint` and A_n = `T_last_tip`; M_i is a rotation about z or a translation along z.
@@ -68,8 +68,8 @@ class FrameChain(Displayable):
         T_last_tip: (4, 4) pose of the tip in the last joint's frame (in the base if no joint moves).
         lengths: (n + 1,) path lengths between joint origins, m, including the merged fixed joints. Entry k is
             an upper bound on the distance from joint k's origin to the next origin, for any rotations.
-        folded: (n + 1,) number of URDF joint poses, including those of fixed joints, whose product is each
-            constant.
+        folded: (n + 1,) for each constant A_k: the number of URDF joint poses that were multiplied to obtain
+            it. Poses of fixed joints count too.
 
     >>> import urdfkin
     >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
@@ -150,7 +150,7 @@ class FrameChain(Displayable):
 
     @cached_property
     def path(self) -> Path:
-        """The path A_0, M_1, A_1 ... M_n, A_n of constants and motions; the joint values are the amounts.
+        """The product A_0 M_1 A_1 ... M_n A_n as a `Path`, whose amounts are the joint values.
 
         >>> import urdfkin
         >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
@@ -162,7 +162,7 @@ class FrameChain(Displayable):
 
     @cached_property
     def reach(self) -> float:
-        """Sum (m) of the constant offsets between joints, with the tip offset, without the base offset.
+        """Sum (m) of the lengths of the constant offsets between joints, and from the last joint to the tip.
 
         >>> import urdfkin
         >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
@@ -172,7 +172,9 @@ class FrameChain(Displayable):
         return float(self.lengths[1:].sum())
 
     def frames(self, q: Given | None = None) -> FloatArray:
-        """Return poses (..., n + 1, 4, 4) in the base: each joint's frame before its motion, then the tip.
+        """Return the poses (..., n + 1, 4, 4) of all joint frames and of the tip in the base frame.
+
+        Each joint frame is the frame before the joint's motion.
 
         Args:
             q: (..., coordinates), ordered as `joint_names`; None for the zero configuration.
@@ -230,7 +232,7 @@ class FrameChain(Displayable):
 
 
 def _rule_text(joint: ChainJoint) -> list[str]:
-    """Return the mimic rule of a joint as text, in a list; empty without a rule."""
+    """Return a list with the mimic rule of a joint as text; the list is empty if the joint has no rule."""
     return [f"= {joint.mimic}"] if joint.mimic else []
 
 
@@ -273,7 +275,7 @@ def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
 
 
 def steps_between(tree: KinematicTree, tip: str, base: str) -> list[tuple[Joint, bool]]:
-    """Return the joints from `base` to `tip`, fixed ones too, each with whether the path passes it backwards.
+    """Return all joints from `base` to `tip`; True marks a joint that the path passes from child to parent.
 
     Raises:
         UnknownNameError: no frame has that name.
@@ -287,7 +289,10 @@ def steps_between(tree: KinematicTree, tip: str, base: str) -> list[tuple[Joint,
 
 
 def _poses_around(joint: Joint, backwards: bool) -> tuple[FloatArray, FloatArray]:
-    """Return the constant poses before and after a joint's motion about its own z, in path direction."""
+    """Return the constant poses before and after a joint's motion, in path order.
+
+    The motion itself is about or along z.
+    """
     if not joint.kind.has_axis:
         return (inverse(joint.T_parent_joint) if backwards else joint.T_parent_joint), np.eye(4)
     align = pose(axis_aligning(-joint.axis if backwards else joint.axis))

@@ -34,11 +34,11 @@ from urdfkin.model.tree import (
     is_bounded,
 )
 
-#: Tolerance of `from_pinocchio` (rad or m) for the coordinate of a mimic joint.
+#: Largest difference (rad or m) between a mimic joint's coordinate and its mimic rule in `from_pinocchio`.
 _MIMIC_TOLERANCE = 1e-9
 
 
-#: Suffix and unit of each number of a joint that has several.
+#: Suffix and unit of each number of a joint that has several numbers in q or v.
 _OF_Q = {
     JointKind.PLANAR: {"x": "m", "y": "m", "angle": "rad"},
     JointKind.FLOATING: {"x": "m", "y": "m", "z": "m", "qx": "", "qy": "", "qz": "", "qw": ""},
@@ -50,7 +50,7 @@ _OF_RATES = {
 
 
 def coordinate_names(tree: KinematicTree) -> tuple[str, ...]:
-    """Return a name for each number of `q`: the joint's name, with a suffix if the joint has several.
+    """Return a name for each number of `q`: the joint's name, with a suffix if the joint has several numbers.
 
     Example: `base.x`, `base.y`, ...; if another joint has such a name, `base:x`, `base:y`, ...
     """
@@ -58,14 +58,14 @@ def coordinate_names(tree: KinematicTree) -> tuple[str, ...]:
 
 
 def rate_names(tree: KinematicTree) -> tuple[str, ...]:
-    """Return a name for each number of `v` and `a`; planar and floating joints have several."""
+    """Return a name for each number of `v` and `a`; planar and floating joints have several numbers."""
     return tuple(name for name, _ in _names_and_units(tree, _OF_RATES))
 
 
 def _names_and_units(
     tree: KinematicTree, of: Mapping[JointKind, Mapping[str, str]]
 ) -> Iterator[tuple[str, str]]:
-    """Yield a name and a unit for each number; the names are unique and differ from every joint name."""
+    """Yield a unique name and a unit for each number; a name with a suffix differs from every joint name."""
     taken = set[str]()
     for joint in tree.joints:
         if not joint.nv:
@@ -82,7 +82,7 @@ def _names_and_units(
 
 
 def units(tree: KinematicTree, what: str) -> tuple[str, ...]:
-    """Return the unit of each number of "q", "v" or "a" without the time unit: "rad", "m", or "" for none."""
+    """Return the unit of each number of q, v or a: "rad", "m" or "" (no unit). The time unit is omitted."""
     return tuple(unit for _, unit in _names_and_units(tree, _OF_Q if what == "q" else _OF_RATES))
 
 
@@ -106,7 +106,7 @@ def places(tree: KinematicTree, what: str) -> CoordinateLayout:
 
 
 def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
-    """Return the joints without a coordinate, each with a hint for the message."""
+    """Return the names of joints that have no coordinate, each with a hint for the error message."""
     return {
         joint.name: Hint(
             f"it mimics {joint.mimic.leader}: give that value, or load with mimic=False (--no-mimic)",
@@ -122,7 +122,7 @@ def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
 
 
 def _other_lengths(tree: KinematicTree, what: str) -> dict[int, Hint]:
-    """Return Pinocchio's lengths of q or v that differ from urdfkin's, each with a hint for the message."""
+    """Return lengths of q or v in Pinocchio that differ from urdfkin's, each with a hint for a message."""
     follow = any(joint.mimic for joint in tree.joints)
     free = Hint(
         "leave out the mimic joints, which have no coordinate, or load with mimic=False (--no-mimic)",
@@ -184,13 +184,15 @@ def locked_values(
 
     Args:
         tree: The robot.
-        lock: A value for each joint to lock, as a mapping or text. With `joints`, a pose may come first.
-        joints: The joints that remain; all others are locked, at 0 unless `lock` has a value.
+        lock: A value for each joint to lock, as a mapping or text. If `joints` is given, the text may begin
+            with the name of a pose.
+        joints: Names of the joints that stay movable. Every other joint is locked at its value in `lock`, or
+            at 0 if `lock` has no value for it.
 
     Raises:
         UnknownNameError: there is no such joint or pose.
-        InputError: a joint has no single value, is a mimic joint, fixed or named twice; a value is not a
-            number or is outside the limits.
+        InputError: a joint to lock has several coordinates, is a mimic joint, is fixed or is named twice; or
+            a value is not a number or is outside the joint's limits.
     """
     layout = places(tree, "q")
     values, pose = layout.named(lock, "lock")
@@ -227,8 +229,11 @@ def locked_values(
 
 
 def _demand_within_limits(tree: KinematicTree, held: Mapping[str, float]) -> None:
-    """Check the limits of joints to lock, and of their mimic joints unless no value satisfies those."""
-    q = np.full(tree.nq, np.nan)  # no limit excludes NaN
+    """Check that locked joints are within their limits.
+
+    Joints that mimic a locked joint are checked too, if their limits can be satisfied.
+    """
+    q = np.full(tree.nq, np.nan)  # NaN is never outside a limit
     for name, value in held.items():
         q[tree.q_index[tree.joint_index(name)]] = value
     impossible = {name for one in narrowed_ranges(tree) if one.kept is None for name in one.by}
@@ -294,9 +299,9 @@ def numbers(tree: KinematicTree, value: Given, what: str) -> FloatArray:
 
 
 def shaped(tree: KinematicTree, value: Given, what: str, *, look: bool = True) -> FloatArray:
-    """Return the same as `numbers`, with unit quaternions; raises InputError.
+    """Return the result of `numbers` with quaternions of norm 1; raises InputError.
 
-    With `look`, values of q that look like degrees cause a `DegreesWarning`.
+    If `look` is true, values of q that look like degrees cause a `DegreesWarning`.
     """
     array = numbers(tree, value, what)
     if what != "q":
@@ -307,7 +312,7 @@ def shaped(tree: KinematicTree, value: Given, what: str, *, look: bool = True) -
 
 
 def checked(tree: KinematicTree, value: Given, what: str, *, look: bool = True) -> FloatArray:
-    """Return the same as `shaped`; raises NotFiniteError as well if a number is not finite."""
+    """Return the result of `shaped`; raises NotFiniteError if a number is not finite."""
     array = shaped(tree, value, what, look=look)
     if not np.isfinite(array).all():
         where = np.argwhere(~np.isfinite(array))[0]
@@ -322,12 +327,15 @@ def _names(tree: KinematicTree, what: str) -> tuple[str, ...]:
 
 
 def limit_violations(tree: KinematicTree, q: FloatArray) -> list[str]:
-    """Return one line for each joint, mimic joints too, that is outside its limits in a batch (..., nq)."""
+    """Return a line of text for each joint outside its limits in a batch `q` (..., nq).
+
+    Mimic joints are checked too.
+    """
     return [words for _, words in _violations(tree, q)]
 
 
 def _violations(tree: KinematicTree, q: FloatArray) -> Iterator[tuple[Joint, str]]:
-    """Yield each joint that is outside its limits, with the line of `limit_violations`."""
+    """Yield each joint that is outside its limits, with its line of text for `limit_violations`."""
     for joint, values in zip(tree.joints, _own_values(tree, q), strict=True):
         if values is None or joint.limit is None or not values.size:
             continue
@@ -355,13 +363,13 @@ def _degrees(joint: Joint, value: float) -> str:
     return f"; degrees? write {value:.6g}deg"
 
 
-#: Number of configurations of a batch in which `warn_of_degrees` looks. A batch has one unit, so some of its
-#: configurations are enough.
+#: Number of configurations of a batch that `warn_of_degrees` examines. All configurations of a batch have the
+#: same unit, so a few of them are enough.
 _LOOKED_AT = 16
 
 
 def degrees_lines(tree: KinematicTree, q: FloatArray) -> list[str]:
-    """Return the lines of `limit_violations` for values that look like degrees, in at most 16 of the rows.
+    """Return the lines of `limit_violations` for values that look like degrees, in at most 16 configurations.
 
     Args:
         tree: The robot.
@@ -389,7 +397,7 @@ def warn_of_degrees(tree: KinematicTree, q: FloatArray) -> None:
 
 
 def _own_values(tree: KinematicTree, q: FloatArray) -> Iterator[FloatArray | None]:
-    """Yield the value of each joint that has an axis, None for the others."""
+    """Yield the value of each joint that has an axis, and None for each joint without an axis."""
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         if not joint.kind.has_axis:
             yield None
@@ -403,14 +411,14 @@ def _own_values(tree: KinematicTree, q: FloatArray) -> Iterator[FloatArray | Non
 
 
 def pinocchio_coordinates(joint: Joint, own: FloatArray) -> FloatArray:
-    """Return Pinocchio's coordinates (..., k) of one joint, from urdfkin's (..., joint.kind.nq)."""
+    """Convert one joint's coordinates (..., joint.kind.nq) to Pinocchio's coordinates (..., k)."""
     if joint.kind.nq_pinocchio == joint.kind.nq:
         return own
     return np.concatenate((own[..., :-1], np.cos(own[..., -1:]), np.sin(own[..., -1:])), axis=-1)
 
 
 def pinocchio_blocks(tree: KinematicTree, q: FloatArray, *, mimic: bool) -> Iterator[tuple[int, FloatArray]]:
-    """Yield the index and the coordinates of each joint that has coordinates in Pinocchio's model, in order.
+    """Yield each joint that has coordinates in Pinocchio's model: its index, and these coordinates.
 
     Args:
         tree: The robot.

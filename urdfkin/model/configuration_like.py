@@ -56,7 +56,8 @@ class CoordinateLayout:
         spans: For each joint with several numbers: the index of the first number, and the count of numbers.
         poses: Returns the named poses. `poses`, `otherwise` and `lengths` are called only when needed.
         otherwise: Returns a hint for each name that is not a coordinate, such as a fixed joint.
-        lengths: Returns a hint for each wrong length that users often pass, such as Pinocchio's.
+        lengths: Returns a hint for each wrong length that users often pass, such as the length of q in
+            Pinocchio.
     """
 
     what: str
@@ -68,10 +69,10 @@ class CoordinateLayout:
     lengths: Callable[[], Mapping[int, Hint]] = dict
 
     def read(self, value: str | Mapping[str, ArrayLike], where: str | None = None) -> FloatArray:
-        """Return the numbers (..., numbers) of a text or a mapping.
+        """Return the numbers (..., n) of q, v or a that a text or a mapping describes.
 
         Args:
-            value: Text or mapping as described in the module.
+            value: Text or mapping, as the module's docstring describes.
             where: Name of the input in messages.
 
         Raises:
@@ -96,7 +97,7 @@ keeps: 'neutral, elbow=...'
     def named(
         self, value: str | Mapping[str, ArrayLike], where: str
     ) -> tuple[dict[str, ArrayLike], FloatArray | None]:
-        """Return the values by name of a text or mapping, and the pose that the text begins with, or None.
+        """Return the values by name in a text or mapping, and the named pose that begins the text or None.
 
         Raises:
             InputError: the text has numbers without names, or a name twice.
@@ -133,11 +134,11 @@ keeps: 'neutral, elbow=...'
         return not is_pose and all(_pair(cell)[0] is None for cell in cells)
 
     def demand_names(self, names: Sequence[str], where: str) -> None:
-        """Check that each name is a coordinate or a joint with several.
+        """Check that each name is that of a coordinate, or of a joint with several coordinates.
 
         Raises:
             UnknownNameError: there is no such coordinate.
-            InputError: the name is that of a fixed joint or a mimic joint, or not a text.
+            InputError: a name is that of a fixed joint or a mimic joint, or a name is not a string.
         """
         for name in names:
             if not isinstance(name, str) or (name not in self.names and name not in self.spans):
@@ -184,7 +185,10 @@ keeps: 'neutral, elbow=...'
         return out
 
     def _of_a_joint(self, name: object, value: ArrayLike, where: str) -> dict[int, FloatArray]:
-        """Return the numbers, by index, of a joint that has several; raises an error for any other name."""
+        """Return the numbers of a joint with several coordinates, by index.
+
+        Raises an error for another name.
+        """
         if not isinstance(name, str) or name not in self.spans:
             raise self._not_a_coordinate(name, where)
         at, size = self.spans[name]
@@ -195,7 +199,7 @@ keeps: 'neutral, elbow=...'
         return {at + k: x[..., k] for k in range(size)}
 
     def _not_a_coordinate(self, name: object, where: str) -> InputError | UnknownNameError:
-        """Return the error for a name that has no number."""
+        """Return the error for a name that belongs to no coordinate."""
         kind = {"q": "coordinate", "v": "joint velocity"}.get(self.what, "joint acceleration")
         if not isinstance(name, str):
             return InputError(f"the name of a {kind} must be text", where=where, found=safe_repr(name))
@@ -240,7 +244,7 @@ keeps: 'neutral, elbow=...'
 
 
 def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
-    """Return a text or mapping as it is, a table with labels as a mapping, and None for numbers in order.
+    """Return a text or mapping unchanged, a table with labels as a mapping, and None for numbers in order.
 
     Raises:
         InputError: a label occurs twice, or `value` is a list of tables with labels.

@@ -119,7 +119,7 @@ def _about_z(angle: FloatArray) -> FloatArray:
 
 
 def _V(w: FloatArray) -> FloatArray:
-    """Return the matrix V(w), (..., 3, 3), of the module's description."""
+    """Return the matrix V(w), (..., 3, 3), which the module's docstring defines."""
     square = (w * w).sum(axis=-1)[..., np.newaxis, np.newaxis]
     angle, W = np.sqrt(square), skew(w)
     half = np.sinc(angle / (2.0 * math.pi))

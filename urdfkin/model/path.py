@@ -4,12 +4,12 @@
 
 Chains, Denavit-Hartenberg tables, screws, and the models that `dh --compare` and `calibrate` fit have this
 form. Only the meaning of the amounts x_k differs: joint values, cells of a table, or parameters. The
-derivative of the last pose with respect to an amount is a twist. Let e be the axis of the motion and O a
-point of this axis, in the frame before the path. The twist is then
+derivative of the pose at the path's end with respect to an amount is a twist. Let e be the axis of the motion
+and O a point of this axis, in the frame before the path. The twist is then
 
     rotation   dp/dx = e x (p - O),   w = e;       translation   dp/dx = e,   w = 0
 
-It is a column of the Jacobian in equation 7.85.
+This twist is a column of the Jacobian in equation 7.85.
 """
 
 from __future__ import annotations
@@ -70,11 +70,11 @@ class Path:
         return frames
 
     def poses(self, amounts: ArrayLike) -> FloatArray:
-        """Return the last pose (..., 4, 4) for amounts (..., motions)."""
+        """Return the pose (..., 4, 4) at the end of the path for amounts (..., motions)."""
         return np.ascontiguousarray(self.frames(amounts)[..., -1, :, :])
 
     def columns(self, amounts: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return the last pose and its Jacobian (..., 6, motions), [linear; angular], for given amounts.
+        """Return the pose at the path's end, and its Jacobian (..., 6, motions), [linear; angular].
 
         Each column is the derivative with respect to one amount.
         """

@@ -26,7 +26,10 @@ def pose(R: ArrayLike | None = None, p: ArrayLike | None = None) -> FloatArray:
 
 
 def is_rigid(T: FloatArray, tolerance: float) -> bool:
-    """Return whether a matrix (4, 4) is a rigid transform; its rotation must be one within the tolerance."""
+    """Return whether a matrix (4, 4) is a rigid transform.
+
+    Its upper left block must be a rotation within `tolerance`.
+    """
     return bool(rotation_defect(T[:3, :3]) <= tolerance) and T[3].tolist() == [0.0, 0.0, 0.0, 1.0]
 
 

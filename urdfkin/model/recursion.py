@@ -16,7 +16,7 @@ Number = Any
 Vector = tuple[Number, Number, Number]
 Matrix = tuple[Vector, Vector, Vector]
 Six = tuple[Number, ...]
-#: The coordinates, joint velocities or joint accelerations of a joint, from the joint's first one on.
+#: Numbers of q, v or a; the first number in the sequence is the first number of the joint.
 Numbers = Sequence[Number]
 
 ZERO: Vector = (0, 0, 0)
@@ -49,7 +49,7 @@ class Column:
         carrier: State of the frame that carries the joint's axis.
         order: Index of the column on the path.
         place: Index of the joint velocity in v.
-        factor: Factor on that joint velocity (the multiplier of a mimic joint).
+        factor: Factor by which this joint velocity is multiplied: the multiplier of a mimic joint.
     """
 
     z: Vector
@@ -62,7 +62,7 @@ class Column:
 
 @dataclass(eq=False)
 class Recursion:
-    """The steps of the recursion. Each step computes the state of the next link from that of a link.
+    """The steps of the recursion. Each step computes a link's state from that of the link before it.
 
     Attributes:
         eq: The equations.
@@ -80,7 +80,7 @@ class Recursion:
         return x if self.own else self.eq.rotate(s.R, x)
 
     def carried(self, s: State, d: Vector) -> State:
-        """Return the state of the link's point at d: 7.58, 7.128, 7.130."""
+        """Return the state of the link's point at the offset d (equations 7.58, 7.128, 7.130)."""
         eq, lever = self.eq, self.seen(s, d)
         vel, acc = eq.point_velocity(s.vel, s.w, lever), eq.point_acceleration(s.acc, s.alpha, s.w, lever)
         return replace(s, p=eq.point_position(s.p, s.R, d), vel=vel, acc=acc)
@@ -203,7 +203,7 @@ class Recursion:
     def hessian(
         self, s: State, columns: Sequence[Column], reference: Reference
     ) -> Iterator[tuple[int, int, Number, Six]]:
-        """Yield each derivative of a Jacobian column by a joint velocity.
+        """Yield the change of each Jacobian column per unit of motion of each joint.
 
         Each item consists of the column's index, the index of the joint velocity in v, a factor and the
         derivative.
@@ -216,11 +216,11 @@ class Recursion:
                 yield of.place, by.place, of.factor * by.factor, self.in_reference(s, reference, *change)
 
     def _change(self, six: Any, by: Any, reference: Reference, *, before: bool) -> tuple[Vector, Vector]:
-        """Return the derivative of a column by a joint velocity.
+        """Return the change of a Jacobian column per unit of motion of a joint.
 
         Args:
             six: The column.
-            by: The column of the joint whose velocity is meant.
+            by: The Jacobian column of the joint that moves.
             reference: The reference frame.
             before: Whether the moving joint is the joint of the column `six`, or is before it on the path.
         """

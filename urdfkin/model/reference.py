@@ -11,8 +11,8 @@ from urdfkin.errors.validators import safe_repr
 class Reference(IntEnum):
     """The three reference frames, with Pinocchio's names.
 
-    Each member has the number that the compiled kernels use. It also has two properties: the axes and the
-    point of the results.
+    Each member has the number that the compiled kernels use. Two properties of a member define the axes and
+    the point of the results.
 
     * `LOCAL`: the frame's own origin, in the frame's axes.
     * `WORLD`: the point of the moving body that is now at the world's origin, in the world's axes.

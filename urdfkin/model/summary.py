@@ -69,7 +69,10 @@ class Joints(dict[str, Joint], Displayable):
 
 
 def guides(tree: KinematicTree) -> Iterator[str]:
-    """Yield the tree lines before each link name, root first; empty before an only child."""
+    """Yield the line characters that draw the tree before each link name, root first.
+
+    An only child gets none.
+    """
     children = [0] * len(tree.links)
     for joint in tree.joints:
         children[joint.parent] += 1
@@ -104,7 +107,7 @@ def _place(letter: str, at: int, count: int) -> str:
 
 
 def axis_words(axis: Sequence[float]) -> str:
-    """Return a joint's axis as text: `z`, `-x`, or three numbers if it is not an axis of the frame.
+    """Return a joint's axis as text: `z`, `-x`, or three numbers if it is not along a frame axis.
 
     >>> axis_words((0.0, -1.0, 0.0)), axis_words((0.0, 0.6, 0.8))
     ('-y', '0 0.6 0.8')

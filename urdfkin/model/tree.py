@@ -1,7 +1,7 @@
 """The robot model: a tree of links and joints, with the joint limits and mimic rules of the URDF.
 
 `KinematicTree` depends neither on XML nor on Pinocchio. Its links and joints are in Pinocchio's order (depth
-first, sibling joints by name), so `q` and `v` have the same order in both.
+first, sibling joints by name), so `q` and `v` have the same order in urdfkin and in Pinocchio.
 """
 
 from __future__ import annotations
@@ -52,9 +52,9 @@ class JointKind(Enum):
 
     nq: int  #: Number of coordinates of a joint of this kind in `q`.
     nv: int  #: Number of entries of a joint of this kind in `v` and `a`.
-    nq_pinocchio: int  #: Number of its coordinates in Pinocchio's layout, with (cos, sin) for a free angle.
-    has_axis: bool  #: Whether the joint moves about or along its axis.
-    turns: bool  #: Whether the joint rotates about its axis.
+    nq_pinocchio: int  #: Number of coordinates in Pinocchio, which stores a free angle as (cos, sin).
+    has_axis: bool  #: Whether a joint of this kind has an axis about or along which it moves.
+    turns: bool  #: Whether a joint of this kind rotates about its axis.
     bounded: bool  #: Whether a URDF gives such a joint a lower and an upper limit.
 
     def __new__(cls, word: object, *properties: Any) -> JointKind:
@@ -91,7 +91,7 @@ _OUTSIDE, _OF_RANGE = 0.5, 0.25
 
 
 def far_outside(lower: float, upper: float) -> tuple[float, float]:
-    """Return the ends beyond which a value is far outside the limits.
+    """Return the two values beyond which a joint value is far outside its limits.
 
     >>> far_outside(-2.0, 2.0), far_outside(-float("inf"), 2.0)
     ((-3.0, 3.0), (-inf, 2.0))
@@ -133,11 +133,11 @@ class Joint:
         T_parent_joint: (4, 4) pose of the joint frame in the parent link's frame at q = 0, in metres. The
             child link's frame is the joint frame after the motion.
         axis: (3,) unit axis in the joint frame; (1, 0, 0) if the kind has no axis.
-        limit: Its limits; None without limits.
-        mimic: Its mimic rule; None if it has its own coordinate.
-        tilt: Angle (rad) between Pinocchio's axis and this one (URDF514), usually 0. No result uses it;
-            differences from Pinocchio may be larger by this amount.
-        lock: The moving joint of the URDF, if this joint is that one, fixed at a value.
+        limit: Limits of the joint; None if the joint has no limits.
+        mimic: Mimic rule of the joint; None if the joint has its own coordinate.
+        tilt: Angle (rad) between the joint's axis in Pinocchio and `axis` (URDF514), usually 0. No result of
+            urdfkin uses this angle, but differences from Pinocchio may be larger by it.
+        lock: If this joint is a moving joint of the URDF that the user fixed: that joint and its value.
     """
 
     name: str
@@ -166,12 +166,12 @@ class Joint:
 
     @property
     def nq(self) -> int:
-        """Number of its own coordinates; 0 for a fixed joint or a mimic joint."""
+        """Number of the joint's own coordinates; 0 for a fixed joint or a mimic joint."""
         return 0 if self.mimic else self.kind.nq
 
     @property
     def nv(self) -> int:
-        """Number of its own joint velocities; 0 for a fixed joint or a mimic joint."""
+        """Number of the joint's own velocities; 0 for a fixed joint or a mimic joint."""
         return 0 if self.mimic else self.kind.nv
 
     @property
@@ -181,7 +181,10 @@ class Joint:
 
     @property
     def length(self) -> float:
-        """Length (m) of the offset from its parent link, and of the displacement of a locked slide."""
+        """Length (m) of the joint's offset from its parent link.
+
+        The displacement of a locked prismatic joint is added.
+        """
         # A URDF may contain 1e-200 or 1e200, whose squares underflow or overflow; hypot avoids this.
         own = math.hypot(*self.unlocked.T_parent_joint[:3, 3].tolist())
         return (
@@ -195,7 +198,7 @@ class Lock:
 
     Attributes:
         joint: The joint as the URDF describes it.
-        q: Its coordinate, rad or m; of a mimic joint the coordinate of its mimicked joint.
+        q: Coordinate of the joint, rad or m; for a mimic joint, the coordinate of the joint that it mimics.
     """
 
     joint: Joint
@@ -216,7 +219,7 @@ class Lock:
         T, axis, value = np.eye(4), self.joint.axis, self.value
         if not self.joint.kind.turns:
             T[:3, 3] = value * axis
-        elif np.count_nonzero(axis) == 1:  # no rounding in the zeros and ones
+        elif np.count_nonzero(axis) == 1:  # the zeros and ones of this rotation are exact
             k = int(np.flatnonzero(axis)[0])
             T[:3, :3] = coordinate_rotation(k, np.array(axis[k] * value))
         else:
@@ -224,7 +227,7 @@ class Lock:
         return T
 
     def fixed(self) -> Joint:
-        """Return the joint as a fixed joint at its value."""
+        """Return the locked joint as a fixed joint at its value."""
         joint = self.joint
         T = joint.T_parent_joint @ self.motion
         return replace(joint, kind=JointKind.FIXED, T_parent_joint=T, limit=None, mimic=None, lock=self)
@@ -238,7 +241,7 @@ class KinematicTree:
         name: The robot's name.
         links: Link names; `links[0]` is the root and `links[i + 1]` the child of `joints[i]`.
         joints: Every joint, fixed ones too; the parent link of a joint always comes before its child link.
-        poses: Named poses: a value for some of the joints. They do not affect the motion.
+        poses: Named poses, each with values for some of the joints. Named poses do not affect the motion.
 
     Raises:
         InputError: the joint order is wrong, a name is not unique, or a mimic rule is invalid.
@@ -313,7 +316,7 @@ class KinematicTree:
 
     @cached_property
     def plausible_angles(self) -> FloatArray:
-        """(2, nq) ends beyond which a value cannot be an angle in radians; infinite for other coordinates."""
+        """Lower and upper ends (2, nq) of plausible angles in radians; infinite for all other coordinates."""
         ends = np.tile([[-np.inf], [np.inf]], self.nq)
         for joint, at in zip(self.joints, self.q_index, strict=True):
             if joint.nq == 1 and joint.kind.turns and is_bounded(joint.limit):
@@ -323,7 +326,7 @@ class KinematicTree:
 
     @cached_property
     def least_implausible(self) -> float:
-        """Smallest size of the numbers of `plausible_angles`; infinite without such a number."""
+        """Smallest absolute value in `plausible_angles`; infinite if the robot has no such value."""
         return float(np.abs(self.plausible_angles).min(initial=np.inf))
 
     # -- names ---------------------------------------------------------------------------------------
@@ -372,8 +375,8 @@ class KinematicTree:
     def frame_link(self, name: str) -> int:
         """Return the index of the link that carries the frame `name`.
 
-        A link or joint with exactly this name is found first. Otherwise `link:NAME` and `joint:NAME` select
-        one of the two.
+        A link or joint with exactly this name is found first. Otherwise `link:NAME` selects the link and
+        `joint:NAME` the joint.
 
         Raises:
             UnknownNameError: nothing has this name; the message lists the nearest names.
@@ -419,12 +422,15 @@ class KinematicTree:
         return None
 
     def _unambiguous(self, *names: FrameName) -> list[str]:
-        """Return, in a list, the first of some frame names that is not the own name of a link or joint."""
+        """Return a list with the first of the given frame names that is not the name of a link or joint."""
         known = self._link_index.keys() | self._joint_index.keys()
         return [str(name) for name in names if name not in known][:1]
 
     def frame_name(self, link: int) -> str:
-        """Return a name that `frame_link` resolves to this link: its own, or a `LinkFrame` if ambiguous."""
+        """Return a name that `frame_link` resolves to this link.
+
+        If the link's own name is ambiguous, the result is a `LinkFrame`.
+        """
         name = self.links[link]
         joint = self._joint_index.get(name)
         return name if joint is None or joint + 1 == link else self.link_frames[link]
@@ -448,7 +454,7 @@ class KinematicTree:
 def with_root_joint(tree: KinematicTree, kind: JointKind) -> KinematicTree:
     """Return the tree with a new root link `universe` and a joint `root_joint` to the old root link.
 
-    Both names are Pinocchio's.
+    Pinocchio uses the same two names.
 
     Args:
         tree: The robot.
@@ -473,14 +479,14 @@ def with_tilts(tree: KinematicTree, tilts: Mapping[str, float]) -> KinematicTree
 
 
 def with_poses(tree: KinematicTree, poses: Mapping[str, Mapping[str, float]]) -> KinematicTree:
-    """Return the tree with named poses, without the values for joints that do not have one coordinate."""
+    """Return the tree with named poses; values for joints without exactly one coordinate are left out."""
     own = {joint.name for joint in tree.joints if joint.nq == 1}
     kept = {pose: {name: x for name, x in of.items() if name in own} for pose, of in poses.items()}
     return replace(tree, poses=kept)
 
 
 def with_locks(tree: KinematicTree, values: Mapping[str, float]) -> KinematicTree:
-    """Return the tree with some joints fixed at a value, with their mimic joints.
+    """Return the tree with some joints, and the joints that mimic them, fixed at given values.
 
     Args:
         tree: The robot.
@@ -505,7 +511,8 @@ def build_tree(name: str, root: str, joints: Sequence[tuple[Joint, str, str]]) -
     Args:
         name: The robot's name.
         root: The root link.
-        joints: (joint, parent link, child link) in any order; the `parent` index inside is ignored.
+        joints: Triples (joint, parent link, child link) in any order; the attribute `parent` of a joint is
+            ignored.
 
     Raises:
         InputError: a joint cannot be reached from the root.

@@ -1,4 +1,4 @@
-"""The alignment of two mechanisms A and B: the matched joints and frames, and the differences of each pair.
+"""The alignment of two mechanisms A and B: the matched joints and frames, and the differences between them.
 
 The matcher starts from a body of A that corresponds to a body of B. Let G be the rigid motion that moves a
 body of A, in A's zero configuration, to the corresponding body of B in B's zero configuration. A joint of A
@@ -9,9 +9,9 @@ motion L is inserted before some joints and some axes are different:
 
     T_A = exp(S_1 t_1) ... exp(S_n t_n) H,      T_B = L_1 exp(S'_1 t'_1) ... L_n exp(S'_n t'_n) L H,
 
-with S'_i = S_i, t'_i = t_i and L_i = 1 where nothing differs. The two models have the same motion if and only
-if nothing differs. There is one exception: two revolute joints on a common line can divide the sum of their
-rotations differently.
+with S'_i = S_i, t'_i = t_i and L_i = 1 for each joint at which A and B agree. The two models have the same
+motion if and only if nothing differs. There is one exception: two revolute joints on a common line can divide
+the sum of their rotations differently.
 
 **Variables.** The joint values of both models are linear functions of shared variables. Each coordinate of A
 is a variable. The coordinates of B are computed from these variables, with the senses and zeros of the
@@ -53,17 +53,20 @@ class Step:
         b: Joint of B (index in its tree).
         kind: Kind of motion: "turns" (revolute), "prismatic", "planar" or "floating".
         previous: Index of the step for the joint pair before this one on the path; -1 if there is none.
-        sense: +1 or -1; `offset` states its meaning.
+        sense: +1 if the values of the two joints increase together, -1 if one value decreases while the other
+            increases.
         offset: B's value is sense * A's value + offset, rad or m.
         before: (4, 4) the rigid motion L that is inserted before B's joint, in A's zero configuration.
-        axis: Screw of A's joint in the zero configuration, for the motion of the body farther from the base.
-        other: Screw of B's joint, in the same form; it is the object `axis` itself if the two screws agree.
+        axis: Screw of A's joint in the zero configuration; its sign is that for the motion of the body
+            farther from the base.
+        other: Screw of B's joint, with the same rule for its sign. If the two screws agree, `other` is the
+            same Python object as `axis`.
         tilt: Angle (rad) between the axes of the two joints, or between the normals of two planar joints.
         shift: Distance (m) between the axes of the two joints; for planar or floating joints, between the
             origins of their frames.
         conversion: Converts the coordinates of A's planar or floating joint to those of B's joint; None if
             the coordinates are equal.
-        unlike: "a" or "b" if the joint is fixed in that model and moves in the other, "kind" if the kinds of
+        unlike: "a" if the joint is fixed only in A, "b" if it is fixed only in B, "kind" if the kinds of
             motion differ; else "".
     """
 
@@ -172,7 +175,7 @@ class Alignment:
 
     @property
     def inner_off(self) -> tuple[float, float]:
-        """Smallest and largest difference (m) between matched axes, or matched links with joints.
+        """Smallest and largest difference (m) of matched joint axes, and of matched links that carry joints.
 
         Pairs that agree are not counted. If all pairs agree, the two results are 0.
         """
@@ -192,7 +195,7 @@ class Alignment:
     def gauge(self) -> Gauge:
         """The free choices of this alignment.
 
-        They contain no joint orders, because `b` already has the chosen order.
+        The free choices contain no joint orders, because the joints of `b` are already in the chosen order.
         """
         joints = self.a.tree.joints
         return Gauge(
@@ -203,10 +206,10 @@ class Alignment:
         )
 
     def exchangeable(self, given: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
-        """Yield two joint pairs at one body that could exchange their partners.
+        """Yield joint pairs of the same body, two at a time, that could exchange their partners in B.
 
-        The user named no partner for their joints of A, and B has no joint of the same name. Each pair is on
-        the path to a difference.
+        The user named no partner for the joints of A in these pairs, and B has no joints with the same names.
+        Each of the pairs is on the path to a joint or link that differs.
         """
         known_names = {joint.name for joint in self.b.tree.joints} | set(given)
         ends = [i for i, step in enumerate(self.steps) if step.differs]
@@ -258,16 +261,16 @@ class Alignment:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gauge:
-    """Prescribed values of the free choices: the pose of B's root, and each joint's sense and zero.
+    """Prescribed values of the free choices: the pose of B's root, and the sense and zero of each joint.
 
     Attributes:
         base: A link of A and a link of B. The matcher begins at the bodies of these links; None: it chooses
             the bodies by names.
         X: (4, 4) pose of B's root in A's root frame.
-        zeros: Sense and offset of each joint of A for which they are not (1, 0.0).
+        zeros: Sense and offset of each joint of A whose sense and offset differ from (1, 0.0).
         conversions: For each planar or floating joint of A whose coordinates differ from those in B: the
             conversion from A's coordinates to B's.
-        orders: New orders of consecutive joints of B. Each entry is one such series of joints in its new
+        orders: New orders of consecutive joints of B. Each entry lists some consecutive joints in their new
             order.
     """
 
@@ -292,7 +295,7 @@ class Line:
     constant: float
 
     def moved(self, slope: float, constant: float) -> Line:
-        """Return the linear function slope * self + constant."""
+        """Return this linear function, multiplied by `slope` and then increased by `constant`."""
         return Line(self.variable, slope * self.slope, slope * self.constant + constant)
 
     def at(self, values: Mapping[str, float | FloatArray]) -> float | FloatArray:
@@ -306,7 +309,7 @@ class Pair:
 
     a: Line
     b: Line
-    #: Sense and offset that convert the value `b` to the value of B's own joint: sense * b + offset.
+    #: Sense and offset for the value of B's joint in B's own coordinates, which is sense * b + offset.
     written: Line
     #: Difference of the two constants (rad or m) that counts as rounding, in addition to the rounding of one
     #: step.
@@ -330,7 +333,8 @@ class Variables:
         freer_a: Indices of the steps whose joint is independent in A and a mimic joint in B.
         freer_b: Indices of the steps whose joint is independent in B and a mimic joint in A.
         rules: Indices of the steps with different mimic rules in A and B.
-        leaders: Each coordinate of B as a linear function of a variable, by joint name.
+        leaders: For each coordinate of B, by joint name: the linear function that computes the coordinate
+            from a variable.
     """
 
     pairs: tuple[Pair | None, ...]
@@ -442,10 +446,10 @@ class _Maker:
     def _alike(self, a: Line, b: Line) -> bool:
         """Return whether two linear functions differ by rounding only.
 
-        The constant of a mimic rule depends on the zeros of two joints. Each zero is computed from poses at
-        the end of a path. The tolerance for the constants is therefore the sum of the rounding errors of all
-        steps of the path. A slope does not depend on a zero, so its tolerance is the rounding error of one
-        step.
+        The constant of a mimic rule depends on the zeros of two joints. Each joint zero is computed from
+        poses at the end of a path. The tolerance for the constants is therefore the sum of the rounding
+        errors of all steps of the path. A slope does not depend on a zero, so its tolerance is the rounding
+        error of one step.
         """
         same = a.variable == b.variable or not (a.slope or b.slope)
         one = self._one_step(a)
@@ -455,7 +459,7 @@ class _Maker:
         return self.tolerance.angle * max(1.0, abs(line.slope), abs(line.constant))
 
     def _ranges(self, pairs: list[Pair | None]) -> dict[str, tuple[float, float]]:
-        """Return the range of each coordinate, from the limits of the joints that it moves.
+        """Return the range of each coordinate, computed from the limits of all joints that it moves.
 
         If a coordinate moves joints of both models, its range is the intersection of their limits, or A's
         limits if the intersection is empty. The limits of a mimic joint are used only for a coordinate that

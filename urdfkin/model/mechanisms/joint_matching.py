@@ -5,11 +5,11 @@ by geometry. Other functions yield candidate poses of a body and candidate zeros
 each candidate.
 
 Two subtrees match exactly if joint zeros exist with which every axis of one subtree coincides with an axis of
-the other. The angles of the two joints before the subtrees do not matter, because a zero can compensate for
-an angle. Whether the subtrees match therefore depends only on the two joints and on the directions and
-positions of the two joint axes. The result is computed once for each such case and then stored. The search
-therefore visits each pair of joints only a few times, even for long chains and for many joints with two
-possible zeros.
+the other. The angles of the two joints before the subtrees do not matter, because another choice of a joint's
+zero can compensate for an angle. Whether the subtrees match therefore depends only on the two joints and on
+the directions and positions of the two joint axes. The result is computed once for each such case and then
+stored. The search therefore visits each pair of joints only a few times, even for long chains and for many
+joints with two possible zeros.
 """
 
 from __future__ import annotations
@@ -86,9 +86,9 @@ class Pairing:
     def edges(
         self, bodies: tuple[int, int], via: Via, G: FloatArray, XC: FloatArray
     ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
-        """Return the pairs of the joints that follow two bodies, and the joints without a partner.
+        """Return the pairs of matched joints that follow two bodies, and the joints without a partner.
 
-        The joints without a partner are those of A, then those of B.
+        The joints of A without a partner and those of B without a partner are returned separately.
 
         Args:
             bodies: Of A and of B.
@@ -121,7 +121,7 @@ class Pairing:
     ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
         """Return the joint pairs found by name, and the joints that must be paired by geometry.
 
-        The latter are the joints of A, then those of B.
+        The joints of A and those of B that must be paired by geometry are returned separately.
         """
         if (known := self._by_names.get((bodies, via))) is None:
             known = self._by_names[bodies, via] = self._named_alike(bodies, via)
@@ -142,7 +142,7 @@ class Pairing:
     def all_lie_alike(self, bodies: tuple[int, int], X: FloatArray) -> bool:
         """Return whether each joint axis at a body of A coincides with an axis of B.
 
-        B's axes are those after the rigid motion X.
+        The axes of B are first moved by the rigid motion X.
         """
         at = np.eye(4)
         return all(
@@ -199,7 +199,7 @@ class Pairing:
     ) -> list[tuple[int, _JointGeometry]]:
         """Return the geometry of the joints whose partners the user did not name, with their indices.
 
-        The geometry is that after the rigid motion T.
+        The rigid motion T is applied to the joints first.
         """
         return [
             (i, _JointGeometry.of(mechanism, edge, T, self._signature(mechanism, body, edge)))
@@ -270,7 +270,7 @@ class _JointGeometry:
     def mismatch(self, other: _JointGeometry) -> tuple[float, float]:
         """Return the angle (rad) and the distance (m) between this joint's axis and another's.
 
-        The two joints are of the same kind.
+        The two joints must be of the same kind.
         """
         if self.kind == "planar":
             normals = (Screw(one.normal, one.normal) for one in (self, other))
@@ -325,7 +325,7 @@ class Axis:
 
 
 def zeros(u: Screw, ours: Axis, theirs: Axis, turns: bool) -> Iterator[float]:
-    """Yield rotations about u, or translations along u, that align the second axis with the first."""
+    """Yield angles about u, or distances along u, that align the axis `theirs` with the axis `ours`."""
     if not turns:
         heights = ours.height(u.direction), theirs.height(u.direction)
         if heights[0] is not None and heights[1] is not None:
@@ -361,11 +361,11 @@ def behind(
 
 
 def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
-    """Yield poses of B's root that align the first axis of B with that of A, and then the axes behind it.
+    """Yield poses of B's root that align the first axis of B with the first axis of A, then the later axes.
 
     After the first axis is aligned, a rotation about it and a translation along it are still free. The axes
     behind the first axis determine this rotation and this translation. If no axes follow, as for a rotor, the
-    other axes of the body determine them.
+    other axes of the same body determine the rotation and the translation.
     """
     firsts = _firsts((a, b), (None, None), bodies, ())
     for (ours, theirs), near, far in firsts:
@@ -389,7 +389,7 @@ def root_poses_by_siblings(
         a: One mechanism.
         b: The other mechanism.
         bodies: A body of A and a body of B, with several joints each.
-        alike: Whether a joint of A may be paired with a joint of B.
+        alike: Function that returns whether a joint of A may be paired with a joint of B.
     """
     edges = _with_axes(a, bodies[0])
     ours = [_axis(a, edge) for edge in edges]
@@ -445,9 +445,9 @@ def _guesses(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: boo
 def _firsts(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], near: tuple[Both[Axis], ...]
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
-    """Return pairs of first revolute axes, with the prismatic axes before each pair and the axes behind it.
+    """Return pairs of first revolute axes, one of A and one of B, with the axes before and behind each pair.
 
-    If there is no revolute axis, the pairs are those of the prismatic axes.
+    If there is no revolute axis, pairs of prismatic axes are returned.
     """
     found = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):
@@ -464,7 +464,7 @@ def _firsts(
 def _next_joints(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int]
 ) -> Iterator[Both[Edge]]:
-    """Yield all pairs of the joints that follow two bodies and are of the same kind.
+    """Yield all pairs of a joint of A and a joint of B that follow two bodies and are of the same kind.
 
     Joints without an axis are left out.
     """
@@ -626,7 +626,7 @@ class Congruence:
     def _rate(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> Rates:
         """Return the correspondence of the coordinates of two joints.
 
-        It is empty if one of the joints has no coordinate.
+        The result is empty if one of the two joints has no coordinate.
         """
         joints = self.a.joint(e), self.b.joint(f)
         if not self._rules or not joints[0].kind.has_axis:
@@ -663,7 +663,7 @@ class Congruence:
         return self.tolerance.holds(*self.pairing.mismatch(e, f, IDENTITY, X))
 
     def _same_case(self, e: Edge, X: FloatArray, other: FloatArray) -> bool:
-        """Return whether a joint can undo the difference between two poses of B's body before it."""
+        """Return whether a joint's motion can undo the difference of two poses of B's body before it."""
         kind = self.a.joint(e).kind
         if kind.nq > 1:
             return family(kind) == "floating" or self.tolerance.holds(*apart(X, other))

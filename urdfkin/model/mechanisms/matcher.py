@@ -96,7 +96,7 @@ class Place:
 
 
 class MechanismMatcher:
-    """Match the joints of two mechanisms, from a common body to their ends.
+    """Match the joints of two mechanisms, from a common body to the ends of all branches.
 
     Args:
         a: One mechanism.
@@ -196,7 +196,8 @@ class MechanismMatcher:
         """Yield pairs of bodies at which the matcher may begin, one of A and one of B.
 
         The first body is A's root body. Its partner is the body of B that has most link names in common with
-        it. If no body has, the partner is each body of B in turn.
+        it. If no body of B has a link name in common with A's root body, every body of B is tried as its
+        partner.
 
         If A's root body has no link names in common with B, B's root body is also yielded, with the body of A
         that has most link names in common. A's root may have no counterpart in B, for example before a
@@ -291,7 +292,7 @@ class MechanismMatcher:
             found.frames.append(FramePair(link_a, link_b, place.previous, home, end, angle, way))
 
     def _as_tools(self, place: Place, taken: list[tuple[int, int]]) -> FramePair | None:
-        """Return one link of each body as different end-effector frames, if no links of the bodies match."""
+        """If no links of two bodies match, return one link of each body as different end-effector frames."""
         ours, theirs = self._own_links(place)
         if taken or not ours or not theirs:
             return None
@@ -302,7 +303,7 @@ class MechanismMatcher:
     def _all_links(self, place: Place) -> list[tuple[int, int]]:
         """Return pairs of links with equal names, then pairs of links with equal poses.
 
-        The second kind contains only links whose names do not exist in the other model.
+        The pairs with equal poses contain only links whose names do not exist in the other model.
         """
         pairs = list(self.pairing.links(*place.bodies))
         taken = {j for _, j in pairs}
@@ -323,7 +324,7 @@ class MechanismMatcher:
         return ours, [j for j in self.b.bodies[place.bodies[1]] if names_b[j] not in names_a]
 
     def _step(self, place: Place, e: Edge, f: Edge, index: int, depth: int) -> tuple[Step, Place, Score]:
-        """Return the step over a pair of joints, the position behind the joints and its score."""
+        """Return the step over a pair of joints, the position behind the joints and that position's score."""
         kinds = family(self.a.joint(e).kind), family(self.b.joint(f).kind)
         via = e, f
         backwards = e.outer == place.bodies[0], f.outer == place.bodies[1]
@@ -380,7 +381,8 @@ class MechanismMatcher:
             tried = self._behind(there, at, homes[1], plane, self._by_axes(there.bodies))
         places = ((N, replace(there, XC=at @ N @ inverse(homes[1]))) for N in tried)
         N, moved, score = self._best(places, depth)
-        # In outward direction, P_b^(1 or -1) = M P_a^(1 or -1) N.
+        # P_a and P_b are the poses of the joint in A and in B, inverted if the path passes the joint
+        # backwards. Then P_b = M P_a N.
         pair = (inverse(N), inverse(M)) if backwards[1] else (M, N)
         before, behind = (IDENTITY if self.tolerance.holds(*apart(IDENTITY, T)) else T for T in pair)
         if before is IDENTITY and behind is IDENTITY and not back:
@@ -395,7 +397,7 @@ class MechanismMatcher:
         plane: FloatArray | None,
         poses_behind: Iterable[FloatArray],
     ) -> Iterator[FloatArray]:
-        """Yield candidates for the rigid motion N between B's joint frame and the body behind it.
+        """Yield candidates for the rigid motion N between B's joint frame and the body behind the joint.
 
         The candidates are the identity, N in the zero configuration, and motions that align a link or an
         axis.
@@ -476,7 +478,7 @@ class MechanismMatcher:
         return self._best(((offset, replace(there, G=G, XC=XC)) for offset, XC in moved), depth)
 
     def _best(self, choices: Iterable[tuple[_Free, Place]], depth: int) -> tuple[_Free, Place, Score]:
-        """Return the first choice with most agreements.
+        """Return the first choice with the most agreements.
 
         If several choices are equally good, the next `depth` joints decide.
 
@@ -555,14 +557,14 @@ def _best_of(scored: Sequence[tuple[_Free, Place, Score]]) -> tuple[_Free, Place
 def better(score: Score, than: Score) -> bool:
     """Return whether `score` is better than the score `than`.
 
-    It is better if it has more agreements, or equally many agreements and less than half the largest
-    difference.
+    A score with more agreements is better. Of two scores with equally many agreements, a score is better if
+    its largest difference is less than half of the other's.
     """
     return score[0] > than[0] or (score[0] == than[0] and score[1] < TWICE_AS_WELL * than[1])
 
 
 def _value_of(screw: Screw, T: FloatArray, *, turns: bool) -> float:
-    """Return the joint value at which a joint with this screw makes the rigid motion T."""
+    """Return the joint value (rad or m) for which the motion about this screw is the rigid motion T."""
     if turns:
         return turn_about(screw.direction, T[:3, :3])
     return float(screw.direction @ T[:3, 3])
@@ -595,7 +597,7 @@ def _all_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> list[
 
 
 def _normals_apart(at: FloatArray, seen: FloatArray) -> tuple[FloatArray, float, float]:
-    """Return the angle and the distance of two planes (`between`), for either direction of the normals."""
+    """Return the angle (rad) and the distance (m) between two planes; opposite normals count as equal."""
     start, end = (Screw(T[:3, 2], T[:3, 3]) for T in (at, seen))
     return between(start, end.reversed() if start.direction @ end.direction < 0.0 else end, turns=False)
 
@@ -646,7 +648,8 @@ def _orders_to_try(
 ) -> Iterator[Sequence[str]]:
     """Yield other orders of commuting joints of B.
 
-    If A has all names of these joints, the only order is A's. Otherwise all orders are yielded.
+    If A has joints with all these names, only the order of A's joints is yielded. Otherwise all orders are
+    yielded.
 
     Args:
         a: One mechanism.
@@ -666,9 +669,9 @@ def _orders_to_try(
 
 
 def _by_rules(best: Alignment) -> Alignment:
-    """Return the alignment with the zeros that the mimic rules determine.
+    """Return the alignment in which the mimic rules determine joint zeros.
 
-    If this alignment agrees less well than the given one, the given one is returned.
+    If this alignment agrees less well than the given alignment, the given alignment is returned.
     """
     zeros = zeros_by_rules(best, tolerance_of(best.a, best.b))
     if not zeros:
@@ -681,7 +684,8 @@ def _by_rules(best: Alignment) -> Alignment:
 def _exchanged(best: Alignment, given: Mapping[str, str]) -> Alignment:
     """Try to exchange the partners of two joint pairs, for example those of two mirrored arms.
 
-    Only pairs of joints of one body that have different names are exchanged.
+    Partners are exchanged only between joints at the same body, and only in pairs of joints with different
+    names.
     """
     if best.only_a or best.only_b:  # A and B are different robots, and an exchange cannot make them equal
         return best
@@ -734,7 +738,7 @@ def _best_alignment(
     tolerance: Tolerance | None = None,
     base: tuple[int, int] | None = None,
 ) -> Alignment:
-    """Return the best alignment over all starting bodies, or that from the bodies of the `base` links."""
+    """Return the best alignment over all starting bodies; if `base` is given, only its bodies are used."""
     tolerance = tolerance or tolerance_of(a, b)
     walk = MechanismMatcher(a, b, Pairing(a, b, given, tolerance), gauge, ahead or Ahead(0), tolerance, base)
     best: Alignment | None = None
@@ -785,11 +789,11 @@ class _Rule:
     meets: bool
 
     def beta(self, turn: int) -> float:
-        """Return beta in y = alpha x + beta, if this joint's zero is changed by some full turns."""
+        """Return beta in y = alpha x + beta, after the joint's zero is changed by some full turns."""
         return (self.constant + self.offset + 2.0 * math.pi * turn - self.d) / self.n
 
     def wanted(self, beta: float) -> float:
-        """Return the offset o of this joint that corresponds to beta in y = alpha x + beta."""
+        """Return the joint's offset o that corresponds to the constant beta in y = alpha x + beta."""
         return self.n * beta + self.d - self.constant
 
     def allows(self, offset: float, tolerance: Tolerance) -> bool:

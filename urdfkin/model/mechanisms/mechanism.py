@@ -34,7 +34,7 @@ from urdfkin.model.chain import LEAST_SIZE
 from urdfkin.model.pose import is_rigid, pose
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
-#: Below this length across an axis (of a unit vector, or in metres), a vector counts as parallel to it.
+#: A vector counts as parallel to an axis if its component perpendicular to the axis is smaller than this.
 ALONG = 1e-12
 
 
@@ -103,7 +103,9 @@ _Z = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointTransform:
-    """The conversion of a planar or floating joint: P_b = before P_a behind; P_a^-1 if `back`.
+    """The conversion of a planar or floating joint: P_b = before P_a behind.
+
+    If `back` is true, P_a is replaced by P_a^-1.
 
     Attributes:
         before: (4, 4) M.
@@ -121,7 +123,10 @@ class JointTransform:
         return coordinates_of(kind, self.before @ (np.linalg.inv(P) if self.back else P) @ self.behind)
 
     def holds_for(self, kind: JointKind) -> bool:
-        """Return whether M and N are rigid, and M P N is a pose of the joint, at zero and at a generic P."""
+        """Return whether M and N are rigid and the joint can reach M P N.
+
+        The test uses two poses P, zero and a generic pose.
+        """
         if not all(is_pose(JointKind.FLOATING, T) for T in (self.before, self.behind)):
             return False
         away = pose_of(JointKind.PLANAR, _AWAY)
@@ -151,7 +156,7 @@ def coordinates_of(kind: JointKind, P: FloatArray) -> FloatArray:
 
 
 def is_pose(kind: JointKind, T: FloatArray) -> bool:
-    """Return whether a planar or floating joint can reach a matrix; a floating joint reaches every pose."""
+    """Return whether a planar or floating joint can reach a pose; a floating joint can reach every pose."""
     near = NEARLY * (1.0 + np.abs(T).max())
     if not is_rigid(T, near):
         return False
@@ -240,14 +245,14 @@ class Mechanism:
                 bodies[body[-1]].append(i + 1)
         self.homes, self.body_of, self.edges = homes, body, edges
         self.bodies = bodies
-        #: Joint orders that differ from the tree's, one for each reordered run of joints.
+        #: Lists of consecutive joints, each in an order that differs from the order in the tree.
         self.orders: tuple[tuple[str, ...], ...] = ()
-        #: For each link: length (m) of the path from the root, and number of joints on it, fixed ones too.
+        #: For each link: length (m) of the path from the root to the link, and number of joints on it.
         self.lengths, self.depths = lengths, depths
         self._screws: dict[int, Screw] = {}
 
     def joint(self, edge: Edge) -> Joint:
-        """Return the tree's joint of an edge."""
+        """Return the joint of the tree that an edge represents."""
         return self.tree.joints[edge.joint]
 
     def screw(self, edge: Edge) -> Screw:
@@ -263,7 +268,7 @@ class Mechanism:
         Links between reordered joints belong to no body in the result.
 
         Args:
-            names: Joints of a run of consecutive joints, from the inner body outwards.
+            names: Names of consecutive joints in their new order, from the inner body outwards.
         """
         joints = [self.tree.joint_index(name) for name in names]
         run = [edge for edge in self.edges if edge.joint in joints]
@@ -279,7 +284,7 @@ class Mechanism:
         return other
 
     def may_be_taken(self, names: Sequence[str], tolerance: Tolerance) -> bool:
-        """Return whether joints are consecutive, and all pairs that change places commute."""
+        """Return whether the named joints are consecutive and all pairs that change places commute."""
         joints = [self.tree.joint_index(name) for name in names]
         run = [edge for edge in self.edges if edge.joint in joints]
         one_line = all(
@@ -295,7 +300,7 @@ class Mechanism:
         return len(run) == len(names) and one_line and all(self._commute(*two, tolerance) for two in changed)
 
     def orders_of_runs(self, tolerance: Tolerance) -> Iterator[Iterator[list[str]]]:
-        """For each run of consecutive joints, yield its orders with the same motion."""
+        """Yield, for each run of consecutive joints, the orders of its joints that give the same motion."""
         run: list[Edge] = []
         for edge in self.edges:  # depth first: the next edge continues the run if the body has no other
             if run and edge.inner == run[-1].outer and len(self.edges_of[edge.inner]) == 2:
@@ -306,7 +311,10 @@ class Mechanism:
         yield self._orders(run, tolerance)
 
     def _orders(self, run: Sequence[Edge], tolerance: Tolerance) -> Iterator[list[str]]:
-        """Yield all orders reached by exchanging commuting neighbours, the given order first."""
+        """Yield all joint orders that exchanges of commuting neighbours produce.
+
+        The given order comes first.
+        """
         if not run:
             yield []
         for k, edge in enumerate(run):
@@ -317,8 +325,8 @@ class Mechanism:
     def _commute(self, one: Edge, other: Edge, tolerance: Tolerance) -> bool:
         """Return whether two joints commute.
 
-        These do: two prismatic joints, a prismatic joint along the axis of a revolute one, and two revolute
-        joints about one line.
+        Two prismatic joints always commute. Two revolute joints commute if their axes are the same line. A
+        prismatic joint and a revolute joint commute if their axes are parallel.
         """
         kinds = [self.joint(edge).kind for edge in (one, other)]
         if not all(kind.has_axis and kind.nv for kind in kinds):
@@ -347,7 +355,7 @@ class Mechanism:
     def rounding(self) -> float:
         """Rounding error of poses read from a file, summed over all links (rad, and as a fraction of `size`).
 
-        It includes the small tilts of Pinocchio's axes (URDF514).
+        This error includes the small tilts of Pinocchio's axes (URDF514).
         """
         return EPS * of_two_texts(max(self.depths)) + 2.0 * sum(joint.tilt for joint in self.tree.joints)
 
@@ -360,12 +368,12 @@ class Tolerance:
     way: float
 
     def holds(self, angle: float, way: float) -> bool:
-        """Return whether both are within the tolerance."""
+        """Return whether an angle (rad) and a distance (m) are within the tolerance."""
         return angle <= self.angle and way <= self.way
 
 
 def tolerance_of(a: Mechanism, b: Mechanism) -> Tolerance:
-    """Return the largest difference of two files of one robot that rounding can cause."""
+    """Return the largest difference that rounding can cause between two models of the same robot."""
     k = a.rounding + b.rounding
     return Tolerance(k, k * size_of(a, b))
 
@@ -376,7 +384,7 @@ def size_of(a: Mechanism, b: Mechanism) -> float:
 
 
 def between_lines(s: Screw, t: Screw, *, placed: bool) -> tuple[float, float]:
-    """Return the angle (rad) and the distance (m) between two axes as lines; distance 0 without `placed`."""
+    """Return the angle (rad) and the distance (m) of two axes; the distance is 0 if `placed` is false."""
     ux, uy, uz = s.direction.tolist()  # called thousands of times; plain floats are faster
     vx, vy, vz = t.direction.tolist()
     sine = math.hypot(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx)

@@ -101,7 +101,7 @@ class Support:
     def at(self, u: FloatArray) -> FloatArray:
         """Return upper bounds (...) on the support function for vectors (..., 3) of any length.
 
-        0 for zero.
+        The bound for the zero vector is 0.
         """
         cells, v = self.grid.cells, self.values
         x, y, z = u[..., 0].ravel(), u[..., 1].ravel(), u[..., 2].ravel()
@@ -124,7 +124,7 @@ class Support:
             near = v[at] + up * (v[at + 1] - v[at])
             far = v[at + cells + 1] + up * (v[at + cells + 2] - v[at + cells + 1])
             found = (near + right * (far - near)) * largest
-        found[np.isnan(found)] = np.inf  # a zero weight times an infinite value: the bound is infinite
+        found[np.isnan(found)] = np.inf  # zero times infinity is NaN; the bound is then infinite
         return np.where(largest > 0.0, found, 0.0).reshape(u.shape[:-1])
 
     def turned(self, screw: Screw, low: float, high: float) -> Support:
@@ -151,7 +151,7 @@ class Support:
     def slid(self, direction: FloatArray, low: float, high: float) -> Support:
         """Return the support function of the set after translations along a direction.
 
-        The distances are all distances of a range.
+        The distances (m) of these translations are all distances from `low` to `high`.
         """
         c = self.grid.points @ direction
         with np.errstate(invalid="ignore"):
@@ -261,7 +261,7 @@ def _radians(
         if step.kind != "turns" or pair is None:
             continue
         if step.other is not step.axis:
-            # Q R Q^T R^T, rotation by t, tilt by s: sin(a quarter of its angle) = sin(s/2) sin(t/2).
+            # R rotates by t, and Q tilts by s. For the angle r of Q R Q^T R^T, sin(r/4) = sin(s/2) sin(t/2).
             most = min(max(map(abs, variables.range(pair.b))), math.pi)
             total += 4.0 * math.asin(math.sin(step.tilt / 2.0) * math.sin(most / 2.0))
         if pair.a != pair.b:
@@ -363,7 +363,7 @@ def _values(pair: Pair, variables: Variables, grid: Grid) -> FloatArray | None:
     """
     if (name := pair.variable) is None:
         return None
-    low, high = variables.ranges.get(name, (0.0, 0.0))  # no variable: both joints stay where they are
+    low, high = variables.ranges.get(name, (0.0, 0.0))  # the joints in A and B do not move
     fastest = max(abs(pair.a.slope), abs(pair.b.slope))
     if math.isinf(high - low):
         if {abs(pair.a.slope), abs(pair.b.slope)} - {0.0, 1.0}:
