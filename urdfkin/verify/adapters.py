@@ -1,16 +1,17 @@
-"""How other libraries read a robot file: one adapter for each library, used in the library's own way.
+"""Read a robot file with other libraries; one adapter for each library follows its documentation.
 
-The module needs NumPy and the library only. `urdfkin readers` imports it; `scripts/make_libraries.py` runs it
-as a program by the Python of an environment that contains one library:
+The module imports only NumPy and the chosen library. The command `urdfkin readers` imports this module.
+`scripts/make_libraries.py` runs this module as a program, with the Python of an environment that contains one
+library:
 
     python -I urdfkin/verify/adapters.py kinpy < cases.json
 
-The program reads a list of cases `{"name", "text", "configurations"}` and prints one line of JSON for each.
-A configuration gives values by the names of the independent joints: one number (rad or m), three for a planar
-joint (x, y, angle), seven for a floating joint (x, y, z, qx, qy, qz, qw).
+The program reads a list of cases `{"name", "text", "configurations"}` and prints one line of JSON for each
+case. A configuration gives values by the names of the independent joints: one number (rad or m), three for a
+planar joint (x, y, angle), seven for a floating joint (x, y, z, qx, qy, qz, qw).
 
-An adapter gives a library all that its documentation asks for. It sets no mimic joint: the file states the
-rule. It does not hide a wrong pose.
+An adapter passes all inputs that the library's documentation requires. It sets no values of mimic joints,
+because the file contains the mimic rules. It does not correct wrong poses.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ import numpy as np
 #: Value of a joint, or the values of a planar or floating joint.
 Value = Any
 Poses = dict[str, Any]
-#: Numbers of values of a planar and of a floating joint.
+#: Number of values of a planar joint, and number of values of a floating joint.
 _PLANAR, _FLOATING = 3, 7
 #: Suffixes of the three joints that MuJoCo makes of a planar joint.
 _MUJOCO_PLANAR = ("_TX", "_TY", "_RZ")
@@ -44,19 +45,19 @@ _MUJOCO_PLANAR = ("_TX", "_TY", "_RZ")
 
 @dataclass(frozen=True)
 class Reading:
-    """A robot as a library read it.
+    """A robot that a library has read from a file.
 
     Attributes:
         joints: Names of the joints that have a coordinate, in the library's order.
-        poses: Returns the pose (4, 4) of each link in the root link, from values by joint. Links that the
-            library merges into others are missing.
+        poses: Function that returns the pose (4, 4) of each link in the root link for given joint values.
+            Links that the library merges into other links are missing.
     """
 
     joints: list[str]
     poses: Callable[[Mapping[str, Value]], Poses]
 
     def unset(self, values: Mapping[str, Value]) -> list[str]:
-        """Return the joints with a value that have no coordinate in the library."""
+        """Return the names in `values` of joints that have no coordinate in the library."""
         return [name for name in values if name not in self.joints]
 
 
@@ -102,13 +103,13 @@ def _rigid(R: Any, p: Any) -> Any:
 
 
 def _relative(poses: Poses, root: str) -> Poses:
-    """Return poses in the root link; a root that was merged into the world is at the origin."""
+    """Return link poses relative to the root link; a root merged into the world is at the world's origin."""
     inverse = np.linalg.inv(poses.get(root, np.eye(4)))
     return {root: np.eye(4)} | {link: inverse @ T for link, T in poses.items()}
 
 
 def read_pinocchio(text: str) -> Reading:
-    """Read with Pinocchio; mimic joints are coupled by `mimic=True`."""
+    """Read a URDF with Pinocchio; `mimic=True` couples its mimic joints."""
     import pinocchio as pin  # noqa: PLC0415
 
     if _is_path(text):
@@ -140,7 +141,7 @@ def read_pinocchio(text: str) -> Reading:
 
 
 def read_mujoco(text: str) -> Reading:
-    """Read with MuJoCo, without merging fixed links, and with a lower limit on masses."""
+    """Read a URDF with MuJoCo; links at fixed joints are not merged, and each mass has a lower limit."""
     import mujoco  # noqa: PLC0415
 
     root = "world"
@@ -181,9 +182,9 @@ def read_mujoco(text: str) -> Reading:
 
 
 def _mujocos(name: str, value: Value, names: list[str]) -> Iterator[tuple[str, Value]]:
-    """Yield the MuJoCo joints that stand for a joint of the URDF, with their values.
+    """Yield the MuJoCo joints that replace a joint of the URDF, with the values of these MuJoCo joints.
 
-    A planar joint becomes two slides and a hinge.
+    A planar joint becomes two slide joints and a hinge joint.
     """
     if name in names:
         yield name, value
@@ -192,7 +193,7 @@ def _mujocos(name: str, value: Value, names: list[str]) -> Iterator[tuple[str, V
 
 
 def read_drake(text: str) -> Reading:
-    """Read with Drake: a discrete plant with the contact solver that mimic elements ask for."""
+    """Read a URDF with Drake, as a discrete plant with the contact solver that mimic joints require."""
     from pydrake.multibody.parsing import Parser  # noqa: PLC0415
     from pydrake.multibody.plant import DiscreteContactApproximation, MultibodyPlant  # noqa: PLC0415
 
@@ -202,7 +203,7 @@ def read_drake(text: str) -> Reading:
     plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(root))
     plant.Finalize()
     context = plant.CreateDefaultContext()
-    carried = {child: joint for joint, child in _children(text).items()}  # Drake calls a floating joint so
+    carried = {child: joint for joint, child in _children(text).items()}  # Drake's name of a floating joint
     moving = [j for i in plant.GetJointIndices() if (j := plant.get_joint(i)).num_positions()]
     joints = {carried.get(j.name(), j.name()): j for j in moving}
     bodies = [plant.get_body(i) for i in plant.GetBodyIndices(plant.GetModelInstanceByName(_name(text)))]
@@ -239,7 +240,9 @@ def read_idyntree(text: str) -> Reading:
     }
     computed.setFloatingBase(root)
 
-    def poses(values: Mapping[str, Value], _owner: Any = loader) -> Poses:  # the loader owns the model
+    def poses(
+        values: Mapping[str, Value], _owner: Any = loader
+    ) -> Poses:  # the model exists only as long as its loader
         q = np.zeros(model.getNrOfPosCoords())
         for name in places.keys() & values.keys():
             q[places[name]] = _scalar(values[name])
@@ -253,7 +256,7 @@ def read_idyntree(text: str) -> Reading:
 
 
 def read_yourdfpy(text: str) -> Reading:
-    """Read with yourdfpy; no mesh is read."""
+    """Read a URDF with yourdfpy, without the meshes."""
     import yourdfpy  # noqa: PLC0415
 
     logging.getLogger("yourdfpy.urdf").disabled = True
@@ -268,7 +271,7 @@ def read_yourdfpy(text: str) -> Reading:
 
 
 def read_urchin(text: str) -> Reading:
-    """Read with urchin; no mesh is read."""
+    """Read a URDF with urchin, without the meshes."""
     import urchin  # noqa: PLC0415
 
     with _file(text) as path:
@@ -283,7 +286,10 @@ def read_urchin(text: str) -> Reading:
 
 
 def _urchins(joint: Any, value: Value) -> Value:
-    """Return a value in urchin's layout: a floating joint takes x, y, z, roll, pitch, yaw or a matrix."""
+    """Convert a joint value to urchin's layout.
+
+    A value of a floating joint in urchin is x, y, z, roll, pitch, yaw, or a matrix.
+    """
     if joint.joint_type != "floating":
         return value
     x, y, z, w = value[3:]
@@ -310,7 +316,7 @@ def read_kinpy(text: str) -> Reading:
 
 
 def read_ikpy(text: str) -> Reading:
-    """Read with ikpy, which follows one path from the root."""
+    """Read a URDF with ikpy, which reads only one path from the root to a tip."""
     from ikpy.chain import Chain  # noqa: PLC0415
 
     root, children = _root(text), _children(text)
@@ -367,11 +373,11 @@ class Library:
     """A library that reads robot files.
 
     Attributes:
-        title: Its name in tables.
+        title: Name of the library in tables.
         package: The name that pip installs.
         module: The module that is imported.
         read: Its adapter.
-        forms: The formats that it reads.
+        forms: The file formats that the library reads.
     """
 
     title: str
@@ -381,7 +387,7 @@ class Library:
     forms: tuple[str, ...] = ("urdf",)
 
 
-#: The libraries by the names of the command line.
+#: The libraries, by their names on the command line.
 LIBRARIES: dict[str, Library] = {
     "pinocchio": Library("Pinocchio", "pin", "pinocchio", read_pinocchio, ("urdf", "mjcf")),
     "mujoco": Library("MuJoCo", "mujoco", "mujoco", read_mujoco, ("urdf", "mjcf")),
@@ -410,7 +416,7 @@ def answer(name: str, case: Mapping[str, Any]) -> dict[str, Any]:
     try:
         reading = LIBRARIES[name].read(case["text"])
         found = [reading.poses(values) for values in case["configurations"]]
-    except Exception as error:  # each library has its own exceptions
+    except Exception as error:  # each library raises other types of exceptions
         words = " ".join(str(error).split())
         return {"error": f"{type(error).__name__}: {words}" if words else type(error).__name__}
     poses = [{link: np.asarray(T, float).tolist() for link, T in one.items()} for one in found]
@@ -430,7 +436,7 @@ def main() -> None:
     """Answer the cases on standard input with the library of the first argument."""
     logging.disable(logging.CRITICAL)
     warnings.simplefilter("ignore")
-    own = os.dup(1)  # libraries print to standard output
+    own = os.dup(1)  # libraries may print their own text to standard output
     os.dup2(2, 1)
     for line in _lines(sys.argv[1], json.load(sys.stdin)):
         os.write(own, f"{line}\n".encode())

@@ -7,7 +7,10 @@ from urdfkin.verify.comparison import CHECKS, KERNELS
 
 
 def load_kernels() -> None:
-    """Compile each kernel or read it from disk, before worker processes start that would each compile it."""
+    """Compile all kernels, or load them from disk, before worker processes start.
+
+    Otherwise each worker process would compile all kernels itself.
+    """
     preload.load_kernels()
     for name in CHECKS:
         preload.load(name, KERNELS)

@@ -1,6 +1,6 @@
-"""Analytical Jacobians from a rotation matrix and a velocity Jacobian, without computing any angle.
+"""Compute analytical Jacobians from a rotation matrix and a velocity Jacobian, without any angle.
 
-This is a second computation of eq. 7.122, with which results are compared. It shares no code with
+The module computes eq. 7.122 a second time, as a check of results. It shares no code with
 `urdfkin.kinematics.rotation` and `urdfkin.kinematics.bodies`.
 
 An Euler sequence rotates about the coordinate axes i, then j, then k, so that R = R_i R_j R_k. The first axis
@@ -56,7 +56,7 @@ def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Number
 def quaternion_jacobian(quat: Numbers, J_v: Numbers) -> Numbers:
     """Return the analytical Jacobian for a unit quaternion.
 
-    It contains the derivatives of the position and of the quaternion.
+    The Jacobian contains the derivatives of the position and of the quaternion.
 
     The derivative of the quaternion is half of the quaternion product of (w, 0) and `quat`, where w is the
     angular velocity.

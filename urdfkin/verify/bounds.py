@@ -1,11 +1,12 @@
 """Bounds on the difference between two correct computations of a quantity.
 
-A result is accepted if each number differs from the oracle's by at most
+A result is accepted if each of its numbers differs from the oracle's number by at most
 
     k * eps * scale,      eps = 2^-52,      k = factors * ROUNDINGS * joints.
 
-*scale* is the size of the terms that the number is summed from, in its own unit (`magnitudes`). Two
-computations that add the same terms in a different order differ in proportion to the terms, not to their sum.
+*scale* is the size of the terms whose sum is the number, in the number's unit (`magnitudes`). If two
+computations add the same terms in different orders, their difference is proportional to the size of the
+terms, not to the sum.
 
 *k* counts roundings to first order in eps (`urdfkin.kinematics.roundings`), a fixed number for each joint on
 the path. Each joint rotates the result of the joints after it. Rotations do not amplify an error, so the
@@ -22,16 +23,18 @@ A quantity is multilinear in rotated vectors. Each vector is a *factor* with its
 | J-dot, linear rows | 3 | w, z, d |
 | Hessian, linear rows | 3 | z, z, d |
 
-LOCAL and WORLD need one factor more: a rotation into the frame's axes, or a cross product with p.
+The references LOCAL and WORLD need one more factor: a rotation into the frame's axes (LOCAL), or a cross
+product with p (WORLD).
 
 Measured differences are a fraction of an eps for each joint, because rounding errors rarely add up in the
-worst way. Reports give them in multiples of eps * scale, which are comparable across robots.
+worst way. Reports state these differences in multiples of eps * scale, which can be compared between robots.
 
 `magnitudes` runs the recursion on lengths. It evaluates eq. 7.58 and 7.127 to 7.130 with the number types of
-`urdfkin.kinematics.number_kinds`, so that no intermediate value exceeds its result. One of its terms occurs
-only in Pinocchio: eq. 7.129 has v_i w_{i-1} x z, Pinocchio has v_i w_i x z. The joint's own part of w_i is
-parallel to z and contributes only rounding, v_i^2 |z x z|. It matters for fast joints with an oblique axis.
-The scale of alpha includes it, because the equation receives the w of the link after the joint.
+`urdfkin.kinematics.number_kinds`. With these number types, no intermediate value exceeds the result. One term
+is different in Pinocchio: eq. 7.129 has v_i w_{i-1} x z, Pinocchio has v_i w_i x z. The joint's own part of
+w_i is parallel to z and contributes only rounding, v_i^2 |z x z|. This rounding is relevant for fast joints
+with an oblique axis. The scale of alpha includes this rounding, because the equation receives the w of the
+link after the joint.
 """
 
 from __future__ import annotations
@@ -84,15 +87,15 @@ def magnitudes(
     Args:
         plan: The compiled tree.
         q: (n, nq) rad, m.
-        v: (n, nv) or None. Without v only `p` and `roundings` are valid, which suffices for placements and
-            Jacobians.
+        v: (n, nv) or None. Without v only `p` and `roundings` are valid; placements and Jacobians need no
+            others.
         a: (n, nv) or None.
         base: (1 or n, 24) state of the moving base.
     """
     n = len(q)
     if v is not None and a is None:
         a = np.zeros((1, plan.nv))
-    # The numbers of each coordinate; Python's numbers for one configuration.
+    # The values of each coordinate: an array for several configurations, a Python number for one.
     rows, rates, rates_2, still = (None if x is None else _columns(x, n) for x in (q, v, a, base))
     assert rows is not None
     assert still is not None
@@ -112,13 +115,13 @@ def magnitudes(
         carried = carry(states[end.step + 1], end.length)
         for row, values in zip(out, carried, strict=False):
             row[:, end.place] = values  # a value equal for all configurations is a scalar
-    turned = (base[:, :9] != _UNTURNED).any(axis=1)  # a rotated base rounds like a joint
+    turned = (base[:, :9] != _UNTURNED).any(axis=1)  # a rotated base has the rounding error of a joint
     out[5] = of_joints(plan.depth + 1 + turned[:, np.newaxis], plan.tilts)
     return Magnitudes(*out)
 
 
 class _Link(NamedTuple):
-    """A step of the recursion on lengths; the multiplier and the constant are absolute values."""
+    """A step of the recursion on lengths; the mimic multiplier and the constant are absolute values."""
 
     kind: int
     q: int
@@ -143,7 +146,7 @@ class _Lengths(NamedTuple):
 
 
 def _lengths(plan: CompiledTree) -> _Lengths:
-    """Return the steps and frames of a plan as Python's numbers; they are collected once."""
+    """Return the steps and frames of a plan as Python numbers; the result is stored for later calls."""
     found: _Lengths | None = plan.made.get("lengths")
     if found is None:
         lengths, count = counted(plan.lengths).tolist(), len(plan.steps)
@@ -160,12 +163,12 @@ def _lengths(plan: CompiledTree) -> _Lengths:
 
 
 def _columns(x: FloatArray, n: int) -> Any:
-    """Return the columns of (n or 1, ...) numbers, or Python's numbers of one row."""
+    """Return the columns of an array (n or 1, ...); if there is only one row, return Python numbers."""
     return x[0].tolist() if n == len(x) == 1 else x.T
 
 
 def _norm(x: Any) -> Length:
-    """Return the length of a vector of columns or of Python's numbers."""
+    """Return the Euclidean length of a vector, whose components are columns or Python numbers."""
     return norm(x.T) if isinstance(x, np.ndarray) else float(norm(np.array(x))) if any(x) else 0.0
 
 
@@ -223,7 +226,7 @@ _BEYOND = np.errstate(over="ignore", under="ignore", invalid="ignore")
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """The bound k * eps * scale of a quantity; both arrays broadcast against the results.
+    """The bound k * eps * scale of a quantity; the arrays `k` and `scale` broadcast against the results.
 
     Attributes:
         scale: Size of the terms, in the result's units; 0 where the results must be equal.
@@ -235,7 +238,7 @@ class Bound:
 
 
 def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
-    """Return `k` of each result, an array of shape `leading`; all numbers of a result share it.
+    """Return the factor `k` of each result, an array of shape `leading`; a result has a single `k`.
 
     A k that is not finite and positive becomes NaN, so that no result is within its bound.
     """
@@ -245,7 +248,10 @@ def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
 
 
 def bound_of(scale: FloatArray, factors: int, size: Magnitudes, reference: Reference = _ALIGNED) -> Bound:
-    """Return the bound of a scale (n, frames, ...): k is the number of factors times their roundings."""
+    """Return the bound with a scale (n, frames, ...).
+
+    The factor k of the bound is the number of factors times the roundings of a factor.
+    """
     factors += reference is not _ALIGNED
     k = factors * size.roundings
     return Bound(scale, k.reshape(*k.shape, *[1] * (scale.ndim - 2)))
@@ -256,10 +262,10 @@ def about_the_root(size: Magnitudes) -> Magnitudes:
     """Return the magnitudes for a comparison of urdfkin with MuJoCo.
 
     MuJoCo stores velocities, accelerations and Jacobian columns for a centre of mass, which is at the root
-    here (`urdfkin.verify.mujoco`). It moves them to the frame at the end. The distance of that point from a
-    joint or from the frame is at most the length of the path, so lever arms are at most 2 p. Both steps use
-    a cross product with a lever arm, which is one factor more. That at most doubles the number of factors.
-    Each joint rounds by `MUJOCO` instead of `ROUNDINGS`.
+    here (`urdfkin.verify.mujoco`). At the end, MuJoCo moves them to the frame. The distance of the centre of
+    mass from a joint or from the frame is at most the length of the path, so lever arms are at most 2 p.
+    Storing and moving each use a cross product with a lever arm, which is one more factor. The number of
+    factors is at most doubled. The rounding of each joint is `MUJOCO` instead of `ROUNDINGS`.
     """
     p = 2.0 * size.p
     shared = eq.tangential(size.w, size.vel)
@@ -274,7 +280,7 @@ def about_the_root(size: Magnitudes) -> Magnitudes:
 
 
 def placement_scale(plan: CompiledTree, size: Magnitudes) -> FloatArray:
-    """Return (n, frames, 4, 4): the path's length for positions, 1 for rotations, 0 for the last row."""
+    """Return the scale (n, frames, 4, 4): path length for positions, 1 for rotations, 0 for the last row."""
     scale = np.zeros((*size.p.shape, 4, 4))
     scale[..., :3, :3] = 1.0
     scale[..., :3, 3] = size.p[..., None]
@@ -283,16 +289,17 @@ def placement_scale(plan: CompiledTree, size: Magnitudes) -> FloatArray:
 
 @_BEYOND
 def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) -> Bound:
-    """Return the bound between the tree made of an MJCF file and MuJoCo's model of that file.
+    """Return the bound between placements of the tree of an MJCF file and of MuJoCo's model of that file.
 
-    The tree contains sums that MuJoCo computes at each configuration: a body's position, the anchors of its
-    joints, a slide's reference value. If the sum of the lengths of these terms
+    The tree contains constant sums of a body's position, the anchors of its joints and a slide's reference
+    value. MuJoCo computes these sums again for each configuration. If the sum of the lengths of these terms
     exceeds the length of the path, the scale of positions is this sum.
 
-    MuJoCo rotates a hinge by fl(q - ref), the tree by ref and by q. The difference is rounded once, by at
-    most (eps/2) (|q| + |ref|) rad. That rotates everything after the hinge. A number of a rotation changes by
-    at most the angle, a number of a position by at most the angle times the length. The bound allows twice
-    that, for terms of second order. As a fraction of k eps it is angle / k.
+    MuJoCo rotates a hinge by the rounded difference fl(q - ref); the tree rotates it by ref and by q. The
+    rounding of the difference is at most (eps/2) (|q| + |ref|) rad. This angle rotates everything after the
+    hinge. A number of a rotation changes by at most the angle. A number of a position changes by at most the
+    angle times the length. The bound allows twice these changes, for terms of second order. The change as a
+    fraction of k eps is angle / k.
 
     Args:
         bound: Bound of the tree's placements, (n, frames, 4, 4).
@@ -318,15 +325,15 @@ def velocity_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -
 def acceleration_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
     """Return (n, frames, 6), the size of the terms of [linear; angular] accelerations.
 
-    Pinocchio computes classical accelerations from spatial ones, which differ by w x vel. The scale includes
-    that term.
+    Pinocchio computes classical accelerations from spatial accelerations. The difference is the term w x vel,
+    which the scale includes.
 
-    The scale also holds for the sum of an acceleration breakdown, which groups the terms by joints. With d_k
-    from joint k to the frame, the terms v_k z x (v_k z x d_k) and 2 w_{k-1} x (v_k z x d_k) have the length
-    (w_k^2 - w_{k-1}^2) d_k. Here w_k is the sum of the joint velocities up to joint k. Their sum over the
-    joints is w^2 times the length of each link, as in eq. 7.130. The d_k are sums of interorigin vectors and
-    round like the sums of eq. 7.77. The sum of the 4 n parts rounds n + 3 times. Both are below the 2 eps
-    that each joint has for sums.
+    The scale is also valid for the sum of an acceleration breakdown, which groups the terms by joints. With
+    d_k from joint k to the frame, the terms v_k z x (v_k z x d_k) and 2 w_{k-1} x (v_k z x d_k) have the
+    length (w_k^2 - w_{k-1}^2) d_k. Here w_k is the sum of the joint velocities up to joint k. The sum of
+    these lengths over all joints is w^2 times the length of each link, as in eq. 7.130. The d_k are sums of
+    interorigin vectors and round like the sums of eq. 7.77. The sum of the 4 n parts has n + 3 roundings. The
+    roundings of d_k and of this sum are below the 2 eps that each joint has for sums.
     """
     shared = eq.tangential(size.w, size.vel)
     linear = size.acc + shared
@@ -337,12 +344,12 @@ def acceleration_scale(plan: CompiledTree, size: Magnitudes, reference: Referenc
 
 @_BEYOND
 def imu_scale(size: Magnitudes, gravity: FloatArray) -> FloatArray:
-    """Return (n, frames, 6), the size of the terms of an IMU reading; gravity (3,) is one more term."""
+    """Return (n, frames, 6), the size of the terms of an IMU reading, including gravity (3,)."""
     return _six(size.acc + eq.tangential(size.w, size.vel) + norm(gravity), size.w)
 
 
 def _six(linear: FloatArray, angular: FloatArray) -> FloatArray:
-    """Return (..., 6) from two arrays (...): three equal linear numbers and three equal angular ones."""
+    """Return (..., 6): each number of `linear` three times, then each number of `angular` three times."""
     scale = np.empty((*linear.shape, 6))
     scale[..., :3] = linear[..., None]
     scale[..., 3:] = angular[..., None]
@@ -350,7 +357,7 @@ def _six(linear: FloatArray, angular: FloatArray) -> FloatArray:
 
 
 def _six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
-    """Return (..., 6, nv) from two arrays (..., nv): three equal linear and three equal angular rows."""
+    """Return (..., 6, nv): the row of `linear` three times, then the row of `angular` three times."""
     scale = np.empty((*linear.shape[:-1], 6, linear.shape[-1]))
     scale[..., :3, :] = linear[..., None, :]
     scale[..., 3:, :] = angular[..., None, :]
@@ -361,7 +368,8 @@ def _six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
 def jacobian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
     """Return (n, frames, 6, nv), the size of the terms of Jacobians.
 
-    Linear rows: the path's length for revolute columns, 1 for prismatic ones, 0 for joints off the path.
+    The size in linear rows is the path's length for revolute joints and 1 for prismatic joints. For joints
+    that are not on the path, it is 0.
     """
     turning, sliding = column_weights(plan)
     linear, angular = eq.turning_column(turning, size.p[..., None])
@@ -373,7 +381,7 @@ def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Referen
     """Return (n, frames, 6, nv), the size of the terms of J-dot.
 
     A revolute column is at most as long as the frame's path. Its lever arm changes at most as fast as the
-    frame's origin moves. In LOCAL the numbers are those in the frame's axes, which rotate.
+    frame's origin moves. In LOCAL the numbers are components along the frame's axes, which rotate.
     """
     turning, sliding = column_weights(plan)
     w, p, vel = size.w[..., None], size.p[..., None], size.vel[..., None]
@@ -387,7 +395,8 @@ def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Referen
 
 
 #: Number of products in a linear row of Pinocchio's Hessian: z x (z x d) of two revolute joints, and z x z of
-#: a revolute and a prismatic one. First for pairs with j before or equal to i, then for pairs with j after i.
+#: a revolute joint and a prismatic joint. The first entry is for pairs with j before or equal to i, the
+#: second entry for pairs with j after i.
 _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = {
     Reference.LOCAL_WORLD_ALIGNED: ((5.0, 2.0), (2.0, 1.0)),
     Reference.WORLD: ((2.0, 1.0), (0.0, 0.0)),
@@ -407,9 +416,9 @@ def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) ->
     - one more to move the result to the frame's origin p, p x (w_1 x w_2)
     - two more to move the other column there, (v - p x w) x w
 
-    These give the five, two and three of `_PAIR_TERMS`. urdfkin needs one product, z x (z x d), or the two of
-    c_1 x c_2. In LOCAL urdfkin rotates both columns by R first. Its two products of five factors (R, z, R, z,
-    d) are below the allowed three products of four.
+    These counts give the numbers five, two and three in `_PAIR_TERMS`. urdfkin needs the single product z x
+    (z x d), or the two products of c_1 x c_2. In LOCAL urdfkin rotates both columns by R first. urdfkin's two
+    products of five factors (R, z, R, z, d) are below the allowed three products of four factors.
     """
     shape = len(plan.frames), plan.nv, plan.nv
     turning, mixed, angular = np.zeros(shape), np.zeros(shape), np.zeros(shape)
@@ -448,9 +457,9 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
     - outer angles: 2 delta / s^2 + delta / s <= 3 delta / s^2
     - middle angle: delta / s + delta <= 2 delta / s
 
-    The Jacobian's bound has two factors, so the scales are 1.5 / s^2 and 1 / s times the Jacobian's. The
-    arithmetic of the angles rounds about 3 eps for arctan2 and its sine and 10 eps for products and
-    quotients, on both sides. The additional joint in `roundings` covers that.
+    The Jacobian's bound has two factors, so the scales are 1.5 / s^2 and 1 / s times the Jacobian's. In
+    urdfkin and in the reference, arctan2 and the sine of the angle add rounding errors of about 3 eps.
+    Products and quotients add about 10 eps. The additional joint in `roundings` covers these errors.
 
     Args:
         bound: Bound of the Jacobian.
@@ -477,17 +486,23 @@ def quaternion_jacobian_bound(bound: Bound) -> Bound:
 
 
 def hidden_scalar(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
-    """Return the |qw| below which rounding hides the sign: 1.5 k eps = 3 delta, above q's error 2.3 delta."""
+    """Return the limit of |qw| below which rounding can change the sign of qw.
+
+    The limit 1.5 k eps = 3 delta exceeds the error 2.3 delta of q.
+    """
     return 1.5 * EPS * result_k(bound, leading)
 
 
 def nearest_singularity(plan: CompiledTree) -> float:
-    """Return the smallest distance from the singularity with a valid digit, rad: four times R's error."""
+    """Return the smallest distance (rad) from the singularity at which results have a valid digit.
+
+    The distance is four times the error of R.
+    """
     return 4.0 * EPS * float(np.max(of_joints(plan.depth + 1, plan.tilts), initial=0.0))
 
 
 def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
-    """Return two (frames, nv): the sum of |multiplier| of each column's revolute and prismatic joints."""
+    """Return, for each frame and column, the sums of |multiplier| over revolute and over prismatic joints."""
     weights: tuple[FloatArray, FloatArray] | None = plan.made.get("column weights")
     if weights is None:
         weights = plan.made["column weights"] = _column_weights(plan)
@@ -508,7 +523,7 @@ def movable(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.b
     """Return (frames, 6, nv), True for the numbers of a Jacobian that are not 0 for every q and base.
 
     The linear rows of a revolute column are z x d. There d is 0 for every q if the path has no length and no
-    prismatic joint. That is the path from the joint to the frame, or in WORLD from the root to the joint.
+    prismatic joint. In WORLD the path leads from the root to the joint, else from the joint to the frame.
     """
     found = np.zeros((len(plan.frames), 6, plan.nv), dtype=bool)
     turns, multipliers = plan.steps[:, Step.KIND] == Motion.TURN, plan.geometry[:, Geometry.MULTIPLIER :]
@@ -532,9 +547,9 @@ def movable(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.b
 
 
 def disagreement(ours: FloatArray, theirs: FloatArray, bound: Bound) -> FloatArray:
-    """Return |ours - theirs| in multiples of eps * scale; inf where they differ and the scale is 0.
+    """Return |ours - theirs| in multiples of eps * scale; inf if the two differ and the scale is 0.
 
-    It is inf also where a result or the scale is not finite.
+    The result is also inf if `ours`, `theirs` or the scale is not finite.
     """
     unit = np.where(bound.scale > 0.0, np.maximum(EPS * bound.scale, LEAST_UNIT), 0.0)
     with np.errstate(all="ignore"):

@@ -1,4 +1,4 @@
-"""Convert the arguments of a call to flat batches for the recursion, and its result to the caller's shape."""
+"""Convert a call's arguments to flat batches for the recursion, and the results to the caller's shape."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Call:
         reference: A `Reference` or its name.
         base: Motion of the root link; None: fixed at the world origin.
         given: The inputs that the quantity needs, of q, v and a.
-        also: Additional frames, which are computed after the frames of `frame` but not returned.
+        also: Additional frames; they are computed after the frames in `frame` and are not returned.
         options: Other arguments of the method, by name.
 
     Raises:
@@ -111,7 +111,7 @@ class Call:
             raise InputError("the batch shapes of q, v, a and base do not broadcast", found=found) from None
 
     def _flat_input(self, array: FloatArray) -> FloatArray:
-        """Return an input as an array (n, width). A single row is broadcast without a copy."""
+        """Return an input as an array (n, width); a single configuration is repeated without a copy."""
         width = array.shape[-1]
         if array.shape[:-1] == self.shape:
             return np.ascontiguousarray(array.reshape(self.n, width))
@@ -125,10 +125,10 @@ class Call:
         return self.n * len(self.links)
 
     def flat(self, out: FloatArray | None, own: tuple[int, ...]) -> FloatArray | None:
-        """Return `out` in the kernels' shape (n, frames, ...).
+        """Return the caller's array `out` in the shape (n, frames, ...) that the kernels need.
 
-        Subclasses of NumPy's array are rejected. `reshape` of a matrix, for example, returns a different
-        shape than requested, and a kernel would then write past its end.
+        Subclasses of NumPy's array are rejected. For example, `reshape` of a NumPy matrix returns a different
+        shape than requested. A kernel would then write past the end of the array.
 
         Raises:
             InputError: `out` has a wrong type, dtype, layout or shape, or shares memory with an input.
@@ -145,13 +145,16 @@ class Call:
                 if isinstance(out, np.ndarray) and type(out) not in _PLAIN
                 else None,
             )
-        self.question.read()  # lists may contain views of out
+        self.question.read()  # an input list may contain views of `out`
         if any(np.may_share_memory(out, array) for array in (*self.inputs, self.q, *self.rates)):
             raise InputError("out must not share memory with q, v or a, because the check reads them again")
         return out.reshape(self.n, len(self.links), *own)
 
     def in_shape(self, result: FloatArray) -> FloatArray:
-        """Return a result (n, frames, ...) in the caller's batch shape. A single frame has no axis."""
+        """Return a result (n, frames, ...) in the caller's batch shape.
+
+        A single frame gets no axis of its own.
+        """
         return result.reshape(*self.shape, *result.shape[1 if self.several else 2 :])
 
     def compute(self, evaluate: Callable[..., T], *arguments: Any, **options: Any) -> T:
@@ -164,7 +167,7 @@ class Call:
             raise
 
     def part(self, part: slice | IntArray) -> Part:
-        """Return some of the configurations, for the check."""
+        """Return the given configurations of this call, for the check."""
         state = self.state if len(self.state) == 1 else self.state[part]
         rates = tuple(x[part] for x in self.rates)
         query = self.question.rows(part)
@@ -176,7 +179,7 @@ class Call:
 
 
 def _described(out: object) -> str:
-    """Describe an invalid `out`: its type and, for an array, the properties that kernels need."""
+    """Describe an invalid argument `out` by its type and, if it is an array, its shape, dtype and layout."""
     if not isinstance(out, np.ndarray):
         return type(out).__name__
     flags = {
@@ -189,7 +192,7 @@ def _described(out: object) -> str:
 
 
 def _frames(frame: str | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
-    """Return whether `frame` is a list, and its names; the lookup reports names that do not exist."""
+    """Return whether `frame` is a list of names, and the names; a later lookup reports unknown names."""
     if isinstance(frame, str):
         return False, (frame,)
     try:

@@ -26,7 +26,7 @@ from urdfkin.verify.comparison import worst_of_each
 from urdfkin.verify.oracles import versions
 from urdfkin.verify.quantities import QUANTITIES
 
-#: The reason that a certificate states for results of calls with verify=False.
+#: Text of the reason why results of calls with verify=False are unchecked.
 NOT_ASKED_FOR = "the check was turned off by verify=False"
 #: A lock for the entries of all ledgers.
 _entering = lock_over_forks()
@@ -85,7 +85,8 @@ class Comparison:
 
     Attributes:
         results: Number of results (matrices or six-vectors).
-        worst: Largest difference between a number of urdfkin and the oracle's, in multiples of eps * scale.
+        worst: Largest difference between a number of urdfkin and the same number of the oracle, in multiples
+            of eps * scale.
         share: Largest ratio of a difference to its bound; above 1 is a failure.
         index: Index of the sample with the largest ratio, in the leading axes of the results.
     """
@@ -101,7 +102,10 @@ class Comparison:
         return cls(0, 0.0, 0.0, ())
 
     def __add__(self, other: Comparison) -> Comparison:
-        """Return the comparison of two batches together; `index` is that of the larger ratio."""
+        """Return the joint comparison of two batches.
+
+        The `index` of the result belongs to the batch with the larger ratio.
+        """
         first, second = (self, other) if self.share >= other.share else (other, self)
         return Comparison(
             self.results + other.results,
@@ -117,10 +121,11 @@ class Comparison:
 
 
 def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> Comparison:
-    """Compare results with the oracle's.
+    """Compare urdfkin's results with the oracle's results.
 
     Args:
-        ours: urdfkin's results. The first `axes` axes count results, the others belong to one result.
+        ours: urdfkin's results. The first `axes` axes number the results; the other axes belong to a single
+            result.
         theirs: The oracle's results, of the same shape.
         bound: Bound on the difference. Its arrays `scale` and `k` broadcast against the results.
         axes: Number of leading axes that count results.
@@ -140,7 +145,7 @@ class Line:
     Attributes:
         quantity: Name of the quantity.
         checked: Number of results that the oracle confirmed.
-        worst: Largest difference between these results and the oracle's, in multiples of eps * scale.
+        worst: Largest difference between a checked result and the oracle's, in multiples of eps * scale.
         share: Largest ratio of a difference to its bound.
         unchecked: Number of results that were returned without a check.
     """
@@ -193,7 +198,7 @@ CERTIFICATE = Layout(
 
 @dataclass(frozen=True, slots=True)
 class Certificate(Displayable):
-    """The record of a robot's results so far: which were checked, and how closely they agreed.
+    """The record of a robot's results so far: which results were checked, and how closely they agree.
 
     Attributes:
         robot: The robot's name.
@@ -224,7 +229,7 @@ class Certificate(Displayable):
 
     @property
     def verified(self) -> bool:
-        """True if there are results, and each of them was checked and is within its bound.
+        """True if there are results, and if every result was checked and is within its bound.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")

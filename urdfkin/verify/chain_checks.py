@@ -23,12 +23,13 @@ from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
 
 
 def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | None:
-    """Compare a chain with Pinocchio; return a line about the agreement.
+    """Compare a chain with Pinocchio's placements; return a line of text about the agreement.
 
-    Pinocchio's frame of a joint is the frame of its child link. This frame comes after the joint's motion if
-    the chain passes the joint forwards, and before the motion if it passes the joint backwards. Pinocchio
-    computes from the root to both ends of the chain; urdfkin computes from one end to the other. The bound
-    uses the joints and lengths of both paths from the root. Neither computation uses more joints or lengths.
+    Pinocchio's frame of a joint is the frame of its child link. Along the chain, this frame comes after the
+    joint's motion if the chain passes the joint from parent to child. It comes before the motion if the chain
+    passes the joint from child to parent. Pinocchio computes from the root to both ends of the chain; urdfkin
+    computes from one end to the other. The bound uses the joints and lengths of the two paths from the root
+    to the ends of the chain. Neither computation uses more joints or lengths than these.
 
     Args:
         verifier: Verifier of the robot.
@@ -77,7 +78,7 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
 
 
 def check_opw(verifier: Verifier, path: FrameChain, found: Opw) -> str | None:
-    """Return a line about the error of the solver's forward kinematics; None if Pinocchio cannot check."""
+    """Return a line of text about the error of an OPW solver's forward kinematics, or None if unchecked."""
     if verifier.cannot() is not None:
         return None
     q = sample(verifier.tree, TABLE_SAMPLES, np.random.default_rng(0))
@@ -91,7 +92,9 @@ def check_opw(verifier: Verifier, path: FrameChain, found: Opw) -> str | None:
 
 
 def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | None:
-    """Compare a product of exponentials with Pinocchio; return a line about the agreement.
+    """Compare a product of exponentials with Pinocchio's placements.
+
+    Return a line of text about the agreement.
 
     Args:
         verifier: Verifier of the robot.
@@ -111,7 +114,7 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
     own = screws.coupling.select(verifier.tree, q)
     off = np.abs(base @ screws.placement(own) - tip)[:, :3]
     path = chain(verifier.tree, screws.tip_frame, screws.base_frame)
-    # Pinocchio computes from the root to both ends. The product goes from one end to the other.
+    # Pinocchio computes from the root to the base and to the tip; the product, from the base to the tip.
     lever = np.linalg.norm(base[:, :3, 3], axis=-1) + path.reach + float(path.lengths[0])
     joints = sum(len(verifier.tree.path(verifier.tree.frame_link(end))) for end in (path.base, path.tip))
     unit = EPS * (of_joints(joints) + np.abs(own).sum(axis=-1)) + left_out(path)

@@ -1,7 +1,7 @@
-"""The largest difference of each result; `bounds.disagreement` defines the difference.
+"""Compute the largest difference of each result from the oracle's (`bounds.disagreement`).
 
-For large batches a kernel computes it in one pass: NumPy takes as long as Pinocchio itself. The numbers are
-equal.
+For large batches a compiled kernel computes the differences in one pass, because NumPy would take as long as
+Pinocchio itself. The kernel and NumPy return equal numbers.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from urdfkin.compiled import preload
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
 from urdfkin.model.tree import FloatArray
 
-#: The module of the kernels of checks, and these kernels.
+#: The module with the compiled kernels of checks, and the kernels of this module that are used here.
 KERNELS = "urdfkin.verify.kernels"
 CHECKS = "worst", "coupling"
 
 
 def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes: int) -> FloatArray:
-    """Return the largest `bounds.disagreement` of each result.
+    """Return, for each result, the largest value of `bounds.disagreement` over the result's numbers.
 
     Args:
         ours: urdfkin's results. The first `axes` axes count results, the others belong to one result.
@@ -30,11 +30,11 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
         axes: Number of leading axes that count results.
 
     Returns:
-        An array of the leading axes' shape, in eps * scale.
+        An array with the shape of the leading axes, in multiples of eps * scale.
     """
     leading, own = ours.shape[:axes], ours.shape[axes:]
     n, numbers = math.prod(leading), math.prod(own)
-    # The scale of one configuration is not copied for the others.
+    # a scale that is the same for all configurations is not copied
     shared = axes > 0 and scale.ndim == ours.ndim and len(scale) == 1
     shape = (1, *ours.shape[1:]) if shared else ours.shape
     one, other = _rows(ours, ours.shape, n, numbers), _rows(theirs, ours.shape, n, numbers)
@@ -50,7 +50,7 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
 
 
 def _rows(x: FloatArray, shape: tuple[int, ...], n: int, numbers: int) -> FloatArray:
-    """Return an array that broadcasts to a shape, as `n` rows."""
+    """Return an array as `n` rows, after it is broadcast to a shape."""
     if x.shape != shape:
         x = np.broadcast_to(x, shape)
     return np.ascontiguousarray(x).reshape(n, numbers)
@@ -58,7 +58,10 @@ def _rows(x: FloatArray, shape: tuple[int, ...], n: int, numbers: int) -> FloatA
 
 @np.errstate(all="ignore")
 def _worst(ours: FloatArray, theirs: FloatArray, scale: FloatArray) -> FloatArray:
-    """Return the largest difference in each row; inf for a row that is not finite."""
+    """Return the largest difference in each row of results.
+
+    The difference is inf for a row with a number that is not finite.
+    """
     difference = np.abs(ours - theirs)
     units = np.where(
         scale > 0.0,

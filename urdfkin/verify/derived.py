@@ -1,6 +1,6 @@
 """Checks of quantities that are derived from several results of an oracle.
 
-| Quantity | Computed from the oracle's |
+| Quantity | Results of the oracle from which it is computed |
 |---|---|
 | analytical Jacobian | rotation and Jacobian, with `urdfkin.verify.analytical_reference` |
 | relative placement | placements of both frames in the world |
@@ -38,7 +38,7 @@ def check_analytical_jacobian(
         bound_of: Function for the bound of the velocity Jacobian.
         oracle: The oracle's model of the robot.
         x: The configurations.
-        ours: urdfkin's results. They determine the sign of a quaternion where rounding hides the sign.
+        ours: urdfkin's results. They determine the sign of a quaternion if rounding errors hide its sign.
         by: The oracle.
     """
     aligned = Reference.LOCAL_WORLD_ALIGNED
@@ -66,11 +66,11 @@ def check_relative_placement(
 ) -> tuple[FloatArray, Bound]:
     """Return relative placements (n, frames, 4, 4) from an oracle, and their bound.
 
-    Let a be the other frame and b the frame. Let s_a and s_b be the lengths of their paths, and k_a and k_b
-    their roundings. The position is R_a^T (p_b - p_a). Its error is k_b s_b + k_a s_a from the positions and
-    k_a |p_b - p_a| from R_a. Since |p_b - p_a| <= s_a + s_b, the sum is at most (2 k_a + k_b) (s_a + s_b).
-    The error of the product of rotations is k_a + k_b. The difference and the products add rounding errors of
-    about 5 eps. Each k counts one additional joint, which covers them.
+    The placement is that of frame b relative to frame a. Let s_a and s_b be the path lengths of the frames,
+    and k_a and k_b the roundings of their placements. The position is R_a^T (p_b - p_a). Its error is k_b s_b
+    + k_a s_a from the positions and k_a |p_b - p_a| from R_a. Since |p_b - p_a| <= s_a + s_b, the sum is at
+    most (2 k_a + k_b) (s_a + s_b). The error of the product of rotations is k_a + k_b. The difference and the
+    products add rounding errors of about 5 eps. The additional joint in each k covers these rounding errors.
 
     Args:
         bound_of: Function for the bound of placements in the world.

@@ -10,7 +10,10 @@ from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
 
 @helper(fastmath={"reassoc"})
 def _finite(x, i):
-    """Return whether a row is finite: 0 * x is NaN if x is not, and NaN remains in a sum in any order."""
+    """Return whether a row is finite.
+
+    If x is not finite, 0 * x is NaN, and a sum with NaN in any order is NaN.
+    """
     total = 0.0
     for j in range(x.shape[1]):
         total += 0.0 * x[i, j]
@@ -19,7 +22,7 @@ def _finite(x, i):
 
 @helper(fastmath={"reassoc"})
 def _finite_difference(x, y, i):
-    """Return whether the differences of two rows are finite; they are not if a number of a row is not."""
+    """Return whether all differences of two rows are finite; any number that is not finite gives False."""
     total = 0.0
     for j in range(x.shape[1]):
         total += 0.0 * (x[i, j] - y[i, j])
@@ -35,7 +38,7 @@ def _units(difference, size):
 
 @helper(fastmath={"nnan", "nsz"})
 def _largest(ours, theirs, scale, i, k):
-    """Return the largest difference in a row of finite numbers; the compiler may reorder the comparisons.
+    """Return the largest difference between two rows of finite numbers; the compiler may reorder comparisons.
 
     The scale is in row `k`.
     """
@@ -47,7 +50,7 @@ def _largest(ours, theirs, scale, i, k):
 
 @helper()
 def _is_in_threes(scale, k):
-    """Return whether the three linear rows of a scale are equal, and the three angular rows."""
+    """Return whether the three linear rows of a scale are equal, and also the three angular rows."""
     width = scale.shape[1] // 6
     equal = scale.shape[1] == 6 * width
     for first in range(0, 6 * width, max(3 * width, 1)):
@@ -58,7 +61,10 @@ def _is_in_threes(scale, k):
 
 @helper(fastmath={"nnan", "nsz"})
 def _largest_of_threes(ours, theirs, scale, i, k):
-    """Return `_largest` of six rows; three rows share a scale, so the largest of three numbers is divided."""
+    """Return `_largest` of six rows.
+
+    Three rows have the same scale, so only the largest of three numbers is divided by it.
+    """
     largest, width = 0.0, ours.shape[1] // 6
     for half in range(2):
         for j in range(3 * half * width, (3 * half + 1) * width):
@@ -71,9 +77,9 @@ def _largest_of_threes(ours, theirs, scale, i, k):
 
 @kernel(ROWS, ROWS, ROWS, SCRATCH)
 def worst(ours, theirs, scale, out):
-    """Write the largest difference in each row; inf for a row that is not finite.
+    """Write the largest difference of each row to `out`; inf for a row with a number that is not finite.
 
-    If the scale has fewer rows, they are repeated.
+    If the scale has fewer rows than the results, its rows are repeated.
     """
     known = in_threes = len(scale) < len(out)
     for k in range(len(scale)):
@@ -92,7 +98,7 @@ def worst(ours, theirs, scale, out):
 
 @kernel(ROWS, PLACES, PLACES, NUMBERS, SCRATCH)
 def coupling(full, columns, index, factor, out):
-    """Add the columns of mimic joints to `out`, which is zero."""
+    """Add the weighted Jacobian columns of all joints to `out`, which contains zeros at first."""
     nv = len(out) // max(1, len(full))
     for i in range(len(full)):
         for column in columns:

@@ -1,7 +1,7 @@
 """Add the Jacobian columns of mimic joints to the columns of the mimicked joints.
 
-For large batches, a compiled kernel reads all Jacobians from memory only once. NumPy reads them once for each
-column. For robots with mimic joints, this takes longer than Pinocchio's computation of the Jacobians. The
+For large batches, a compiled kernel reads all Jacobians from memory only once; NumPy would read them once for
+each column. With NumPy, the addition would take longer than Pinocchio's computation of the Jacobians. The
 kernel and NumPy return equal numbers.
 """
 

@@ -54,8 +54,8 @@ class MjcfReading:
         listed: Elements of the file that the tree does not contain.
         path: The file; None for a text.
         answer: The process's answer about the robot, with its frames and MuJoCo's results.
-        not_whole: Reason why MuJoCo compiled the file without shapes and inertias; None if MuJoCo compiled
-            the complete file.
+        not_whole: Reason why MuJoCo could compile the file only without shapes and inertias; None if MuJoCo
+            compiled the complete file.
         pinocchio: The process's answer about Pinocchio's reader; None if there is no such answer.
     """
 
@@ -70,7 +70,7 @@ class MjcfReading:
 def read_mjcf(
     source: str | bytes | os.PathLike[str], *, check: bool = True, patience: float = PATIENCE
 ) -> MjcfReading:
-    """Read the robot of an MJCF file or text in a process with limits on time and memory.
+    """Read a robot from an MJCF file or text, in a process with limits on time and memory.
 
     Args:
         source: A path, a text or its bytes; included files are read too.
@@ -188,9 +188,9 @@ def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
 
 
 def _demand_the_rules(name: str, answer: Mapping[str, Any]) -> float | None:
-    """Check the mimic rules with the equalities of MuJoCo's model.
+    """Compare the mimic rules with the joint equalities in MuJoCo's model.
 
-    Return the largest ratio of a difference to its bound, or None.
+    The result is the largest ratio of a difference to its bound, or None without mimic rules.
     """
     rules = {int(i): str(joint) for i, joint in answer["rules"]}
     residuals, sizes = unpacked(answer["residuals"]), unpacked(answer["rule_sizes"])
@@ -239,7 +239,7 @@ def _shares(ours: FloatArray, theirs: FloatArray, bound: Bound) -> FloatArray:
 
 
 def _pinocchios(read: MjcfReading, ours: FloatArray, bound: Bound) -> str:
-    """Return a phrase about the comparison with the placements by Pinocchio's MJCF reader."""
+    """Return a phrase that compares the placements with those of Pinocchio's MJCF reader."""
     if read.path is None:
         return "not compared with Pinocchio's MJCF reader, which needs a file"
     found = read.pinocchio or {"error": "the process of the reader ended"}

@@ -1,4 +1,4 @@
-"""Program that compiles an MJCF file with MuJoCo, and with Pinocchio's MJCF reader, in a separate process.
+"""Compile an MJCF file with MuJoCo and with Pinocchio's MJCF reader; this program is a separate process.
 
 A few lines of MJCF, such as nested `<replicate>` or `nuser_body`, can require any amount of time and memory.
 A defect of a parser can crash the process. Therefore a separate process compiles the file, and the caller's
@@ -161,7 +161,7 @@ def _pinocchios(path: str, read: Mjcf, q: FloatArray) -> dict[str, Any]:
 def _pinocchio_placements(
     path: str, qpos: FloatArray, coordinates: Mapping[str, int], bodies: Sequence[str]
 ) -> FloatArray:
-    """Return placements (n, bodies, 4, 4) that Pinocchio computes from the MJCF file.
+    """Return the placements (n, bodies, 4, 4) of bodies that Pinocchio computes from an MJCF file.
 
     The joints and bodies of Pinocchio and MuJoCo are matched by name.
 
@@ -205,8 +205,8 @@ def _pinocchio_placements(
 def _numbered(model: Any, names: Sequence[str]) -> Iterator[tuple[str, tuple[int, int]]]:
     """Yield the name of each joint with its index in q and its number of coordinates.
 
-    Pinocchio combines several joints of a body into one joint. Its name is `Composite_` followed by the first
-    joint's name. It has one coordinate for each of the combined joints.
+    Pinocchio combines several joints of a body into one joint. The name of the combined joint is `Composite_`
+    followed by the name of the first joint. The combined joint has one coordinate for each of its joints.
     """
     for j, name in list(enumerate(map(str, model.names)))[1:]:
         joint, first = model.joints[j], name.removeprefix("Composite_")

@@ -12,9 +12,9 @@ method. Before MuJoCo reads the text, this module makes these changes:
 - The rules of `rules_of_text` couple the mimic joints. MuJoCo would turn the mimic rules into constraints,
   and its kinematics ignores constraints.
 
-MuJoCo's inputs are qpos(q), qvel = S v and qacc = S a + S' v. With MuJoCo's Jacobian J, the robot's Jacobian
-is J S. S contains the factors of mimic joints, and the rotation from a floating joint's own axes to the axes
-of its slides.
+MuJoCo's inputs are qpos(q), qvel = S v and qacc = S a + S' v. If J is MuJoCo's Jacobian, the robot's Jacobian
+is J S. S contains the multipliers of mimic joints, and rotates from a floating joint's own axes to the axes
+of the three slides that replace this joint.
 """
 
 from __future__ import annotations
@@ -62,9 +62,10 @@ class _Joint:
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """Indices of a moving joint in MuJoCo's and in urdfkin's vectors, with its mimic rule.
+    """Indices of a moving joint in MuJoCo's vectors and in urdfkin's vectors, with the joint's mimic rule.
 
-    For the moving base, q and v are -1. For a locked joint, v is -1 and the offset is its value.
+    For the moving base, the indices q and v are -1. For a locked joint, v is -1 and the offset is the joint's
+    value.
     """
 
     kind: str
@@ -77,7 +78,7 @@ class _Place:
 
 
 class MujocoOracle(Oracle):
-    """MuJoCo's results for one robot. MuJoCo must know all features of the text."""
+    """MuJoCo's results for one robot. MuJoCo must support all elements of the URDF text."""
 
     title = "MuJoCo"
 
@@ -96,7 +97,7 @@ class MujocoOracle(Oracle):
             raise OracleError("the oracle cannot read the text", where=tree.name, found=str(error)) from error
         moving = [joint.name for joint in joints if joint.kind != "fixed"]
         coupled = mimic_rules(text, moving, tree.name) if self.mimic else {}
-        held = locked_by_rules(self.lock, coupled)  # MuJoCo's model keeps locked joints, at these values
+        held = locked_by_rules(self.lock, coupled)  # locked joints stay in MuJoCo's model, with these values
         rules = self.rules([name for name in moving if name not in held])
         carrier = [_Joint("", "floating", "", links[0])] if self.moving_base else []
         self._bodies = {link: f"l{i}" for i, link in enumerate([*([""] if carrier else []), *links])}
@@ -140,7 +141,7 @@ class MujocoOracle(Oracle):
             ) from error
 
     def _joint(self, i: int, joint: _Joint) -> Element:
-        """Return a joint element for MuJoCo with the original text of origin and axis only."""
+        """Return a joint element for MuJoCo; only the origin and the axis are copied from the URDF text."""
         kind = "fixed" if joint.kind in _PARTS else joint.kind
         element = Element("joint", name=f"j{i}", type="continuous" if kind == "revolute" else kind)
         SubElement(element, "parent", link=self._bodies[joint.parent])
@@ -179,7 +180,7 @@ class MujocoOracle(Oracle):
                 raise OracleError(
                     "the mimicked joint does not exist", where=f"joint {joint.name}", found=rule.leader
                 )
-            at = leaders.get(rule.leader, (-1, -1))  # the moving base has no numbers in q
+            at = leaders.get(rule.leader, (-1, -1))  # the motion of the base is not part of q
             yield _Place(
                 joint.kind, int(own.qposadr[0]), int(own.dofadr[0]), *at, rule.multiplier, rule.offset
             )
@@ -234,7 +235,7 @@ class MujocoOracle(Oracle):
         poses = self._poses(x, 2, read)
         vel, w = velocity[..., None, :3], velocity[..., None, 3:]
         which = Reference.of(x.reference)
-        if which.own_axes:  # the derivative in rotating axes
+        if which.own_axes:  # add the term of the rotating axes
             for rows in (slice(0, 3), slice(3, 6)):
                 rate[..., rows, :] -= np.cross(w, J[..., rows, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         out = _referred(which, poses, rate, columns=True)
@@ -298,7 +299,7 @@ class MujocoOracle(Oracle):
     # -- layout --------------------------------------------------------------------------------------
 
     def _states(self, x: QueryBatch, count: int) -> tuple[FloatArray, FloatArray | None, FloatArray | None]:
-        """Return MuJoCo's inputs qpos, qvel and qacc (n, ...)."""
+        """Return MuJoCo's inputs qpos, qvel and qacc, each an array (n, ...)."""
         q, base, n = x.q, x.base, len(x.q)
         qpos = np.zeros((n, self._model.nq))
         for place in self._places:
@@ -327,7 +328,8 @@ class MujocoOracle(Oracle):
             second = (S @ x.a[..., None] + self._spread_rate(q, v) @ v[..., None])[..., 0]
         rates = np.array(np.broadcast_to(rates, (n, self._model.nv)))
         if self.moving_base and base is not None:
-            # Velocities of the slides are in world axes, that of the ball in the base's own axes.
+            # The velocities of the slides are in world axes; the velocity of the ball joint is in the base's
+            # own axes.
             at, back = self._places[0].their_v, np.swapaxes(_rotation(qpos[:, 3:7]), -1, -2)
             velocity, acceleration = np.asarray(base.velocity), np.asarray(base.acceleration)
             rates[:, at : at + 3] = velocity[..., :3]
@@ -354,7 +356,7 @@ class MujocoOracle(Oracle):
         return S
 
     def _spread_rate(self, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Return S' (n or 1, MuJoCo's nv, nv), from R' = R [w]x of floating and planar joints."""
+        """Return the time derivative S' of S, computed from R' = R [w]x of floating and planar joints."""
         S_rate = np.zeros((1 if self._constant else len(q), self._model.nv, self.nv))
         for place in self._places:
             at, own = place.their_v, place.v
@@ -367,7 +369,7 @@ class MujocoOracle(Oracle):
         return S_rate
 
     def _turn(self, place: _Place, q: FloatArray) -> tuple[FloatArray, int]:
-        """Return the rotation (n, slides, slides) from a joint's own axes to those of its slides."""
+        """Return the rotation (n, slides, slides) from a joint's own axes to the axes of its slides."""
         own = q[:, place.q : place.q + 7]
         if place.kind == "floating":
             unit = own[:, 3:] / np.linalg.norm(own[:, 3:], axis=1, keepdims=True)
@@ -377,10 +379,10 @@ class MujocoOracle(Oracle):
 
 
 def _weighing_its_root(model: Any, root: str) -> Any:
-    """Set all masses to zero except that of the root, so that the root's origin is the centre of mass.
+    """Set all masses except the root's to zero, so that the centre of mass is at the root's origin.
 
-    MuJoCo computes velocities at the centre of mass. When this point is the root's origin, lever arms that
-    should be zero are exactly zero.
+    MuJoCo computes velocities at the centre of mass. If this point is the root's origin, zero lever arms are
+    exactly zero.
     """
     body = model.body(root).id
     for mass in (model.body_mass, model.body_subtreemass):
@@ -394,7 +396,7 @@ def _weighing_its_root(model: Any, root: str) -> Any:
 
 
 def _ordered(text: str, root_joint: str | None) -> tuple[list[_Joint], list[str]]:
-    """Return the joints of the text, depth first with siblings by name, and the links, root first."""
+    """Return the joints of the text (depth first, siblings sorted by name), and the links (root first)."""
     robot = plain_xml(text)
     links = [element.get("name", "") for element in robot.iterfind("link")]
     below, carried = dict[str, list[_Joint]](), set[str]()

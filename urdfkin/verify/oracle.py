@@ -1,12 +1,12 @@
-"""The base class of the oracles, and the query that its methods take.
+"""Define the base class of the oracles, and the query, which is the argument of an oracle's methods.
 
 `OracleQuery` converts the arguments of a call to flat batches for the oracle. `urdfkin.verify.call` converts
 the same arguments for the recursion. Apart from the exceptions below, the two modules share no code. A wrong
 broadcast, order or name in one of them therefore leads to a disagreement.
 
-Names are looked up here a second time, among the joints in their order. The oracle compares that order of the
-joints with its own. Both modules use the same numbers of named poses and the same parser of units
-(`urdfkin.errors.numbers`).
+This module looks up names a second time, in the list of joints. The oracle compares the order of this list
+with the order of joints in the oracle's model. The exceptions are the values of named poses and the parser of
+units (`urdfkin.errors.numbers`), which the two modules share.
 """
 
 from __future__ import annotations
@@ -60,7 +60,10 @@ class _Names:
             at += len(own) or 1
 
     def place(self, name: str) -> int | slice:
-        """Return the index of a number, or the slice of a joint; raise OracleError for an unknown name."""
+        """Return the index of a coordinate, or the slice of a joint.
+
+        Raise OracleError for an unknown name.
+        """
         if name in self._joints:
             at, own = self._joints[name]
             return slice(at, at + len(own)) if own else at
@@ -94,7 +97,7 @@ def _number(text: str) -> float:
 
 
 class BaseRows(NamedTuple):
-    """Motion of the base, one row for each configuration: (n, 4, 4), (n, 6), (n, 6)."""
+    """Placement (n, 4, 4), velocity (n, 6) and acceleration (n, 6) of the base for n configurations."""
 
     placement: FloatArray
     velocity: FloatArray
@@ -111,8 +114,8 @@ class QueryBatch(NamedTuple):
         reference: The reference frame, as the user gave it. Placements ignore it.
         base: Motion of the base; None: fixed at the world origin.
         joints: True: use the library's functions for joints, if it has them. Each frame is a `JointFrame`.
-        divided: True: the frames are some of many. The library's functions are then those for many frames, so
-            that no number depends on the division.
+        divided: True: the frames are a part of a longer list. The library's functions for many frames are
+            then used, so that no number depends on the division of the list.
 
     >>> x = QueryBatch(["tool0"], (np.zeros((1, 6)), np.ones((1, 6))))
     >>> x.q.shape, x.v.shape, x.reference.name
@@ -150,7 +153,7 @@ class OracleQuery:
         reference: A `Reference` or its name.
         base: Motion of the base; None: fixed at the world origin.
         inputs: q, or q and v, or q, v and a, as numbers that broadcast.
-        named: The original argument of each input that was given by names; None for the others.
+        named: The original argument of each input that was given by names; None for every other input.
         joints: Name and number of joint velocities of each joint with coordinates, in order.
     """
 
@@ -182,7 +185,7 @@ class OracleQuery:
     def _by_name(
         self, x: FloatArray, given: str | Mapping[str, ArrayLike], of: Mapping[int, tuple[str, ...]]
     ) -> FloatArray:
-        """Return `x` with each named number at the index of its name."""
+        """Return `x` after each number that was given by name is written to the index of its name."""
         names = _Names(self._joints, of)
         for name, value in given.items() if isinstance(given, Mapping) else names.pairs(given):
             x[..., names.place(name)] = _number(value) if isinstance(value, str) else np.asarray(value, float)
@@ -203,7 +206,7 @@ class OracleQuery:
         return math.prod(self.shape)
 
     def rows(self, part: slice | IntArray) -> QueryBatch:
-        """Return some of the configurations, by index in the flat batch (C order)."""
+        """Return the configurations with the given indices in the flat batch (C order)."""
 
         def pick(x: FloatArray, own: int = 1) -> FloatArray:
             batch, one = x.shape[: x.ndim - own], x.shape[x.ndim - own :]
@@ -219,7 +222,7 @@ class OracleQuery:
         return QueryBatch(self.frames, tuple(map(pick, self._inputs)), self.reference, base)
 
     def flat(self, result: FloatArray, axes: int) -> FloatArray:
-        """Return (n, frames, ...) of a result in the user's shape; one result has `axes` axes.
+        """Convert results in the user's shape to the shape (n, frames, ...); one result has `axes` axes.
 
         Raises:
             OracleError: the shape does not match the query.
@@ -256,10 +259,10 @@ class Oracle:
         text: The URDF text.
         tree: urdfkin's tree of the same text, only for a comparison of the joints, their order and the mimic
             joints.
-        mimic: True: couple mimic joints. False: each moves freely.
+        mimic: True: couple mimic joints. False: every mimic joint moves freely.
         moving_base: Build the model on a free-flyer, which receives the base's motion.
         root_joint: "floating" or "planar" if the tree has such a root joint, which the text does not contain.
-        lock: Value (rad or m) of each locked joint; the tree has it as a fixed joint.
+        lock: Value (rad or m) of each locked joint, which is a fixed joint in the tree.
 
     Attributes:
         title: Name of the library.
@@ -342,7 +345,7 @@ class Oracle:
         """Return Hessians (n, frames, 6, nv, nv).
 
         Raises:
-            OracleError: the library has no derivative of a Jacobian by the coordinates.
+            OracleError: the library cannot compute the derivative of a Jacobian with respect to q.
         """
         raise OracleError(
             f"{self.title} computes no Hessian", where=self.tree.name, remedy="use oracle='pinocchio'"

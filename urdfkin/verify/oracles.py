@@ -24,14 +24,13 @@ class OracleLibrary:
     """An oracle: a library that reads the URDF text itself and computes the same quantities.
 
     Attributes:
-        name: Its name in arguments.
-        title: Its name in sentences.
-        package: Name of its Python package.
+        name: Name of the oracle in arguments.
+        title: Name of the oracle in sentences.
+        package: Name of the library's Python package.
         version: Function that returns the installed version without importing the library.
         oracle: Function (text, tree, mimic=, moving_base=, root_joint=, lock=) that returns the oracle's
             model of a robot.
-        size: Function that converts magnitudes to those of the bound for this oracle
-            (`urdfkin.verify.bounds`).
+        size: Function that adapts the magnitudes of the bound to this oracle (`urdfkin.verify.bounds`).
     """
 
     name: OracleName
@@ -74,11 +73,11 @@ def _known(name: str) -> OracleLibrary:
 
 
 def oracle_library(name: object) -> OracleLibrary:
-    """Return the oracle of a name.
+    """Return the oracle with the given name.
 
     Raises:
         UnknownNameError: there is no such oracle.
-        InputError: it is not installed.
+        InputError: the oracle is not installed.
     """
     wanted = as_str(name, "oracle")
     oracle = next((one for one in ORACLES.values() if one.name == wanted), None)
@@ -90,7 +89,7 @@ def oracle_library(name: object) -> OracleLibrary:
 
 
 def version(package: str) -> str:
-    """Return the version of an installed package, or a text if it has none."""
+    """Return the version of an installed package, or a text which states that the version is unknown."""
     return installed_version(package) or ("a checkout" if package == "urdfkin" else "not installed")
 
 

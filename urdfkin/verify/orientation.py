@@ -15,9 +15,9 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.certificate import VerificationError
 from urdfkin.verify.pinocchio_module import pinocchio
 
-#: Rounding errors of urdfkin and of Pinocchio together, in eps; each is less than 8 eps. They are counted as
-#: for a joint in `roundings`. For angles, the operations are arctan2, sines, cosines and products of three
-#: numbers. For quaternions, they are a square root, a quotient and products of two numbers.
+#: Rounding errors of urdfkin and of Pinocchio together, in eps; each is less than 8 eps. They are counted in
+#: `roundings` in the same way as those of a joint. For angles, the operations are arctan2, sines, cosines and
+#: products of three numbers. For quaternions, they are a square root, a quotient and products of two numbers.
 _ROUNDINGS = 16.0
 
 
@@ -25,13 +25,13 @@ def check_orientations(numbers: FloatArray, R: FloatArray, frame: str, again: Ca
     """Compare rotations that Pinocchio computes from angles or quaternions with the original rotations.
 
     The bound includes the distance of `R` from the nearest rotation matrix. Angles and quaternions represent
-    exact rotations only, so Pinocchio's rotation cannot be closer to `R` than that.
+    exact rotations only, so Pinocchio's rotation cannot be closer to `R` than this distance.
 
     Args:
         numbers: (n, 3) roll, pitch, yaw in rad, or (n, 4) quaternions, scalar last.
         R: (n, 3, 3) rotations from which the numbers were computed; they were checked before.
         frame: Name of the frame, for the message.
-        again: Function that returns a command or lines of Python that reproduce a sample.
+        again: Function that returns a shell command, or lines of Python, to compute a sample again.
 
     Raises:
         VerificationError: a rotation differs by more than the bound.

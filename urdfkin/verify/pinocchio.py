@@ -1,8 +1,8 @@
 """The oracle Pinocchio.
 
 The oracle shares no code with urdfkin's computation. It reads the URDF text with its own parser.
-`urdfkin.verify.pinocchio_inputs` determines the frame of a name, the joint of each number of q, and the
-motion of the base a second time, from Pinocchio's model and the user's original numbers.
+`urdfkin.verify.pinocchio_inputs` determines three things a second time from Pinocchio's model and the user's
+original numbers: the frame of a name, the joint of each number of q, and the motion of the base.
 
 Pinocchio's model is built without mimic joints, because Pinocchio 4.1 with mimic joints refuses four of the
 robots it ships with. `urdfkin.verify.pinocchio_inputs` reads the mimic rules from the text a second time.
@@ -46,7 +46,7 @@ _SHALLOW = 100
 #: below 2 GB.
 MOST_RATES = 315
 
-#: Number of values of Pinocchio's results that are collected before they are copied together. They fit into
+#: Number of Pinocchio's result values that are collected and then copied together. So many values fit into
 #: the processor's cache.
 _AT_A_TIME = 16384
 #: Name of the free-flyer of a moving base.
@@ -116,7 +116,7 @@ def _parse(text: str, tree: KinematicTree, root_joint: str | None, mimic: bool) 
             return pin.buildModelFromXML(text, roots[root_joint](), mimic=mimic)
         return pin.buildModelFromXML(text, mimic=mimic)
     except (ValueError, RuntimeError) as error:
-        # `check` reports all known reasons for a refusal before this point. So this reason is a new one.
+        # `check` has already reported all known reasons for a refusal, so the reason here is unknown.
         raise OracleError(
             "Pinocchio does not accept this robot",
             where=tree.name,
@@ -146,7 +146,7 @@ class PinocchioOracle(Oracle):
         self.new_data = self._model.createData
 
     def _put_on_free_flyer(self, joints: Sequence[int]) -> tuple[list[int], list[int]]:
-        """Put the model on a free-flyer for the base's motion; a root joint of the robot remains.
+        """Add a free-flyer joint for the base's motion before the model; an existing root joint stays.
 
         Returns:
             The new indices of the joints and of the frames. The frame of the world becomes the frame of the
@@ -183,7 +183,7 @@ class PinocchioOracle(Oracle):
     def _inputs(self, x: QueryBatch, count: int) -> tuple[FloatArray, ...]:
         """Return Pinocchio's vectors for q, or for q and v, or for q, v and a.
 
-        The free-flyer of a moving base has velocities and spatial accelerations in the base's own axes.
+        Velocities and spatial accelerations of the free-flyer of a moving base are in the base's own axes.
         """
         full = [self._layout.configurations(x.q), *map(self._layout.rates, x.inputs[1:count])]
         if self.moving_base:
@@ -223,10 +223,12 @@ class PinocchioOracle(Oracle):
         )
 
     def jacobians(self, x: QueryBatch) -> FloatArray:
-        """Return Jacobians (n, frames, 6, nv), of one frame by `computeFrameJacobian`.
+        """Return Jacobians (n, frames, 6, nv).
 
-        That function computes only the joints of the frame's path. Jacobians of several frames are computed
-        by `getFrameJacobian`, those of joints by `getJointJacobian`.
+        `computeFrameJacobian` computes the Jacobian of a single frame.
+
+        `computeFrameJacobian` uses only the joints of the frame's path. Jacobians of several frames are
+        computed by `getFrameJacobian`, and Jacobians of joints by `getJointJacobian`.
         """
         pin = self._pin
         if len(x.frames) == 1 and not (x.joints or x.divided):
@@ -238,7 +240,10 @@ class PinocchioOracle(Oracle):
         return self._columns(x, 1, pin.computeJointJacobians, get)
 
     def jacobian_rates(self, x: QueryBatch) -> FloatArray:
-        """Return J-dot (n, frames, 6, nv) by `getFrameJacobianTimeVariation`, or the joints' function."""
+        """Return J-dot (n, frames, 6, nv) by `getFrameJacobianTimeVariation`.
+
+        Joints have their own function.
+        """
         pin = self._pin
         get = pin.getJointJacobianTimeVariation if x.joints else pin.getFrameJacobianTimeVariation
         return self._columns(x, 2, pin.computeJointJacobiansTimeVariation, get)
@@ -301,7 +306,10 @@ class PinocchioOracle(Oracle):
         ids: Sequence[int],
         *reference: Any,
     ) -> FloatArray:
-        """Return (n, ids, *own): `compute` for each configuration, then `get` for each frame or joint."""
+        """Return results (n, ids, *own).
+
+        Call `compute` for each configuration, then `get` for each frame or joint.
+        """
         model, data, steps = self._model, self.data, self._each(compute, inputs)
         return _stacked(
             lambda n: [get(model, data, one, *reference) for _ in islice(steps, n) for one in ids],
@@ -310,12 +318,15 @@ class PinocchioOracle(Oracle):
 
 
 def _stacked(compute: Callable[[int], list[FloatArray]], *shape: int) -> FloatArray:
-    """Return results as one array of a shape (n, frames, ...); without numbers none is computed.
+    """Return results as one array (n, frames, ...).
+
+    An array without numbers is returned without a computation.
 
     Pinocchio 4.1 crashes the process for a Jacobian without columns, and returns a vector for one column.
 
     Args:
-        compute: Returns the results of all frames for the next configurations, at most the given number.
+        compute: Function that returns the results of all frames for the next configurations. Its argument is
+            the largest number of these configurations.
         shape: Shape of all results.
     """
     out = np.empty(shape)

@@ -4,7 +4,7 @@ urdfkin converts the same arguments for its own computation. This module repeats
 text, Pinocchio's model and the user's numbers. A mistake in one of the two conversions therefore makes the
 results disagree.
 
-| Part | Here | urdfkin's own |
+| Part | In this module | In urdfkin's own computation |
 |---|---|---|
 | mimic rules | `rules_of_text` | `urdfkin.lint`, `urdfkin.urdf.reader` |
 | order of q, v and a | `Layout` | `KinematicTree` |
@@ -14,13 +14,13 @@ results disagree.
 Mimic rules: Pinocchio's model has no mimic joints (`urdfkin.verify.pinocchio`), so this module reads the
 rules. It parses the text again at the first check.
 
-Layout of q: joints in Pinocchio's order; one number for a revolute, continuous or prismatic joint, three for
-a planar joint, seven for a floating joint, none for a mimic joint.
+Layout of q: the joints are in Pinocchio's order. A revolute, continuous or prismatic joint has one number, a
+planar joint three, a floating joint seven, and a mimic joint none.
 
-Moving base: its rotation is the one nearest to the given matrix M (`urdfkin.kinematics.rotation.matrix`).
-urdfkin computes it with a Newton step. This module uses Davenport's q-method: among unit quaternions,
-q^T K q = trace(R(q)^T M) is largest for the nearest rotation. So q is the eigenvector of K for the largest
-eigenvalue.
+Moving base: the base's rotation is the rotation nearest to the given matrix M. urdfkin computes this rotation
+with a Newton step (`urdfkin.kinematics.rotation.matrix`). This module uses Davenport's q-method: among unit
+quaternions, q^T K q = trace(R(q)^T M) is largest for the nearest rotation. The quaternion q is therefore the
+eigenvector of K for the largest eigenvalue.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from urdfkin.verify.mimic_columns import Places, coupled
 
 
 def rules_of_text(text: str, joints: Collection[str]) -> dict[str, Mimic]:
-    """Return the rule of each mimic joint; a chain of rules is resolved to the independent joint.
+    """Return the rule of each mimic joint relative to an independent joint; chains of rules are resolved.
 
     Args:
         text: The URDF text.
@@ -61,7 +61,7 @@ def rules_of_text(text: str, joints: Collection[str]) -> dict[str, Mimic]:
 
 
 def resolved_rules(rules: dict[str, Mimic]) -> dict[str, Mimic]:
-    """Return mimic rules in terms of joints that are not mimic joints."""
+    """Return mimic rules in which every mimicked joint is independent, not a mimic joint."""
     known: dict[str, Mimic] = {}
     return {name: _resolved(name, rules, known) for name in rules}
 
@@ -69,8 +69,8 @@ def resolved_rules(rules: dict[str, Mimic]) -> dict[str, Mimic]:
 def _resolved(joint: str, rules: dict[str, Mimic], known: dict[str, Mimic]) -> Mimic:
     """Return the resolved rule q_mimic = m_1 (m_2 (... q_independent ...) + o_2) + o_1.
 
-    The product is computed from the independent joint on. Results are stored in `known`, so each rule of a
-    chain is resolved once.
+    The products are computed from the independent joint outwards. The results are stored in `known`, so each
+    rule of a chain is resolved only once.
     """
     chain = [joint]
     while (leader := rules[chain[-1]].leader) in rules and leader not in known and len(chain) <= len(rules):
@@ -84,7 +84,7 @@ def _resolved(joint: str, rules: dict[str, Mimic], known: dict[str, Mimic]) -> M
 
 
 def locked_by_rules(lock: Mapping[str, float], rules: Mapping[str, Mimic]) -> dict[str, float]:
-    """Return the value of each locked joint, with those of the mimic joints that a locked joint moves.
+    """Return the value of each locked joint, and the value of each mimic joint that a locked joint moves.
 
     >>> locked_by_rules({"a": 2.0}, {"b": Mimic("a", 0.5, 0.25), "c": Mimic("d", 1.0, 0.0)})
     {'a': 2.0, 'b': 1.25}
@@ -97,13 +97,13 @@ def locked_by_rules(lock: Mapping[str, float], rules: Mapping[str, Mimic]) -> di
     return {**lock, **moved}
 
 
-#: Pinocchio's (nq, nv) of a joint -> number of urdfkin's coordinates of this joint.
+#: For each pair (nq, nv) of a joint in Pinocchio: the joint's number of coordinates in urdfkin.
 _CONTINUOUS, _PLANAR, _FLOATING = (2, 1), (4, 3), (7, 6)
 _COORDINATES = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 
 
 class _Place(NamedTuple):
-    """A joint: Pinocchio's (nq, nv), first indices in Pinocchio's and urdfkin's vectors, and mimic rule."""
+    """A joint: its (nq, nv) in Pinocchio, its first indices in Pinocchio and urdfkin, and its mimic rule."""
 
     sizes: tuple[int, int]
     full_q: int
@@ -115,7 +115,7 @@ class _Place(NamedTuple):
 
 
 class Layout:
-    """Conversion of q, v and a to Pinocchio's vectors, and of Pinocchio's columns to urdfkin's.
+    """Convert q, v and a to Pinocchio's vectors, and Pinocchio's Jacobian columns to urdfkin's.
 
     Args:
         model: Pinocchio's model.
@@ -126,7 +126,8 @@ class Layout:
     Attributes:
         nq: Length of q.
         nv: Length of v.
-        rate_columns: Indices of Pinocchio's Jacobian columns of the moving joints, mimic joints included.
+        rate_columns: Indices of the columns of Pinocchio's Jacobian that belong to moving joints, including
+            mimic joints.
     """
 
     def __init__(
@@ -153,14 +154,14 @@ class Layout:
         self._columns = np.array(self.rate_columns, dtype=np.int64)
         self._free = [place for place in self._places if place.sizes in (_PLANAR, _FLOATING)]
         self._single, self._angles = (self._of_sizes(sizes) for sizes in ((1, 1), _CONTINUOUS))
-        #: True if Pinocchio's coordinates, or joint velocities, are equal to the robot's.
+        #: True if Pinocchio's coordinates (or joint velocities) are the same numbers as the robot's.
         plain = [(p.q, (1, 1), 1.0, 0.0) == (p.full_q, p.sizes, p.multiplier, p.offset) for p in self._places]
         self._same_q = all(plain) and model.nq == self.nq
         self._same_v = model.nv == self.nv and bool((self._factor == 1.0).all())
         self._same_v &= bool((self._index == np.arange(model.nv)).all())
 
     def _of_sizes(self, sizes: tuple[int, int]) -> tuple[Places, Places, FloatArray, FloatArray]:
-        """Return the indices in Pinocchio's and urdfkin's q, and the rules, of the joints of some sizes."""
+        """Return the indices in Pinocchio's q and urdfkin's q, and the rules, of joints with given sizes."""
         own = [place for place in self._places if place.sizes == sizes]
         return (
             np.array([place.full_q for place in own], dtype=np.int64),
@@ -170,7 +171,10 @@ class Layout:
         )
 
     def _rates(self) -> tuple[Places, FloatArray]:
-        """Return the index in v and the factor in G of each joint velocity of Pinocchio; 0 for the base."""
+        """Return, for each joint velocity of Pinocchio, its index in v and its factor in G.
+
+        The index and the factor are 0 for the base's velocities.
+        """
         index, factor = np.zeros(self._model.nv, dtype=np.int64), np.zeros(self._model.nv)
         for place in self._places:
             for c in range(place.sizes[1]):
@@ -208,7 +212,7 @@ class Layout:
         return full
 
     def couple(self, full: FloatArray) -> FloatArray:
-        """Return J_full G: add each mimic joint's column to its mimicked joint's; omit the base's columns."""
+        """Return J_full G without the base's columns; mimic joints' columns are added to those they mimic."""
         if self._same_v:
             return full
         return coupled(full, self._columns, self._index, self._factor, self.nv)
@@ -227,8 +231,8 @@ class Frames:
         robot: Name of the robot, for errors.
         bodies: Index of the frame of each link.
         joints: Index of the frame of each joint.
-        carriers: Index of the joint's frame for the frame of each link that a joint carries. A frame that is
-            not in it serves for both.
+        carriers: For the frame of each link that a joint carries: the index of the joint's frame. A frame
+            that is missing here is the frame of the link and of the joint.
     """
 
     def __init__(
@@ -273,16 +277,17 @@ class Frames:
 
 
 def frames_of(model: Any, pin: Any, *, stands_on_world: bool) -> Frames:
-    """Return the frames of Pinocchio's model, as its parser returned it.
+    """Return the frames of a model that Pinocchio's URDF parser returned.
 
     Args:
         model: The model.
         pin: The module of Pinocchio.
-        stands_on_world: Whether the robot has a root joint. If it has one, the world counts as a link.
+        stands_on_world: Whether the robot has a root joint. If the robot has a root joint, the world counts
+            as a link.
     """
     bodies, joints = dict[str, int](), dict[str, int]()
     for index, frame in enumerate(model.frames):
-        if index:  # the first is the world
+        if index:  # the first frame is the world
             (bodies if frame.type == pin.FrameType.BODY else joints)[frame.name] = index
     if stands_on_world:
         bodies[WORLD] = 0
@@ -328,7 +333,7 @@ def nearest_quaternion(M: FloatArray) -> FloatArray:
     """Return the unit quaternion (..., 4), scalar last, of the rotation nearest to M (..., 3, 3)."""
     K = davenport(M)
     q = np.linalg.eigh(K).eigenvectors[..., -1:]
-    # For a rotation, K + I = 4 q q^T. Multiplying q by K + I once more removes the parts of the other
+    # For a rotation, K + I = 4 q q^T. The product of K + I and q does not contain the parts of the other
     # eigenvectors.
     q = (K @ q + q)[..., 0]
     unit: FloatArray = q / np.linalg.norm(q, axis=-1, keepdims=True)
@@ -348,7 +353,7 @@ def davenport(M: NDArray[Any]) -> NDArray[Any]:
 
 
 def _in_own_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
-    """Return R^T times both halves of a six-vector.
+    """Return R^T times the linear half and R^T times the angular half of a six-vector.
 
     For a quaternion (u, w) and a half x, this is x + 2 w (x x u) + 2 (x x u) x u.
     """

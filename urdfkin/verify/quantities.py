@@ -60,28 +60,31 @@ class Quantity:
     Attributes:
         name: Name in certificates, errors and reports.
         title: Name in sentences.
-        inputs: The inputs it depends on: "q", "qv" or "qva".
+        inputs: The inputs of the quantity: "q", "qv" or "qva".
         shape: Shape of one result; "nv" stands for the robot's nv.
         equations: Equations of the textbook.
         compute: Function (plan, *inputs, reference, base=, out=, threads=) that returns (n, frames, ...). If
             `recursive` is False, a method of `Robot` calls it in another way.
         ask: Function (oracle, query) that returns the oracle's (n, frames, ...).
-        scale: Function (plan, magnitudes, reference) for the size of its terms (`urdfkin.verify.bounds`).
+        scale: Function (plan, magnitudes, reference) that returns the size of the terms of the quantity
+            (`urdfkin.verify.bounds`).
         factors: Number of rotated vectors in each term of [linear; angular], in LOCAL_WORLD_ALIGNED.
         against: Function (oracle, part, ours, by) that returns the oracle's results and the bound, for
             quantities that need more than `ask` and `scale`.
-        exact: Function (motion, link, reference) for exact values, for accuracy study and enclosures.
-        recursive: True if the forward recursion computes it for any frames.
-        validated: True if `validate`, the accuracy study and plots include it. A Hessian is left out. It has
-            nv times as many numbers as a Jacobian, and consists of products of the Jacobian's columns.
-        referred: True if it depends on a reference frame; a placement does not. If False, `compute` takes
-            none.
-        of: What the quantity belongs to, and a validation compares: "frames", "joints" or "columns".
+        exact: Function (motion, link, reference) that returns exact values, for the accuracy study and for
+            enclosures.
+        recursive: True if the forward recursion computes the quantity for any frames.
+        validated: True if `validate`, the accuracy study and plots include the quantity. A Hessian is left
+            out: it has nv times as many numbers as a Jacobian, and consists of products of the Jacobian's
+            columns.
+        referred: True if the quantity depends on a reference frame. If False, as for a placement, `compute`
+            has no argument for a reference frame.
+        of: Objects for which a validation compares the quantity: "frames", "joints" or "columns".
         head: Heading of the column in reports. Quantities with the same heading share a column.
         labels: Names of a result's rows, if any.
         units: Unit of each group of three numbers, by the group's name.
         command: Command that computes one case again, if there is one.
-        summary: Line in the list of commands, if it has a command of its own.
+        summary: Line in the list of commands, if the quantity has a command of its own.
         page: The help text of the command after its summary.
         example: Example command line.
     """
@@ -121,12 +124,12 @@ class Quantity:
 
     @property
     def columns(self) -> bool:
-        """True if it has a column for each joint velocity."""
+        """True if the quantity has a column for each joint velocity."""
         return "nv" in self.shape
 
     @property
     def references(self) -> tuple[Reference | None, ...]:
-        """Reference frames of its validation and accuracy study."""
+        """Reference frames in which the validation and the accuracy study compare the quantity."""
         from urdfkin.model.reference import Reference  # noqa: PLC0415
 
         return tuple(Reference) if self.referred else (None,)
@@ -138,12 +141,12 @@ class Quantity:
     def ours(
         self, plan: CompiledTree, inputs: Sequence[FloatArray], reference: Reference | None, **how: Any
     ) -> FloatArray:
-        """Return urdfkin's results (n, frames, ...); inputs that it does not need are ignored."""
+        """Return urdfkin's results (n, frames, ...); inputs that the quantity does not need are ignored."""
         found: FloatArray = self.compute(plan, *inputs[: len(self.inputs)], *self._in(reference), **how)
         return found
 
     def bound(self, plan: CompiledTree, size: Magnitudes, reference: Reference | None) -> Bound:
-        """Return the bound between urdfkin's and the oracle's results."""
+        """Return the bound on the difference between urdfkin's results and the oracle's results."""
         scale = self.scale(plan, size, *self._in(reference))
         bound: Bound = _bound(scale, self.factors, size, *self._in(reference))
         return bound
@@ -347,7 +350,7 @@ QUANTITIES = {
 
 
 def recursive_quantities(of: str = "frames") -> list[Quantity]:
-    """Return the quantities that the forward recursion computes for any frames, or for any joints."""
+    """Return the quantities that the forward recursion computes for all frames, or for all joints."""
     return [row for row in QUANTITIES.values() if row.recursive and row.of == of]
 
 
@@ -362,7 +365,7 @@ def compared() -> str:
 
 
 def not_compared() -> str:
-    """Return the names of the quantities that a validation does not compare; calls do check them."""
+    """Return the names of the quantities that a validation does not compare; each call checks these."""
     return _listed(
         [row.title for row in QUANTITIES.values() if row.of == "frames" and row not in validated()]
     )
@@ -373,12 +376,15 @@ def _listed(titles: Sequence[str]) -> str:
 
 
 def by_command() -> dict[str, Quantity]:
-    """Return the quantities with a command of their own, by the command."""
+    """Return the quantities that have a command of their own, by the name of the command."""
     return {row.command: row for row in recursive_quantities() if row.command}
 
 
 def quantity(name: str) -> Quantity:
-    """Return the quantity of a name; raise UnknownNameError, with the nearest names, if there is none."""
+    """Return the quantity with the given name.
+
+    Raise UnknownNameError, with the nearest names, if there is no such quantity.
+    """
     if (found := QUANTITIES.get(name)) is None:
         raise UnknownNameError("quantity", name, QUANTITIES)
     return found

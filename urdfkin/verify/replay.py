@@ -20,7 +20,7 @@ def replay_line(
         command: Name of the urdfkin command that computes the quantity.
         frame: Name of a link or joint.
         reference: Reference frame; None for a placement.
-        values: The numbers of q, v and a, as far as the command takes them.
+        values: The numbers of those inputs q, v and a that the command needs.
 
     >>> replay_line(Origin("ur5"), "velocity", "tool 0", "local", {"q": [0.5, 0.1], "v": []})
     "urdfkin velocity ur5 --frame 'tool 0' --reference local --q 0.5,0.1 --v neutral"

@@ -35,9 +35,9 @@ def sample(tree: KinematicTree, n: int, rng: np.random.Generator) -> FloatArray:
     """Return random configurations (n, nq), uniform within the limits.
 
     Continuous joints take any angle. Planar and floating joints take any orientation and positions within
-    +-2 m. A missing limit, or one beyond 10 (rad or m), counts as 10. The limits of mimic joints restrict the
-    mimicked joint too. If no value satisfies both, only the limits of the mimicked joint apply, and
-    `configuration.limit_violations` names the mimic joint.
+    +-2 m. A missing limit, or a limit beyond 10 (rad or m), counts as 10. The limits of mimic joints restrict
+    the mimicked joint too. If no value is within the limits of the mimicked joint and of the mimic joint,
+    only the limits of the mimicked joint apply. `configuration.limit_violations` then names the mimic joint.
     """
     return _uniform(tree, n, rng, coordinate_ranges(tree))
 
@@ -77,7 +77,7 @@ def special(tree: KinematicTree) -> FloatArray:
 
 
 def draw_base(n: int, rng: np.random.Generator) -> BaseMotion:
-    """Return random motions of the root link: poses as of a floating joint, velocities as in `draw`."""
+    """Return random motions of the root link, with poses of a floating joint and velocities as in `draw`."""
     placed = _sample_floating(n, rng)
     placement = np.tile(np.eye(4), (n, 1, 1))
     placement[:, :3, :3], placement[:, :3, 3] = rotation_of(placed[:, 3:]), placed[:, :3]
@@ -88,11 +88,12 @@ def draw_base(n: int, rng: np.random.Generator) -> BaseMotion:
 
 
 def draw(tree: KinematicTree, n: int, rng: np.random.Generator, *, with_special: bool) -> Samples:
-    """Return samples for a validation: `n` random ones, and those of `special` if requested.
+    """Return samples for a validation: `n` random samples and, if requested, the samples of `special`.
 
-    The samples cover the full range of each joint, even where a mimic joint then exceeds its own limits. The
-    equations also hold there. Joint velocities and accelerations are standard normal. In every eighth sample
-    they are a hundred times larger, so that the quadratic terms of eq. 7.129 and 7.130 dominate.
+    The samples cover the full range of each joint, even if a mimic joint then exceeds its own limits. The
+    equations are valid beyond the limits too. Joint velocities and accelerations are standard normal. In
+    every eighth sample they are a hundred times larger, so that the quadratic terms of eq. 7.129 and 7.130
+    dominate.
     """
     q = _uniform(tree, n, rng, own_ranges(tree))
     if with_special:

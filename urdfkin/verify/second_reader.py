@@ -1,7 +1,7 @@
-"""A second reader of a robot's URDF: yourdfpy reads the same text, and its tree is compared with ours.
+"""Read a robot's URDF a second time with yourdfpy, and compare yourdfpy's tree with urdfkin's tree.
 
-Pinocchio checks the computed results. This check compares the data of the robot itself: links, joint kinds,
-origins, axes, limits and mimic rules. The two readers share no code.
+Pinocchio checks the computed results. This module checks the data of the robot itself: links, joint kinds,
+origins, axes, limits and mimic rules. yourdfpy and urdfkin's reader share no code.
 
 yourdfpy (0.0.60) is known to differ from the URDF specification in two ways. The report names them as known
 faults and does not count them as differences:
@@ -36,12 +36,12 @@ from urdfkin.verify.pinocchio_inputs import resolved_rules
 if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf
 
-#: Largest difference of an entry of two rotation matrices that are computed from the same angles. On each
-#: side, a sine and a cosine have an error of one eps, and two products and a sum have half an eps each. The
-#: sum of the terms is at most 1.
+#: Largest difference of an entry of two rotation matrices that are computed from the same angles. In each of
+#: the two computations, a sine and a cosine have an error of one eps, and two products and a sum have half an
+#: eps each. The sum of the terms is at most 1.
 _ROTATION = 9.0 * EPS
-#: Largest difference of an entry of two normalised axes. On each side, the length has an error of 2 eps, and
-#: the quotient rounds once.
+#: Largest difference of an entry of two normalised axes. In each of the two computations, the length has an
+#: error of 2 eps, and the quotient is rounded once.
 _AXIS = 5.0 * EPS
 #: If the length of an axis differs from 1 by more than this, the axis counts as not normalised.
 _UNIT = 1e-6
@@ -87,16 +87,16 @@ class SecondReading:
 def second_reading(
     text: str, tree: KinematicTree, *, mimic: bool = True, root_joint: bool = False
 ) -> SecondReading:
-    """Compare yourdfpy's tree of a URDF text with ours.
+    """Compare yourdfpy's tree of a URDF text with urdfkin's tree.
 
     Args:
         text: The URDF text.
-        tree: Our tree of the same text.
-        mimic: Whether our tree couples the mimic joints; if it does not, the mimic rules are not compared.
+        tree: urdfkin's tree of the same text.
+        mimic: Whether urdfkin's tree couples the mimic joints; otherwise the mimic rules are not compared.
         root_joint: Whether `load` has added the first joint and link, which the text does not contain.
     """
     by = f"yourdfpy {installed_version('yourdfpy') or 'not installed'}"
-    if "<!DOCTYPE" in text:  # it could name files and entities, which yourdfpy would read
+    if "<!DOCTYPE" in text:  # a document type could name files and entities, which yourdfpy would read
         return SecondReading(by, unread="the file has a document type")
     try:
         robot = read(text)
@@ -135,7 +135,7 @@ def read(text: str) -> yourdf.Robot:
     """
     import yourdfpy  # noqa: PLC0415  imports trimesh
 
-    # The text is UTF-8 now, whatever the file declared.
+    # The text is now UTF-8, even if the file declares another encoding.
     plain = re.sub(r"\A\s*<\?xml[^>]*\?>", "", text)
     logger = logging.getLogger("yourdfpy.urdf")
     before, logger.disabled = logger.disabled, True
@@ -191,7 +191,7 @@ def _own_limit(joint: Joint) -> dict[str, float] | None:
 
 
 def _rules(theirs: Mapping[str, yourdf.Joint], ours: Mapping[str, object]) -> dict[str, Mimic]:
-    """Return yourdfpy's mimic rules of moving joints, in terms of joints that are not mimic joints."""
+    """Return yourdfpy's mimic rules of moving joints; every mimicked joint in the rules is independent."""
     return resolved_rules(
         {
             name: Mimic(joint.mimic.joint, joint.mimic.multiplier, joint.mimic.offset)
@@ -213,7 +213,7 @@ def _quaternions(text: str) -> set[str]:
 
 
 def _names(what: str, ours: Iterable[str], theirs: Iterable[str]) -> Iterator[str]:
-    """Yield the names that one reader has and the other has not, or that it has twice."""
+    """Yield the names that only one reader has, and the names that a reader has twice."""
     found, own = Counter(iter(theirs)), Counter(iter(ours))
     for name in found.keys() | own.keys():
         if found[name] != own[name]:

@@ -1,13 +1,13 @@
-"""Singular values of Jacobians with guaranteed bounds, and from them the condition number and manipulability.
+"""Compute singular values of Jacobians, condition numbers and manipulabilities, with guaranteed bounds.
 
 Let s_k be the k-th singular value. By Weyl's inequality, |s_k(J + E) - s_k(J)| <= |E|. The inequality holds
 for every norm that is at least the spectral norm; this module uses the Frobenius norm. E is the sum of two
-errors. One is the error of J, whose bound is computed in `urdfkin.verify.bounds`. The other is the residual
-of the decomposition, J - U S V^T.
+errors. The first error is that of J; `urdfkin.verify.bounds` computes its bound. The second error is the
+residual of the decomposition, J - U S V^T.
 
 The computed U and V are not exactly orthogonal. Let |U^T U - I| <= a and |V^T V - I| <= b. By Ostrowski's
-theorem, each singular value of U S V^T is that of S times a factor between (1 - a)^(1/2) (1 - b)^(1/2) and (1
-+ a)^(1/2) (1 + b)^(1/2).
+theorem, each singular value of U S V^T is a singular value of S times a factor between (1 - a)^(1/2) (1 -
+b)^(1/2) and (1 + a)^(1/2) (1 + b)^(1/2).
 
 The computed residuals have rounding errors too. The error of a sum of m products is at most m eps times the
 sum of the absolute values of the products. Two measures keep every intermediate value in the range of
@@ -30,7 +30,7 @@ from urdfkin.kinematics.roundings import EPS, SMALLEST
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singularity import FrameColumns, Singularity, explain
 
-#: Bound on the relative rounding of a few dozen sums and products of positive numbers.
+#: Bound on the relative rounding error of a few dozen sums and products of positive numbers.
 _OUTWARD = 256.0 * EPS
 #: Number of samples of a batch that `print` displays.
 _SHOWN = 10
@@ -52,7 +52,7 @@ class Between(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SingularValues(Displayable):
-    """The singular values of some rows of a Jacobian. Columns that are 0 in every configuration are left out.
+    """Singular values of some rows of a Jacobian. Columns that are 0 in every configuration are left out.
 
     `print` and notebooks display the singular values as a table, and explain a singularity.
 
@@ -61,8 +61,8 @@ class SingularValues(Displayable):
         values: (..., k) the singular values, largest first; k is the number of rows or of columns, whichever
             is smaller.
         U: (..., rows, k) left singular vectors, which are directions of the frame's velocity.
-        V: (..., nv, k) right singular vectors, which are directions of v; their numbers are 0 for joints that
-            do not move the frame.
+        V: (..., nv, k) right singular vectors, which are directions of v; a component of V is 0 for a joint
+            that does not move the frame.
         columns: The Jacobian with the names of its frame and joints; None if the matrix is not a robot's
             Jacobian.
 
@@ -140,7 +140,8 @@ class SingularValues(Displayable):
     def manipulability(self) -> Between:
         """Product of the singular values, (...).
 
-        It is Yoshikawa's manipulability sqrt(det J J^T), or sqrt(det J^T J) if J has more rows than columns.
+        This product is Yoshikawa's manipulability sqrt(det J J^T), or sqrt(det J^T J) if J has more rows than
+        columns.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -270,7 +271,7 @@ def _norm(E: FloatArray) -> FloatArray:
 def _product(x: FloatArray) -> FloatArray:
     """Return the product (...) of k numbers (..., k).
 
-    Products of some of them cannot overflow or underflow.
+    Intermediate products cannot overflow or underflow.
     """
     mantissas, exponents = np.frexp(x)
     with np.errstate(over="ignore", under="ignore"):

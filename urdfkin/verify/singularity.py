@@ -1,9 +1,9 @@
 """Explain a singular Jacobian by its rank, the lost directions, and the joints that cause the loss of rank.
 
 A left null vector u of J is a lost direction. The frame has no velocity along it: u^T J v = 0 for every v. A
-right null vector is a null motion, which consists of joint velocities that do not move the frame. A set of
-linearly dependent columns shows which joints cause the loss, if each proper subset of it is independent. Such
-a set is called a smallest dependent set. A geometric reason, such as parallel axes, is stated only if the
+right null vector is a null motion, which consists of joint velocities that do not move the frame. A smallest
+dependent set is a set of linearly dependent columns of which each proper subset is independent. Such a set
+shows which joints cause the loss of rank. A geometric reason, such as parallel axes, is stated only if the
 columns satisfy its condition within the error bound of J.
 
 A column of a revolute joint is [a x z; z], where z is the axis and a leads from the frame's origin to a point

@@ -1,8 +1,8 @@
 """Check the URDF that urdfkin writes for a Denavit-Hartenberg table.
 
-Pinocchio checks a robot's results with its URDF text. For a robot made of a table, urdfkin writes that text.
-This module checks the text itself. It compares Pinocchio's placements of the tip with the products of the
-table's own matrices (eq. 7.64).
+Pinocchio checks a robot's results with the robot's URDF text. For a robot that was made from a table, urdfkin
+writes this text. This module checks the text itself. It compares Pinocchio's placements of the tip with the
+products of the table's own matrices (eq. 7.64).
 """
 
 from __future__ import annotations
@@ -54,6 +54,6 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
 
 
 def _defect(table: DHTable) -> float:
-    """Return the distance of base and tool from rigid motions; a table may have six digits only."""
+    """Return the distance of base and tool from rigid motions; a table may have only six digits."""
     rotations: list[FloatArray] = [table.base[:3, :3], table.tool[:3, :3]]
     return sum(float(np.linalg.norm(R.T @ R - np.eye(3))) for R in rotations)

@@ -1,8 +1,8 @@
 """Compare a Denavit-Hartenberg table with Pinocchio: placement, Jacobian and acceleration of its tip.
 
 Pinocchio computes frames in the world. A table's numbers are relative to the table's base. This base may move
-too, for example in a chain from the left foot to the right hand. With R, w, v, alpha, a of base b and tip t
-in the world, and r = p_t - p_b:
+too, for example in a chain from the left foot to the right hand. Let R, w, v, alpha and a be the motion of
+base b and of tip t in the world, and r = p_t - p_b:
 
     w    = R_b^T (w_t - w_b)
     vel  = R_b^T (v_t - v_b - w_b x r)
@@ -11,15 +11,16 @@ in the world, and r = p_t - p_b:
 
 These are eq. 7.124 and 7.125, solved for the motion relative to the moving frame. This module implements the
 equations a second time. The check would not be independent if it used `urdfkin.kinematics.equations`, which
-computes the table's results. The bound is the rounding of both sides, plus the deviation that a snapped table
-declares.
+computes the table's results. The bound is the sum of the rounding errors of urdfkin and of Pinocchio, plus
+the deviation that a snapped table declares.
 
-The scale of rounding is the robot's size: the lengths from the root to both ends, prismatic displacements
-included. Columns of the Jacobian are scaled by the mimic multipliers. The scale includes the table's own
-lengths, up to `PROMISED` times the robot's reach. Lengths in tables with Hayati rows never exceed that limit.
+The scale of rounding is the robot's size: the path lengths from the root to the table's base and to its tip,
+with prismatic displacements. Columns of the Jacobian are scaled by the mimic multipliers. The scale includes
+the table's own lengths, up to `PROMISED` times the robot's reach. Lengths in tables with Hayati rows never
+exceed that limit.
 
-Four parameters for nearly parallel axes may need lengths of kilometres. When two such lengths cancel, the
-error is eps times their size. A difference within that error is not a disagreement, but the table loses
+With only four parameters, nearly parallel axes may need lengths of kilometres. When two such lengths cancel,
+the error is eps times their size. A difference within that error is not a disagreement, but the table loses
 digits. `TableCheck.loss` then states this loss.
 """
 
@@ -43,7 +44,7 @@ from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.sampling import Samples
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
-#: Largest length in a table with Hayati rows, in multiples of the robot's reach (docs/dh.md).
+#: Largest length in a table with Hayati rows, as a multiple of the robot's reach (docs/dh.md).
 PROMISED = 10.0
 
 
@@ -60,12 +61,12 @@ class TableError(UrdfkinError):
 
 @dataclass(frozen=True, slots=True)
 class TableCheck:
-    """Result of the check of a table; each number is the worst of all samples.
+    """Result of the check of a table; each number is the largest of all samples.
 
     Attributes:
         samples: Number of configurations.
-        metres: Distance of the two tips, m.
-        radians: Angle between their orientations, rad.
+        metres: Distance between the table's tip and Pinocchio's tip, m.
+        radians: Angle between the orientations of these two tips, rad.
         units: Differences of "placement", "jacobian" and "acceleration", in eps * scale.
         shares: The same differences divided by their bounds; at most 1 if the table agrees.
         snapped: True if the bound includes the declared deviation of snapping.
@@ -88,7 +89,10 @@ class TableCheck:
 
     @property
     def agrees(self) -> bool:
-        """True if rounding (also of the table's own lengths) and snapping explain the differences."""
+        """True if rounding and snapping explain the differences between table and Pinocchio.
+
+        The rounding of the table's own lengths is included.
+        """
         return self.within or self.loss is not None
 
     def __str__(self) -> str:
@@ -165,7 +169,7 @@ def _loss(table: DHTable) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Apart:
-    """Differences between a table and Pinocchio: (n,), (n,), (n, 6, columns), and a pair of (n,)."""
+    """Differences between a table and Pinocchio in position, angle, Jacobian and acceleration."""
 
     metres: FloatArray
     radians: FloatArray
@@ -174,7 +178,7 @@ class _Apart:
 
 
 def _measured(apart: _Apart, size: Sizes, slack: _Slack) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the worst difference of each quantity, in eps * scale and divided by the bound."""
+    """Return the largest difference of each quantity, in eps * scale and as a fraction of the bound."""
     rates = size.rates**2 + size.accelerations
     one = np.ones_like(apart.metres)
     columns = size.turning + size.sliding
@@ -213,7 +217,7 @@ class RelativeMotion:
 
 
 def relative_motion(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Samples) -> RelativeMotion:
-    """Return the tip's motion relative to the table's base, from Pinocchio's motions of both."""
+    """Return the tip's motion relative to the table's base, from Pinocchio's motions of tip and base."""
     x = QueryBatch([table.base_frame, table.tip_frame], (samples.q, samples.v, samples.a))
     T = oracle.placements(x)
     R = T[:, 0, :3, :3]
@@ -243,13 +247,15 @@ class Sizes:
     """Scales of the rounding.
 
     Attributes:
-        reach: (n,) length of the paths from the root to both ends, m.
-        turning: (columns,) sum of the |multiplier| of the revolute joints of a coordinate on these paths.
-        sliding: (columns,) the same for prismatic joints.
+        reach: (n,) sum of the path lengths from the root to the table's base and to its tip, m.
+        turning: (columns,) for each coordinate, the sum of |multiplier| of its revolute joints on these
+            paths.
+        sliding: (columns,) for each coordinate, the sum of |multiplier| of its prismatic joints on these
+            paths.
         rates: (n,) sum of all |joint velocity|, rad/s and m/s.
         accelerations: (n,) sum of all |joint acceleration|, rad/s^2 and m/s^2.
-        rounding: (n,) number of roundings times eps, the rounding of angles included; plus the tilts that a
-            table omits (`urdfkin.dh.common_normals`).
+        rounding: (n,) number of roundings times eps, including those of angles, plus the tilts that a table
+            omits (`urdfkin.dh.common_normals`).
     """
 
     reach: FloatArray
@@ -260,12 +266,12 @@ class Sizes:
     rounding: FloatArray
 
     def of_length(self, metres: float) -> Sizes:
-        """Return the scales for a table of that length."""
+        """Return the scales for a table whose lengths have the sum `metres`."""
         return replace(self, reach=np.maximum(self.reach, metres))
 
 
 def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
-    """Return the scales of all joints from the root to both ends, because Pinocchio starts at the root."""
+    """Return the scales for the paths from the root to base and tip, because Pinocchio starts at the root."""
     n = len(samples.q)
     reach, rates, accelerations, angles = np.zeros((4, n))
     names, joints, tilt = table.joint_names, 0, 0.0
@@ -292,7 +298,7 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
     own = own_length(table)
     reach = np.maximum(reach, np.minimum(own, PROMISED * reach))
     # Rounding occurs at the joints in Pinocchio, at the joints of the chain that the rows are made of, and at
-    # the rows. The acceleration relative to the base has four factors that a tilt rotates.
+    # the rows. The acceleration relative to the base contains four factors that a tilt rotates.
     counted = of_rows(len(table.rows)) + of_joints(joints, 4.0 * tilt) + angles
     rounding = EPS * counted + left_out(chain(tree, table.tip_frame, table.base_frame))
     return Sizes(reach, weights[True], weights[False], rates, accelerations, rounding)
@@ -301,9 +307,9 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
 class _Slack:
     """Allowed difference of a snapped table beyond rounding.
 
-    Snapping rotates an axis by at most `turn` and displaces a joint origin or the tip by at most `metres`. So
-    z x d changes by at most `turn` times the reach plus twice `metres`. A product of two such factors changes
-    by at most twice as much. Angular terms z x z change by at most twice `turn`.
+    Snapping rotates an axis by at most `turn` and displaces a joint origin or the tip by at most `metres`.
+    Therefore z x d changes by at most `turn` times the reach plus twice `metres`. A product of two such
+    factors changes by at most twice this amount. Angular terms z x z change by at most twice `turn`.
     """
 
     def __init__(self, table: DHTable, own_q: FloatArray, size: Sizes) -> None:

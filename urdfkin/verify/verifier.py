@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from urdfkin.dh.tree_parameters import TreeParameters
     from urdfkin.verify.tables import TableCheck
 
-#: Random configurations for the check of a table, besides the zero configuration and the limits.
+#: Number of random configurations in the check of a table; the zero configuration and the limits are added.
 TABLE_SAMPLES = 40
 
 
@@ -61,7 +61,7 @@ class Verifier:
         tree: urdfkin's tree of the same text.
         origin: Source of the text, for lines that reproduce a case.
         policy: Default of `verify` in calls.
-        mimic: True: mimic joints are coupled. False: each moves freely.
+        mimic: True: mimic joints are coupled. False: every mimic joint moves freely.
         unverifiable: Known reason why Pinocchio cannot check the robot; None if there is none.
         oracle: Oracle for quantities, "pinocchio" or "mujoco". Checks of tables, the accuracy study and
             enclosures always use Pinocchio.
@@ -90,8 +90,8 @@ class Verifier:
         self._refusals: dict[str, str] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        # Pinocchio's models are rebuilt when needed. A copy, in this process or another, has returned no
-        # results yet, so its ledger is empty.
+        # Pinocchio's models are rebuilt when needed. A copy of a verifier, in this or another process, has
+        # not yet returned results, so the ledger of the copy is empty.
         return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
 
     def oracle(self, base: BaseMotion | None = None, by: OracleLibrary = PINOCCHIO) -> Oracle:
@@ -167,7 +167,7 @@ class Verifier:
         return self._refusals.get(by.name)
 
     def wanted(self, verify: Verify | None) -> Verify:
-        """Return the effective value of `verify`; None means the policy."""
+        """Return the value of `verify` that a call uses; for None, that is the robot's policy."""
         return checked_choice(self.policy if verify is None else verify)
 
     def ready(self, verify: Verify | None) -> None:
@@ -236,7 +236,8 @@ class Verifier:
     ) -> Callable[..., FloatArray | None]:
         """Return a function that calls `compute`, checks its result as `check` does, and records the check.
 
-        The new function returns None if `compute` does so, and always if the oracle cannot check the robot.
+        The new function returns None if `compute` returns None, and always if the oracle cannot check the
+        robot.
 
         Args:
             name: Name of a quantity.
@@ -274,9 +275,9 @@ class Verifier:
     def _compare(
         self, quantity: Quantity, call: Call, ours: FloatArray, part: slice | IntArray
     ) -> tuple[Comparison, VerificationError | None]:
-        """Compare some of the results with the oracle's.
+        """Compare some of urdfkin's results with the oracle's results.
 
-        Also return the error to raise for the worst result, if that result exceeds its bound.
+        The error for the worst result is also returned, if this result exceeds its bound.
         """
         x = call.part(part)
         theirs, bound = oracle_results_with_bound(
@@ -308,7 +309,7 @@ class Verifier:
         )
 
     def _replay(self, quantity: Quantity, call: Call, k: int, frame: str) -> str:
-        """Return a line that computes sample `k` again: a command, or Python if no command can express it."""
+        """Return a shell command, or else a line of Python, that computes sample `k` again."""
         inputs = (call.q, *call.rates)
         values = {name: array[k].tolist() for name, array in zip("qva", inputs, strict=False)}
         reference = call.reference.name.lower() if quantity.referred else None
@@ -326,7 +327,7 @@ class Verifier:
     def table(self, table: DHTable, samples: int = TABLE_SAMPLES) -> TableCheck | None:
         """Check a Denavit-Hartenberg table with Pinocchio.
 
-        A strict table with very large lengths loses digits. In this case a warning is issued.
+        A warning is issued for a strict table whose very large lengths make it lose digits.
 
         Returns:
             The result; None, with a warning, if Pinocchio cannot check the robot.
@@ -356,7 +357,7 @@ class Verifier:
         """Compare the placements of all links by tree parameters with Pinocchio's.
 
         Returns:
-            A line about the agreement; None, with a warning, if Pinocchio cannot check the robot.
+            A line of text about the agreement; None, with a warning, if Pinocchio cannot check the robot.
 
         Raises:
             TableError: the two differ by more than the bound.
@@ -400,10 +401,12 @@ def oracle_results_with_bound(
 
 
 def bound_of(quantity: Quantity, x: Part, by: OracleLibrary = PINOCCHIO) -> Bound:
-    """Return the bound between urdfkin's and the oracle's results; it broadcasts against the results.
+    """Return the bound on the difference between urdfkin's and the oracle's results.
 
-    Lengths of paths without sliding joints are the same in every configuration. On a fixed base, the bound of
-    a quantity that depends on lengths alone is therefore computed for one configuration, once.
+    The bound can be broadcast to the shape of the results.
+
+    Lengths of paths without prismatic joints are the same in every configuration. On a fixed base, the bound
+    of a quantity that depends only on lengths is therefore computed once, for one configuration.
     """
     v, a = (*x.rates, None, None)[:2]
     constant = v is None and x.state is STILL_STATE and x.plan.turns_only and len(x.q) > 0
@@ -418,7 +421,7 @@ def bound_of(quantity: Quantity, x: Part, by: OracleLibrary = PINOCCHIO) -> Boun
 
 
 def own_results(quantity: Quantity, x: Part) -> FloatArray:
-    """Return urdfkin's results (n, frames, ...), by the forward recursion."""
+    """Return urdfkin's results (n, frames, ...), which the forward recursion computes."""
     return quantity.ours(x.plan, (x.q, *x.rates), x.reference, base=x.state)
 
 

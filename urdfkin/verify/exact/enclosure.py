@@ -159,7 +159,7 @@ def enclose(
     *,
     hessian: bool = False,
 ) -> Enclosures:
-    """Return the enclosures of one frame for one sample. Most arguments are those of `Robot.enclose`.
+    """Return the enclosures of one frame for one sample. `Robot.enclose` explains most arguments.
 
     Args:
         verifier: Verifier of the robot.

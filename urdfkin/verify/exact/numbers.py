@@ -1,4 +1,4 @@
-"""Balls that contain true values, vectors and rotations of them, and the exact decimals of a URDF text.
+"""Compute with intervals that contain the true values, and read the exact decimals of a URDF text.
 
 A ball is an interval: a midpoint with many digits, and a radius. Arb (python-flint) proves that the result of
 each sum, product, quotient, root, sine and cosine contains the true value. Vectors are triples of balls.
@@ -30,8 +30,8 @@ from urdfkin.urdf.plain_xml import plain_xml
 DIGITS = 50
 #: Twice the number of digits of a double.
 _TWO_DOUBLES = 30
-#: Bits of a digit, and bits beyond the digits. Fifteen digits have 55 bits, two more than a double: a ball at
-#: 53 bits is up to four times as wide as an interval whose ends have 53 bits.
+#: Bits for each decimal digit, and additional bits. Fifteen digits get 55 bits, two more than a double has,
+#: because a ball with 53 bits is up to four times as wide as an interval whose ends have 53 bits.
 _BITS, _MORE_BITS = math.log2(10.0), 5
 #: Additional bits of precision during iterations.
 _SPARE = 30
@@ -40,7 +40,7 @@ _ONE_THREAD = lock_over_forks()
 
 
 def enough_digits(joints: int) -> int:
-    """Return the number of digits for balls that are smaller than the last digit of a double.
+    """Return the number of digits with which balls are smaller than the last digit of a double.
 
     One digit is added for each joint before the frame. A joint with an oblique axis loses a third of a digit.
     """
@@ -49,28 +49,30 @@ def enough_digits(joints: int) -> int:
 
 @contextmanager
 def precision(digits: int) -> Iterator[None]:
-    """Compute with midpoints of at least so many decimal digits in a `with` block; 15 are those of a double.
+    """Set the number of decimal digits of midpoints in a `with` block.
 
-    Arb has one precision for the whole process. Therefore, one thread at a time is in such a block.
+    15 digits equal the precision of a double.
+
+    Arb has one precision for the whole process. Therefore, only one thread at a time can be in such a block.
     """
     with _ONE_THREAD, ctx.workprec(math.ceil(digits * _BITS) + _MORE_BITS):
         yield
 
 
 def exact(value: Number) -> Number:
-    """Return the ball of a double or an integer, which is exact; a ball is returned as it is."""
+    """Return a double or an integer as a ball with radius 0; return a ball unchanged."""
     return arb(value)
 
 
 def ends(x: Number) -> tuple[float, float]:
     """Return the ends of a ball or an integer, rounded outward to doubles."""
-    if isinstance(x, int):  # most numbers of a large robot are zeros
+    if isinstance(x, int):  # for a large robot, most numbers are zeros
         return float(x), float(x)
     return _outward(x.lower(), -math.inf), _outward(x.upper(), math.inf)
 
 
 def _outward(end: arb, towards: float) -> float:
-    """Return the double nearest to an exact number, or the next one if that is on the wrong side."""
+    """Round an exact number to a double in the direction `towards`."""
     found = float(end)
     inside = arb(found) > end if towards < 0.0 else arb(found) < end
     return math.nextafter(found, towards) if inside else found
@@ -110,11 +112,11 @@ def from_quaternion(quaternion: Sequence[Number]) -> Matrix:
 
 
 def nearest_rotation(M: Matrix) -> Matrix:
-    """Return the rotation nearest to M, which must be close to one: the orthogonal factor U of M = U H.
+    """Return the rotation nearest to M, the orthogonal factor U of M = U H; M must be nearly a rotation.
 
-    Each step of Newton's iteration X - X (X^T X - I)/2 doubles the number of correct digits. It returns
-    X = U (1 + E) with the same orthogonal factor U. X^T X - 1 = 2 E + E^2. The eigenvalues of E are above -1,
-    so |E| <= |2 E + E^2| and |X - U| <= |X^T X - 1|. This bound is added to the radius of each number.
+    Each step of Newton's iteration X - X (X^T X - I)/2 doubles the number of correct digits. The result X = U
+    (1 + E) has the same orthogonal factor U. X^T X - 1 = 2 E + E^2. The eigenvalues of E are above -1, so |E|
+    <= |2 E + E^2| and |X - U| <= |X^T X - 1|. This bound is added to the radius of each number.
     """
     with ctx.workprec(ctx.prec + _SPARE):
         for _ in range(6):
@@ -133,7 +135,7 @@ def _defect(M: Matrix) -> Matrix:
     return x, y, z
 
 
-#: First URDF version with `quat_xyzw`; in older files it is ignored.
+#: First URDF version with the attribute `quat_xyzw`; in files of older versions, the attribute is ignored.
 _WITH_QUATERNIONS = (1, 1)
 
 
@@ -174,7 +176,7 @@ def read_exact(text: str, tree: KinematicTree, among: Iterable[int] | None = Non
     }
 
 
-@lru_cache(maxsize=1)  # to parse the text of a large robot takes longer than to enclose a sample
+@lru_cache(maxsize=1)  # parsing the text of a large robot takes longer than enclosing a sample
 class _Text:
     """Reader of the joints of a URDF text."""
 
@@ -229,7 +231,7 @@ class _Text:
         return from_rpy(self.vector(origin, "rpy", "0 0 0"))
 
     def rule(self, name: str) -> tuple[Number, Number]:
-        """Return multiplier and offset of a mimic joint relative to the independent joint."""
+        """Return the multiplier and the offset of a mimic joint relative to its independent joint."""
         multiplier, offset = exact(1), exact(0)
         elements = self.elements
         while (rule := elements[name].find("mimic")) is not None and elements[name].get("type") != "fixed":

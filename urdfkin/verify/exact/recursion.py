@@ -29,8 +29,8 @@ from urdfkin.verify.pinocchio_inputs import BaseNumbers
 
 _RECURSION = Recursion(equations)
 
-#: For each joint velocity of a planar or floating joint: the index of its axis of the child link, and whether
-#: the motion is a rotation.
+#: For each joint velocity of a planar or floating joint: the index of the child link's axis along or about
+#: which the link moves, and whether the motion is a rotation.
 _FREE_AXES = {
     JointKind.PLANAR: ((0, False), (1, False), (2, True)),
     JointKind.FLOATING: tuple((k, turns) for turns in (False, True) for k in range(3)),
