@@ -11,15 +11,15 @@ Hartenberg). Then a is the distance between the two joint axes. delta and delta_
 the feet of their common normal. If the axes are parallel, the feet are undetermined. If the axes are nearly
 parallel, the feet are far away. docs/dh.md explains the choices for these two cases.
 
-`steps_like` takes the free choices from another table: the feet, the directions of x and the offsets. The
-pose of the tip fixes only the sum of d along a run of parallel axes, and only the sum of theta about a run of
-coinciding axes. Each row of such a run takes its d or theta from the other table, except one row. The d or
-theta of that row only defines the zero of a joint, or is a part of the first row that the base absorbs. The
-URDF defines the zeros of joints. That row therefore takes the remaining offset.
+`steps_like` takes all free choices from another table. These are the feet, the directions of x and the
+offsets. The pose of the tip fixes only the sum of d along a run of parallel axes, and only the sum of theta
+about a run of coinciding axes. Each row of such a run takes its d or theta from the other table, except one
+row. The d or theta of that row only defines the zero of a joint, or is a part of the first row that the base
+absorbs. The URDF defines the zeros of joints. That row therefore takes the remaining offset.
 
-A Hayati row passes an offset on to the next row, in the same way as a row of parallel axes. The plane in
-which a Hayati row ends depends on the offset that this row receives. The zero of a row's joint is therefore
-computed before the following rows.
+A Hayati row passes an offset on to the next row, like a row between parallel axes. The plane in which a
+Hayati row ends depends on the offset that this row receives. The zero of a row's joint is therefore computed
+before the following rows.
 
 **Noise.** Two correct programs read the same URDF and compute slightly different constant poses between two
 joint axes. The program that wrote the file may also have rounded each angle to fifteen digits.
@@ -29,9 +29,9 @@ eps from a multiple of a right angle, where eps is the machine epsilon. An angle
 digits differs by 900 eps or more and is not treated as round. The option `snap` makes such an angle round and
 reports the effect.
 
-A table contains zero in place of a tilt below the noise. The axes then count as parallel, so that no foot is
-far away. `left_out` returns the sum of these tilts. The orientations of a table and of the URDF may differ by
-this sum.
+If the tilt between two axes is below the noise, the table contains zero instead of the tilt. The two axes
+then count as parallel, so that no foot is far away. `left_out` returns the sum of these tilts. The
+orientations of a table and of the URDF may differ by this sum.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ from urdfkin.model.tree import FloatArray, Joint
 #: magnified more than 100 times in the positions of the feet.
 NEARLY_PARALLEL = 1e-2
 
-#: Up to this tilt (rad) two axes count as nearly parallel if a foot of their common normal lies beyond the
-#: reach.
+#: Two axes with a tilt (rad) up to this number count as nearly parallel if a foot of their common normal lies
+#: beyond the reach.
 FAR_FEET = 0.35
 
 
@@ -69,7 +69,8 @@ class NearParallel(StrEnum):
 class Step:
     """The seven numbers of a step between two joint axes, in metres and radians.
 
-    They are phi, delta, a, alpha, beta, phi_next and delta_next of the formula in the module's docstring.
+    The numbers are phi, delta, a, alpha, beta, phi_next and delta_next in the formula of the module's
+    docstring.
 
     Attributes:
         free: Whether `phi` was a free choice because the axes coincide.
@@ -99,7 +100,7 @@ class Step:
 
 
 def lifted(A: FloatArray, carry: float) -> FloatArray:
-    """Return Tz(carry) A: the pose A relative to the origin of the DH frame, not of the joint's frame."""
+    """Return Tz(carry) A, which is the pose A relative to the DH frame instead of the joint's frame."""
     raised = A.copy()
     raised[2, 3] += carry
     return raised
@@ -119,9 +120,8 @@ def step_between(
         A: (4, 4) pose of the next joint's frame in this joint's frame.
         reach: Metres; a foot beyond it is far.
         near_parallel: Kind of row for nearly parallel axes.
-        phi_free: Value of phi where the axes coincide
-            and every phi is correct.
-        delta_each: Whether to put the offset between parallel axes into `delta` of this step, instead of
+        phi_free: Value of phi if the axes coincide, so that every phi is correct.
+        delta_each: Whether the offset between parallel axes becomes `delta` of this step instead of
             `delta_next`.
         noise: Tilts and lengths below this noise become zero. None: the noise of the constant pose of one
             joint.
@@ -178,8 +178,8 @@ def _parallel(A: FloatArray, reach: float, noise: Noise, phi_free: float, delta_
 def hayati_step(A: FloatArray, reach: float, noise: Noise, phi_free: float) -> Step:
     """Return the step of a Hayati row (Hayati, 1983).
 
-    The plane through the origin of this joint's frame, normal to this axis, intersects the next axis in a
-    point. x points from the origin to this point.
+    The plane that is normal to this joint's axis and contains the origin of this joint's frame intersects the
+    next axis in a point. The x axis points from the origin to this point.
     """
     z = A[:3, 2]
     delta_next = cleaned_length(A[2, 3] / z[2], reach, noise.metres)
@@ -223,7 +223,10 @@ def cleaned_length(length: float, reach: float, noise: float = 0.0) -> float:
 
 
 def cleaned_angle(angle: float) -> float:
-    """Return the angle in (-pi, pi], rounded to a multiple of pi/12 if it is within rounding error of one."""
+    """Return the angle in (-pi, pi].
+
+    An angle within rounding error of a multiple of pi/12 becomes this multiple.
+    """
     angle = wrapped(angle)
     twelfth = nearest_twelfth(angle)
     return wrapped(twelfth) + 0.0 if abs(angle - twelfth) <= ANGLE * EPS else angle
@@ -254,7 +257,10 @@ class PairLike:
 
     @property
     def passes_on(self) -> bool:
-        """Whether the row does not determine a foot; the rest of its offset then goes to the next row."""
+        """Whether the row determines no foot of a common normal.
+
+        The next row then takes the rest of the offset.
+        """
         return tilt_of(self.A) <= self.noise.radians or self._gets_hayati_row
 
     @property
@@ -278,10 +284,10 @@ class PairLike:
     def cut(self) -> float | None:
         """Distance (metres) along the first axis, from its joint's frame to the plane of the Hayati row.
 
-        This plane is normal to the first axis, and is that of the other table's Hayati row.
+        This plane is normal to the first axis. The Hayati row of the other table lies in the same plane.
 
-        The result is None if no such plane is within reach. The next axis intersects that plane at the
-        distance a of the other row from the first axis. The component of a along the direction of the tilt
+        The result is None if no such plane is within reach. The next axis intersects this plane at a distance
+        from the first axis that equals the other row's a. The component of a along the direction of the tilt
         determines the plane. The error is then the rounding error divided by the tilt. For a slight tilt, the
         component of a across that direction determines the plane more accurately.
         """
@@ -298,7 +304,9 @@ class PairLike:
         return cut if abs(cut) <= self.reach else None
 
     def step(self, carry: float, d: float, phi_free: float = 0.0) -> Step:
-        """Return the step of the pair if the first row begins at the offset `carry` before the first joint.
+        """Return the step between the two axes.
+
+        The first row begins at the offset `carry` before the first joint.
 
         If the row does not determine d, the step uses the argument `d`.
         """
@@ -314,7 +322,7 @@ class PairLike:
         return replace(step, delta=step.delta + d) if d else step
 
     def passed_back(self, carry: float) -> float:
-        """Return the offset (metres) that a row with d = 0 must receive to pass `carry` to the next row."""
+        """Return the offset (metres) with which a row with d = 0 passes `carry` on to the next row."""
         return float(carry * self.A[2, 2] - self.A[2, 3])
 
 
@@ -350,9 +358,10 @@ def steps_like(
 
 
 def _offset_without_foot(pairs: Sequence[PairLike], i: int, carry: float, tip: float | None) -> float:
-    """Return d of a row without a foot.
+    """Return d of a row that determines no foot of a common normal.
 
-    It is the d of the other table, or the d that lets the later rows have the same d as in the other table.
+    The result is the d in the other table, or the d with which the later rows have the same d as in the other
+    table.
     """
     pair = pairs[i]
     if not pair.passes_on or not (pair.slides or (i == 0 and pair.row.d)):
@@ -400,7 +409,7 @@ def _phi_of_coinciding(pairs: Sequence[PairLike], steps: Sequence[Step], i: int,
 
 
 def _closer_direction(step: Step, pair: PairLike, phi_in: float = 0.0) -> Step:
-    """Return the step, or the same step with x reversed if that is closer to the other table.
+    """Return the step; reverse the direction of x if the reversed step is closer to the other table.
 
     The function compares the cells a, alpha and beta with those of the other table. If both directions of x
     are equally close, theta decides.
@@ -416,7 +425,7 @@ def _closer_direction(step: Step, pair: PairLike, phi_in: float = 0.0) -> Step:
 
 
 def near(theta: float, there: float) -> float:
-    """Return `theta` in (-pi, pi]; return `there` if `theta` and `there` are equal within rounding."""
+    """Return `theta` in (-pi, pi], or return `there` if `theta` and `there` are equal within rounding."""
     off = math.remainder(theta - there, 2.0 * math.pi)
     return there if abs(off) <= ANGLE * EPS else cleaned_angle(theta)
 
@@ -463,14 +472,14 @@ def _check_length(where: str, length: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Largest angle (radians) and largest length (metres) in a constant pose that count as rounding."""
+    """Largest angle (radians) and length (metres) that count as rounding errors in a constant pose."""
 
     radians: float
     metres: float
 
 
 def noise_of(joints: int, length: float, reach: float) -> Noise:
-    """Return the largest angle and length of a constant pose that count as rounding.
+    """Return the largest angle and the largest length that count as rounding errors in a constant pose.
 
     Args:
         joints: Number of URDF joints that the constant pose combines.

@@ -8,8 +8,8 @@ X):
 
 The conversion to the modified convention moves X_n into the tool. The conversion to the standard convention
 moves X_0 into the base. A base of the form Tx(a) Rx(alpha) moves into the free cells of the first modified
-row. A tool of this form moves into the free cells of the last standard row. A conversion to the other
-convention and back therefore gives the original table.
+row. A tool of this form moves into the free cells of the last standard row. Therefore, conversion to the
+other convention and back gives the original table.
 
 In a tree, each joint's frame is a Denavit-Hartenberg frame. In a standard table z_{i-1} is the axis of joint
 i, so the frame of joint i is frame i - 1. S_i X_i with the joint at zero leads to frame i: d_{i-1,i} = d_i

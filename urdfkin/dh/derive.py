@@ -49,14 +49,14 @@ RIGHT_ANGLE_SLACK = 1e-3
 
 
 class Last(StrEnum):
-    """Part of the table that leads to the tip: the last row if it can reach the tip exactly, or the tool."""
+    """Part of the table that leads to the tip: the last row if that row can reach it exactly, or the tool."""
 
     TIP = "tip"
     FLANGE = "flange"
 
 
 class First(StrEnum):
-    """Part of the table with the transform from base to first joint: d_1 and theta_1, or the base."""
+    """Part of the table with the transform from the base to the first joint: d_1 and theta_1, or the base."""
 
     BASE = "base"
     JOINT = "joint"
@@ -239,11 +239,11 @@ def _use_freedom_of_prismatic_axes(
 ) -> None:
     """Choose the lines of prismatic joints; a prismatic joint defines only a direction.
 
-    Tz(q) commutes with any translation, so a shift of the line changes no placement. The first joint's line
-    passes through the base's origin, so that the base can be the identity. The last joint's line passes
-    through the tip if the last row can then reach the tip. In strict tables, the line may be nearly parallel
-    to the axis of a neighbouring joint. The line then passes through the origin of that joint, so that no
-    foot of a common normal is far away.
+    A prismatic motion commutes with every translation, so a shift of the joint's line changes no placement.
+    The first joint's line passes through the base's origin, so that the base can be the identity. The last
+    joint's line passes through the tip if the last row can then reach the tip. In strict tables, the line may
+    be nearly parallel to the axis of a neighbouring joint. The line then passes through the origin of that
+    joint, so that no foot of a common normal is far away.
     """
     slides = [not joint.kind.turns for joint in chain.joints]
     noise = noises(chain, reach)
@@ -318,7 +318,7 @@ def _frame_zero(A: FloatArray, reach: float, noise: Noise) -> tuple[FloatArray, 
     offset = cleaned_length(float(z @ p), reach, noise.metres)
     base = np.eye(4)
     base[:3, 3] = [cleaned_length(component, reach, noise.metres) for component in p - offset * z]
-    if tilt_of(A) <= noise.radians:  # z_0 is the base's z axis, or opposite to this axis
+    if tilt_of(A) <= noise.radians:  # z_0 is parallel or opposite to the base's z axis
         z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
     # This is (1, 0, 0) - z_0 z for a unit vector z, in a form that avoids cancellation for z close to x.
     x = np.array([z[1] ** 2 + z[2] ** 2, -z[0] * z[1], -z[0] * z[2]])
@@ -380,7 +380,7 @@ def _first_like(
 ) -> tuple[FloatArray, tuple[float, float]]:
     """Set theta of the first row to that of another table, and d to 0 if the other table has d = 0.
 
-    The base takes the rest of the rotation and the offset.
+    The base contains the remaining rotation and the remaining offset.
     """
     theta, d = first
     rest = (math.remainder(theta - row.theta, 2.0 * math.pi), 0.0 if row.d else d)
@@ -395,8 +395,9 @@ def _last_like(
 ) -> tuple[float, float, Step, FloatArray]:
     """Return the numbers of the last row, and the tool.
 
-    If both tables have no tool, and theta agrees with the other table's last row, the row keeps its numbers.
-    Otherwise the row takes the numbers of the other table, and the tool takes the difference.
+    If neither of the two tables has a tool, and theta agrees with the other table's last row, the last row
+    keeps its numbers. Otherwise the last row gets the numbers of the other table, and the tool gets the
+    difference.
     """
     row = like.rows[-1]
     as_there = _has_no_tool(like) and np.array_equal(tool, np.eye(4))
@@ -415,8 +416,7 @@ def _last_like(
 def _needs_reversal(step: Step, theta: float, sign: Sign) -> bool:
     """Whether x must be reversed by the rule `sign`.
 
-    If the rule uses a, and a is 0, then alpha decides. If the rule uses alpha, and alpha is 0 or pi, then a
-    decides.
+    With the rule "a", alpha decides if a is 0. With the rule "alpha", a decides if alpha is 0 or pi.
     """
     by_alpha = 0.0 if step.alpha == math.pi else step.alpha
     if sign is Sign.THETA or (not step.a and not by_alpha):

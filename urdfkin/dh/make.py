@@ -27,7 +27,7 @@ from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.tree import KinematicTree
 
 #: Limits of differences, relative to the reach, or in rad. If cells differ by more than `_ANOTHER`, the table
-#: belongs to another robot. If zeros differ by more than `_OTHER`, they count as different.
+#: describes another robot. Joint zeros that differ by more than `_OTHER` count as different.
 _ANOTHER, _OTHER = 0.1, 1e-2
 #: Two cells with a smaller difference (relative to the reach, or in rad) count as equal.
 _ROUNDING = 1e-12
@@ -78,12 +78,12 @@ def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tu
 
 
 def _difference_key(found: DHTable, there: DHTable, reach: float) -> tuple[float, int, int, float, int]:
-    """Return a key that ranks tables by their difference; the smallest is the best.
+    """Return a key that ranks tables by their difference from another table; the smallest key is the best.
 
     The key has these entries, in this order: the largest difference of the cells, the power of ten of this
     difference, the number of different zeros and signs of d, the number of different ends (base and tool),
-    and the number of reversed senses. The line of a prismatic joint is free, so cells that depend on this
-    line only affect the power of ten.
+    and the number of reversed senses. The axis line of a prismatic joint can be chosen freely, so cells that
+    depend on this line only affect the power of ten.
     """
     n, cells, lines, zeros = len(found.rows), 0.0, 0.0, 0
     for i, (row, other) in enumerate(zip(found.rows, there.rows, strict=True)):

@@ -5,8 +5,8 @@
 A table in text has a line of headings that contains a, alpha, d and theta in any order. Below the headings
 there is a line for each joint. Commas, semicolons, tabs, bars, ampersands or blanks separate the cells. The
 lines before and after the table may state the convention, names, base and tool. urdfkin prints its own tables
-in this form. The result is plain data for `urdfkin.dh.rows`. The module guesses nothing. For example,
-`urdfkin.dh.rows` raises an error for a table without a convention.
+in this form. The result is plain data for `urdfkin.dh.rows`. The module never guesses. For example, a table
+without a convention is an error in `urdfkin.dh.rows`.
 
 `references` finds the reference tables in urdfkin. These are tables of vendors and textbooks, each with its
 source.
@@ -223,7 +223,7 @@ def _bars(lines: list[str]) -> _Grid | None:
 def _separated(lines: list[str]) -> _Grid | None:
     """Parse cells separated by semicolons, tabs or commas.
 
-    With semicolons or tabs, a comma inside a cell is a decimal comma.
+    If semicolons or tabs separate the cells, a comma inside a cell is a decimal comma.
     """
     for mark in (";", "\t", ","):
         kept = [line for line in lines if not re.fullmatch(r'"?sep=.?"?', line.strip())]
@@ -296,7 +296,8 @@ def _settings(lines: list[str], pattern: re.Pattern[str]) -> dict[str, Any]:
 def _convention(around: list[str], columns: tuple[_Column, ...]) -> str | None:
     """Return the convention that the headings or the text name.
 
-    The result is None if they name no convention, or both the standard and the modified convention.
+    The result is None if the headings and the text name no convention, or both the standard and the modified
+    convention.
     """
     if any(column.previous for column in columns):
         return "modified"
@@ -354,7 +355,7 @@ def _row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
     row: dict[str, Any] = {}
     for column, cell in zip(grid.columns, cells, strict=True):
         if not column.name and grid.strict and column.heading not in _COUNTS:
-            row[column.heading] = cell  # this unknown heading, which may be misspelt, is rejected later
+            row[column.heading] = cell  # an unknown heading, which may be misspelt, is rejected later
         elif not column.name or (not cell and column.name not in ORDER):
             continue
         elif column.name in (*ORDER, "beta", "offset"):
@@ -474,7 +475,10 @@ def read_table(path: str | os.PathLike[str]) -> DHTable:
 
 
 def read_table_or_screws(path: str | os.PathLike[str]) -> DHTable | ProductOfExponentials:
-    """Read a table, or a product of exponentials if the file has the key M; errors as for `read_table`."""
+    """Read a table, or a product of exponentials if the file contains the key M.
+
+    Raises the same errors as `read_table`.
+    """
     data = read_mapping(path)
     return _with_place(screws_of_mapping, data, str(path)) if "M" in data else table_of(data, str(path))
 
@@ -570,7 +574,8 @@ def reference_path(name: str) -> Path:
     """Return the file of a table, given its path or the name of a reference table.
 
     Raises:
-        UnknownNameError: it is neither a file nor a reference table; the message lists the nearest names.
+        UnknownNameError: there is no such file and no such reference table; the message lists the nearest
+            names.
     """
     path = Path(name)
     if path.suffix or exists(path):

@@ -1,9 +1,9 @@
 """Compute the tip error of a printed table, which is caused by the rounding of its numbers.
 
-The rounding of an angle turns the rest of the chain. This moves the tip by at most the rounding error times
-the sum of all later lengths. The rounding of a length shifts the rest of the chain. The sum of these effects
-is a bound of the tip error for every configuration within the limits. The module also computes the largest
-error on samples.
+The rounding error of an angle rotates the rest of the chain. This rotation moves the tip by at most the error
+times the sum of all later lengths. The rounding error of a length shifts the rest of the chain. The sum of
+these effects is a bound of the tip error for every configuration within the limits. The module also computes
+the largest error on samples.
 """
 
 from __future__ import annotations
@@ -28,8 +28,10 @@ class PrintedPrecision:
 
     Attributes:
         digits: Number of printed significant digits.
-        metres: Largest distance between the tips of the printed table and of the exact table, on samples.
-        bound: Guaranteed bound of this distance within the limits (metres); None if there is no bound.
+        metres: Largest distance on samples between the tip of the printed table and the tip of the exact
+            table (metres).
+        bound: Guaranteed bound (metres) of this distance at all joint values within the limits; None if there
+            is no bound.
         samples: Number of samples.
     """
 
@@ -48,7 +50,7 @@ class PrintedPrecision:
 
 
 def printed(table: DHTable, units: Units, pose_digits: int | None = None) -> PrintedPrecision:
-    """Parse a table's printed form and compare it with the table.
+    """Parse the printed form of a table, and compare the printed table with the exact table.
 
     Args:
         table: The table.
@@ -112,7 +114,7 @@ def _pose(T: FloatArray, digits: int) -> FloatArray:
 def _bound(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, tool: FloatArray) -> float:
     """Return the sum of the tip errors (metres) that the rounding of each number can cause.
 
-    The rounding of an angle counts with the largest possible distance of the tip from the row.
+    The rounding error of an angle is multiplied by the largest possible distance of the tip from the row.
     """
     lever = float(np.linalg.norm(table.tool[:3, 3]))
     total = float(np.linalg.norm((tool - table.tool)[:3, 3]))

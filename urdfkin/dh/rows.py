@@ -18,7 +18,7 @@ units; an effort is in N or N m.
 
 `last_digits` returns the precision of each number as it is written: half a unit of its last digit. For
 example, 311.1 mm in a data sheet is uncertain by 0.05 mm. A number without a decimal point (90 degrees, zero)
-and a multiple of pi are exact. A whole number of millimetres is an exception: it counts as a rounded length.
+and a multiple of pi are exact. A whole number of millimetres is an exception, and counts as a rounded length.
 """
 
 from __future__ import annotations
@@ -312,7 +312,7 @@ def _sense(value: Any, where: str) -> int:
 
 
 def _own(name: str, value: Any, fields: Mapping[str, Any], units: Units, where: str) -> float:
-    """Parse a value of a joint's variable: the angle of a revolute joint, the length of a prismatic joint."""
+    """Parse a value of a joint's variable: an angle for a revolute joint, a length for a prismatic joint."""
     number = read_number(value, f"{where}, {name}")
     return cell_in_si("theta" if _kind(fields.get("kind", "R"), where).turns else "d", number, units)
 

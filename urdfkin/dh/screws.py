@@ -173,7 +173,7 @@ class ProductOfExponentials(Displayable):
 
     @property
     def roundings(self) -> float:
-        """Bound of the rotation error of `placement` by rounding, in multiples of the machine epsilon.
+        """Bound of the rotation error that rounding causes in `placement`, in machine epsilons.
 
         The bound does not contain the effect of rounding in q.
 

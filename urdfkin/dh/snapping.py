@@ -7,13 +7,13 @@ snapped, from base to tip:
 2. the tilt between consecutive axes, and the rotations before and after it;
 3. the angle theta of each row, after the rows are computed.
 
-Positions stay as they are in the file, so each change only turns the rest of the chain about a joint's
-origin. `urdfkin.dh.table` derives the bound from this.
+Positions stay as they are in the file, so each change only rotates the rest of the chain about a joint's
+origin. `urdfkin.dh.table` derives the bound of the effect from this fact.
 
 `snap_hint` finds cells that look like angles rounded by the file (1.5708, 3.14159265359). For example, such
 an angle may cause a tilt of 5e-12 rad. This tilt is larger than rounding errors of the computation
 (`urdfkin.dh.common_normals`). The table therefore contains the tilt, and offsets of about 1e-12 m that the
-tilt causes. The hint explains that these numbers come from the file.
+tilt causes. The hint explains that the tilt and the offsets come from the file.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ def snap_thetas(table: DHTable, exact: FrameChain, tolerance: float) -> tuple[DH
 def statement(
     exact: FrameChain, table: DHTable, changes: Sequence[SnapChange], tolerance: float
 ) -> SnapReport:
-    """Return the sum of the bounds of the changes, and their largest effect on samples within the limits."""
+    """Return the sum of the bounds of all changes, and the largest effect of the changes on samples."""
     radians = sum((change.angle for change in changes), 0.0)
     per_metre = dict[str, float]()
     for change in changes:
@@ -191,7 +191,7 @@ def _product(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray
         is_round = abs(angle - twelfth) <= max(tolerance, TURN * EPS)
         turn = coordinate_rotation(axis, np.asarray(twelfth if is_round else angle))
         if is_round:
-            turn[np.abs(turn) < EPS] = 0.0  # rounding in the cosine of a right angle
+            turn[np.abs(turn) < EPS] = 0.0  # the computed cosine of a right angle is not exactly 0
         R = R @ turn
     return R
 

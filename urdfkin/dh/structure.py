@@ -1,11 +1,11 @@
 """Find the structure of an arm and export it for closed-form inverse kinematics solvers.
 
-`structure` reports which axes are parallel or intersect, with the deviation from this property. It also
-reports which closed-form solutions exist. The distance and the angle of two consecutive axes are the same in
-every configuration. They are therefore computed only in the zero configuration, from the screws
-(`urdfkin.dh.screws`). Pinocchio checks the screws. Pieper (1968): six revolute joints have a closed-form
-solution if three consecutive axes are parallel or intersect in one point. A calibrated robot has such a
-property only approximately. The deviation is given in radians and metres.
+`structure` reports which axes are parallel or intersect, each with the deviation from the exact property. The
+function also reports which closed-form solutions exist. The distance and the angle of two consecutive axes
+are the same in every configuration. They are therefore computed only in the zero configuration, from the
+screws (`urdfkin.dh.screws`). Pinocchio checks the screws. Pieper (1968): six revolute joints have a
+closed-form solution if three consecutive axes are parallel or intersect in one point. A calibrated robot has
+such a property only approximately. The deviation is given in radians and metres.
 
 `opw_of` returns the seven parameters of an ortho-parallel arm with a spherical wrist (OPW, Brandstoetter et
 al., 2014). An OPW arm is the standard table
@@ -15,7 +15,7 @@ al., 2014). An OPW arm is the standard table
 with cells in the order a, alpha, d, theta. `opw_of` derives the URDF's table in the frames, zeros and senses
 of this table (`urdfkin.dh.make`), and reads the parameters from it. OPW has no parameter for the small tilts
 of a calibrated arm, so `opw_of` ignores these tilts. `Opw.placement` computes the forward kinematics of the
-solver. Its difference from the arm's placement is the resulting error.
+solver. The difference between this result and the arm's placement is the error of the OPW parameters.
 
 `axes_and_steps` returns H and P, the input of solvers by subproblem decomposition (IK-Geo, EAIK):
 
@@ -58,7 +58,7 @@ _SAMPLES = 2000
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """Two consecutive axes: the angle between the two lines (at most pi/2), and their distance.
+    """The angle (at most pi/2) and the distance between two consecutive joint axes.
 
     The distance is 0 if one of the two joints is prismatic.
     """
@@ -281,7 +281,7 @@ def _origin(screws: ProductOfExponentials) -> FloatArray:
 def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
     """Return an upper bound of the tip's distance from a point of the first axis, in metres.
 
-    The bound is the length of the path that follows the axes and the perpendiculars between them.
+    The bound is the length of the path along the joint axes and the common perpendiculars between them.
     """
     here, total = origin, 0.0
     for i, joint in enumerate(screws.joints):
@@ -421,7 +421,10 @@ def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
 
 
 def _read(table: DHTable) -> Opw:
-    """Return the OPW parameters of a table with the frames of an OPW table; ignore its other numbers."""
+    """Return the OPW parameters of a table with the frames of an OPW table.
+
+    The table's other numbers are ignored.
+    """
     rows = table.rows
     lengths = {"a1": rows[0].a, "a2": rows[2].a, "b": rows[1].d + rows[2].d}
     lengths |= {"c1": rows[0].d, "c2": rows[1].a, "c3": rows[3].d, "c4": rows[5].d}

@@ -78,7 +78,7 @@ class DHRow:
         kind: Revolute, continuous or prismatic.
         joint: The joint's name.
         sense: +1, or -1 if the row subtracts the joint's value.
-        beta: Rotation about y, after alpha; 0 except in a Hayati row.
+        beta: Rotation about y after the rotation alpha; 0 except in a Hayati row.
         mimic: The mimic rule; None if the joint is not a mimic joint and has its own coordinate.
         limit: The joint's limits; None if it has no limits.
 
@@ -131,10 +131,10 @@ class DHRow:
     def foot(self) -> float:
         """Distance to the foot of the common normal, along the next axis (metres); 0 if `beta` is 0.
 
-        In a Hayati row, the x axis meets the next joint's axis at the distance `a`. There the next joint's
-        axis is tilted by `beta` along x and by `alpha` across x. A row of four parameters would use the
-        common normal of the two axes. The distance along the next joint's axis, from the point where x meets
-        this axis to the foot of the common normal, is |a sin(beta)| / sin^2(tilt).
+        In a Hayati row, the x axis meets the next joint's axis at the distance `a`. At this point the next
+        joint's axis is tilted by `beta` along x and by `alpha` across x. A row of four parameters would use
+        the common normal of the two axes. The distance along the next joint's axis, from the point where x
+        meets this axis to the foot of the common normal, is |a sin(beta)| / sin^2(tilt).
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -291,7 +291,7 @@ class SnapReport:
     def rows(self) -> tuple[int, ...]:
         """Sorted indices of the changed rows, from 0.
 
-        The index -1 stands for the base, and the number of rows for the tool.
+        The index -1 denotes the base, and an index equal to the number of rows denotes the tool.
         """
         return tuple(sorted({change.row for change in self.changes}))
 
@@ -466,7 +466,7 @@ class DHTable(Displayable):
 
     @cached_property
     def span(self) -> float:
-        """Sum of all |a|, of all |d| and of the length of the tool, with all joints at zero (metres).
+        """Sum (metres) of all |a|, all |d| and the length of the tool, with all joints at zero.
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -479,10 +479,10 @@ class DHTable(Displayable):
     def rounding(self, q: Given) -> FloatArray:
         """Return the (...,) bound of the position error of `placement(q)` by rounding, in metres.
 
-        The bound divided by `span` is a bound of the orientation error in radians.
+        The result divided by `span` is a bound of the orientation error in radians.
 
-        The position bound is the sum of the rounding errors of the rows (`urdfkin.kinematics.roundings`) and
-        of their angles, multiplied by the length of the chain.
+        The position bound is the length of the chain times the sum of the rounding errors of the rows and of
+        their angles (`urdfkin.kinematics.roundings`).
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -496,7 +496,7 @@ class DHTable(Displayable):
         return np.asarray(EPS * (of_rows(len(self.rows)) + angle) * lever)
 
     def tolerance(self, q: Given) -> tuple[FloatArray, FloatArray]:
-        """Return the (...,) bounds of the difference between the table's and the URDF's placement (m, rad).
+        """Return bounds (...,), in m and rad, of the difference between the table's placement and the URDF's.
 
         For an exact table these are the bounds of rounding errors. For a snapped table the bounds of the
         effect of snapping are added.

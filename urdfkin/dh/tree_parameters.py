@@ -95,10 +95,10 @@ class TreeParameters:
         robot: The robot's name.
         root: The root link.
         rows: One row for each joint, including fixed joints, in the tree's order.
-        ways: (joints,) path length
-            from the root to each joint: the sum of the URDF's offsets (metres).
-        T_frame_link: (joints, 4, 4) pose of the URDF's link frame in the row's frame. The row's frame has z
-            along the joint's axis and x along the common normal.
+        ways: (joints,) path length (metres) from the root to each joint, which is the sum of the URDF's
+            offsets.
+        T_frame_link: (joints, 4, 4) pose of each row's URDF link frame in the frame of the row. The frame of
+            a row has z along the joint's axis and x along the common normal.
         left_out: Largest sum, over all paths, of the tilts that count as rounding (rad;
             `urdfkin.dh.common_normals`).
     """
@@ -117,10 +117,10 @@ class TreeParameters:
 
     @property
     def roundings(self) -> float:
-        """Rounding of the rows on the longest path, and of the last link's frame, in eps of the reach.
+        """Rounding error of the rows on the longest path and of the last link's frame, in eps * reach.
 
-        This number does not include Pinocchio's rounding. It is smaller than the worst case, and larger than
-        every measured error.
+        This number does not include Pinocchio's rounding errors. The number is smaller than the worst case,
+        and larger than every measured error.
         """
         deepest = max((len(self._way(j)) for j in range(len(self.rows))), default=0)
         return of_rows(1 + deepest) + self.left_out / EPS
@@ -160,7 +160,7 @@ class TreeParameters:
         return values
 
     def placements(self, q: FloatArray) -> FloatArray:
-        """Return the (..., joints, 4, 4) poses of every link's URDF frame in the root frame.
+        """Return the poses (..., joints, 4, 4) of the URDF frames of all links in the root frame.
 
         Args:
             q: (..., coordinates) in the order of `coordinates`.
@@ -190,8 +190,8 @@ def tree_parameters(tree: KinematicTree) -> TreeParameters:
         tree: The robot.
 
     Raises:
-        InputError: a planar or floating joint, which has no single axis.
-        RangeError: lengths with squares outside the range of doubles.
+        InputError: the robot has a planar or floating joint, which has no single axis.
+        RangeError: the square of a length is outside the range of doubles.
     """
     demand_squares(tree.joints)
     for joint in tree.joints:
@@ -236,7 +236,7 @@ class _Link:
 
 
 def _links(tree: KinematicTree) -> list[_Link]:
-    """Return the axis frame of each joint: z along the axis; the link's own frame for a fixed joint."""
+    """Return the axis frame of each joint, with z along the axis; a fixed joint has its link's own frame."""
     links = list[_Link]()
     # For each link: the nearest moving link towards the root, the pose of the link in the axis frame of that
     # moving link, and the number of joints between the two links.
@@ -254,7 +254,7 @@ def _links(tree: KinematicTree) -> list[_Link]:
 
 
 def _steps(tree: KinematicTree, links: list[_Link]) -> tuple[list[Step], dict[int, tuple[float, float]]]:
-    """Return the step to each axis, and the rotation and offset from each axis frame to its row's frame.
+    """Return the step to each axis, and the rotation and the offset from each axis frame to the row's frame.
 
     The first moving child of a link defines the link's x axis. For a link without a moving child, x is chosen
     so that theta = 0.
@@ -336,7 +336,10 @@ def document(table: TreeParameters, units: Units) -> TextDocument:
 
 
 def as_csv(table: TreeParameters) -> str:
-    """Return a CSV line for each row, in metres and radians: its numbers, then T11 to T34 of T_frame_link."""
+    """Return CSV, in metres and radians.
+
+    Each line contains the numbers of a row, and T11 to T34 of T_frame_link.
+    """
     places = [f"T{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3, 4)]
     lines: list[list[object]] = [[*(field.name for field in fields(TreeRow)), *places]]
     for row, T in zip(as_mapping(table)["rows"], table.T_frame_link[:, :3].tolist(), strict=True):

@@ -1,6 +1,6 @@
 r"""Convert a table's numbers from text and to text, with fractions of pi, degrees or millimetres.
 
-A table itself is always in metres and radians. Other units occur only when a table is read or written.
+A table itself is always in metres and radians. Other units are used only when a table is read or written.
 
 A cell is parsed from text such as `q1 + pi/2`, `90 deg`, `107 mm`, `-θ₂*`, `\frac{\pi}{2}` or `180°`. The
 text of a cell is a sum. At most one term of the sum is the joint's variable. The other terms are numbers or

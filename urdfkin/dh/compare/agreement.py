@@ -1,9 +1,9 @@
-"""Compare a URDF with a published table: the cells, and the error of the tip's pose.
+"""Compare a URDF with a published table: compare the cells, and compute the error of the tip's pose.
 
 `max_tip_error_bound` proves a bound of the tip error for every configuration, by the method of `urdfkin
 same`. The path and the table become two mechanisms with the same joints. `urdfkin.model.mechanisms` matches
-the two mechanisms joint by joint, without a fit. It then bounds the effect of all differences on the tip,
-from the tip to the base, with support functions.
+the joints of the two mechanisms without a fit. Then it bounds the effect of all differences on the tip with
+support functions, joint by joint from tip to base.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
 from urdfkin.model.ranges import values_within
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree, is_bounded
 
-#: Default tolerance for the tip's position (metres). It is 1.5 times the error if one or two cells are
-#: rounded to 0.1 mm.
+#: Default tolerance for the tip's position (metres). The tolerance is 1.5 times the error of a table in which
+#: one or two cells are rounded to 0.1 mm.
 TOLERANCE = 2e-4
 #: Number of configurations for a fit, and for the check of the fit. The fit and the check use different
 #: seeds, so their configurations differ.
@@ -74,11 +74,11 @@ def compare(
     """Compare a reference table with a path of a URDF.
 
     Args:
-        chain: The path, from base to tip. The base and tip frames of the table may be other frames that are
-            fixed to the same links.
+        chain: The path, from base to tip. The base and tip frames of the table may differ from those of the
+            path if they are fixed to the same links.
         reference: The table in either convention, with a row for each moving joint in the path's order.
         tolerance: Tolerance at the tip (metres).
-        fit: Whether to fit base, tool, and the zeros and senses of the joints. With False, the table is
+        fit: Whether to fit base, tool, and the zeros and senses of the joints. If False, the table is
             compared as it is written.
         digits: Precision of each cell in the table's file (`urdfkin.dh.rows.last_digits`).
 
@@ -187,7 +187,7 @@ def check_joints(chain: FrameChain, reference: DHTable) -> None:
 
 
 def _target_poses(chain: FrameChain) -> tuple[TargetPoses, TargetPoses]:
-    """Return the samples for a fit, and the samples for the check of the fit."""
+    """Return the samples on which a fit is made, and other samples on which the fit is checked."""
     values, poses = _samples(chain, FIT_SAMPLES, _FIT_SEED)
     scale = _reach(chain, poses)
     return TargetPoses(values, poses, scale), TargetPoses(*_samples(chain, CHECK_SAMPLES, _CHECK_SEED), scale)
@@ -237,13 +237,13 @@ def _cell_at(reference: DHTable, i: int, cell: str) -> int:
 
 
 def _cells_of(reference: DHTable) -> FloatArray:
-    """Return an (n, 5) mask of the cells in standard rows: 1 for the cells of the reference, otherwise 0."""
+    """Return an (n, 5) mask of cells in standard rows: 1 if the reference table contains the cell, else 0."""
     n = len(reference.rows)
     return np.array([[float(_cell_at(reference, i, cell) < n) for cell in CELLS] for i in range(n)])
 
 
 def _hidden(reference: DHTable, fitted: Model, judged: TargetPoses) -> tuple[tuple[int, str], ...]:
-    """Return the cells that base, tool and joint offsets can replace; a beta of 0 is left out."""
+    """Return the cells that a change of base, tool and joint offsets can replace; a beta of 0 is left out."""
     found = [
         (_cell_at(reference, i, CELLS[k]), CELLS[k])
         for i, k in hidden_cells(fitted, judged)
@@ -261,7 +261,7 @@ def _differences(
     digits: Digits,
     free: bool,
 ) -> tuple[CellDifference, ...]:
-    """Return the cells that the fit changed by more than rounding; those with the largest effect first."""
+    """Return the cells that the fit changed by more than rounding, in descending order of their effect."""
     twists, scale = columns(fitted, judged)[2], judged.scale
     linear = np.linalg.norm(twists.reshape(len(judged.values), 6, -1)[:, :3], axis=1).max(axis=0)
     found = []
@@ -325,7 +325,7 @@ def _fitted_table(chain: FrameChain, standard: DHTable, fitted: Model) -> DHTabl
 def max_tip_error_bound(
     path: FrameChain, table: DHTable, slides: Mapping[str, tuple[float, float]]
 ) -> tuple[float, float]:
-    """Return a bound of a table's tip error (metres, radians), without the errors of rounding.
+    """Return an upper bound of a table's tip error (metres, radians); rounding errors are not included.
 
     Args:
         path: The path; its mimic rules are ignored.

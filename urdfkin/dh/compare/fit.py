@@ -1,4 +1,4 @@
-"""Fit a reference table to the URDF: first its free parameters, then as few cells as possible.
+"""Fit a reference table to the URDF: first the table's free parameters, then as few cells as possible.
 
 The tip's error at each sampled configuration is a twist. A small change of any number in the table also moves
 the tip by a twist: a rotation about a line or a translation along a line. The Gauss-Newton method finds the
@@ -53,8 +53,8 @@ _ROUNDS, _BETTER, _SOLVED = 40, 1e-9, 1e-14
 _FREE, _CELLS = 1e-8, 1e-9
 #: Number of iterations of the sparse solution, and the smallest weight of a cell relative to the reach.
 _SPARSER, _STAYS = 25, 1e-9
-#: Weight of the last cell relative to the first cell. Because of different weights, the solution changes only
-#: one of two cells with the same effect.
+#: Weight of the last cell relative to the first cell. Because the weights differ, the solution changes only
+#: one of two cells that have the same effect.
 _LAST_WINS = 1.2
 #: Initial weight of beta, and the factor by which each iteration multiplies this weight. Small weights make
 #: changes of beta expensive, so beta changes only if a change of alpha is not enough.
@@ -97,7 +97,7 @@ class Model:
         return Path((*self._motions[begin:], self.tool)).poses(self.cells.ravel()[begin:])
 
     def own(self, i: int) -> int:
-        """Return the index of the cell of row i that contains the joint's variable: theta or d."""
+        """Return the index of the cell in row i that contains the joint's variable, which is theta or d."""
         return 0 if self.turns[i] else 1
 
     @property
@@ -125,7 +125,7 @@ class TargetPoses:
     """The target poses of the tip: the poses of the URDF's tip that the table should have.
 
     Attributes:
-        values: (s, n) the URDF's joint values.
+        values: (s, n) joint values of the URDF in s samples.
         poses: (s, 4, 4) poses of the URDF's tip at these values.
         scale: Length that converts radians to metres.
     """
@@ -141,7 +141,7 @@ class TargetPoses:
         return float(metres), float(rotation_angle(poses[:, :3, :3], self.poses[:, :3, :3]).max())
 
     def errors(self, poses: FloatArray) -> FloatArray:
-        """Return the twists (6 s,) from a model's poses to the target poses.
+        """Return the twists (6 s,) that lead from a model's poses to the target poses.
 
         The angular parts of the twists are multiplied by `scale`.
         """
@@ -150,7 +150,7 @@ class TargetPoses:
 
 
 def columns(model: Model, wanted: TargetPoses) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the tip's poses, the twists (6 s, parameters) of free parameters, and the twists of cells.
+    """Return the tip's poses, and the twists (6 s, columns) for changes of free parameters and of cells.
 
     A twist is the derivative of the tip's poses with respect to a parameter.
 
@@ -293,8 +293,8 @@ _AT_ROUNDING = 1e-12
 #: The fit uses another sign pattern than the written one only if the tip error is then less than this
 #: fraction of the error with the written pattern.
 _TWICE_AS_GOOD = 0.5
-#: Rotations (rad) that are tried for two consecutive joint offsets. Each is added to the first offset and
-#: subtracted from the second.
+#: Rotations (rad) that are tried for two consecutive joint offsets. Each rotation is added to the first
+#: offset and subtracted from the second offset.
 _TURNS = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
 
 
@@ -332,7 +332,7 @@ def fitted_model(
     best, best_size = written, size(written)
     for start in starts(chain, standard, written, *(HASTY if hasty else ())):
         # Least squares minimize the sum over all samples, but models are compared by their worst sample. By
-        # this measure the start may be better than the fit.
+        # the worst sample, the start may be better than the fit.
         model = min(fit_freedoms(start, wanted, turns=not hasty), start, key=size)
         needed = 1.0 if start is written else _TWICE_AS_GOOD
         if (its_size := size(model)) < needed * best_size:
@@ -343,7 +343,7 @@ def fitted_model(
 
 
 def ends_gathered(model: Model, written: Model) -> Model:
-    """Move the fitted offset of the first joint into the base, and that of the last joint into the tool."""
+    """Move the first joint's fitted offset into the base, and the last joint's into the tool."""
     cells, n = model.cells.copy(), len(model.cells)
     _, _, a, alpha, beta = cells[-1]
     step = between_axes(a, alpha, beta)
@@ -485,8 +485,8 @@ class _Partial:
         carry: Offset from this joint's DH frame to its URDF frame (metres).
         base: (4, 4) part of the base that comes from the first row's offset.
         absorber: The row with a free offset, and the sign of this offset's effect on x. There is such a row
-            if the axes before the joint coincide. Then only the sum of their angles is defined. The offset of
-            row 0 is in the base.
+            if the axes before the joint coincide. Then only the sum of the joint angles is defined. The
+            offset of row 0 is in the base.
     """
 
     cost: float
@@ -535,7 +535,7 @@ def _without_equivalents(partials: list[_Partial]) -> list[_Partial]:
     """
     found: dict[tuple[object, ...], _Partial] = {}
     for one in partials:
-        # If a row before the joint has a free offset, both directions of x are equivalent.
+        # If a row before the joint has a free offset, the two directions of x are equivalent.
         circle = math.pi if one.absorber else 2.0 * math.pi
         ahead = round(one.phi_in % circle, _ALIKE), round(one.carry, _ALIKE)
         found.setdefault((one.senses, one.absorber, *ahead), one)
@@ -543,7 +543,7 @@ def _without_equivalents(partials: list[_Partial]) -> list[_Partial]:
 
 
 def _pose(chain: FrameChain, k: int, before: int, after: int) -> FloatArray:
-    """Return the constant pose A_k, with the z axis reversed of each neighbouring joint that has sense -1."""
+    """Return the constant pose A_k; for each neighbouring joint with sense -1, its z axis is reversed."""
     A = chain.constants[k]
     A = _HALF_TURN @ A if before < 0 else A
     return np.array(A @ _HALF_TURN if after < 0 else A)
@@ -552,7 +552,7 @@ def _pose(chain: FrameChain, k: int, before: int, after: int) -> FloatArray:
 def _extend(
     partial: _Partial, chain: FrameChain, reference: DHTable, i: int, sense: int, reach: float
 ) -> list[_Partial]:
-    """Extend an alignment from joint i to joint i + 1 (from 0), with both directions of x."""
+    """Extend an alignment from joint i to joint i + 1, with each of the two directions of x."""
     row, turns = reference.rows[i], [one.kind.turns for one in reference.rows]
     A = _pose(chain, i + 1, partial.senses[-1], sense)
     delta = row.d - partial.carry if turns[i] and i > 0 else 0.0
@@ -586,7 +586,7 @@ def _extend(
 
 
 def _absorber(partial: _Partial, step: Step, i: int, turns: bool) -> tuple[int, float] | None:
-    """Return the row before joint i + 1 with a free offset, and the sign of its effect on x."""
+    """Return the row before joint i + 1 with a free offset, and the sign of this offset's effect on x."""
     if not step.free:
         return None
     sign = math.copysign(1.0, math.cos(step.alpha))
@@ -615,7 +615,7 @@ def _absorb(partial: _Partial, step: Step, theta: float) -> _Partial:
 def _steps(
     A: FloatArray, row: DHRow, delta: float, reach: float, phi_free: float, placed: bool
 ) -> Iterator[Step]:
-    """Yield the possible steps between two axes, each with both directions of x.
+    """Yield the possible steps between two axes, each step with each of the two directions of x.
 
     If the axes are nearly parallel in the URDF and in the reference table, a Hayati step at the d of the
     reference table is also tried. In this step x is free if the distance of the axes is nearly zero. x is
@@ -643,7 +643,7 @@ def _steps(
 
 
 def _close_chain(best: _Partial, chain: FrameChain, reference: DHTable) -> Alignment:
-    """Complete an alignment with the base and the tool, so that the chain leads from base to tip."""
+    """Complete an alignment with its base and its tool, so that its chain leads from base to tip."""
     n = len(reference.rows)
     last = reference.rows[-1]
     start = _pose(chain, 0, 1, best.senses[0]) @ best.base

@@ -96,7 +96,7 @@ class Search:
         return ()
 
     def _needs_one_thing(self, table: DHTable) -> bool:
-        """Whether a table agrees after a fit of one parameter: the base, the tool, one zero or one sense."""
+        """Whether a table agrees after a fit of a single parameter: the base, the tool, a zero or a sense."""
         if self._with_one_end(table) is not None:
             return True
         model = self._with_zeros(table)
@@ -113,7 +113,7 @@ class Search:
         return model if self._agrees(model) else None
 
     def _with_one_end(self, table: DHTable) -> Model | None:
-        """Fit only the tool or, if the table then does not agree, only the base.
+        """Fit only the tool; if the table does not agree after this fit, fit only the base instead.
 
         The result is None if the table agrees after neither of these fits.
         """
@@ -187,9 +187,8 @@ def _changes(reference: DHTable) -> Iterator[_Change]:
                 yield _Change(MistakeKind.SIGN, (i,), cell, _with_cell(reference, i, cell, -value))
         for turn in (-0.5 * math.pi, 0.5 * math.pi):
             value = math.remainder(row.alpha + turn, 2.0 * math.pi)
-            if (
-                abs(math.remainder(value + row.alpha, 2.0 * math.pi)) > _SAME_ANGLE
-            ):  # otherwise this is a change of sign, which is tried above
+            # otherwise the change is a change of sign, which was tried above
+            if abs(math.remainder(value + row.alpha, 2.0 * math.pi)) > _SAME_ANGLE:
                 table = _with_cell(reference, i, "alpha", value)
                 yield _Change(MistakeKind.RIGHT_ANGLE, (i,), "alpha", table)
     orders = list[tuple[MistakeKind, tuple[int, ...], list[DHRow]]]()
@@ -217,7 +216,10 @@ def _with_cell(table: DHTable, i: int, cell: str, value: float) -> DHTable:
 
 
 def _mean(poses: FloatArray) -> FloatArray:
-    """Return the (4, 4) mean of nearly equal poses; for poses that are not nearly equal, return the first."""
+    """Return the (4, 4) mean of nearly equal poses.
+
+    If the poses are not nearly equal, return the first pose.
+    """
     middle = poses.mean(axis=0)
     R = polar_factor(middle[:3, :3])
     return pose(R, middle[:3, 3]) if np.linalg.det(R) > 0.0 else np.array(poses[0])

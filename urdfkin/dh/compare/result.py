@@ -43,8 +43,8 @@ class CellDifference:
         cell: "a", "alpha", "d", "theta" or "beta".
         reference: The table's value (metres or radians).
         urdf: The URDF's value (metres or radians).
-        tip: Displacement of the tip by this difference alone, at the sample with the largest displacement
-            (metres).
+        tip: Displacement (metres) of the tip that this difference alone causes, at the sample with the
+            largest displacement.
         last_digit: Half a unit of the value's last digit in the table's file (metres or radians). 0 if the
             value is exact, or if its text is unknown.
     """
@@ -64,13 +64,13 @@ class CellDifference:
 
     @property
     def is_rounding(self) -> bool:
-        """Whether the difference is within half a unit of the table's last digit."""
+        """Whether the difference is at most half a unit of the last digit in the table."""
         return abs(self.difference) <= self.last_digit * _HALF
 
 
 @dataclass(frozen=True, slots=True)
 class AbsorbedOffset:
-    """How far the fit moved a table's base or tool, in metres and radians."""
+    """Distance (metres) and angle (radians) by which the fit moved a table's base or tool."""
 
     metres: float
     radians: float
@@ -92,8 +92,8 @@ class Fitted:
     Attributes:
         base: Whether the base changes.
         tool: Whether the tool changes.
-        zeros: Number of joints with a different zero.
-        reversed: Number of reversed joints.
+        zeros: Number of joints whose zero the fit changes.
+        reversed: Number of joints whose sense the fit reverses.
     """
 
     base: bool = False
@@ -150,26 +150,28 @@ class Comparison:
         senses: Sense of each joint. The table's variable is sense * q + offset, where q is the URDF's joint
             value.
         offsets: Offset of each joint (radians or metres).
-        base: How far the fit moved the base.
-        tool: How far the fit moved the tool.
-        metres: Position error of the fitted table's tip at the worst sample.
-        radians: Orientation error of the fitted table's tip at the worst sample.
+        base: Distance and angle by which the fit moved the base.
+        tool: Distance and angle by which the fit moved the tool.
+        metres: Position error (metres) of the fitted table's tip at the worst sample.
+        radians: Orientation error (radians) of the fitted table's tip at the worst sample.
         most_metres: Proven bound of the fitted table's position error at any joint values, without rounding
             (`urdfkin.dh.compare.agreement`).
-        most_radians: Proven bound of the fitted table's orientation error in the same sense.
-        written_metres: Position error at the worst sample of the table as it is written.
-        written_radians: Orientation error at the worst sample of the table as it is written.
+        most_radians: Proven bound of the fitted table's orientation error at any joint values, without
+            rounding.
+        written_metres: Position error (metres) of the unfitted table at the worst sample.
+        written_radians: Orientation error (radians) of the unfitted table at the worst sample.
         differences: The cells that differ, in descending order of their effect at the tip. If there is a
             single mistake, this is the cell of the mistake.
-        instead: The cells that would have to change without a fit. It is empty if such changes do not explain
-            the difference, or if too many cells would have to change.
+        instead: The cells that would have to change if base, tool, senses and offsets were not fitted. The
+            list is empty if such changes do not explain the difference, or if too many cells would have to
+            change.
         hidden: (row, cell) of each cell that base, tool and offsets can replace. The value of such a cell
             cannot be determined from the tip's poses.
         mistakes: Single changes of the table after which the fewest parameters must be fitted.
         residual: Tip error (metres) that remains if the differing cells take the URDF's values. If these
             cells explain the whole difference, only rounding errors remain.
         tolerance: Tolerance at the tip (metres).
-        samples: Number of configurations in the check.
+        samples: Number of configurations at which the fitted table was checked.
     """
 
     reference: DHTable
@@ -226,7 +228,7 @@ class Comparison:
 def resolution(share: float, radians: float) -> float:
     """Return the resolution of printed fitted numbers.
 
-    It is a power of ten that is at least twice the tip error.
+    The resolution is a power of ten and at least twice the tip error.
 
     Args:
         share: Position error of the tip, metres per metre of reach.
@@ -400,7 +402,10 @@ def _table(cells: Sequence[CellDifference], units: Units) -> Table:
 
 
 def shown_offset(offset: float, row: DHRow, fine: float, units: Units) -> str:
-    """Format an offset at the resolution `fine`; use a fraction of pi if it equals the offset at `fine`."""
+    """Format an offset at the resolution `fine`.
+
+    A fraction of pi is used if it equals the offset at this resolution.
+    """
     if abs(offset) <= fine:
         return "0"
     if not row.kind.turns:

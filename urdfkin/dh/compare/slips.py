@@ -1,18 +1,18 @@
 """Find another convention, other units or other column names with which a table agrees with a URDF.
 
-A reading is one way to interpret the numbers of a table. Every reading has a shape: the distance and the
-angle of each pair of consecutive axes, and the offset along each axis between the feet of two common normals.
-The shape does not depend on signs, zeros, base and tool, and is fast to compute. Only the few readings with a
-shape that is closest to the URDF's shape are fitted.
+A *reading* is a way to interpret the numbers of a table: a convention, units and column names. The *shape* of
+a reading consists of the distance and the angle of each pair of consecutive axes, and of the offset along
+each axis between the feet of two common normals. The shape does not depend on signs, zeros, base and tool,
+and is fast to compute. Only the few readings with a shape that is closest to the URDF's shape are fitted.
 
 `other_readings` changes the convention, units or column names of the plain data (in the form of
 `urdfkin.dh.rows`), and parses the data again. A reading with an impossible value, such as an angle of eighty
 turns, is rejected by the parser.
 
-`doubts` needs no URDF. It finds units that look wrong, and two columns that may be exchanged. It uses two
-facts. First, most angles in the table of an arm are multiples of 30 degrees, and lengths hardly ever look
-like such angles. Second, an arm is between some centimetres and some metres long. If there is a URDF,
-`diagnose` decides by a fit.
+`doubts` needs no URDF. It finds units that look wrong, and two columns that may be exchanged. The function
+uses two facts. First, most angles in the table of an arm are multiples of 30 degrees, and lengths hardly ever
+look like such angles. Second, the length of an arm is between some centimetres and some metres. If there is a
+URDF, `diagnose` decides by a fit.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ from urdfkin.errors import InputError, Question, RangeError
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
 
-#: Number of readings to fit, largest tilt of axes that count as parallel (rad), and relative cost of each
-#: further difference from the reading that the file states.
+#: Number of readings that are fitted; largest tilt (rad) of axes that count as parallel; relative cost of
+#: each further difference from the reading that the file states.
 _TRIED, _PARALLEL, _WORTH = 3, 2e-2, 0.1
-#: Largest fraction of the original tip error that may remain with another reading.
+#: Largest fraction of the tip error that may remain with another reading.
 _EXPLAINS = 0.05
 
 
@@ -123,7 +123,7 @@ def diagnose(
 def convention_that_fits(
     chain: FrameChain, data: Mapping[str, Any], tolerance: float, where: str = "table"
 ) -> Convention:
-    """Return the convention with which a table agrees with a path, if its file names no convention.
+    """Return the convention with which a table agrees with a path, if the table's file names none.
 
     Args:
         chain: The path of the URDF.
@@ -132,7 +132,8 @@ def convention_that_fits(
         where: The table's file.
 
     Raises:
-        InputError: both conventions agree equally well, or neither convention agrees with any units.
+        InputError: the table agrees equally well with the two conventions, or with neither of them in any
+            units.
     """
     found = list[tuple[Convention, Comparison]]()
     errors = list[InputError]()
@@ -168,8 +169,9 @@ def shape(table: DHTable, scale: float) -> FloatArray:
     Lengths are in metres, and angles are in radians times `scale`. For each pair of consecutive axes, the
     result contains the distance and the angle of the two axes. For each axis that is parallel to neither of
     its neighbours, the result also contains the offset along the axis. Offsets along a run of parallel axes
-    are summed. The line of a prismatic axis is free, so distances from this line and offsets next to it are
-    set to zero. Offsets along the first axis are also left out, because the base absorbs them.
+    are summed. A prismatic joint has a direction but no fixed axis line, so distances from its axis and
+    offsets next to it are set to zero. Offsets along the first axis are also left out, because the base
+    absorbs them.
     """
     rows = to_convention(table, Convention.STANDARD).rows
     numbers, offset, known = list[float](), 0.0, False
@@ -222,7 +224,10 @@ class ConventionHypothesis:
         return {meant.get(key, key): value for key, value in row.items()}
 
     def slips(self, other: ConventionHypothesis) -> int:
-        """Count the differences between two readings; two exchanged columns count as one difference."""
+        """Return the number of differences between two readings.
+
+        Two exchanged columns count as one difference.
+        """
         moved = sum(mine != theirs for mine, theirs in zip(self.columns, other.columns, strict=True))
         return len(self._differences(other)) + (moved + 1) // 2
 
@@ -246,7 +251,10 @@ def as_said(data: Mapping[str, Any]) -> ConventionHypothesis:
 
 
 def other_readings(data: Mapping[str, Any]) -> Iterator[tuple[ConventionHypothesis, DHTable]]:
-    """Yield every other reading that gives a valid table; readings with the fewest differences are first."""
+    """Yield every other reading with which the table is valid.
+
+    Readings with the fewest differences come first.
+    """
     if not _has_rows(data):
         return
     data, said = {**data, "rows": [_row(row) for row in data["rows"]]}, as_said(data)

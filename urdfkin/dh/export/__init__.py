@@ -36,14 +36,14 @@ FORMATS: dict[str, tuple[str, str]] = {
 def export(table: DHTable, format: str, units: Units | None = None, *, verify: bool = True) -> str:
     """Return the table in a format.
 
-    Code on numbers contains the placement, the Jacobian and the acceleration of the tip, and its proof
-    (`urdfkin export --form dh`).
+    Code for numbers computes the placement, the Jacobian and the acceleration of the tip. The code contains
+    its own check, as after `urdfkin export --form dh`.
 
     Args:
         table: Any table.
         format: A name in `FORMATS`.
         units: Number format of printed tables; data and code are in metres and radians.
-        verify: Whether Pinocchio checks code with a proof.
+        verify: Whether Pinocchio checks the exported code.
 
     Raises:
         UnknownNameError: an unknown format.

@@ -31,7 +31,7 @@ HAYATI_FORMULA = {
 }
 
 #: A number is multiplied by this factor before it is rounded up to some digits. Without this factor, a
-#: rounding error of 1e-12 above such a number would increase the last digit.
+#: rounding error of 1e-12 would increase the last digit of a number that already has so few digits.
 _ON_THE_DIGIT = 1.0 - 1e-12
 
 
@@ -55,7 +55,10 @@ def variable(
 
 
 def coordinate_names(table: DHTable) -> str:
-    """Return text with the joint of each coordinate; "" if each row has its own coordinate, in row order."""
+    """Return text that names the joint of each coordinate.
+
+    The text is empty if the coordinates are the rows' joints in order.
+    """
     if [row.joint for row in table.rows] == list(table.joint_names):
         return ""
     return "with " + ", ".join(f"q{i} = {name}" for i, name in enumerate(table.joint_names, 1))
@@ -75,9 +78,9 @@ def added(variable: str, constant: str) -> str:
 
 
 def cells(table: DHTable, row: DHRow, units: Units, pi: str = "pi", **style: Any) -> list[str]:
-    """Return a row's cells a, alpha, d and theta as text with the joint's variable; also a beta column.
+    """Return a row's cells a, alpha, d and theta, and if needed beta, as text with the joint's variable.
 
-    The column of beta is present only if any row of the table has a beta that is not 0.
+    The cell beta is returned only if some row of the table has a beta that is not 0.
     """
     moves = variable(table, row, **style)
     theta, d = units.angle(row.theta, pi), units.length(row.d)
@@ -150,7 +153,7 @@ def snap_lines(table: DHTable) -> list[str]:
 
 
 def document(table: DHTable, units: Units, pi: str = "pi", *, wrapped: bool = False) -> TextDocument:
-    """Return a document with a title, the formula, the table, base and tool, and the effect of snapping.
+    """Return a document with a title, the formula, the rows, base and tool, and the effect of snapping.
 
     Args:
         table: The table.
