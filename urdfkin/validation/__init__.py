@@ -1,1 +1,1 @@
-"""Validation: comparison of every frame and every joint with Pinocchio, on many samples."""
+"""Validate a robot: compare every frame and every joint with Pinocchio on many samples."""

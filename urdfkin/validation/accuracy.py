@@ -1,9 +1,10 @@
-"""Accuracy study: the errors of urdfkin and of Pinocchio with respect to values with fifty digits or more.
+"""Accuracy study: errors of urdfkin and of Pinocchio relative to values with at least fifty digits.
 
-The values are balls that contain the true values, as in an enclosure. So an error is never too small.
+The values are balls (intervals) that contain the true values, as in an enclosure. Therefore, no error is
+underestimated.
 
-Errors are in eps * scale. The scale is the one that verification uses, so you can compare the numbers with
-those of a report.
+Errors are in eps * scale. Verification uses the same scale, so you can compare the errors with the numbers of
+a validation report.
 """
 
 from __future__ import annotations
@@ -45,12 +46,13 @@ from urdfkin.verify.verifier import bound_of, oracle_results, own_results
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _BALLS = np.vectorize(exact, otypes=[object])
-#: Name of a line of the study -> the representations of an orientation that it covers.
+#: For each line of the study about analytical Jacobians: the representations of an orientation that it
+#: covers.
 _REPRESENTATIONS = {
     "euler angles": tuple(name for name in SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
 }
-#: urdfkin counts as less accurate when its typical or worst error is more than this many times Pinocchio's.
+#: urdfkin counts as less accurate if its typical or worst error exceeds Pinocchio's by more than this factor.
 FACTOR = 2.0
 
 
@@ -69,7 +71,7 @@ class Errors:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """The errors of both libraries for one quantity in one reference frame.
+    """The errors of urdfkin and of Pinocchio for one quantity in one reference frame.
 
     Attributes:
         quantity: Name of the quantity.
@@ -115,26 +117,27 @@ class Judgement:
 
 
 def judge(robot: Robot, *, samples: int = 5, seed: int = 0, base: BaseMotion | None = None) -> Judgement:
-    """Compute the errors of urdfkin and of Pinocchio with respect to values at 50 digits.
+    """Compute the errors of urdfkin and of Pinocchio relative to values with fifty digits.
 
     The quantities are each link's placement, velocity, Jacobian, analytical Jacobians, Jacobian rate and
     acceleration.
 
-    The analytical Jacobians are those of the twelve sequences of Euler angles together, and of quaternions.
-    (Sequences about fixed axes have the same Jacobians, last row first.) Two kinds of samples are skipped:
-    those nearer to a singularity than `Robot.analytical_jacobian` accepts, and those in which rounding hides
-    the sign of the quaternion. Pinocchio computes no analytical Jacobians: its rotation and Jacobian are
-    inserted into (7.122), as urdfkin's are.
+    The study contains one line for the analytical Jacobians of all twelve sequences of Euler angles, and one
+    line for those of quaternions. Sequences about fixed axes are left out, because they have the same
+    Jacobians with the rows in reverse order. Samples nearer to a singularity than `Robot.analytical_jacobian`
+    accepts are skipped. Samples in which rounding hides the sign of the quaternion are skipped too. Pinocchio
+    computes no analytical Jacobians. Therefore, the rotation and the Jacobian of each library are inserted
+    into (7.122).
 
     Args:
         robot: The loaded robot.
-        samples: Number of configurations, drawn like the first ones of `validate`. Each takes most of a
-            second.
+        samples: Number of configurations; they are the first random configurations of `validate`. The study
+            of a configuration takes almost a second.
         seed: Seed of the samples. The same seed gives the same numbers.
         base: Motion of the root link: one for all samples, or (samples, ...). None: the root link is fixed.
 
     Returns:
-        The errors of both libraries, one line for each quantity and reference frame.
+        The errors of urdfkin and of Pinocchio, with one line for each quantity and reference frame.
 
     Raises:
         OracleError: Pinocchio does not accept the robot.
@@ -149,7 +152,7 @@ def judge(robot: Robot, *, samples: int = 5, seed: int = 0, base: BaseMotion | N
 
 
 class _Compared(NamedTuple):
-    """The doubles of both libraries, the values at 50 digits, and the scale of the errors."""
+    """The results of urdfkin and of Pinocchio, the values with 50 digits, and the scale of the errors."""
 
     urdfkin: FloatArray
     pinocchio: FloatArray
@@ -158,7 +161,7 @@ class _Compared(NamedTuple):
 
 
 class _Work:
-    """One batch of samples, with the inputs for urdfkin, Pinocchio and the computation at 50 digits."""
+    """A batch of samples, with the inputs for urdfkin, Pinocchio and the computation with 50 digits."""
 
     def __init__(self, robot: Robot, x: Samples, base: BaseMotion | None) -> None:
         if base is not None and base.batch_shape not in ((), (len(x.q),)):
@@ -201,7 +204,7 @@ class _Work:
         return _Compared(ours, theirs, self._true(row, reference).reshape(ours.shape), scale)
 
     def _true(self, row: Quantity, reference: Reference) -> NDArray[np.object_]:
-        """Return the values at 50 digits (n, links, ...), in the order of `own_results`."""
+        """Return the values with 50 digits (n, links, ...), in the order of urdfkin's results."""
         return np.array(
             [[row.truth(motion, link, reference) for link in self.links] for motion in self.motions],
             dtype=object,
@@ -234,14 +237,14 @@ class _Work:
 
 
 def _moving_columns(scale: FloatArray) -> NDArray[np.intp]:
-    """Return (n, links, most) the columns that move each link, padded with fixed columns."""
+    """Return indices (n, links, most) of the columns that move each link, padded with other columns."""
     idle = ~(scale > 0.0).any(axis=-2)
     most = int((~idle).sum(axis=-1).max(initial=0))
     return np.argsort(idle, axis=-1, kind="stable")[..., :most]
 
 
 def _columns(J: NDArray[Any], which: NDArray[np.intp]) -> NDArray[Any]:
-    """Return the selected columns of (..., rows, nv)."""
+    """Return the selected columns of matrices (..., rows, nv)."""
     return np.take_along_axis(J, which[..., np.newaxis, :], axis=-1)
 
 
@@ -251,7 +254,10 @@ def _one(base: BaseNumbers, k: int) -> BaseNumbers:
 
 
 def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.object_]:
-    """Return (m, 4) unit quaternions of rotations (m, 3, 3), with the signs of the quaternions `near`."""
+    """Return the unit quaternions (m, 4) of rotations (m, 3, 3).
+
+    The signs of the results are those of the quaternions `near`.
+    """
     K = davenport(R)
     q = (K @ near[..., np.newaxis])[..., 0] + near  # K + I is 4 q q^T
     unit: NDArray[np.object_] = q / np.sqrt((q * q).sum(axis=-1, keepdims=True))
@@ -259,7 +265,7 @@ def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.obj
 
 
 def _line(quantity: str, reference: str | None, compared: Sequence[_Compared]) -> Line:
-    """Return the errors of both libraries for one quantity."""
+    """Return the errors of urdfkin and of Pinocchio for one quantity."""
     sides: tuple[list[FloatArray], list[FloatArray]] = [], []
     for ours, theirs, true, scale in compared:
         counted = scale > 0.0
@@ -272,7 +278,7 @@ def _line(quantity: str, reference: str | None, compared: Sequence[_Compared]) -
 
 @partial(np.vectorize, otypes=[float])
 def _error(x: float, true: Number) -> float:
-    """Return the largest distance of a double from a ball."""
+    """Return an upper bound on the distance of a double from the true value in a ball."""
     return float(abs(exact(true) - x).upper())
 
 

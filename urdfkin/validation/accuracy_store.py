@@ -1,8 +1,8 @@
-"""Results of the accuracy study in a campaign's store, so that an interrupted study can be resumed.
+"""Save the results of the accuracy study in a campaign's store, so that an interrupted study can be resumed.
 
 The file `judge.json` holds the settings. The result of each robot is a file in the folder of the chunks. The
-name of the file is the sha256 of everything that the numbers in it depend on. The file has a checksum in the
-same format as a chunk's file.
+name of the file is the sha256 of all data on which the numbers in the file depend. Like the file of a chunk,
+the file contains a checksum.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from urdfkin.verify.oracles import version
 
 @dataclass(frozen=True, slots=True)
 class NotJudged:
-    """The reason why a robot has no accuracy result."""
+    """The reason why a robot has no result of the accuracy study."""
 
     reason: str
 
@@ -101,7 +101,7 @@ class AccuracyResult:
         return self._store.kept(self._key(robot), JUDGED, _read)
 
     def has(self, robot: int) -> bool:
-        """Whether the store has a file with the result of a robot. The file is not read."""
+        """Return whether the store has a file with the result of a robot; the file is not read."""
         return self._store.has(self._key(robot), JUDGED)
 
     def keep(self, robot: int, found: Judgement | NotJudged) -> None:
@@ -110,7 +110,7 @@ class AccuracyResult:
         self._store.keep_part(key, JUDGED, packed(key, {"judge": found}))
 
     def stamp(self, robot: int) -> str:
-        """Return the sha256 of the robot's text. It identifies the text to which a result belongs."""
+        """Return the sha256 of the robot's text, which identifies the text to which a result belongs."""
         return self._store.manifest.robots[robot][1]
 
     def _copy_missing(self, other: AccuracyResult) -> None:

@@ -1,11 +1,11 @@
-"""The answer of a chunk, which is a result or the reason of a failure, and the file format of answers.
+"""Define the answer of a chunk (a result, or the reason of a failure), and the file format of answers.
 
 Every exception that a robot raises becomes an answer. An answer is plain data, because some exceptions cannot
 be sent between processes.
 
-A file holds compressed JSON with the key of its chunk and a checksum (sha256). It may come from another
-machine, so it contains data only and no code. Damaged, truncated, renamed and foreign files are detected
-before their data is used.
+A file contains compressed JSON with the key of its chunk and a checksum (sha256). The file may come from
+another machine, so it contains only data and no code. Before the data of a file is used, the module detects
+damaged, truncated, renamed and foreign files.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ from urdfkin.verify.pinocchio import OracleError
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """Why a robot was not checked.
+    """The reason why a robot was not checked.
 
     Attributes:
         verdict: BAD_INPUT if the robot's file has an error, NOT_VERIFIED otherwise.
         reason: The reason as text.
-        portrait: Summary of the robot, as far as it could be read.
+        portrait: Summary of the robot; it contains only the parts of the robot that could be read.
         error: The traceback of an unexpected error; None otherwise.
         passing: Whether the process or the cluster caused the failure, and not the robot. Such a failure is
             not stored, so that a resumed run computes the chunk again.
@@ -53,7 +53,7 @@ Answer = ChunkResult | Failure
 
 
 def answer(chunk: Chunk) -> Answer:
-    """Run a chunk. Return a `Failure` for every exception except an interrupt."""
+    """Run a chunk and return its result; every exception except an interrupt becomes a `Failure`."""
     try:
         return run_chunk(chunk)
     except Exception as error:
@@ -83,7 +83,10 @@ def format_traceback(error: Exception) -> str:
 
 
 def _portrait(subject: RobotInput) -> RobotSummary:
-    """Return the summary of a robot if it can be read. The tables in this summary are not checked."""
+    """Return the summary of a robot, without a check of its tables.
+
+    If the robot cannot be read, return the empty summary.
+    """
     try:
         return RobotSummary.of(subject.read(), None)
     except Exception:
@@ -97,14 +100,14 @@ _MOST = 2**27
 
 
 class DamagedError(Exception):
-    """The bytes are not an answer of the chunk. The message states the reason."""
+    """Error for bytes that are not an answer of the chunk; the message states the reason."""
 
 
 def written(key: str, found: Answer) -> bytes:
     """Return an answer as the bytes of its file."""
     if isinstance(found, Failure):
         return packed(key, {"failure": found})
-    rows = list(found.tallies.items())  # JSON has no pairs as keys
+    rows = list(found.tallies.items())  # a key of a JSON object cannot be a pair
     return packed(key, {"tallies": rows, "result": replace(found, tallies={})})
 
 
@@ -127,8 +130,8 @@ def read(key: str, content: bytes) -> Answer:
 def packed(key: str, body: dict[str, Any]) -> bytes:
     """Return results as the bytes of a file, with their key and a checksum.
 
-    JSON contains each double with enough decimals to read back the same double. It contains infinity as
-    Python's word `Infinity`.
+    JSON contains each double with enough decimals to read back the same double, and infinity as Python's word
+    `Infinity`.
     """
     data = zlib.compress(json.dumps(as_data({"key": key} | body), separators=(",", ":")).encode(), 1)
     return _MAGIC + hashlib.sha256(data).digest() + data

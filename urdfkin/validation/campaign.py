@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 
 class StoreWarning(UserWarning):
-    """A damaged file of a store. Its chunk is computed again."""
+    """Warning about a damaged file of a store; the chunk of this file is computed again."""
 
 
 def validate(
@@ -64,7 +64,8 @@ def validate(
 ) -> ValidationReport:
     """Compare every frame and joint with Pinocchio in all three reference frames.
 
-    `urdfkin.verify.quantities.compared()` lists the quantities; `not_compared()` lists the others.
+    `urdfkin.verify.quantities.compared()` lists the compared quantities, and `not_compared()` all other
+    quantities.
 
     Args:
         robots: One robot or several: anything that `load` accepts, or loaded robots.
@@ -72,24 +73,25 @@ def validate(
             and both ends of the limits are added. Every eighth sample has joint velocities and joint
             accelerations a hundred times larger.
         seed: Seed of the samples. The same seed gives the same numbers for every `jobs` and `executor`.
-        jobs: Number of local processes. If one crashes, its robot is tried once more, alone. Other robots are
-            not affected.
+        jobs: Number of local processes. If a process crashes, its robot is tried once more, alone in a
+            process. Other robots are not affected.
         mimic: As in `load`.
         root_joint: As in `load`.
         xacro_args: As in `load`, for each .xacro file among the robots.
         lock: As in `load`, for each robot.
         joints: As in `load`, for each robot.
-        oracle: "mujoco": also compare every frame with MuJoCo. If two of the three libraries
-            agree, the report names the third one. This needs the extra `mujoco`.
-        isolate: Run each robot in its own process, `jobs` processes at a time. If one crashes, its robot is
-            reported as not verified with the reason; the other robots continue.
-        executor: Runs the chunks instead of local processes: an executor with the interface of
-            `concurrent.futures`, or a cluster (`urdfkin.validation.cluster.connected`).
+        oracle: "mujoco": also compare every frame with MuJoCo. If only two of the three libraries agree, the
+            report names the third library. This needs the extra `mujoco`.
+        isolate: Run each robot in its own process, `jobs` processes at a time. If a process crashes, its
+            robot is reported as not verified with the reason, and the other robots continue.
+        executor: Runs the chunks if they shall not run in local processes. It is an executor with the
+            interface of `concurrent.futures`, or a cluster (`urdfkin.validation.cluster.connected`).
         store: A folder in which each finished chunk is saved. After any interruption, the same call resumes
-            the run. `stored` makes a report from the folder at any time.
-        retry: "failed": compute again the robots in the store that could not be checked. Their texts may have
-            changed.
-        shard: "2/4": run only the second of four equal parts, with a store. The report covers that part only.
+            the run. The function `stored` makes a report from the folder at any time.
+        retry: "failed": compute again the robots in the store that could not be checked. The texts of these
+            robots may have changed.
+        shard: "2/4": run only the second of four equal parts of the work. A store is required, and the report
+            covers only that part.
         progress: Callback, called before the work and after each chunk.
 
     Returns:
@@ -118,7 +120,7 @@ def validate(
         raise InputError("`retry` and `shard` need `store`", remedy="give store=FOLDER")
     given = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
     started = datetime.datetime.now(datetime.UTC)
-    pinocchio()  # once, before the work, so that a missing Pinocchio is an error at once
+    pinocchio()  # tested before the work, so that a missing Pinocchio is reported at once
     found, unread = subjects(given, mimic, root_joint, xacro_args, lock, joints)
     if oracle_library(oracle) is not PINOCCHIO:
         found = [replace(one, origin=replace(one.origin, oracle=oracle)) for one in found]
@@ -142,7 +144,7 @@ def validate(
                     campaign.enter(campaign.task(i, index), failure(found[i], error))
             missing = [robot for i, robot in enumerate(found) if any(True for _ in collector.missing(i))]
             if _kernels_pay(len(missing) * samples) and (isolate or any(map(_is_robot, missing))):
-                load_kernels()  # once, so that no worker compiles and no robot's time includes it
+                load_kernels()  # here, so that no worker compiles and no robot's time includes it
                 begin = time.perf_counter()
             collector.begin()
             _engine(jobs, isolate, executor).run(campaign.work(), campaign.enter)
@@ -167,7 +169,7 @@ def validate(
 
 
 def _folder(store: str | os.PathLike[str]) -> Path:
-    """Return the path of a store. Raise InputError if it is not a valid path."""
+    """Return the path of a store; raise InputError if the argument is not a valid path."""
     try:
         name = os.fsencode(store)
     except (TypeError, ValueError):
@@ -180,7 +182,7 @@ def _folder(store: str | os.PathLike[str]) -> Path:
 
 
 def _is_robot(subject: RobotInput) -> bool:
-    """Whether the robot can be loaded. If not, its chunk reports the error."""
+    """Return whether a robot can be loaded; if it cannot, its chunk reports the error."""
     try:
         subject.load()
     except Exception:
@@ -189,7 +191,7 @@ def _is_robot(subject: RobotInput) -> bool:
 
 
 def stored(folder: str | os.PathLike[str]) -> ValidationReport:
-    """Return the report of a store, equal to that of one uninterrupted run.
+    """Return the report of a store, which is equal to the report of an uninterrupted run.
 
     Until the store is complete, the report is marked as interrupted.
 
@@ -220,7 +222,7 @@ def stored(folder: str | os.PathLike[str]) -> ValidationReport:
 
 
 def _judgements(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Judgement | None, ...], bool]:
-    """Return the accuracy result of each compared robot, if requested, and whether all robots have one."""
+    """Return the requested accuracy result of each compared robot, and whether all robots have a result."""
     if not store.has_judge:
         return (), True
     from urdfkin.validation.accuracy_store import AccuracyResult, NotJudged  # noqa: PLC0415  needs python-flint
@@ -231,12 +233,12 @@ def _judgements(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Jud
     return tuple(None if isinstance(one, NotJudged) else one for one in found), None not in found
 
 
-#: Samples from which kernels pay: those on disk, and those that must be compiled first.
+#: Smallest number of samples for which kernels save time: if they are on disk, and if they must be compiled.
 _WORTH_LOADING, _WORTH_COMPILING = 30, 300
 
 
 def _kernels_pay(samples: int) -> bool:
-    """Return whether reading or compiling all kernels takes less time than these samples without them."""
+    """Return whether kernels save more time on these samples than loading or compiling them takes."""
     return samples > _WORTH_COMPILING or (samples > _WORTH_LOADING and are_on_disk())
 
 
@@ -270,7 +272,7 @@ class _Campaign:
         return (self.task(robot, index) for index in self.collector.missing(robot))
 
     def enter(self, task: Task, found: Answer) -> None:
-        """Save an answer in the store, then count it."""
+        """Save an answer in the store, and then add it to the collected answers."""
         if self.store is not None and not (isinstance(found, Failure) and found.passing):
             self.store.keep(task.robot, task.chunk.index, found)
         self.collector.enter(task, found)

@@ -1,11 +1,12 @@
 """Chunks of a validation: a range of samples of one robot.
 
-The samples depend on the seed and on their index only. Inputs and results of a chunk are plain data, so a
-chunk can run in this process, in another one or on another machine. Samples 0, 1 and 2 of a robot are the
-neutral configuration and the two ends of the limits.
+A sample depends only on the seed and on the index of the sample. Inputs and results of a chunk are plain
+data, so a chunk can run in this process, in another one or on another machine. Samples 0, 1 and 2 of a robot
+are the neutral configuration and the two ends of the limits.
 
 Samples are drawn 25 at a time, each draw with its own seed. A chunk compares several draws together. The
-number of draws in a chunk changes no result, only the cost of distributing and storing chunks.
+number of draws in a chunk does not change any result; it only changes the cost of distributing and storing
+chunks.
 """
 
 from __future__ import annotations
@@ -32,9 +33,11 @@ from urdfkin.verify.sampling import Samples, draw
 DRAWN = 25
 #: Number of special configurations before the random ones.
 SPECIAL = 3
-#: Minimum number of chunks of a robot, so that several workers can share it (unless it has fewer draws).
+#: Minimum number of chunks of a robot, so that several workers can share the robot. A robot with fewer draws
+#: has fewer chunks.
 _CHUNKS = 8
-#: Maximum number of draws in a chunk: one second of work for a typical robot, a few kilobytes of results.
+#: Maximum number of draws in a chunk. For a typical robot, so many draws take one second and give a few
+#: kilobytes of results.
 _DRAWS = 40
 
 
@@ -44,9 +47,9 @@ class Chunk:
 
     Attributes:
         subject: The robot.
-        seed: Seed of the samples. Each draw combines it with its own index.
+        seed: Seed of the samples. Each draw combines the seed with the index of the draw.
         index: Index of the chunk within the robot.
-        first: Index of its first draw.
+        first: Index of the chunk's first draw.
         samples: Number of random configurations.
         memory: Bytes that the robot may use; None: half of the free memory of the machine.
     """
@@ -69,7 +72,7 @@ class Chunk:
         return 0 if self.first == 0 else SPECIAL + self.first * DRAWN
 
     def draw(self, tree: KinematicTree) -> Samples:
-        """Draw the samples. They do not depend on the machine, the number of workers or the chunk size."""
+        """Draw the samples of the chunk; they do not depend on the machine, the workers or the chunk size."""
         drawn = [self._draw(tree, i) for i in range(max(1, -(-self.samples // DRAWN)))]
         return Samples(*(np.concatenate([getattr(x, name) for x in drawn]) for name in ("q", "v", "a")))
 
@@ -83,7 +86,7 @@ class Chunk:
 class ChunkResult:
     """Result of a chunk: error statistics, names and times. The first chunk also has the robot's summary.
 
-    The sum of the results of two adjacent chunks is the result of both.
+    The sum of the results of two adjacent chunks is the result of the combined chunk.
     """
 
     name: str
@@ -110,7 +113,7 @@ class ChunkResult:
 
 @dataclass(frozen=True, slots=True)
 class Cut:
-    """Division of the samples of each robot into chunks. It depends on the number of samples only.
+    """Division of each robot's samples into chunks, which depends only on the number of samples.
 
     >>> len(Cut(1000)), len(Cut(10_000)), len(Cut(1_000_000)), len(Cut(0))
     (8, 10, 1000, 1)
@@ -128,7 +131,7 @@ class Cut:
         return max(1, -(-self.samples // (self._draws * DRAWN)))
 
     def chunk(self, subject: RobotInput, seed: int, index: int, most: int | None = None) -> Chunk:
-        """Return one chunk of a robot. `most` is the number of bytes that the robot may use."""
+        """Return a chunk of a robot; `most` is the number of bytes that the robot may use."""
         first = index * self._draws
         samples = min(self._draws * DRAWN, self.samples - first * DRAWN)
         return Chunk(subject, seed, index, first, samples, most)
@@ -148,8 +151,8 @@ def chunks(subject: RobotInput, samples: int, seed: int, most: int | None = None
     return (cut.chunk(subject, seed, index, most) for index in range(len(cut)))
 
 
-#: Cache of the latest robot. A worker gets the chunks of a robot one after another and reads the robot once.
-#: Two large robots at a time would need too much memory.
+#: Cache of the latest robot. A worker gets the chunks of a robot one after another, and reads the robot only
+#: once. Two large robots at a time would need too much memory.
 _cache: dict[RobotInput, tuple[Robot, Oracle, SecondWitness | None]] = {}
 
 

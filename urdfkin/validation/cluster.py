@@ -30,21 +30,21 @@ from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.verify.oracles import version
 
-#: Maximum number of chunks in flight (sent and not yet answered). It is the first number times the number of
-#: the workers' threads, plus the second number. It is large enough that no thread waits for a chunk.
+#: The maximum number of chunks in flight (sent and not yet answered) is the first number times the number of
+#: the workers' threads, plus the second number. This maximum is so large that no thread waits for a chunk.
 _FOR_EACH, _MORE = 2, 4
 #: Maximum number of times a chunk is sent when Dask loses its worker. A robot can crash only the process in
 #: which its chunks run, not Dask's worker.
 _TRIES = 20
 #: Seconds between two counts of the workers.
 _COUNT = 1.0
-#: Packages that must have the same version on the scheduler as here, if the scheduler has them.
+#: Packages that must have the same version in this process and on the scheduler, if the scheduler has them.
 _COMPARED = ("urdfkin", "pin")
 _NOBODY = RobotInput(b"", Origin(""))
 
 
 class ClusterError(UrdfkinError, RuntimeError):
-    """The cluster cannot be used, or the connection to it was lost."""
+    """Error if the cluster cannot be used, or if the connection to the cluster was lost."""
 
 
 @contextmanager
@@ -52,12 +52,12 @@ def connected(scheduler: str, tell: Callable[[str], None] = lambda _: None) -> I
     """Yield an engine on a cluster, for `validate(executor=...)`.
 
     Args:
-        scheduler: The address of a running scheduler, `tls://host:8786`; or `local:N` for N workers on this
-            machine, which end with the engine and open no port.
-        tell: Callback for messages: the number of workers, and the dashboard of a running scheduler.
+        scheduler: The address of a running scheduler, such as `tls://host:8786`. `local:N` starts N workers
+            on this machine, which end with the engine and open no port.
+        tell: Callback for messages about the number of workers and the dashboard of a running scheduler.
 
     Raises:
-        ClusterError: No scheduler answers there, or the versions of urdfkin or Pinocchio differ.
+        ClusterError: No scheduler answers at the address, or the versions of urdfkin or Pinocchio differ.
         InputError: `local:N` has no number.
     """
     with _client(scheduler) as client:
@@ -101,10 +101,10 @@ def _client(scheduler: str) -> Iterator[Client]:
 
 
 class _Portless:
-    """A part of a Dask cluster that serves no web pages, because all users of the machine could open them."""
+    """A part of a Dask cluster without web pages, because all users of the machine could open such pages."""
 
     def start_http_server(self, *_: object, **__: object) -> None:
-        """Start no server (overrides Dask's method)."""
+        """Do nothing; this method overrides Dask's method, which starts a web server."""
 
 
 class _Scheduler(_Portless, Scheduler):
@@ -154,7 +154,7 @@ def _without_ports(number: int) -> Iterator[SpecCluster]:
 def _demand_same(client: Client) -> None:
     """Raise ClusterError if a worker or the scheduler has other versions than this process.
 
-    Call this before anything is sent to them.
+    Call this function before anything is sent to the workers or the scheduler.
     """
     for worker, found in client.run(remote.computes, on_error="return").items():
         if isinstance(found, BaseException):
@@ -245,7 +245,7 @@ class Cluster:
             self._robots.clear()
 
     def _count(self) -> int:
-        """Return how many chunks may be in flight for the current workers."""
+        """Return the number of chunks that may be in flight with the current workers."""
         if time.monotonic() - self._counted > _COUNT and self._client.status == "running":
             threads = sum(self._client.nthreads().values())
             self._room, self._counted = _FOR_EACH * threads + _MORE, time.monotonic()
@@ -277,7 +277,7 @@ class Cluster:
         if future.status == "finished":
             try:
                 result = future.result()
-            except OSError as gone:  # results come through the scheduler, so its connection is lost
+            except OSError as gone:  # results come through the scheduler, whose connection is lost
                 raise self._lost() from gone
             return self._answer(result, flight.task)
         if self._client.status != "running":

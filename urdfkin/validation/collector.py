@@ -1,4 +1,4 @@
-"""Collector of the answers of a run: progress, and the report of each robot.
+"""Collect the answers of a run, report the progress, and make the report of each robot.
 
 Every requested robot has a report. A robot with missing answers is not verified. Results of adjacent chunks
 are added as they arrive, so memory does not grow with the number of samples. The sums follow the order of the
@@ -46,7 +46,7 @@ class CampaignProgress:
     label: str
 
 
-#: Callback for the progress, called after each chunk.
+#: Function that is called with the progress after each chunk.
 Progress = Callable[[CampaignProgress], None]
 
 
@@ -93,7 +93,7 @@ class ResultCollector:
             self._progress(self.standing(self._subjects[task.robot].label))
 
     def standing(self, label: str = "") -> CampaignProgress:
-        """Return the progress so far. `label` is the name of the current robot."""
+        """Return the progress so far; `label` is the name of the current robot."""
         return CampaignProgress(
             robots_done=self._robots_done,
             robots=sum(bool(robot.part) for robot in self._robots),
@@ -105,7 +105,7 @@ class ResultCollector:
         )
 
     def missing(self, robot: int) -> Iterator[int]:
-        """Yield the chunks of a robot that have no answer; none once the robot has failed."""
+        """Yield the chunks of a robot that have no answer; if the robot has failed, yield none."""
         known = self._robots[robot]
         for index in known.part:
             if known.failures:
@@ -203,7 +203,10 @@ class _Robot:
 def _verdict(
     tallies: dict[Key, Tally], portrait: RobotSummary, failure: Failure | None, samples: int, wanted: int
 ) -> tuple[Verdict, list[str]]:
-    """Return the verdict and all its reasons. A disagreement takes precedence over every other verdict."""
+    """Return the verdict on a robot and all reasons for it.
+
+    A disagreement takes precedence over every other verdict.
+    """
     disagreements = [*_outside(tallies), *portrait.disagreements]
     verdict, reasons = Verdict.VERIFIED, list[str]()
     if failure is not None:

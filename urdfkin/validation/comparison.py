@@ -1,8 +1,8 @@
-"""Comparison of every frame of a robot with Pinocchio, for a batch of samples.
+"""Compare every frame of a robot with Pinocchio, for a batch of samples.
 
-Frames are compared in blocks, which bounds the memory for every robot. The largest arrays are the Jacobians:
-samples * frames * 6 * nv numbers. The results of a frame do not depend on its block, so the report does not
-depend on the blocks.
+Frames are compared in blocks, which limits the memory for every robot. The largest arrays are the Jacobians,
+with samples * frames * 6 * nv numbers. The results of a frame do not depend on the block that contains the
+frame, so the report does not depend on the division into blocks.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class SecondWitness:
     def three_sides(
         self, block: _Block, row: Quantity, reference: Reference | None, ours: FloatArray, theirs: FloatArray
     ) -> ThreeSides:
-        """Compare its results with those of urdfkin and Pinocchio, for the frames or joints of the block."""
+        """Compare the results of three libraries, for the frames or joints of a block."""
         answers = block.clock.second_oracle(row.ask, self.oracle, block.asked(row, reference))
         bounds = (
             row.bound(block.plan, size, reference) for size in (block.size, self.library.size(block.size))
@@ -83,12 +83,15 @@ def tallies(
 
 
 def frame_bytes(samples: int, nv: int) -> int:
-    """Return the bytes of the largest array of a frame: its Jacobians, or its placements if nv is small."""
+    """Return the size (bytes) of a frame's largest array: the Jacobians, or the placements if nv is small."""
     return samples * 8 * max(16, 6 * nv)
 
 
 def blocks(count: int, size: int) -> Iterator[slice]:
-    """Divide `count` items of `size` bytes into slices of at most `BLOCK_BYTES`; at least one slice."""
+    """Divide `count` items of `size` bytes each into slices of at most `BLOCK_BYTES`.
+
+    Return at least one slice.
+    """
     most = max(1, BLOCK_BYTES // size)
     for start in range(0, max(1, count), most):
         yield slice(start, min(count, start + most))
@@ -120,8 +123,8 @@ class _Block(_Work):
         whole = len(links) == len(robot.all_frames)
         self.plan = robot.plan(links) if whole else compile_tree(tree, links)
         self.size = magnitudes(self.plan, x.q, x.v, x.a, STILL_STATE)
-        # A joint's Jacobian is that of its child link. Links come first among the frames, the root before
-        # all.
+        # The Jacobian of a joint is the Jacobian of its child link. Links come first among the frames, the
+        # root before all.
         moving = [i + 1 for i, joint in enumerate(tree.joints) if joint.kind.nv]
         joints = slice(bisect_left(moving, frames.start), bisect_left(moving, frames.stop))
         self.joint_rows = [link - frames.start for link in moving[joints]]
@@ -130,7 +133,7 @@ class _Block(_Work):
     def tallies(self, second: SecondWitness | None) -> Iterator[tuple[Key, Tally]]:
         """Yield the error statistics of each quantity.
 
-        The result of a joint is that of its child link. Pinocchio computes it with another function.
+        The result of a joint is the result of its child link, which Pinocchio computes with another function.
         """
         inputs = self.x.q, self.x.v, self.x.a
         for row in validated():
@@ -143,7 +146,7 @@ class _Block(_Work):
                     yield self._compare(joint, reference, ours[:, self.joint_rows], self.part(bound), second)
 
     def part(self, bound: Bound) -> Bound:
-        """Return the rows of joints of a bound that has a row for each frame."""
+        """Select the rows of the block's joints from a bound that has a row for each frame."""
         return Bound(bound.scale[:, self.joint_rows], bound.k[:, self.joint_rows])
 
     def asked(self, row: Quantity, reference: Reference | None) -> QueryBatch:
@@ -171,7 +174,10 @@ class _Block(_Work):
 
 
 class _Screws(_Work):
-    """Comparison of Pinocchio's `data.J`: each column belongs to the WORLD Jacobian of its own joint."""
+    """Comparison of the columns of Pinocchio's `data.J`.
+
+    Each column is a column of its joint's WORLD Jacobian.
+    """
 
     def tallies(self) -> Iterator[Tally]:
         robot, x = self.robot, self.x
@@ -202,7 +208,10 @@ class _Screws(_Work):
 
 
 def _expand_mimic(tree: KinematicTree, free: KinematicTree, q: FloatArray) -> FloatArray:
-    """Return the configuration of the freed tree, with each mimic joint at the value from its mimic rule."""
+    """Return the configuration of the tree in which mimic joints are independent.
+
+    The values of the mimic joints follow their mimic rules.
+    """
     spread = np.empty((len(q), free.nq))
     for joint, at, free_at in zip(tree.joints, tree.q_index, free.q_index, strict=True):
         own = q[:, at : at + joint.kind.nq]

@@ -1,4 +1,4 @@
-"""Explain a wrong result of a user's function by a usual mistake.
+"""Find common mistakes that explain a wrong result of a user's function.
 
 Each mistake predicts the results of a function with this mistake from urdfkin's results. Examples are
 exchanged rows, another reference frame, another frame, other units, and joints in another order. A mistake is
@@ -31,14 +31,14 @@ EXPLAINED = 1e-3
 _MOST = 3
 #: Number of configurations at which exchanges of two joints are tried.
 _FEW = 4
-#: Smallest scale of a number, as a fraction of the largest scale. It is needed because a number that must be
-#: 0 has the scale 0.
+#: Smallest scale of a number, as a fraction of the largest scale. This fraction is needed because a number
+#: that must be 0 has the scale 0.
 _LEAST = 1e-9
 _HALVES = [3, 4, 5, 0, 1, 2]
 _G = 9.81
 
-#: Inputs of a function: q, q and v, or q, v and a. A mistake is simulated by changing them: urdfkin then
-#: computes the results that a mistaken function would return.
+#: Inputs of a function: q, q and v, or q, v and a. To simulate a mistake, the inputs are changed. urdfkin
+#: then computes the results that a function with this mistake would return.
 Inputs = tuple[FloatArray, ...]
 
 
@@ -63,7 +63,7 @@ class Diagnosis:
     def remainder(self, predicted: FloatArray, n: int | None = None) -> float:
         """Return the fraction of the difference that a prediction for the first n results does not explain.
 
-        0: the prediction explains the whole difference.
+        If the prediction explains the whole difference, the result is 0.
         """
         scale = np.maximum(self.scale[:n], _LEAST * self.scale[:n].max(initial=_LEAST))
         with np.errstate(all="ignore"):
@@ -82,7 +82,7 @@ class Diagnosis:
 
 
 def diagnose(mistakes: Mistakes, case: Diagnosis) -> list[str]:
-    """Return sentences about the mistakes that explain the results, at most three; none if no mistake does.
+    """Return at most three sentences about the mistakes that explain the results; the list may be empty.
 
     A combination of a mistake with exchanged halves of the six-vectors is named only if no single mistake
     explains the results.
@@ -132,9 +132,9 @@ class Mistakes:
 
     @property
     def exchanged_halves(self) -> str:
-        """A sentence about exchanged linear and angular halves of a six-vector.
+        """A sentence which states that the linear and angular halves of a six-vector are exchanged.
 
-        It is empty for a quantity without such halves.
+        The sentence is empty for a quantity without such halves.
         """
         first = "linear" if self._angular_first else "angular"
         return f"the {first} rows come first" if self.row.shape[0] == 6 else ""
@@ -267,13 +267,14 @@ class Mistakes:
                 yield words.replace(" q ", all_inputs), partial(case.compute, everywhere)
 
     def _turning(self) -> list[tuple[int, int]]:
-        """Return the indices in q and v of each joint with one angle, in the function's convention."""
+        """Return the indices in q and in v of each joint with one angle, in the function's convention."""
         return [(q, v) for _, q, v, turns in self._axes() if turns]
 
     def _axes(self) -> list[tuple[str, int, int, bool]]:
         """Return the data of each joint with one coordinate.
 
-        They are its name, its index in q, its index in v, and whether its coordinate is an angle.
+        The data of a joint are its name, its index in q, its index in v, and whether its coordinate is an
+        angle.
         """
         tree = self.robot.tree
         found = []
@@ -344,7 +345,7 @@ class Mistakes:
     def _of_joints(self, case: Diagnosis) -> Iterator[Mistake]:
         """Yield the mistakes about single joints: a reversed sign, or two exchanged joints.
 
-        For a Jacobian, the columns change with the coordinates.
+        In a Jacobian, the columns are changed in the same way as the coordinates.
         """
         axes = self._axes()
         for name, q, v, _ in axes:
@@ -418,7 +419,7 @@ class Mistakes:
             )
 
     def _of_frames(self, case: Diagnosis) -> Iterator[Mistake]:
-        """Yield a mistake for each other link: the function computes the frame of that link."""
+        """Yield a mistake for each other link, namely that the function computes the frame of this link."""
         names = [f"link:{name}" for name in self.robot.link_names if name != self.frame]
         if self.row.against is not None or not names:
             return

@@ -1,4 +1,7 @@
-"""Types of the JSON document of a validation. Its schema is generated from them."""
+"""Define the types of the JSON document of a validation.
+
+The document's schema is generated from these types.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +38,10 @@ class Mimic(TypedDict):
 
 
 class Kept(TypedDict):
-    """The part of a joint's range in which its mimic joints stay within their limits; null: no such part."""
+    """The part of a joint's range in which its mimic joints are within their limits.
+
+    The value is null if there is no such part.
+    """
 
     lower: Annotated[
         float | None, says("Lower end of this part of the range, rad or m; null: the part is empty.")
@@ -220,7 +226,7 @@ class Chain(TypedDict):
 
 
 class Errors(TypedDict):
-    """Errors of one library with respect to values at fifty digits, in eps * scale."""
+    """Errors of one library relative to values with fifty digits, in eps * scale."""
 
     worst: Annotated[float, says("Largest error of all values, in eps * scale.")]
     typical: Annotated[float, says("Root mean square of the errors of all values, in eps * scale.")]
@@ -243,7 +249,7 @@ class Judged(TypedDict):
 
 
 class Judgement(TypedDict):
-    """Result of the accuracy study: errors of both libraries with respect to values at fifty digits."""
+    """Result of the accuracy study: errors of urdfkin and Pinocchio relative to values with fifty digits."""
 
     robot: Annotated[str, says("The robot's name.")]
     samples: Annotated[Count, says("Number of configurations in the accuracy study.")]
@@ -285,7 +291,7 @@ class Pair(TypedDict):
 
 
 class Alone(TypedDict):
-    """Number of results in which one of the three differs and the two others agree."""
+    """For each of three libraries: number of results in which it differs and the other two agree."""
 
     urdfkin: Annotated[Count, says("Number of results in which only urdfkin differs.")]
     pinocchio: Annotated[Count, says("Number of results in which only Pinocchio differs.")]
@@ -293,7 +299,7 @@ class Alone(TypedDict):
 
 
 class SecondOracle(TypedDict):
-    """Comparison of the same results with a second oracle; missing without one."""
+    """Comparison of the same results with a second oracle; the entry is missing without a second oracle."""
 
     by: Annotated[str, says("Name of the second oracle: mujoco.")]
     urdfkin: Pair
@@ -369,7 +375,7 @@ class Timings(TypedDict):
 
 
 class SecondReading(TypedDict):
-    """Comparison of the tree with that of a second reader of the same text."""
+    """Comparison of urdfkin's tree with the tree that a second reader makes from the same text."""
 
     by: Annotated[str, says("Name and version of the second reader.")]
     joints: Annotated[Count, says("Number of joints compared in both readings, fixed joints included.")]
@@ -417,7 +423,7 @@ class Robot(TypedDict):
 class Document(Header):
     """The output of `urdfkin validate --json`.
 
-    Within a version, entries may be added. They are never removed and never change their meaning.
+    Within a version of the layout, entries may be added, but no entry is removed or changes its meaning.
     """
 
     started: Annotated[str, says("Start time of the validation, ISO 8601, UTC.")]
@@ -435,7 +441,7 @@ class Document(Header):
     robots: Annotated[list[Robot], says("Reports of the robots in the requested order.")]
 
 
-#: The layout of the document. Entries may be added, but are never removed and never change their meaning.
+#: The layout of the document. Entries may be added, but no entry is removed or changes its meaning.
 VALIDATION = Layout(
     "urdfkin-validation/1",
     Document,
@@ -446,6 +452,6 @@ VALIDATION = Layout(
 
 
 def outcome_of(document: Document) -> Outcome:
-    """Return the outcome of the run, from the verdicts of its robots."""
+    """Return the outcome of the run, which follows from the verdicts of all robots."""
     verdicts = [robot["verdict"] for robot in document["robots"]]
     return outcome(verdicts, document["asked"], document["interrupted"])

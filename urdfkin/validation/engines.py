@@ -2,14 +2,14 @@
 
 An engine runs tasks and passes each answer to a callback once, in any order. The collector sorts the answers
 by robot and chunk before it adds them, so no result depends on the engine. If a robot has failed, an engine
-may skip its remaining chunks. It must run all other chunks. Tasks are created lazily, so that a million of
-them take no memory.
+may skip the remaining chunks of this robot. The engine must run all other chunks. Tasks are created only when
+they are needed, so a million tasks take no memory.
 
 The engines here run in this process, or on an executor with the interface of `concurrent.futures`.
 `urdfkin.validation.worker_processes` has an engine of local processes.
 
-Each worker gets a robot of its own, so that only one worker has to read this robot. If no robot
-is waiting, a free worker takes chunks of the robot with the most chunks left.
+Each worker gets its own robot, so that only one worker has to read this robot. If no robot is waiting, a free
+worker takes chunks of the robot with the most chunks left.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ class WorkQueue:
         return None
 
     def next(self, row: Row) -> Task | None:
-        """Return the next task of a row; None if it has none, or if its robot was ended."""
+        """Return the next task of a row; None if the row has no task, or if its robot was ended."""
         task = next(row, None)
         if task is None or task.robot in self._ended:
             if row in self._begun:
@@ -97,11 +97,11 @@ class WorkQueue:
         self._waiting = chain([row], self._waiting)
 
     def end(self, robot: int) -> None:
-        """From now on, return no more tasks of a robot."""
+        """Return no further tasks of a robot from now on."""
         self._ended.add(robot)
 
     def withdraw(self, robot: int) -> list[Task]:
-        """End a robot and return its remaining tasks."""
+        """End a robot, and return the remaining tasks of this robot."""
         self.end(robot)
         return [task for row in self._begun if row.robot == robot for task in row]
 
@@ -120,7 +120,7 @@ class Task:
 
 #: The tasks of each robot, in the order of its chunks.
 Work = Iterable[Iterable[Task]]
-#: Callback that receives the answer of a task. It is called at most once for each task.
+#: Callback that receives the answer of a task. The callback is called at most once for each task.
 Enter = Callable[[Task, Answer], None]
 
 
@@ -194,12 +194,12 @@ def _result(future: Future[Answer]) -> Answer:
 
 
 def lost(what: str, error: Exception) -> Failure:
-    """Return the answer for a robot if a chunk could not be run, or its answer was lost."""
+    """Return the answer for a robot with a chunk that could not be run, or whose answer was lost."""
     message = " ".join(str(error).split()) or "no message"
     return Failure(Verdict.NOT_VERIFIED, f"{what}: {type(error).__name__}: {message}", passing=True)
 
 
-#: Reasons for a robot that crashed its process.
+#: Reasons that are reported for a robot that crashed its process.
 DIED = "the process that validated the robot crashed"
 DIED_TWICE = "the process that validated the robot crashed twice, the second time without other work"
 

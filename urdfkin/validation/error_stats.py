@@ -1,8 +1,8 @@
-"""Error statistics of a validation, which add up over chunks, processes and machines.
+"""Error statistics of a validation, which can be added over chunks, processes and machines.
 
 A `Tally` counts the results of one quantity in one reference frame. Addition of tallies is associative and
-commutative. If two tallies have equally bad worst cases, their sum keeps the case with the earlier sample.
-The sum therefore does not depend on the division of the samples into chunks.
+commutative. If two tallies have worst cases with the same ratio, their sum contains the worst case with the
+earlier sample. The sum therefore does not depend on the division of the samples into chunks.
 
 With a second oracle, `ThreeSides` compares three results: urdfkin's, Pinocchio's and the second oracle's.
 Each pair of libraries has a bound. Two results agree if their difference lies within the bound of their pair.
@@ -23,7 +23,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.bounds import Bound, result_k
 from urdfkin.verify.comparison import worst_of_each
 
-#: The three compared libraries, in the order of columns. The last is the second oracle.
+#: The three compared libraries, in the order of columns. The last library is the second oracle.
 SIDES = ("urdfkin", "pinocchio", "second_oracle")
 
 
@@ -51,16 +51,18 @@ class Pair:
 
 @dataclass(frozen=True, slots=True)
 class ThreeSides:
-    """Comparison of three libraries for one quantity in one reference frame. Such comparisons add up.
+    """Comparison of three libraries for one quantity in one reference frame.
+
+    Several comparisons can be added.
 
     Attributes:
         by: Name of the second oracle.
         urdfkin: urdfkin compared with the second oracle.
         pinocchio: Pinocchio compared with the second oracle.
-        alone: For each library of `SIDES`, the number of results in which this library differs from the two
-            others and these two agree.
-        undecided: Number of results without a majority. Either no two of the three results agree, or one
-            result agrees with two results that do not agree with each other.
+        alone: For each library of `SIDES`, the number of results in which this library differs from the other
+            two libraries and these two agree.
+        undecided: Number of results without a majority. Either no two of the three results agree, or a result
+            agrees with two results that disagree with each other.
     """
 
     by: str
@@ -85,7 +87,7 @@ class ThreeSides:
 
 
 def plus(first: ThreeSides | None, second: ThreeSides | None) -> ThreeSides | None:
-    """Return the sum of two comparisons; None stands for an empty one."""
+    """Return the sum of two comparisons; None is an empty comparison."""
     return first if second is None else second if first is None else first + second
 
 
@@ -128,7 +130,7 @@ def three_sides(
 def _shares(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[FloatArray, FloatArray]:
     """Return two arrays (n, frames) of disagreements.
 
-    In the first array the disagreements are divided by their bound. In the second one they are in eps *
+    In the first array the disagreements are divided by their bounds. In the second array they are in eps *
     scale.
     """
     units = worst_of_each(one, other, bound.scale, 2)
@@ -137,7 +139,7 @@ def _shares(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[FloatArra
 
 
 def _together(first: Bound, second: Bound) -> Bound:
-    """Return the sum of two bounds k * eps * scale, written with the k of the second bound."""
+    """Return the sum of two bounds k * eps * scale; the sum has the k of the second bound."""
     size = first.k * first.scale + second.k * second.scale
     with np.errstate(invalid="ignore", over="ignore"):
         return Bound(size / second.k, second.k)
@@ -153,7 +155,7 @@ Inputs = tuple[list[float], list[float], list[float]]
 
 @dataclass(frozen=True, slots=True)
 class WorstCase:
-    """The sample with the largest ratio to its bound, with the inputs to compute it again."""
+    """The sample with the largest ratio of disagreement to bound, and the inputs to compute it again."""
 
     share: float
     units: float
@@ -217,14 +219,14 @@ class Tally:
         return replace(joined, by_frame=self.by_frame + other.by_frame)
 
     def percentile(self, percent: float) -> float:
-        """Return a percentile of the disagreements, accurate to the width of a histogram bin (26 %)."""
+        """Return a percentile of the disagreements; its accuracy is the width of a histogram bin (26 %)."""
         return percentile(self.histogram, HISTOGRAM_EDGES, self.worst, percent)
 
 
 def percentile(
     histogram: Sequence[int], edges: Sequence[float] | FloatArray, worst: float, percent: float
 ) -> float:
-    """Return a percentile of the values in a histogram, accurate to the width of a bin."""
+    """Return a percentile of the values in a histogram; its accuracy is the width of a bin."""
     counts = np.cumsum(histogram)
     if not counts[-1]:
         return 0.0
@@ -254,7 +256,7 @@ def tally(
     Args:
         ours: (n, frames, ...) results of urdfkin.
         theirs: (n, frames, ...) results of Pinocchio.
-        bound: Scale and k, broadcastable.
+        bound: Bound whose scale and k can be broadcast to the shape of the results.
         frames: A name for each frame.
         first_sample: Index of the first of the n samples.
         inputs: q, v and a of each sample, for the worst case.

@@ -40,18 +40,19 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.verify.call import Call
 
-#: Number of configurations that are computed together, and number of configurations that a diagnosis uses.
+#: Number of configurations that are computed together, and number of configurations for a diagnosis.
 _AT_A_TIME = 256
 _DIAGNOSED = 48
 #: Largest number of exceptions and wrong shapes that are stored with their message.
 _KEPT = 5
-#: If all relative differences are below this, a diagnosis names rounding to single precision.
+#: If all relative differences are below this number, the diagnosis is that the function rounds to single
+#: precision.
 _SINGLE = 1e-5
 
 
 @dataclass(frozen=True)
 class FunctionError:
-    """An exception of the function, or a result that is no array of the right shape.
+    """An exception of the user's function, or a result that is not an array of the right shape.
 
     Attributes:
         sample: Index of the configuration.
@@ -83,7 +84,7 @@ class WorstResult:
     replay: str
 
     def largest(self, rows: Sequence[str], columns: Sequence[str]) -> str:
-        """Return a sentence about the number that exceeds its bound most."""
+        """Return a sentence about the number whose difference is the largest multiple of its bound."""
         with np.errstate(all="ignore"):
             over = np.abs(self.found - self.expected) / np.maximum(self.bound, np.finfo(float).tiny)
         flat = int(np.nan_to_num(over, nan=np.inf).argmax())
@@ -106,7 +107,8 @@ class FunctionCheck(Displayable):
         frame: Name of the frame.
         reference: Name of the reference frame; None for a quantity that has none.
         convention: Name of the convention of inputs and results; None for urdfkin's.
-        oracle: Name and version of the oracle that confirmed urdfkin's results; "" if none could.
+        oracle: Name and version of the oracle that confirmed urdfkin's results; "" if no oracle could check
+            them.
         samples: Number of configurations.
         compared: Number of results that have the right shape.
         factor: The bound is multiplied by this factor.
@@ -150,7 +152,7 @@ class FunctionCheck(Displayable):
 
     @property
     def agrees(self) -> bool:
-        """True if the function returned every result, and each is within the bound times `factor`.
+        """True if the function returned every result, and if each result is within the bound times `factor`.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -263,8 +265,8 @@ def verify_function(
 
     The function receives q (nq,), and v and a (nv,) if the quantity needs them, in rad, m and seconds. The
     values are random within the limits; the zero configuration and the joint limits come first. In every
-    eighth sample, v and a are a hundred times larger, so that quadratic terms show. An exception of the
-    function and a wrong shape are results of the check, not exceptions of this function.
+    eighth sample, v and a are a hundred times larger, so that quadratic terms have a visible effect. An
+    exception of the function and a wrong shape are results of the check, not exceptions of this function.
 
     Args:
         function: The function to check: q -> result, (q, v) -> result or (q, v, a) -> result.
@@ -277,8 +279,8 @@ def verify_function(
             None: urdfkin's convention.
         samples: Number of random configurations.
         seed: Seed of the random configurations.
-        factor: Multiplies the bound, for a function that rounds more than the textbook's recursion. The
-            result's `needed_factor` is the smallest that suffices.
+        factor: Number that multiplies the bound, for a function that rounds more than the textbook's
+            recursion. The result's `needed_factor` is the smallest sufficient factor.
         batch: True: the function receives q (n, nq), and v and a (n, nv), and returns n results.
         **options: Other arguments of the method of `Robot`, such as `representation`.
 
@@ -340,7 +342,7 @@ class _How:
 
 @dataclass
 class _Compared:
-    """The results of some configurations, as the function and as urdfkin return them.
+    """The results of the user's function and of urdfkin at some configurations.
 
     Attributes:
         first: Index of the first configuration.
@@ -367,7 +369,10 @@ class _Compared:
         return self.units(other) / k
 
     def units(self, other: FloatArray) -> FloatArray:
-        """Return each number's difference from another result, in eps * scale; inf if it is not finite."""
+        """Return the difference of each number from another result, in eps * scale.
+
+        A number whose difference is not finite gets inf.
+        """
         with np.errstate(all="ignore"):
             units = disagreement(self.found, other, Bound(self.scale, self.k))
         return np.where(np.isfinite(units), units, np.inf)
@@ -506,7 +511,7 @@ class _Run:
         return self.conversion.result(self.how.row.name, ours, result, jacobian)
 
     def _converted_scale(self, ours: Sequence[FloatArray], scale: FloatArray) -> FloatArray:
-        """Return the scale of a result in the function's convention.
+        """Return the scale of a result that is expressed in the function's convention.
 
         Each number of the converted result is a sum of numbers in urdfkin's convention.
         """
@@ -530,11 +535,11 @@ class _Run:
         return found
 
     def _rounding_of_the_conversion(self, q: FloatArray) -> float:
-        """Return the roundings of a conversion that is more than a permutation, in multiples of eps * scale.
+        """Return the rounding errors of a conversion that is not a mere permutation, in eps * scale.
 
-        The function receives an angle that the conversion has rounded. It differs from urdfkin's angle by up
-        to 2 eps |q|. The joint's rotation matrix, which is a factor of each term, is therefore rotated by up
-        to this angle. The matrix that converts a base velocity has at most 16 roundings.
+        The function receives an angle that the conversion has rounded. This angle differs from urdfkin's
+        angle by up to 2 eps |q|. The joint's rotation matrix, which is a factor of each term, is therefore
+        rotated by up to this angle. The matrix that converts a base velocity has at most 16 roundings.
         """
         conversion, row = self.conversion, self.how.row
         assert conversion is not None
@@ -550,7 +555,7 @@ class _Run:
         total: _Total,
         good: list[int],
     ) -> FloatArray:
-        """Return the function's results of the right shape; add their indices to `good`."""
+        """Return those results of the function that have the right shape; add their indices to `good`."""
         n, found = len(inputs[0]), list[FloatArray]()
         if self.how.batch:
             array = _call(self.function, [x.copy() for x in inputs], (n, *shape), first, total, n)
@@ -669,7 +674,7 @@ class _Total:
     def for_diagnosis(self) -> tuple[tuple[FloatArray, ...], FloatArray, FloatArray, FloatArray]:
         """Return the data of some configurations for a diagnosis.
 
-        They are the inputs, the function's results, urdfkin's results, and the scale.
+        The data are the inputs, the function's results, urdfkin's results, and the scale.
         """
         assert self.kept is not None
         good = np.array(self.kept.good[:_DIAGNOSED])
@@ -688,7 +693,7 @@ def _call(
 ) -> FloatArray | None:
     """Return a copy of the function's result.
 
-    After an exception or a wrong shape, add it to `total` and return None.
+    An exception or a wrong shape is added to `total`, and the result is then None.
     """
     try:
         given = np.asanyarray(function(*inputs))
@@ -697,7 +702,7 @@ def _call(
             total.error(sample, f"{kind}, expected real numbers", configurations)
             return None
         found = np.array(given, dtype=np.float64)
-    except (Exception, SystemExit) as error:  # a fault of the user's code is a result of the check
+    except (Exception, SystemExit) as error:  # an exception of the user's code is a result of the check
         total.error(sample, f"{type(error).__name__}: {str(error)[:300]}", configurations)
         return None
     if found.shape != shape:

@@ -1,8 +1,8 @@
-"""Manifest of a campaign: its robots, samples and versions, written before the first computation.
+"""Define the manifest of a campaign: the robots, samples and versions, written before the first computation.
 
-The manifest defines the chunks and their keys. A key is the sha256 of everything that the numbers of the
-chunk depend on. If the code, the text of the robot or the options change, the keys change too. Results of an
-older state are therefore never reused.
+The manifest defines the chunks and their keys. The key of a chunk is the sha256 of all data on which the
+numbers of the chunk depend. If the code, the text of the robot or the options change, the keys change too.
+Results of an older state are therefore never reused.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class Manifest:
 
     @cached_property
     def _keys(self) -> list[str]:
-        """The key of each robot: the sha256 of its text, the settings and the versions."""
+        """The key of each robot, which is a sha256 of the robot's text, the settings and the versions."""
         settings = json.dumps([LAYOUT, self.samples, self.seed, self.provenance], sort_keys=True)
         return [
             hashlib.sha256(f"{settings}\n{json.dumps(as_data(robot))}".encode()).hexdigest()
@@ -89,7 +89,7 @@ class Manifest:
         return layout.checked(parse_json(content, where), where)
 
     def differences(self, other: Manifest) -> list[str]:
-        """Return the differences from another manifest, each with the two values.
+        """Return the differences from another manifest, each with the values in the two manifests.
 
         The result is empty if both manifests define the same chunks.
         """

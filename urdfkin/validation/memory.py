@@ -1,7 +1,7 @@
-"""Memory limit of a validation, and estimate of the memory that a robot needs.
+"""Limit the memory of a validation, and estimate the memory that a robot needs.
 
 All processes of a validation together use at most `SHARE` of the memory that is free at the start. A robot
-that needs more is not verified; the reason states both numbers.
+that needs more memory is not verified; the reason states the needed and the allowed memory.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from urdfkin.verify.pinocchio import OracleError
 
 #: Fraction of the free memory that a validation uses.
 SHARE = 0.5
-#: Memory of Pinocchio, measured with version 4.1.0. The size of its workspace is the first number of bytes
-#: times nv^3. The second number is the total number of bytes for each link.
+#: Memory (bytes) that Pinocchio needs, measured with version 4.1.0. The workspace takes the first number
+#: times nv^3, and each link takes the second number.
 _FOR_CUBE, _FOR_LINK = 64, 24_000
 #: Number of arrays that exist at the same time and have the size of a block of samples.
 _ARRAYS = 12
@@ -68,7 +68,7 @@ def _gigabytes(size: int) -> str:
 def _free() -> Iterator[int]:
     """Yield several numbers of free bytes.
 
-    They are the free bytes of the machine, of each control group of this process, and below the process's own
+    These are the free bytes of the machine, of each control group of this process, and of the process's own
     limit.
     """
     for line in _lines(_PROC / "meminfo"):
@@ -89,7 +89,7 @@ def _free() -> Iterator[int]:
 def _group(mount: Path, group: str, limit: str, usage: str) -> Iterator[int]:
     """Yield the free bytes of a control group and of its parents, whose limits apply too.
 
-    In a container the container's own group is the topmost.
+    In a container, the topmost visible group is the container's own group.
     """
     folder = mount / group.lstrip("/")
     for place in (folder, *folder.parents):

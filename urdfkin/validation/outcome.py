@@ -1,4 +1,4 @@
-"""Verdict of each robot, and outcome of a validation run with its reason.
+"""Define the verdict on a robot, and the outcome of a validation run with its reason.
 
 Only this module decides whether a run has passed. New reports and reports that are read from a file use this
 module.
@@ -13,7 +13,7 @@ from enum import StrEnum
 
 
 class Verdict(StrEnum):
-    """Result of the validation of a robot; worse ones first."""
+    """Result of the validation of a robot; worse results come first."""
 
     BAD_INPUT = "bad input"
     NOT_VERIFIED = "not verified"
@@ -26,7 +26,7 @@ class Verdict(StrEnum):
 DISAGREEMENT, INPUT, UNCHECKED = 1, 2, 3
 #: Exit code of an interrupted run: 128 + SIGINT, as in shells.
 INTERRUPTED = 130
-#: The verdict of a run with each exit code.
+#: For each exit code: the verdict on a run that ends with this code.
 OUTCOMES = {
     0: Verdict.VERIFIED.value,
     DISAGREEMENT: Verdict.DISAGREES.value,
@@ -38,12 +38,12 @@ OUTCOMES = {
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """How a run ended.
+    """The outcome of a validation run.
 
     Attributes:
         exit_code: 0: everything verified. Otherwise the first of these that applies: 1: a disagreement. 130:
             interrupted. 2: a robot cannot be read. 3: a robot was not verified, or there was none.
-        reason: Reason in one line if the run has not passed; None if it has.
+        reason: Reason in one line if the run has not passed; None if it has passed.
     """
 
     exit_code: int
@@ -56,7 +56,7 @@ class Outcome:
 
     @property
     def passed(self) -> bool:
-        """Whether every requested robot was verified, and there was at least one."""
+        """Whether at least one robot was requested, and every requested robot was verified."""
         return self.reason is None
 
 

@@ -1,4 +1,4 @@
-"""A program in any language as a function to check: it answers lines of JSON on its standard output.
+"""Call a program in any language like a function; the program answers requests with lines of JSON.
 
 Each request is one line on the program's standard input:
 
@@ -6,9 +6,10 @@ Each request is one line on the program's standard input:
      "reference": "local_world_aligned", "coordinates": ["shoulder", ...],
      "q": [...], "v": [...], "a": [...]}
 
-`coordinates` names the numbers of q. `v` and `a` are present if the quantity needs them, and `reference` if
-it has one. `lock` (values of locked joints), `root_joint` and `convention` are present if they were given.
-The file is the whole URDF without them. The answer is one line:
+`coordinates` names the numbers of q. The entries `v` and `a` are present if the quantity needs them. The
+entry `reference` is present if the quantity has a reference frame. The entries `lock` (values of locked
+joints), `root_joint` and `convention` are present if the user gave them. The file contains the whole URDF,
+without locks and without a root joint. The answer is one line:
 
     {"result": [[...], ...]}    or    {"error": "a text"}
 
@@ -47,7 +48,7 @@ _DAY = 86400.0
 
 
 class ProgramError(Exception):
-    """The program did not answer a request with a result."""
+    """Error for a program that did not answer a request with a result."""
 
 
 class Program:
@@ -55,7 +56,7 @@ class Program:
 
     Args:
         command: The program and its arguments. No shell is involved.
-        robot: The robot; the program receives the path of a file with its URDF, and the names of its joints.
+        robot: The robot; the program receives the path of a file with the robot's URDF, and the joint names.
         quantity: Name of the quantity.
         frame: Name of the frame.
         reference: Name of the reference frame; None for a placement.
@@ -171,7 +172,7 @@ class Program:
                 stream.close()
 
     def _ask(self, request: bytes) -> bytes:
-        """Write a request and return the line of the answer. The timeout covers writing and reading."""
+        """Write a request, and return the line of the answer; the timeout covers writing and reading."""
         process = self._process
         assert process is not None
         assert process.stdin is not None

@@ -3,9 +3,9 @@
 A chunk runs in a separate process, not in the process of Dask's worker.
 
 Dask's worker imports no computing code, so a robot cannot crash the worker. It can only crash the separate
-process. A chunk that crashes its process is tried a second time in a new process. If that process crashes
-too, the crash is the answer. Chunks and answers are transferred as bytes. The text of a robot is sent once
-for all its chunks.
+process. A chunk that crashes its process is tried a second time in a new process. If the second process
+crashes too, the crash is the answer. Chunks and answers are transferred as bytes. The text of a robot is sent
+only once for all chunks of the robot.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from urdfkin.validation.worker_processes import WorkerProcess
 if TYPE_CHECKING:
     from urdfkin.validation.chunk import Chunk
 
-#: The result of a chunk on a worker: the pickle of its answer, the cause of its crashes, or the versions on
-#: the worker's machine.
+#: The result of a chunk on a worker. It is the pickle of the answer, the cause of the chunk's crashes, or the
+#: versions on the worker's machine.
 Found = (
     tuple[Literal["answer"], bytes]
     | tuple[Literal["died"], str]
@@ -35,7 +35,7 @@ _lock = threading.Lock()
 
 
 def hold(robot: bytes) -> bytes:
-    """Keep a robot on a worker for its chunks. Dask runs this again if the worker is lost."""
+    """Store a robot on a worker for its chunks; Dask calls this function again if the worker is lost."""
     return robot
 
 
@@ -48,9 +48,10 @@ def run(robot: bytes, chunk: bytes, by: dict[str, str]) -> Found:
     """Run a chunk in a process and return its answer.
 
     Args:
-        robot: The pickle of its robot.
+        robot: The pickle of the chunk's robot.
         chunk: The pickle of the chunk without the robot.
-        by: Versions and digests on the client. The chunk runs only if they are the same here.
+        by: Versions and digests on the client. The chunk runs only if the versions and digests on this
+            machine are the same.
     """
     if by != computes():
         return "other code", computes()
@@ -75,7 +76,7 @@ class _DiedError(Exception):
 
 
 class _Parcel:
-    """A robot and a chunk as bytes. Unpickling it gives the chunk."""
+    """A robot and a chunk as bytes. Unpickling an object of this class returns the chunk."""
 
     def __init__(self, robot: bytes, chunk: bytes) -> None:
         self._robot, self._chunk = robot, chunk
@@ -90,7 +91,7 @@ def _unpickle(robot: bytes, chunk: bytes) -> Chunk:
 
 
 def _idle_or_new() -> WorkerProcess:
-    """Return an idle process, or start one. An idle process may have the robot in its cache."""
+    """Return an idle process, which may have the robot in its cache; start a process if none is idle."""
     with _lock:
         while _idle:
             child = _idle.pop()

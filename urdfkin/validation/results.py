@@ -1,4 +1,4 @@
-"""Report of a validation as data, and the versions that its numbers depend on.
+"""Define the report of a validation, and the versions on which the report's numbers depend.
 
 `ValidationReport.as_dict` returns the JSON document, whose layout `urdfkin.validation.document` defines.
 """
@@ -65,7 +65,7 @@ class RobotReport:
         origin: Source of the robot and its loading options.
         name: The robot's name in the URDF.
         verdict: The verdict.
-        reason: Why the robot is not verified; None if it is.
+        reason: Reason why the robot is not verified; None if it is verified.
         joints: Names of the moving joints, mimic joints included.
         frames: Names of the compared frames: every link and every joint.
         tallies: Error statistics of each quantity in each reference frame.
@@ -109,11 +109,14 @@ class RobotReport:
         return [tally for (kind, _), tally in self.tallies.items() if kind == quantity]
 
     def worst(self, quantity: str) -> float | None:
-        """Return the largest disagreement of a quantity in eps * scale; None if it was not compared."""
+        """Return the largest disagreement of a quantity, in eps * scale.
+
+        The result is None if the quantity was not compared.
+        """
         return max((tally.worst for tally in self.of(quantity)), default=None)
 
     def replay(self, key: Key) -> str | None:
-        """Return a command that computes the worst case of a quantity again; None without a worst case."""
+        """Return a command that computes a quantity's worst case again, or None if there is no worst case."""
         quantity, reference = key
         case = self.tallies[key].case
         return None if case is None else replay(self.origin, quantity, reference, case)
@@ -175,9 +178,9 @@ class RobotReport:
 def replay(origin: Origin, quantity: str, reference: str, case: WorstCase) -> str:
     """Return the command that computes a case again."""
     row = QUANTITIES[quantity]
-    # Joints are compared under their plain names. A link may have the same name.
+    # Joints are compared under their plain names, and a link may have the same name as a joint.
     frame = case.frame if row.of == "frames" else f"joint:{case.frame}"
-    origin = replace(origin, oracle=None)  # the replay compares with Pinocchio, as this check does
+    origin = replace(origin, oracle=None)  # the command compares with Pinocchio, as this check does
     return replay_line(origin, row.command, frame, reference, {x: getattr(case, x) for x in row.inputs})
 
 
@@ -193,10 +196,10 @@ class ValidationReport(Displayable):
         started: Start time, ISO 8601, UTC.
         seconds: Wall time.
         interrupted: Whether the run ended early. Finished results are included.
-        made_by: Versions of urdfkin and the oracles that computed the report; None if these are the installed
-            versions.
-        judgements: Results of the accuracy study, if requested: one for each compared robot; None where the
-            study failed.
+        made_by: Versions of urdfkin and of the oracles that computed the report; None if these are the
+            installed versions.
+        judgements: Results of the accuracy study, if requested. Each compared robot has a result, or None if
+            its study failed.
     """
 
     robots: tuple[RobotReport, ...]
@@ -236,8 +239,8 @@ class ValidationReport(Displayable):
     def command(self) -> str:
         """The command that repeats the run.
 
-        Each set of options has its own line. So has each robot that was given as text, because standard input
-        is a single file.
+        Each set of options has its own line. Each robot that was given as text also has its own line, because
+        only one robot can be read from standard input.
         """
         settings = f"--samples {self.samples} --seed {self.seed}"
         return "\n".join(
@@ -261,7 +264,10 @@ class ValidationReport(Displayable):
         return self.outcome.exit_code
 
     def as_dict(self) -> Document:
-        """Return the JSON document. An infinite disagreement, which also stands for NaN, becomes None."""
+        """Return the JSON document.
+
+        An infinite disagreement, which may also result from NaN, becomes None.
+        """
         judgements = iter(self.judgements)  # only compared robots have an accuracy result
         document = {
             "schema": VALIDATION.name,
@@ -285,7 +291,10 @@ class ValidationReport(Displayable):
 
 
 def _group_by_command(origins: Sequence[Origin]) -> list[list[Origin]]:
-    """Group the robots that one command can validate: the same options, and standard input at most once."""
+    """Group the robots that a single command can validate.
+
+    The robots of a group have the same options, and at most one comes from standard input.
+    """
     groups: dict[tuple[str, int], list[Origin]] = {}
     texts = Counter[str]()
     for origin in origins:

@@ -1,7 +1,8 @@
-"""Robots of a validation as plain data, each identified by the digest of its text.
+"""Represent the robots of a validation as plain data; the digest of a robot's text identifies the robot.
 
-A robot from a file is stored as its path, so that thousands of robots take little memory. The text is read
-when it is needed. If the text has changed since the start of the validation, reading it is an error.
+A robot from a file is stored as its path, so that thousands of robots take little memory. The text of the
+robot is read only when it is needed. If the text has changed since the start of the validation, reading it is
+an error.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ class RobotInput:
     Attributes:
         source: A path, a catalogue name or the text of the URDF, as for `load`.
         origin: Source of the robot (also if `source` is the text) and its loading options.
-        stamp: The sha256 of its text; empty if the text cannot be read.
+        stamp: The sha256 of the robot's text; empty if the text cannot be read.
         file: The file name in findings, if `source` is the text.
         listed: Findings in the MJCF that the text was converted from.
         made: Whether the text was converted from another format than URDF.
@@ -90,7 +91,7 @@ class RobotInput:
         return replace(self, source=text.data, file=text.label)
 
     def read(self) -> Robot:
-        """Return the robot, without warnings. Its findings are in its summary."""
+        """Return the robot without warnings, because the robot's summary contains the findings."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)
             robot = robot_of(
@@ -125,7 +126,7 @@ def subjects(
     lock: str | Mapping[str, ArrayLike] = MappingProxyType({}),
     joints: Sequence[str] | None = None,
 ) -> tuple[list[RobotInput], dict[int, Exception]]:
-    """Return the robots as plain data, and the errors of those that cannot be read, by index."""
+    """Return the robots as plain data, and, by index, the errors of the robots that cannot be read."""
     found, errors = list[RobotInput](), dict[int, Exception]()
     for i, robot in enumerate(robots):
         try:
@@ -144,7 +145,7 @@ def subject(
     lock: str | Mapping[str, ArrayLike] = MappingProxyType({}),
     joints: Sequence[str] | None = None,
 ) -> RobotInput:
-    """Return one robot as plain data. Raise any error of reading it."""
+    """Return one robot as plain data; an error in reading the robot is raised."""
     found = _subject(robot, mimic, root_joint, xacro_args)
     if isinstance(lock, str | Mapping) and not lock and joints is None:
         return found
@@ -156,7 +157,7 @@ def _subject(
 ) -> RobotInput:
     if isinstance(robot, DHTable) or is_table_file(robot) or is_mjcf(robot):
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UrdfWarning)  # the findings are in its summary
+            warnings.simplefilter("ignore", UrdfWarning)  # the robot's summary contains the findings
             return replace(RobotInput.of(load(robot, mimic=mimic, root_joint=root_joint)), made=True)
     if isinstance(robot, Robot):
         return RobotInput.of(robot)
@@ -184,7 +185,7 @@ def _word(source: str, mimic: bool | None, root_joint: str | None) -> RobotInput
     try:
         text = read_source(source)
     except UrdfkinError:
-        return RobotInput(source, Origin(source, mimic, root_joint))  # its chunk reports the error
+        return RobotInput(source, Origin(source, mimic, root_joint))  # the robot's chunk reports the error
     return RobotInput(source, Origin(text.source, mimic, root_joint), _digest(text.data))
 
 

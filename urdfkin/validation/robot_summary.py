@@ -3,8 +3,9 @@
 The summary has the links and joints, the findings in the file, and Denavit-Hartenberg tables. It is plain
 data, which can be sent between processes and written as JSON.
 
-The chains are the limbs in the catalogue. For other robots they are the paths from the base to the leaves,
-one for each set of moving joints. The tables are exact, in both conventions, and are compared with Pinocchio.
+The chains of a catalogue robot are the limbs in the catalogue. For other robots the chains are the paths from
+the base to the leaves, one path for each set of moving joints. The tables are exact, in both conventions, and
+are compared with Pinocchio.
 """
 
 from __future__ import annotations
@@ -83,7 +84,7 @@ def _joint(robot: Robot, i: int, narrowed: dict[str, NarrowedRange]) -> dict[str
 def _remaining_range(narrowed: NarrowedRange | None) -> dict[str, Any] | None:
     """Return the part of a joint's range in which its mimic joints stay within their limits.
 
-    None: the mimic joints do not narrow the range.
+    The result is None if the mimic joints do not narrow the range.
     """
     if narrowed is None:
         return None
@@ -98,11 +99,12 @@ _CONVENTIONS = ("standard", "modified")
 
 
 def chains_of(robot: Robot, oracle: Oracle | None) -> tuple[Chain, ...]:
-    """Return each chain as plain data for JSON: frames, both tables, and their disagreement with Pinocchio.
+    """Return each chain as plain data for JSON: frames, two tables, and their differences from Pinocchio.
 
     Args:
         robot: The robot.
-        oracle: Pinocchio's model; None if Pinocchio cannot check the robot. The tables are then unchecked.
+        oracle: Pinocchio's model; None if Pinocchio cannot check the robot, so that the tables are not
+            checked.
     """
     found = []
     for limb, base, tip in _chains(robot):
@@ -156,7 +158,8 @@ class RobotSummary:
     Attributes:
         model: The result of `describe`; None if the robot could not be read.
         findings: The findings in the file, as `Finding.as_dict` returns them.
-        chains: Denavit-Hartenberg tables of its chains, each in both conventions.
+        chains: Denavit-Hartenberg tables of the robot's chains, in the standard and in the modified
+            convention.
         second_reader: The comparison with yourdfpy's tree of the same text; None: not compared.
     """
 
@@ -167,14 +170,14 @@ class RobotSummary:
 
     @classmethod
     def of(cls, robot: Robot, oracle: Oracle | None) -> RobotSummary:
-        """Return the summary of a loaded robot. The tables are checked if Pinocchio accepts the robot."""
+        """Return the summary of a loaded robot; the tables are checked if Pinocchio accepts the robot."""
         mimic, added = robot.verifier.mimic, robot.root_joint is not None
         reading = plain(second_reading(robot.urdf, robot.tree, mimic=mimic, root_joint=added).as_dict())
         return cls(describe(robot), entries_of(robot.findings), chains_of(robot, oracle), reading)
 
     @property
     def disagreements(self) -> tuple[str, ...]:
-        """Messages on chains with tables outside their bound, and on another tree of yourdfpy."""
+        """Messages about chains whose tables exceed their bound, and about differences of yourdfpy's tree."""
         found = [text for chain in self.chains if (text := chain_disagreement(chain)) is not None]
         if self.second_reader and (text := reader_disagreement(self.second_reader)) is not None:
             found.append(text)
@@ -182,7 +185,7 @@ class RobotSummary:
 
 
 def chain_disagreement(chain: Chain) -> str | None:
-    """Return how the tables of a chain disagree with Pinocchio; None if they agree or were not compared."""
+    """Describe how the tables of a chain disagree with Pinocchio; None if they agree or were not compared."""
     share = chain["share_of_bound"]
     if not chain["samples"] or (share is not None and share <= 1.0):
         return None
@@ -195,7 +198,10 @@ def chain_disagreement(chain: Chain) -> str | None:
 
 
 def reader_disagreement(reading: SecondReading) -> str | None:
-    """Return how yourdfpy's tree differs from ours; None if it does not or was not compared."""
+    """Describe how yourdfpy's tree differs from urdfkin's.
+
+    The result is None if the trees are equal or were not compared.
+    """
     if not reading["differences"]:
         return None
     return f"{reading['by']} reads another robot from the file: {'; '.join(reading['differences'])}"

@@ -1,13 +1,14 @@
-"""Store of a campaign: a folder with a manifest and one small file for each chunk.
+"""Store the results of a campaign in a folder with a manifest and one small file for each chunk.
 
     DIR/manifest.json             definition of the campaign
     DIR/chunks/4f/4f1a....chunk   result of a chunk; .failed: why its robot could not be checked
     DIR/judge.json                settings of the accuracy study; chunks/*/*.judged: its results
     DIR/lock                      locked by the process that writes to the store
 
-Files are written atomically, so a file is complete or absent. The answer of a chunk is stored under the
-chunk's key and does not depend on the engine. A damaged file is reported and moved to `damaged/`, and its
-chunk is computed again. A file whose name belongs to no chunk of the campaign is also reported and moved.
+Files are written atomically, so a file is either complete or absent. The answer of a chunk is stored under
+the chunk's key and does not depend on the engine. A damaged file is reported and moved to `damaged/`, and the
+chunk of this file is computed again. A file whose name belongs to no chunk of the campaign is also reported
+and moved.
 """
 
 from __future__ import annotations
@@ -35,11 +36,12 @@ _MANIFEST, _LOCK, _CHUNKS, _ASIDE = "manifest.json", "lock", "chunks", "damaged"
 _WRITING = ".writing"
 #: File with the settings of the accuracy study (`urdfkin.validation.accuracy_store`).
 JUDGE = "judge.json"
-#: Suffix of a file with the accuracy result of a robot. The accuracy store defines its key.
+#: Suffix of a file with the accuracy result of a robot. The accuracy store defines the key in the file's
+#: name.
 JUDGED = ".judged"
 _DONE, _FAILED = ".chunk", ".failed"
 
-#: Number of attempts to take a lock, 0.1 s apart.
+#: Number of attempts to acquire a lock; the attempts are 0.1 s apart.
 _TRIES = 10
 
 _T = TypeVar("_T")
@@ -50,7 +52,7 @@ Tell = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Store:
-    """The folder of a campaign for reading; `opened` returns one for writing.
+    """The folder of a campaign for reading; the function `opened` returns a store for writing.
 
     Attributes:
         folder: The folder.
@@ -66,7 +68,7 @@ class Store:
 
     @classmethod
     def reading(cls, folder: Path, tell: Tell) -> Store:
-        """Return a read-only store. Another process may be writing to it.
+        """Return a read-only store; another process may be writing to the same folder.
 
         Raises:
             SourceError, InputError: The folder is not a store.
@@ -75,9 +77,9 @@ class Store:
         return cls(folder, Manifest.from_json(read_bytes(place), str(place)), tell)
 
     def answer(self, robot: int, index: int) -> Answer | None:
-        """Return the answer of a chunk; None if there is none.
+        """Return the answer of a chunk, or None if the store has no answer.
 
-        A damaged file is moved to `damaged/`; in a read-only store it stays.
+        A damaged file is moved to `damaged/`; in a read-only store, a damaged file is not moved.
         """
         key = self.manifest.key(robot, index)
         return self.kept(key, _DONE, read) or self.kept(key, _FAILED, read)
@@ -94,7 +96,7 @@ class Store:
             return None
 
     def keep(self, robot: int, index: int, found: Answer) -> None:
-        """Write an answer. When this returns, the complete file is on disk.
+        """Write an answer; when this method returns, the complete file is on disk.
 
         Raises:
             SourceError: The file cannot be written.
@@ -103,7 +105,7 @@ class Store:
         self.keep_part(key, _FAILED if isinstance(found, Failure) else _DONE, written(key, found))
 
     def has(self, key: str, kind: str) -> bool:
-        """Whether a file with a key exists."""
+        """Return whether a file with the given key exists."""
         return self._place(key, kind).exists()
 
     @property
@@ -112,7 +114,7 @@ class Store:
         return (self.folder / JUDGE).exists()
 
     def keep_part(self, key: str, kind: str, data: bytes) -> None:
-        """Write the file with a key, atomically, for `kept` to read."""
+        """Write the file with the given key atomically; the method `kept` reads this file."""
         self._write(self._place(key, kind), data)
 
     def forget_failures(self) -> None:
@@ -121,7 +123,7 @@ class Store:
             place.unlink(missing_ok=True)
 
     def check_names(self) -> None:
-        """Report files with a name that no chunk has, such as renamed ones, and move them to `damaged/`."""
+        """Report files whose name belongs to no chunk, such as renamed files, and move them to `damaged/`."""
         keys = (
             self.manifest.key(robot, index)
             for robot in range(len(self.manifest.robots))
@@ -133,7 +135,10 @@ class Store:
                 self._quarantine(place, "is not used: no chunk of this campaign has this name")
 
     def counts(self) -> dict[int, tuple[int, bool]]:
-        """Return for each robot the number of stored chunks and whether it failed, from the file names."""
+        """Return, for each robot, the number of stored chunks and whether the robot failed.
+
+        Only file names are read.
+        """
         names = {place.name for kind in (_DONE, _FAILED) for place in self._files(kind)}
         found = {}
         for robot in range(len(self.manifest.robots)):
@@ -143,7 +148,7 @@ class Store:
         return found
 
     def take(self, other: Store) -> int:
-        """Copy the chunks that are missing here from another store of the same campaign.
+        """Copy the chunks that are missing in this store from another store of the same campaign.
 
         Return the number of copied chunks.
         """
@@ -171,7 +176,7 @@ class Store:
             )
 
     def at_work(self) -> str | None:
-        """Return the process that writes to the store; None if there is none."""
+        """Return the process that is writing to the store, or None if no process is writing."""
         try:
             with _lock_file(self.folder / _LOCK, os.O_RDONLY) as file:
                 return None if _try_lock(file, fcntl.LOCK_SH) else _holder(file)
@@ -228,7 +233,9 @@ class Store:
 def opened(
     folder: Path, manifest: Manifest, tell: Tell, *, shard: str | None = None, retry_failed: bool = False
 ) -> Iterator[Store]:
-    """Open the store of a campaign for writing by this process only. Make it if it does not exist.
+    """Open the store of a campaign so that only this process can write.
+
+    Create the store if it does not exist.
 
     Args:
         folder: The folder.
@@ -278,15 +285,18 @@ def opened(
 
 
 def _is_ours(path: Path) -> bool:
-    """Whether another shard, which starts at the same time, may have made this file.
+    """Return whether another shard, which starts at the same time, may have created this file.
 
-    The other shard may have made it before it writes the manifest.
+    The other shard may create the file before it writes the manifest.
     """
     return path.name in (_WRITING, _CHUNKS) or path.name.startswith(_LOCK)
 
 
 def _check_or_write_manifest(store: Store, *, retry_failed: bool) -> Store:
-    """Return the store. An existing manifest is kept, because it has the original start time."""
+    """Write the manifest if there is none, and return the store.
+
+    An existing manifest stays, because it contains the original start time.
+    """
     if not (store.folder / _MANIFEST).exists():
         store.write_manifest()
         return store
@@ -302,7 +312,7 @@ def _check_or_write_manifest(store: Store, *, retry_failed: bool) -> Store:
 
 
 def _only_failed_ones_differ(store: Store, manifest: Manifest) -> bool:
-    """Whether the manifests differ only in the texts of robots that failed."""
+    """Return whether two manifests differ only in the texts of robots that failed."""
     own, theirs = store.manifest, manifest
     if len(own.robots) != len(theirs.robots):
         return False
@@ -319,7 +329,7 @@ def _only_failed_ones_differ(store: Store, manifest: Manifest) -> bool:
 
 @contextlib.contextmanager
 def _locked(folder: Path, shard: str | None) -> Iterator[None]:
-    """Lock the whole store, or one part of it."""
+    """Lock the whole store, or one part of the store."""
     with contextlib.ExitStack() as stack:
         whole = stack.enter_context(_lock_file(folder / _LOCK))
         _lock(whole, fcntl.LOCK_SH if shard else fcntl.LOCK_EX, folder)
@@ -334,7 +344,7 @@ def _locked(folder: Path, shard: str | None) -> Iterator[None]:
 
 
 def _lock_file(place: Path, how: int = os.O_RDWR | os.O_CREAT | os.O_APPEND) -> IO[bytes]:
-    """Open the file of a lock. Raise SourceError for a link, a pipe or a device in its place."""
+    """Open the file of a lock; raise SourceError if the path is a link, a pipe or a device."""
     try:
         descriptor = os.open(place, how | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
     except OSError as error:
@@ -357,7 +367,7 @@ def _lock(file: IO[bytes], how: int, folder: Path) -> None:
     for _ in range(_TRIES):
         if _try_lock(file, how):
             return
-        time.sleep(0.1)  # another process may hold the lock for a moment, only to check it
+        time.sleep(0.1)  # another process may hold the lock for a moment to test whether it is free
     raise InputError(
         "another process uses this store",
         where=str(folder),

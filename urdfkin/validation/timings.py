@@ -1,4 +1,4 @@
-"""Computing times of a validation: reading, urdfkin, the oracles, and comparison."""
+"""Measure the computing times of a validation: reading, urdfkin, the oracles, and comparison."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _T = TypeVar("_T")
 
 @dataclass(slots=True)
 class Clock:
-    """Seconds of each part of a validation. `compare` is the remainder of the total.
+    """Computing time (seconds) of each part of a validation; `compare` is the rest of the total time.
 
     Attributes:
         read: Reading the file and building the models of urdfkin and Pinocchio.
@@ -31,17 +31,17 @@ class Clock:
     second: float = 0.0
 
     def ours(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        """Call a function of urdfkin and add its time."""
+        """Call a function of urdfkin, and add its computing time to `urdfkin`."""
         with self._add_time("urdfkin"):
             return function(*args, **kwargs)
 
     def theirs(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        """Call a function of Pinocchio and add its time."""
+        """Call a function of Pinocchio, and add its computing time to `pinocchio`."""
         with self._add_time("pinocchio"):
             return function(*args, **kwargs)
 
     def second_oracle(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        """Call a function of the second oracle and add its time."""
+        """Call a function of the second oracle, and add its computing time to `second`."""
         with self._add_time("second"):
             return function(*args, **kwargs)
 

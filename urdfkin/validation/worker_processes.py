@@ -1,13 +1,13 @@
-"""Engine that runs chunks on processes of this machine. A crash of a process affects only its robot.
+"""Engine that runs chunks in processes of this machine; the crash of a process affects only its robot.
 
-A worker process runs one chunk after another. It ends when its parent process ends. It is a new Python
-interpreter that does not import the parent's main module, so a script needs no `__main__` guard. It
+A worker process runs one chunk after another, and ends when its parent process ends. A worker is a new Python
+interpreter that does not import the parent's main module, so a script needs no `__main__` guard. The worker
 imports nothing from the current folder.
 
-One thread distributes the chunks and receives the answers. Each worker has its own robot as long as robots
-are waiting, and one chunk at a time, so a crash can be assigned to a robot. That robot is tried once more,
-alone, after all others. With `isolate`, each robot runs alone from the start, so its first crash is
-reported as its result.
+One thread distributes the chunks and receives the answers. As long as robots are waiting, each worker has its
+own robot. A worker has one chunk at a time, so a crash can be attributed to a robot. This robot is tried once
+more, alone in a process, after all other robots. With `isolate`, each robot runs alone from the start, so the
+first crash of a robot is reported as its result.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from urdfkin.validation.engines import DIED, DIED_TWICE, Enter, Row, Task, Work,
 
 #: The module with the function `serve` that a process runs.
 WORKER = "urdfkin.validation.worker_processes"
-#: Maximum time in seconds from the end of a worker's pipe until its process ends.
+#: Maximum time (seconds) that a worker process may take to end after its pipe has ended.
 _GRACE = 5.0
 
 
@@ -46,7 +46,7 @@ class WorkerProcess:
             self.connection.close()
             raise
         finally:
-            theirs.close()  # the worker now has the only copy, so that the pipe ends with its process
+            theirs.close()  # the worker now has the only copy, so the pipe closes when the worker ends
 
     @property
     def alive(self) -> bool:
@@ -80,7 +80,7 @@ def _interpreter(pipe: int) -> subprocess.Popen[bytes]:
 
 
 def _cause(status: int) -> str:
-    """Return an exit status as text: the name of a signal, or the number.
+    """Return an exit status as text: the name of a signal, or the status as a number.
 
     >>> _cause(-11), _cause(3)
     ('signal SIGSEGV', 'exit status 3')
@@ -112,9 +112,9 @@ def serve(pipe: int, parent: int) -> None:
 
 
 def _receive(connection: Connection, chunks: SimpleQueue[Chunk]) -> None:
-    """Receive chunks while an earlier chunk is computed.
+    """Receive the next chunks while an earlier chunk is computed.
 
-    The end of the parent is therefore detected at once.
+    This process therefore detects at once that its parent has ended.
     """
     try:
         while True:
@@ -124,7 +124,7 @@ def _receive(connection: Connection, chunks: SimpleQueue[Chunk]) -> None:
 
 
 def _end_with(parent: int) -> None:
-    """End this process with its parent. On Linux the kernel does so, even if compiled code hangs."""
+    """End this process when its parent ends; on Linux the kernel ends it, even if compiled code hangs."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
@@ -160,8 +160,8 @@ class _Crew:
         work: The tasks of each robot.
         jobs: Maximum number of workers.
         enter: Callback that receives the answers.
-        alone: None: several workers may share a robot. Otherwise each worker has one robot, and `alone` is
-            the reason that is reported if it crashes.
+        alone: None: several workers may share a robot. Otherwise each worker has a single robot, and `alone`
+            is the reason that is reported if the worker crashes.
     """
 
     def __init__(self, work: Work, jobs: int, enter: Enter, *, alone: str | None = None) -> None:
