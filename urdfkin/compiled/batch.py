@@ -31,7 +31,7 @@ Compute = Callable[[Sequence[FloatArray], FloatArray], int]
 def default_threads(n: int) -> int:
     """Return the default number of threads for n configurations.
 
-    It is 1 for a small batch, else the number of processors that this process may use.
+    The number is 1 for a small batch, else the number of processors that this process may use.
     """
     return _processors() if n >= _WORTH_THREADS else 1
 
@@ -44,7 +44,7 @@ def _processors() -> int:
 
 
 def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, threads: int | None) -> int:
-    """Compute `out` (n, ...) from `inputs`, each (n, ...) or (1, ...), with several threads.
+    """Compute `out` (n, ...) with several threads; each array of `inputs` is (n, ...) or (1, ...).
 
     The result is 1 if an input is nan, infinite or too large, else 0.
 
@@ -69,7 +69,7 @@ def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, t
 
 
 def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> None:
-    """Compute `n` rows with NumPy, part by part, so that the memory for intermediate results stays constant.
+    """Compute `n` rows with NumPy in parts, so that the memory for intermediate results does not grow with n.
 
     Args:
         compute: Computes the rows of a slice. For an empty batch it is called once, with an empty slice.

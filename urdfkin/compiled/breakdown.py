@@ -42,7 +42,7 @@ from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
-#: The kinds of contribution, in the order in which they are stored.
+#: The kinds of contribution, in the order of the array `terms`.
 KINDS = ("transverse", "centripetal", "coriolis", "sliding")
 
 
@@ -56,7 +56,8 @@ class AccelerationBreakdown(Displayable):
 
     Attributes:
         joints: Names of the moving joints from the base to the frame.
-        base: (..., 6) acceleration that the moving base alone gives the frame, with all joints fixed.
+        base: (..., 6) acceleration that the frame would have if all joints were fixed and only the base
+            moved.
         terms: (..., joints, 4, 6) contributions of the joints. The four kinds are in the order of `KINDS`,
             and the six numbers are [linear; angular].
     """

@@ -1,8 +1,8 @@
-"""The recursions as plain functions of arrays.
+"""Compute placements, velocities, accelerations and Jacobians of arrays of configurations.
 
-Inputs are checked flat batches, (n, nq) and (n, nv); `urdfkin.robot` checks, reshapes and verifies. A row
-that was broadcast to n is not copied. Python's numbers compute a few configurations, and a kernel computes
-more (`preload`); the bits are the same.
+Inputs are flat batches, (n, nq) and (n, nv), which `urdfkin.robot` has checked and reshaped. An input row
+that was broadcast to n rows is not copied. A few configurations are computed with Python numbers, and more
+configurations by a compiled kernel (`preload`); the two results have the same bits.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from urdfkin.model.tree import FloatArray
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _PLACES = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
-#: From this output size (bytes) on, results are written to memory past the caches, which are too small for
-#: them.
+#: From this output size (bytes) on, results are written directly to memory and not to the caches, which are
+#: too small for them.
 _STREAMED = 2 << 20
-#: Number of values of a block that fit into half of the first-level cache.
+#: Number of values in a block of results; so many values fit into half of the first-level cache.
 _MOST_STAGED = 3072
 
 _STRIDES = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V, KernelArgs.STRIDE_A
@@ -54,7 +54,7 @@ class How(TypedDict, total=False):
 
 
 def placements(plan: CompiledTree, q: FloatArray, **how: Unpack[How]) -> FloatArray:
-    """Return T_world_frame (n, frames, 4, 4): the positions of 7.77, and the rotations."""
+    """Return T_world_frame (n, frames, 4, 4): the positions by equation 7.77, and the rotations."""
     program = program_of(plan, turned=True)
     return _compute("placements", plan, program, [q], _ALIGNED, (4, 4), **how)
 
@@ -62,7 +62,7 @@ def placements(plan: CompiledTree, q: FloatArray, **how: Unpack[How]) -> FloatAr
 def velocities(
     plan: CompiledTree, q: FloatArray, v: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]
 ) -> FloatArray:
-    """Return velocities (n, frames, 6), [linear; angular]: 7.127, 7.128."""
+    """Return velocities (n, frames, 6), [linear; angular], by equations 7.127 and 7.128."""
     local = reference.own_axes
     name = "local_velocities" if local else "velocities"
     return _compute(name, plan, program_of(plan, turned=local), [q, v], reference, (6,), **how)
@@ -76,7 +76,7 @@ def accelerations(
     reference: Reference = _ALIGNED,
     **how: Unpack[How],
 ) -> FloatArray:
-    """Return classical accelerations (n, frames, 6), [linear; angular]: 7.129, 7.130."""
+    """Return classical accelerations (n, frames, 6), [linear; angular], by equations 7.129 and 7.130."""
     local = reference.own_axes
     name = "local_accelerations" if local else "accelerations"
     return _compute(name, plan, program_of(plan, turned=local), [q, v, a], reference, (6,), **how)
@@ -85,7 +85,7 @@ def accelerations(
 def jacobians(
     plan: CompiledTree, q: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]
 ) -> FloatArray:
-    """Return Jacobians (n, frames, 6, nv): 7.85."""
+    """Return Jacobians (n, frames, 6, nv) by equation 7.85."""
     program = program_of(plan, turned=reference.own_axes, columns=True)
     return _compute("jacobians", plan, program, [q], reference, (6, plan.nv), **how)
 
@@ -93,7 +93,7 @@ def jacobians(
 def jacobian_rates(
     plan: CompiledTree, q: FloatArray, v: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]
 ) -> FloatArray:
-    """Return time derivatives of the Jacobians (n, frames, 6, nv): the J-dot of 7.126."""
+    """Return time derivatives J-dot of Jacobians (n, frames, 6, nv) by equation 7.126."""
     program = program_of(plan, turned=reference.own_axes, columns=True)
     return _compute("jacobian_rates", plan, program, [q, v], reference, (6, plan.nv), **how)
 
@@ -101,7 +101,10 @@ def jacobian_rates(
 def hessians(
     plan: CompiledTree, q: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]
 ) -> FloatArray:
-    """Return Hessians (n, frames, 6, nv, nv); [..., i, j]: derivative of column i by joint velocity j."""
+    """Return Hessians (n, frames, 6, nv, nv).
+
+    [..., i, j] is the change of column i per unit of motion of joint velocity j.
+    """
     program = program_of(plan, turned=reference.own_axes, columns=True, pairs=True)
     return _compute("hessians", plan, program, [q], reference, (6, plan.nv, plan.nv), **how)
 
@@ -138,7 +141,7 @@ def _compute(
     threads: int | None = None,
     read: bool = False,
 ) -> FloatArray:
-    """Return (n, frames, *shape), computed from q, or q and v, or q, v and a.
+    """Return a result (n, frames, *shape) that is computed from q, or q and v, or q, v and a.
 
     Raises:
         NotFiniteError: an input is not finite.
@@ -162,9 +165,9 @@ def _interpreted(
     out: FloatArray,
     threads: int | None,
 ) -> int | None:
-    """Compute with Python's numbers; return whether an input is not ordinary, or None if a kernel pays.
+    """Compute with Python numbers; return whether an input is not ordinary, or None if a kernel is faster.
 
-    Whether it pays depends on the processor time of the first configurations.
+    The processor time of the first configurations decides whether a kernel is faster.
     """
     if preload.kernel(name) is not None:
         return None
@@ -178,7 +181,7 @@ def _interpreted(
         row[:] = result
         least = min(least, took := time.thread_time() - begin)
         preload.spend(name, took)
-        # The first one takes longer than the others.
+        # The first configuration takes longer than the others.
         if i and (left := len(flat) - 1 - i) and preload.kernel(name, left * least) is not None:
             return None
     return odd
@@ -187,7 +190,7 @@ def _interpreted(
 def _lists(
     program: Program, reference: Reference, inputs: Sequence[FloatArray], i: int, result: list[float]
 ) -> list[Any]:
-    """Return the arguments of a recursion on Python's numbers for configuration `i`."""
+    """Return the arguments with which Python runs a recursion for configuration `i`."""
     task: list[Any] = [0] * len(KernelArgs)
     task[KernelArgs.PROGRAM], task[KernelArgs.CONSTANTS] = program.lists
     task[KernelArgs.SCRATCH], task[KernelArgs.OUT] = [None] * program.rows, result
@@ -213,7 +216,10 @@ def _compiled(
     *,
     staged: bool,
 ) -> int:
-    """Compute with a kernel; return whether an input is not ordinary."""
+    """Compute with a compiled kernel.
+
+    Return whether an input is not ordinary (nan, infinite or too large).
+    """
     core = preload.kernel(name)
 
     def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
@@ -226,7 +232,7 @@ def _compiled(
 
 
 def is_staged(out: FloatArray) -> bool:
-    """Return whether results are collected in a buffer and then written past the caches, in whole lines.
+    """Return whether results are collected in a buffer and then written to memory in whole cache lines.
 
     A processor that writes a part of a cache line reads the whole line first. If the output is larger than
     the cache, this read is slow.
@@ -242,7 +248,7 @@ def task_of(
     Args:
         program: The program of the recursion.
         reference: The reference frame of the results.
-        inputs: The base's state, q and, if needed, v and a; each with one row or as many as `out`.
+        inputs: The base's state, q and, if needed, v and a; each input has one row or as many rows as `out`.
         out: (n, ...) array for the result.
         staged: Whether blocks are collected before output (`is_staged`).
     """

@@ -20,8 +20,8 @@ from urdfkin.system.lazy_import import installed_version
 from urdfkin.system.locks import importing, lock_over_forks
 
 #: Lock for the import of Numba and for compilations. A fork of the process waits for this lock, because the
-#: child process could not finish an import or a compilation. A fork takes the newest lock first. This lock is
-#: newer than the lock of `logging`, which the import of Numba uses. It exists before that import begins.
+#: child process could not finish an import or a compilation. A fork acquires the newest lock first. This lock
+#: is created after the lock of `logging`, which the import of Numba uses, and before that import begins.
 compiling = lock_over_forks()
 
 #: A function that receives the events of compilations. When a compilation begins, it is called with the

@@ -21,7 +21,10 @@ REFERENCES = {
 
 
 class KernelArgs(IntEnum):
-    """Index of each argument in the row; arguments from CORE on are for calls with one configuration."""
+    """Index of each argument in the row of integers.
+
+    Arguments from CORE on are for calls with one configuration.
+    """
 
     @staticmethod
     def _generate_next_value_(name: str, start: int, count: int, last_values: list[int]) -> int:

@@ -33,17 +33,17 @@ def _unused_vector():
 
 
 def follow_place(state):
-    """Keep R and p of a link's state, which is all that a placement needs."""
+    """Keep R and p of a link's state; a placement needs only these."""
     return state[0], state[1], _unused_vector(), _unused_vector(), _unused_vector(), _unused_vector()
 
 
 def follow_velocity(state):
-    """Keep R, p, w and vel of a link's state, which is all that a velocity needs."""
+    """Keep R, p, w and vel of a link's state; a velocity needs only these."""
     return state[0], state[1], state[2], state[3], _unused_vector(), _unused_vector()
 
 
 def follow_acceleration(state):
-    """Keep R, p, w, alpha and acc. The velocity vel is not needed, because 7.130 does not contain it."""
+    """Keep R, p, w, alpha and acc of a link's state; the velocity vel does not occur in equation 7.130."""
     return state[0], state[1], state[2], _unused_vector(), state[4], state[5]
 
 
@@ -171,7 +171,7 @@ def column_rate(s, row, to, how, g, c, reference, state):
 def _end(reference, x):
     """Return the reference point of a Jacobian column.
 
-    It is the frame's origin x; for the reference frame WORLD it is the world's origin.
+    The point is the frame's origin x; for the reference frame WORLD it is the world's origin.
     """
     if reference == _WORLD:
         nil = same(0.0)

@@ -1,4 +1,4 @@
-"""A robot's tree as arrays for the recursion: one step for each moving joint, one row for each frame.
+"""Represent a robot's tree by arrays for the recursion: a step for each moving joint, a row for each frame.
 
 As in the textbook, every joint frame is rotated so that the joint's axis is z (`turned` returns this
 rotation). Each revolute joint is then Rz, and each prismatic joint is Tz. Fixed joints are merged into the
@@ -22,9 +22,9 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 IntArray = NDArray[np.int64]
 
 
-#: If all coordinates, velocities, lengths and multipliers are below this, no result overflows. With N joints,
-#: the velocity of a joint is below LARGE^2 and the length of a path is below N LARGE^2. The largest product,
-#: w^2 d, is therefore below N^3 LARGE^6.
+#: If all coordinates, velocities, lengths and multipliers are below this number, no result overflows. With N
+#: joints, the velocity of a joint is below LARGE^2 and the length of a path is below N LARGE^2. The largest
+#: product, w^2 d, is therefore below N^3 LARGE^6.
 LARGE = 1e45
 
 
@@ -46,7 +46,7 @@ class Motion(IntEnum):
 
 
 class Geometry(IntEnum):
-    """Columns of `CompiledTree.geometry`: R (9), the offset in the previous step's axes (3), mimic rule."""
+    """Columns of `CompiledTree.geometry`: R, the offset in the previous step's axes, and the mimic rule."""
 
     R = 0
     OFFSET = 9
@@ -55,7 +55,7 @@ class Geometry(IntEnum):
 
 
 class Column(IntEnum):
-    """Columns of `CompiledTree.columns`; each row is one column of eq. 7.85."""
+    """Columns of `CompiledTree.columns`; each row of that array describes a Jacobian column of eq. 7.85."""
 
     STEP = 0
     AXIS = 1
@@ -91,21 +91,22 @@ class CompiledTree:
         joints: The moving joint of each step, as an index into the tree's joints.
         steps: (steps, 3) integers, columns `Step`.
         geometry: (steps, 14), columns `Geometry`.
-        frames: (frames, 2): the step after which a frame comes (-1: the base), and its index in the output;
-            sorted by step.
-        offsets: (frames, 12): rotation (9) and offset (3) from the step's frame to the frame, the offset
-            in the axes of the step.
-        columns: (columns, 4), columns `Column`: every joint velocity of every step.
+        frames: (frames, 2) for each frame: the step before the frame (-1: the base), and the frame's index in
+            the output. The rows are sorted by step.
+        offsets: (frames, 12) rotation (9) and offset (3) from the frame of the step to each frame. The offset
+            is in the axes of the step.
+        columns: (columns, 4) a row for every joint velocity of every step; `Column` describes its numbers.
         multipliers: (columns,) the mimic multiplier of each column.
-        leaders: (frames, columns): -1 if the column's joint does not move the frame; else the index of the
-            column to which it is added: its own, or that of the mimicked joint.
+        leaders: (frames, columns) index of the column to which a column is added: the column itself or, for a
+            mimic joint, the column of the mimicked joint. The index is -1 if the column's joint does not move
+            the frame.
         places_q: Indices of the coordinates that the recursion needs.
         parents: (steps,) the step before each step, -1 for the base.
         lengths: (steps + frames,) metres: sum of the lengths of all URDF offsets, including those of fixed
-            joints. First, for each step, from its parent step to the step. Then, for each frame, from its
-            step to the frame (in the order of `frames`).
-        depth: (frames,) in output order: number of URDF joints between a frame and the root.
-        tilts: (frames,) in output order, rad: sum of the `Joint.tilt` of the joints that `depth` counts.
+            joints. The first numbers are the lengths from the parent step to each step. The other numbers are
+            the lengths from the step to each frame (in the order of `frames`).
+        depth: (frames,) number of URDF joints between the root and each frame, in output order.
+        tilts: (frames,) sum (rad) of `Joint.tilt` over the joints that `depth` counts, in output order.
     """
 
     nq: int
@@ -134,18 +135,18 @@ class CompiledTree:
 
     @cached_property
     def made(self) -> dict[object, Any]:
-        """Cache of objects computed from the plan, such as programs and the weights of error bounds."""
+        """Cache of objects that are computed from this tree, such as programs and weights of error bounds."""
         return {}
 
     @cached_property
     def is_large(self) -> bool:
-        """Whether results may overflow for ordinary coordinates and velocities, because of the geometry."""
+        """Whether results for ordinary coordinates and velocities may overflow because of large lengths."""
         numbers = self.geometry, self.offsets, self.lengths
         return any(float(np.abs(x).max(initial=0.0)) >= LARGE for x in numbers)
 
     @cached_property
     def turns_only(self) -> bool:
-        """Whether every step turns, so that the lengths of all paths are the same in every configuration."""
+        """Whether every step is revolute, so that all paths have the same length in every configuration."""
         return bool((self.steps[:, Step.KIND] == Motion.TURN).all())
 
     def __reduce__(self) -> tuple[type[CompiledTree], tuple[Any, ...]]:
@@ -199,7 +200,7 @@ def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
 
 
 def _depths(tree: KinematicTree, links: Iterable[int]) -> dict[int, int]:
-    """Return the links on the paths to the given links, root first, with the number of joints before each.
+    """Return the links on the paths to the given links, root first, each with the number of joints before it.
 
     Each joint is visited once. A separate path for each link would take time proportional to the tree's
     depth.
@@ -217,7 +218,7 @@ def _depths(tree: KinematicTree, links: Iterable[int]) -> dict[int, int]:
 
 
 class _Anchor(NamedTuple):
-    """A link's step (-1: the base), its pose in the step's rotated frame, and the path length to it."""
+    """The step that moves a link (-1: the base), the link's pose in the step's frame, and the path length."""
 
     step: int
     T: FloatArray

@@ -1,10 +1,11 @@
-"""Decide when a kernel is compiled, without importing Numba.
+"""Decide when a kernel is loaded or compiled; this decision does not import Numba.
 
-A single configuration needs no kernel: Python computes it in a millisecond, with the same bits. Importing
-Numba and reading a kernel from disk takes longer, and compiling takes seconds. So each kernel has an account
-of the time that was spent without it. From `LOADING` on, the kernel is read from disk. If it is not there,
-a process beside this one compiles it from `BESIDE` on, and Python computes until that is done. This process
-compiles it itself if more than `COMPILING` would pass.
+A single configuration needs no kernel, because Python computes it in a millisecond with the same bits.
+Importing Numba and reading a kernel from disk takes longer, and compiling takes seconds. Therefore, this
+module sums up the time that the interpreted computation has taken in place of each kernel. When this time
+exceeds `LOADING`, the kernel is read from disk. If the kernel is not on disk and the time exceeds `BESIDE`, a
+second process compiles the kernel. Python computes until the second process has finished. If more time than
+`COMPILING` would pass without a kernel, this process compiles the kernel itself.
 """
 
 from __future__ import annotations
@@ -24,15 +25,16 @@ from urdfkin.system.locks import importing
 if TYPE_CHECKING:
     import subprocess
 
-#: Seconds that a kernel must save before Numba is imported, and before this process compiles it.
+#: Seconds that a kernel must save before Numba is imported, and seconds before this process compiles the
+#: kernel.
 LOADING, COMPILING = 0.3, 3.0
-#: Seconds spent without a kernel, from which a process beside this one compiles it.
+#: When this many seconds were spent without a kernel, a second process compiles the kernel.
 BESIDE = 1.0
-#: The same if Numba is imported already.
+#: The number of seconds in place of `LOADING` if Numba is imported already.
 _LOADING_MORE = 0.03
-#: Seconds that the function for single calls saves in a call.
+#: Seconds that each call saves through the fast function for single configurations.
 _SAVED = 5e-5
-#: Seconds until the folder of the kernels is read again for a kernel that was not there.
+#: Seconds after which the cache folder is searched again for a kernel that it did not contain.
 _AGAIN = 0.05
 
 #: The modules of the kernels, and the kernels of `warm` in two groups of equal compile time.
@@ -42,7 +44,7 @@ _OTHER_HALF = "jacobians", "jacobian_rates", "local_velocities", "placements"
 
 # -- when a kernel pays ----------------------------------------------------------------------------------
 
-#: How to compute: with Python's numbers, or with a kernel.
+#: The way to compute: with Python numbers, or with a compiled kernel.
 Way = Literal["interpreted", "compiled"]
 
 _spent: dict[str, float] = {}
@@ -53,7 +55,10 @@ _only: list[Way] = []
 
 @contextmanager
 def only(way: Way) -> Iterator[None]:
-    """Compute everything in one way while the context is open, to compare the two."""
+    """Compute everything in the given way while the context is open.
+
+    The caller can thus compare the two ways.
+    """
     _only.append(way)
     try:
         yield
@@ -62,17 +67,17 @@ def only(way: Way) -> Iterator[None]:
 
 
 def spend(name: str, seconds: float) -> None:
-    """Record time that was spent without a kernel."""
+    """Add the time (seconds) of a computation that did not use the kernel `name`."""
     _spent[name] = _spent.get(name, 0.0) + seconds
 
 
 def kernel(name: str, more: float = 0.0, home: str = RECURSIONS) -> Any:
-    """Return a kernel if it is loaded, or if it pays to load or compile it; else None.
+    """Return a kernel if it is loaded, or if loading or compiling it saves time; else return None.
 
     Args:
         name: Name of the kernel.
-        more: Seconds that the next computations will take without it.
-        home: Its module.
+        more: Seconds that the next computations will take without the kernel.
+        home: Module of the kernel.
     """
     if _only and _only[-1] == "interpreted":
         return None
@@ -89,9 +94,9 @@ def kernel(name: str, more: float = 0.0, home: str = RECURSIONS) -> Any:
 
 
 def single_pays(name: str) -> bool:
-    """Return whether to load the function for single calls (`SINGLE`) of the kernel `name`.
+    """Return whether to load the fast function (`SINGLE`) that calls the kernel `name` for one configuration.
 
-    Each call of `single_pays` counts as a call that the function would have made faster.
+    Each call of `single_pays` counts as a call that the fast function would have accelerated.
     """
     if _only:
         return _only[-1] == "compiled"
@@ -103,7 +108,7 @@ def single_pays(name: str) -> bool:
 
 
 def load(name: str, home: str = RECURSIONS) -> Any:
-    """Return a kernel; compile it or read it from disk."""
+    """Compile a kernel, or read the kernel from disk, and return it."""
     with compiling, importing:
         found = getattr(import_module(home), name)
     _ = found.compiled
@@ -112,7 +117,10 @@ def load(name: str, home: str = RECURSIONS) -> Any:
 
 
 def _on_disk(name: str) -> bool:
-    """Return whether a kernel is stored; the folder is read again after `_AGAIN`."""
+    """Return whether a kernel is on disk.
+
+    A kernel that was missing is searched again after `_AGAIN` seconds.
+    """
     folder = cache_folder()
     if folder is None or time.monotonic() < _absent.get((folder, name), 0.0):
         return False
@@ -124,7 +132,7 @@ def _on_disk(name: str) -> bool:
 
 # -- the process beside ----------------------------------------------------------------------------------
 
-#: Ends the process when its standard input closes: at the end of this process, however it ends.
+#: Code that ends the second process when its standard input closes, which happens when this process ends.
 _UNTIL_CLOSED = (
     "import os, sys, threading;"
     " threading.Thread(target=lambda: (sys.stdin.read(), os._exit(1)), daemon=True).start();"
@@ -133,9 +141,9 @@ _beside: dict[str, subprocess.Popen[bytes]] = {}
 
 
 def _compile_beside(name: str, home: str) -> bool:
-    """Return whether another process compiles a kernel; start it, unless it has failed before.
+    """Return whether a second process compiles a kernel; start this process, unless it has failed before.
 
-    One process compiles at a time; a kernel whose turn has not come counts as being compiled.
+    Only one second process compiles at a time. A kernel that waits for this process counts as being compiled.
     """
     if cache_folder() is None:
         return False
@@ -147,7 +155,10 @@ def _compile_beside(name: str, home: str) -> bool:
 
 
 def _compile_elsewhere(names: Sequence[str], home: str = RECURSIONS) -> subprocess.Popen[bytes]:
-    """Start another interpreter that compiles; this process compiles all kernels that it fails to compile."""
+    """Start a second interpreter that compiles kernels.
+
+    If it fails, this process compiles the missing kernels.
+    """
     import subprocess  # noqa: PLC0415
 
     from urdfkin.system.processes import own_python  # noqa: PLC0415
@@ -180,7 +191,7 @@ def _close(process: subprocess.Popen[bytes]) -> None:
 
 
 def _forget_beside() -> None:
-    """Forget the process in a forked child, which must not keep its standard input open."""
+    """Close the second process's standard input in a forked child, which must not keep it open."""
     for process in _beside.values():
         process.returncode = 0
         _close(process)
@@ -195,7 +206,7 @@ os.register_at_fork(after_in_child=_forget_beside)
 
 
 def are_on_disk() -> bool:
-    """Return whether all kernels of `load_kernels` are stored."""
+    """Return whether all kernels that `load_kernels` loads are on disk."""
     return all(map(_on_disk, _ONE_HALF + _OTHER_HALF))
 
 

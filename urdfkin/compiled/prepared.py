@@ -1,8 +1,8 @@
-"""Fast calls for one frame and one configuration at a time, for control loops and solvers.
+"""Compute results of one frame for one configuration in fast calls, for control loops and solvers.
 
-The recursion is the same as for the methods of `Robot`; every lane computes the one configuration. Each
-function is bound to its program and its scratch memory, so a call passes only the arrays. If another thread
-is using the same function, the call uses `Robot` instead, with the same result.
+The recursion is the same as for the methods of `Robot`; every lane of the kernel computes the same
+configuration. Each function is bound to a program and to scratch memory, so a call passes only the arrays. If
+another thread is using the same function, the call uses `Robot` instead, with the same result.
 """
 
 from __future__ import annotations
@@ -51,10 +51,10 @@ class _Robot(Protocol):
 class PreparedFrame:
     """Fast evaluation of one frame in one reference frame; create it with `Robot.prepare`.
 
-    Results have the same bits as those of `Robot`. Without `verify` the ledger counts them as not checked.
-    With `verify` each result is compared with Pinocchio's within the same bound as the robot's.
-    Contiguous float64 arrays are used directly. For other arguments `Robot` computes the result, or raises
-    the error, as usual. Several threads may share one object, also on free-threaded Python.
+    Results have the same bits as those of `Robot`. Without `verify` the robot's ledger counts the results as
+    not checked. With `verify` each result is compared with Pinocchio's result, within the same bound as in
+    `Robot`. Contiguous float64 arrays are used directly. For other arguments `Robot` computes the result, or
+    raises the error, as usual. Several threads may share one object, also on free-threaded Python.
 
     Attributes:
         frame: The frame's name.
@@ -81,7 +81,8 @@ class PreparedFrame:
     ) -> None:
         self.frame, self.reference, self.verify = frame, reference, verify
         self._robot, self._plan = robot, plan
-        #: Whether the user asked for this object, and so for machine code at the first call.
+        #: Whether the user created this object with `Robot.prepare`; the first call then compiles machine
+        #: code.
         self.wanted = False
         # Compiled, or read from disk, at the first call.
         self._placement: Fast = partial(self._first, "placement")
@@ -97,7 +98,7 @@ class PreparedFrame:
     # The functions count or check their results for the ledger themselves.
 
     def placement(self, q: Given, out: FloatArray | None = None) -> FloatArray:
-        """Return T_world_frame (4, 4): eq. 7.77.
+        """Return T_world_frame (4, 4) by eq. 7.77.
 
         >>> import urdfkin
         >>> tip = urdfkin.load("planar_two_link").prepare("tip")
@@ -109,7 +110,7 @@ class PreparedFrame:
         return self._robot.placement(q, self.frame, out=out, verify=self.verify, threads=1)
 
     def velocity(self, q: Given, v: Given, out: FloatArray | None = None) -> FloatArray:
-        """Return the velocity (6,), [linear; angular], m/s and rad/s: eq. 7.127, 7.128.
+        """Return the velocity (6,), [linear; angular], m/s and rad/s, by eq. 7.127 and 7.128.
 
         >>> import urdfkin
         >>> tip = urdfkin.load("planar_two_link").prepare("tip")
@@ -121,7 +122,7 @@ class PreparedFrame:
         return self._robot.velocity(q, v, self.frame, self.reference, out=out, verify=self.verify, threads=1)
 
     def jacobian(self, q: Given, out: FloatArray | None = None) -> FloatArray:
-        """Return the Jacobian (6, nv): eq. 7.85.
+        """Return the Jacobian (6, nv) by eq. 7.85.
 
         >>> import urdfkin
         >>> tip = urdfkin.load("planar_two_link").prepare("tip")
@@ -133,7 +134,7 @@ class PreparedFrame:
         return self._robot.jacobian(q, self.frame, self.reference, out=out, verify=self.verify, threads=1)
 
     def hessian(self, q: Given, out: FloatArray | None = None) -> FloatArray:
-        """Return the derivatives (6, nv, nv) of `jacobian` by each joint velocity.
+        """Return the Hessian (6, nv, nv), the change of the Jacobian per unit of motion of each joint.
 
         >>> import urdfkin
         >>> tip = urdfkin.load("planar_two_link").prepare("tip")
@@ -145,7 +146,9 @@ class PreparedFrame:
         return self._robot.hessian(q, self.frame, self.reference, out=out, verify=self.verify, threads=1)
 
     def acceleration(self, q: Given, v: Given, a: Given, out: FloatArray | None = None) -> FloatArray:
-        """Return the classical acceleration (6,), [linear; angular], m/s^2 and rad/s^2: eq. 7.129, 7.130.
+        """Return the classical acceleration (6,), [linear; angular], m/s^2 and rad/s^2, by eq.
+
+        7.129 and 7.130.
 
         >>> import urdfkin
         >>> tip = urdfkin.load("planar_two_link").prepare("tip")
@@ -159,7 +162,10 @@ class PreparedFrame:
         )
 
     def _first(self, quantity: str, q: Given, *others: object) -> FloatArray | None:
-        """Create the function of a quantity, and call it; None as long as that does not pay."""
+        """Create the fast function of a quantity and call it.
+
+        Return None as long as creating it saves no time.
+        """
         # The robot handles quaternions, which are normalised first, and trees whose results may overflow.
         robots = self._robot.tree.floating_joints or self._plan.is_large
         if robots or not (isinstance(q, np.ndarray) and q.ndim == 1):

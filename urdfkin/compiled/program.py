@@ -2,8 +2,8 @@
 
 The instructions are chosen once for each robot. There are special instructions for a translation along a
 coordinate axis and for a rotation about a coordinate axis. These instructions take a third of the time of the
-general ones. A translation by zero needs no instruction. The state of a link stays in registers until the
-next link is computed. At a branch of the tree, the state is saved to memory and read again later.
+general instructions. A translation by zero needs no instruction. The state of a link stays in registers until
+the next link is computed. At a branch of the tree, the state is saved to memory and read again later.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Op(IntEnum):
     FLOATING = 12
     SAVE = 13
     RESUME = 14
-    KEEP = 15  # store what the joint's Jacobian column needs
+    KEEP = 15  # store the data that the joint's Jacobian column needs
     COLUMN = 16
     EMIT = 17
 
@@ -58,7 +58,7 @@ class Head(IntEnum):
     BLOCKS_END = 6
     ANGLES = 7  # index of the list of joint angles
     ANGLES_END = 8
-    Q = 9  # first scratch row of the coordinates; the next entries are those of other numbers
+    Q = 9  # first scratch row of the coordinates; the next entries are the first rows of other numbers
     V = 10
     A = 11
     BASE = 12
@@ -218,7 +218,7 @@ class _Writer:
     def _rigid(self, R: FloatArray, p: FloatArray, *, turned: bool = True) -> bool:
         """Write the instructions for a translation by p and a rotation by R.
 
-        Return whether any instruction was needed.
+        The result is True if an instruction was needed.
         """
         before = len(self.code)
         along = np.flatnonzero(p).tolist()
@@ -265,7 +265,7 @@ class _Writer:
     def _frame(self, f: int) -> bool:
         """Write the instructions that write a frame's results.
 
-        Return whether they change the current state.
+        The result is True if these instructions change the current state.
         """
         plan, offsets = self.plan, self.plan.offsets[f]
         moved = self._rigid(offsets[:9].reshape(3, 3), offsets[9:], turned=self.turned)

@@ -1,4 +1,4 @@
-"""Number types for the recursion without a compiler, which computes one configuration with Python's floats.
+"""Number types with which Python runs the recursion without a compiler, for one configuration at a time.
 
 Results have the same bits as those of compiled kernels (`urdfkin.compiled.machine.numbers`). A product is
 stored as its two factors until it is added: x y + z is then one fused multiply-add, rounded once. `zero()`
@@ -50,7 +50,7 @@ def _c_fma() -> Callable[[float, float, float], float]:
 
 
 def _python_fma(own: Callable[..., float], c: Callable[..., float]) -> Callable[[float, float, float], float]:
-    """Return a function that computes `math.fma`, with C's results inf and nan instead of Python's errors."""
+    """Return a function that computes `math.fma`, but returns inf and nan where Python raises an error."""
 
     def fma(x: float, y: float, z: float) -> float:
         try:
@@ -247,12 +247,12 @@ same = Number
 
 
 def numbers_of(array: Any) -> Any:
-    """Return the numbers of an array; here they are given as a list already."""
+    """Return the numbers of an array; in interpreted code the array is already a list of numbers."""
     return array.tolist()
 
 
 def numbers_at(address: Any) -> Any:
-    """Return the list of numbers that is given instead of an address."""
+    """Return the list of numbers that interpreted code passes instead of an address."""
     return address
 
 

@@ -264,7 +264,7 @@ def _read(m, x, b, width, stride, blocks, begin, end, s, row):
 def _start(axes, m, s, task, row, b):
     """Return the initial state of the recursion, which is the base's motion in the world.
 
-    In the textbook it is the motion of frame 0 relative to frame -1.
+    In the textbook, this is the motion of frame 0 relative to frame -1.
     """
     nil, unit = same(0.0), same(1.0)
     R = (unit, nil, nil), (nil, unit, nil), (nil, nil, unit)

@@ -32,7 +32,7 @@ from urdfkin.compiled.recursion import forward_recursion
 
 
 def placements(task):
-    """Compute placements of frames: the positions of 7.77, and the rotations."""
+    """Compute placements of frames: the positions by equation 7.77, and the rotations."""
     return forward_recursion(task, world_axes, 1, follow_place, keep_none, column_none, emit_place)
 
 
@@ -66,7 +66,7 @@ def jacobians(task):
 
 
 def jacobian_rates(task):
-    """Compute the time derivatives of the Jacobians: J-dot of 7.126."""
+    """Compute the time derivatives J-dot of the Jacobians by equation 7.126."""
     return forward_recursion(task, world_axes, 2, follow_velocity, keep_moving_axis, column_rate, emit_matrix)
 
 

@@ -1,10 +1,10 @@
-"""Everything that needs Numba: number types, kernels, and the cache of kernels.
+"""The modules that need Numba: number types, kernels, and the cache of kernels.
 
 Numba reads settings from a file `.numba_config.yaml` in the current folder, when it is imported and before
 each compilation. One of these settings is the folder of Numba's cache, and Numba executes the files of that
 cache. A foreign file in the current folder could therefore run foreign code. To prevent this, this package
-lets Numba read its settings from the environment only. This is not possible if a program imported Numba
-before.
+lets Numba read its settings from the environment only. This protection does not work if a program has
+imported Numba before.
 """
 
 from __future__ import annotations

@@ -6,10 +6,10 @@ cache files have no digest: a truncated file makes every later run fail, and a c
 this module each cache file has a digest. If a cache file is damaged, its kernel is compiled again. If no
 folder is writable, nothing is cached.
 
-Parts. Some functions are only called by kernels, never by Python. The compiler inlines such a function, which
-is called a part, into each kernel. A part therefore needs no machine code of its own, and no optimization
-before it is inlined. It also needs no passes for closures, `with`, literal loops, inlining by Numba, or
-rewriting of array expressions. Skipping these steps halves the compile time.
+Parts. A *part* is a function that only kernels call, never Python. The compiler inlines a part into each
+kernel that calls it. A part therefore needs no machine code of its own, and no optimization before it is
+inlined. A part also needs no compiler passes for closures, `with`, literal loops, inlining by Numba, or array
+expressions. Skipping these steps halves the compile time.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ _register: Any = register_pass
 class _Part(_Library):  # type: ignore[misc]
     """The LLVM code of a part.
 
-    It is linked into a kernel with the code of all functions that the part calls.
+    The code of a part is linked into a kernel, with the code of all functions that the part calls.
     """
 
     def finalize(self) -> None:
@@ -153,10 +153,10 @@ class PartCompiler(_Compiler):  # type: ignore[misc]
 
 _config: Any = numba.config  # Numba defines these settings at run time
 
-#: Options of every compiled function. The compiler must not reorder operations. It fuses a product and a sum
-#: only where the module `numbers` requests it. Results therefore do not depend on the compiler. Division by
-#: zero gives inf as in C, so that loops contain no branch that raises an error. The functions allocate no
-#: memory, so their arrays need no reference counts.
+#: Options of every compiled function. The compiler must not reorder operations. The compiler fuses a product
+#: and a sum only where the module `numbers` requests it. Results therefore do not depend on the compiler.
+#: Division by zero gives inf as in C, so that loops contain no branch that raises an error. The functions
+#: allocate no memory, so their arrays need no reference counts.
 COMPILED: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 #: Options of a part. Because a part is only inlined into kernels, it has no entry point for Python or C.
 _PART: dict[str, Any] = {

@@ -119,7 +119,8 @@ def _at_address(kind: Any) -> Any:
     return at_address
 
 
-#: The first function returns a pointer to the doubles at an address, the second a pointer to the integers.
+#: The first function returns a pointer to the doubles at an address, the second function a pointer to the
+#: integers.
 numbers_at, whole_numbers_at = map(_at_address, (NUMBERS, WHOLE_NUMBERS))
 
 
@@ -129,7 +130,7 @@ _NUMBERS = types.CPointer(types.float64)
 
 
 def _piece(builder: Any, vector: Any, start: int, width: int) -> Any:
-    """Return `width` elements of a vector, from index `start` on."""
+    """Return `width` consecutive elements of a vector, beginning with the element `start`."""
     mask = ir.Constant(ir.VectorType(ir.IntType(32), width), list(range(start, start + width)))
     return builder.shuffle_vector(vector, ir.Constant(vector.type, ir.Undefined), mask)
 

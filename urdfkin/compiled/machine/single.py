@@ -1,4 +1,4 @@
-"""Fast calls with one configuration, by compiled functions that Python calls like built-in functions.
+"""Compute one configuration with compiled functions that Python calls like built-in functions.
 
 A call through Numba checks the type of each argument and unpacks every array, which takes as long as the
 recursion itself. CPython calls a built-in function without these checks: it passes the addresses of the
