@@ -1,4 +1,7 @@
-"""Check a URDF: each finding has a code and a position. Every URDF is checked before it is used."""
+"""Check a URDF and return findings, each with a code and a position.
+
+Urdfkin checks every URDF before it uses it.
+"""
 
 from urdfkin.lint.runner import check, check_text
 from urdfkin.urdf.findings import Finding, PinocchioReading, Severity, UrdfError, UrdfWarning

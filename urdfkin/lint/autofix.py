@@ -1,11 +1,11 @@
-"""Apply automatic fixes, and check that the robot does not change. Write the changes as a patch.
+"""Apply automatic fixes to a URDF, check that the robot does not change, and write the changes as a patch.
 
 A fix is accepted under three conditions:
 
-- The new file has fewer findings of its code.
-- It has no new findings.
-- It describes the same robot. Every name, number and limit that has a meaning is equal. The direction of an
-  axis may differ by rounding, and the angles of an origin by at most `Fix.turns`.
+- The new file has fewer findings with the code of the fix.
+- The new file has no new findings.
+- The new file describes the same robot. Every name, number and limit that has a meaning is equal. The
+  direction of an axis may differ by rounding, and the angles of an origin by at most `Fix.turns`.
 
 
 Write the changes of `--fix` as a patch for `git apply` that is safe to print.
@@ -13,7 +13,7 @@ Write the changes of `--fix` as a patch for `git apply` that is safe to print.
 A patch contains whole lines of the file. A line can contain text that controls a terminal or a CI service:
 a mark for the writing direction, an escape sequence, a workflow command. If such text were escaped, the line
 would change and `git apply` would refuse the patch. For such a file the output is therefore git's binary
-patch, which has ASCII characters only. The readable patch stands above it as a comment.
+patch, which has ASCII characters only. The readable patch is a comment above the binary patch.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ from urdfkin.urdf.sources import Text
 #: are needed.
 PASSES = 100
 
-#: Bound (rad) on the rotation of a unit vector when each of its three numbers is rounded to a double. It is
-#: twice 2**-53.
+#: Bound (rad) on the rotation of a unit vector when each of its three numbers is rounded to a double. The
+#: bound is twice 2**-53.
 TILT = Fraction(1, 2**52)
 
 
@@ -50,7 +50,7 @@ class Mended:
     Attributes:
         text: The fixed file.
         fixed: The fixed findings.
-        kept: Code -> the reason why the fixes of this code are not applied.
+        kept: For each code with fixes that were not applied: the reason.
     """
 
     text: Text
@@ -94,10 +94,10 @@ def mend(
 
 
 def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> Iterator[str]:
-    """Yield the reasons against a fix."""
+    """Yield the reasons why a fix must not be applied."""
     code = fixable[0].code
-    # Only a limited number of findings of a kind is stored. Skip a kind that exceeds this number, because
-    # after a fix other findings of the kind are stored, and these look new.
+    # Only a limited number of findings of a kind is stored. A kind with more findings is skipped, because
+    # other findings of this kind are stored after a fix and would look new.
     many = {finding.code for finding in before.findings if finding.also}
     old, new = (
         Counter((f.code, f.element, f.name) for f in seen.findings if f.code not in many)
@@ -118,12 +118,12 @@ def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> It
 
 
 def differences(a: RobotRecord, b: RobotRecord, turns: Mapping[str, float]) -> Iterator[str]:
-    """Yield the differences between two robots. Differences without a meaning are left out.
+    """Yield the differences between two robots, without differences that have no effect.
 
     Args:
         a: The first robot.
         b: The second robot.
-        turns: Joint -> bound on the rotation (rad) of its frame.
+        turns: For each joint: the bound on the rotation (rad) of the joint's frame.
     """
     if (a.version, [*a.links], len(a.joints)) != (b.version, [*b.links], len(b.joints)):
         yield "the fix would change the links or joints"
@@ -165,7 +165,7 @@ def _same_direction(a: tuple[float, ...] | None, b: tuple[float, ...] | None) ->
 
 
 def _limits(joint: JointRecord) -> tuple[float | None, ...]:
-    """Return the limits that have a meaning for the type of a joint."""
+    """Return the limits of a joint that have an effect for its joint type."""
     if joint.limit is None:
         return ()
     bounded = ("lower", "upper") if joint.kind in ("revolute", "prismatic") else ()
@@ -202,7 +202,7 @@ def patch(file: str, before: bytes, after: bytes, shown: Callable[[str], str]) -
 
 
 def _relative(file: str) -> str:
-    """Return a file name for `git apply`. It is relative if the file is in the current folder."""
+    """Return a file name for `git apply`, which is relative if the file is in the current folder."""
     below = os.path.relpath(file)
     return file if below.startswith(os.pardir) else Path(below).as_posix()
 

@@ -106,7 +106,9 @@ def _region(finding: Finding) -> dict[str, int]:
 
 
 def _uri(file: str) -> str:
-    """Return a file name as a URI reference; `stdin` for standard input. A relative name stays relative.
+    """Return a file name as a URI reference; `stdin` for standard input.
+
+    A relative file name becomes a relative reference.
 
     Bytes that a URI does not allow are written as %XX.
     """
@@ -115,7 +117,7 @@ def _uri(file: str) -> str:
     return Path(file).as_uri() if Path(file).is_absolute() else quote(os.fsencode(Path(file).as_posix()))
 
 
-#: Version of the JSON format; it changes when a field changes its meaning or is removed.
+#: Version of the JSON format; the version changes when a field is removed or changes its meaning.
 JSON_VERSION = 1
 
 
@@ -132,7 +134,10 @@ def summary(findings: Sequence[Finding], files: int) -> str:
 
 
 def statistics(findings: Sequence[Finding]) -> Iterator[str]:
-    """Yield a line for each code, the most frequent first: count, severity, `[*]` if --fix applies, title."""
+    """Yield a line for each code, the most frequent code first.
+
+    A line has the count, the severity, `[*]` if --fix can fix the findings, and the title.
+    """
     counts, worst, fixable = Counter[str](), dict[str, Severity](), set[str]()
     for finding in findings:
         counts[finding.code] += finding.count
@@ -154,9 +159,9 @@ def as_json(
     """Return the findings as one JSON document.
 
     `{"schema": "urdfkin-findings", "version": 1, "urdfkin": "...", "files": [...], "findings": [...],
-    "silenced": [...]}`. An entry of "findings" has the fields of `Finding`, and `title`, the title of its
-    code. An entry of "silenced" also has `reason`, the reason in the comment. The positions in a `fix` are in
-    bytes and do not count a byte order mark.
+    "silenced": [...]}`. An entry of "findings" has the fields of `Finding`, and the field `title` with the
+    title of the finding's code. An entry of "silenced" also has `reason`, the reason in the comment. The
+    positions in a `fix` are in bytes and do not count a byte order mark.
     """
     document = {
         "schema": "urdfkin-findings",
@@ -176,7 +181,7 @@ def _entry(finding: Finding) -> dict[str, Any]:
 
 
 def as_github(findings: Sequence[Finding]) -> str:
-    """Return a workflow command for each finding, errors first. GitHub shows them beside the line."""
+    """Return a workflow command for each finding, errors first; GitHub shows a finding beside its line."""
     words = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.NOTE: "notice"}
     return "\n".join(
         f"::{words[f.severity]} file={_property(f.file)},line={f.line},col={f.column},"

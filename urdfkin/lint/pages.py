@@ -1,10 +1,10 @@
-"""The rules by code, and the page of each rule, as data and as text.
+"""Provide the rules by code, and the documentation page of each rule as data and as text.
 
 A topic is a module that defines rules: the parser, or a module of `lint.rules`. The pages of a topic are in a
 TOML file with the module's name, beside the module. The file is read on demand. The entries `cure`, `others`
 and `question` at the top of a TOML file are defaults for all its pages. The table `parts` defines texts that
-replace `{name}` in examples. Each is a text, or [text, times] for a repeated text, in which `{i}` is the
-index of the repetition. Line breaks in prose have no meaning.
+replace `{name}` in examples. Such a text is a string, or a pair [text, times] for a repeated text, in which
+`{i}` is the index of the repetition. Line breaks in prose have no meaning.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ if TYPE_CHECKING:
 
 _MODULES = (parser, dialect, joints, bodies)
 
-#: Topic -> rules.
+#: For each topic: its rules.
 TOPICS: dict[str, tuple[Rule, ...]] = {
     module.__name__.rpartition(".")[2]: tuple(x for x in vars(module).values() if isinstance(x, Rule))
     for module in _MODULES
 }
 
-#: Code -> rule, in the order of the codes.
+#: For each code, in ascending order: the rule with this code.
 RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lambda rule: rule.id)}
-#: Code -> rule, for the findings of `load` about MJCF files, which `check` does not read.
+#: For each code of `load`'s findings about MJCF files: the rule. `check` does not read MJCF files.
 OF_MJCF = {rule.id: rule for rule in (left_out.LEFT_OUT_MOTION, left_out.LEFT_OUT)}
 
-#: Name of a rule in lower case -> code. Each rule has three names: its code, the digits of the code, and its
-#: short name.
+#: For each name of a rule in lower case: the code of the rule. Each rule has three names: its code, the
+#: digits of the code, and its short name.
 CODES = {word: rule.id for rule in RULES.values() for word in (rule.id.lower(), rule.id[4:], rule.slug)}
 
 _TOPIC = {rule.id: topic for topic, own in TOPICS.items() for rule in own} | dict.fromkeys(

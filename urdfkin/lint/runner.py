@@ -1,4 +1,4 @@
-"""Run all rules on a URDF: bytes, XML, dialect, numbers, names, and so on.
+"""Run all rules on a URDF, from rules about its bytes and its XML to rules about its numbers and names.
 
 The text is read once. `urdfkin.load` builds the robot from the same records that the rules have checked.
 """
@@ -38,23 +38,23 @@ def check(
 ) -> Findings:
     """Check a URDF and return the findings by line.
 
-    The function checks the text. It also checks that the packages and mesh files that the text names exist,
-    but opens no mesh.
+    The function checks the text of the URDF. It also checks that the packages and mesh files named in the
+    text exist, but it opens no mesh.
 
     Args:
         source: A path, a catalogue name, URDF text, bytes, an open file, or `-` for standard input.
         limits: Limits on the size of the file.
-        mimic: Whether mimic joints follow their mimicked joints. False: problems with them are notes. None:
-            True, except for catalogue robots whose mimic rules are known to be invalid.
+        mimic: Whether mimic joints follow their mimicked joints. False: problems with mimic joints are notes.
+            None: as True, except for catalogue robots whose mimic rules are known to be invalid.
         root_joint: `"floating"` or `"planar"` if you will load the robot with such a joint.
         xacro_args: Arguments for a .xacro file, which is expanded first. Lines refer to the expanded text.
-        fold: Whether to combine many warnings of one kind into one that lists the lines. Errors of one kind
-            are combined from the hundredth on.
+        fold: Whether to combine many warnings of one kind into a single warning that lists the lines. Errors
+            of one kind are combined from the hundredth error on.
 
     Returns:
-        The findings that no comment silences, as a list that displays as a table in notebooks. It is empty if
-        the file has no problem. At most 10,000 findings of a kind are complete; the attribute `also` of the
-        last complete finding contains the lines of the others.
+        The findings that no comment silences, as a list that displays as a table in notebooks. The list is
+        empty if the file has no problem. At most 10,000 findings of a kind are complete; the attribute `also`
+        of the last complete finding contains the lines of the further findings.
 
     Raises:
         SourceError: the file cannot be read.
@@ -126,7 +126,7 @@ def examine(
 
 
 def file_of(text: Text) -> Path | None:
-    """Return the file that a text comes from; None if there is none. The search for packages begins there."""
+    """Return the file of a text, at which the search for packages begins; None if the text has no file."""
     path = Path(text.source if text.entry is None else text.label)
     return None if text.source in ("-", "<text>", "<bytes>") or not path.is_file() else path
 
@@ -150,11 +150,12 @@ def check_text(data: bytes, *, limits: Limits = DEFAULT_LIMITS, fold: bool = Tru
 
 
 def read_urdf(report: Reporter, *, mimic: bool = True, root_joint: str | None = None) -> RobotRecord | None:
-    """Read the reporter's file, add findings to the reporter, and return the records of the robot.
+    """Read the file of a reporter, add findings to this reporter, and return the records of the robot.
 
     Args:
-        report: The name, the bytes and the limits of the file; it receives the findings.
-        mimic: Whether mimic joints follow their mimicked joints. False: problems with them are notes.
+        report: The reporter with the name, the bytes and the limits of the file. The reporter receives the
+            findings.
+        mimic: Whether mimic joints follow their mimicked joints. False: problems with mimic joints are notes.
         root_joint: `"floating"` or `"planar"` if the robot gets such a joint. Then the file must not use the
             names of this joint and of its parent link.
 

@@ -1,4 +1,4 @@
-"""The files that `check` reads, its settings, and the selection of findings.
+"""Find the files and the settings for `urdfkin check`, and select the findings to report.
 
 The arguments of `urdfkin check` are files, folders or patterns. Settings are in pyproject.toml:
 
@@ -12,8 +12,8 @@ Files and patterns are relative to the folder of pyproject.toml. A finding is re
 and neither the baseline nor the older version of the file contains it.
 
 A baseline is a file of known findings. A finding is known if its file, code, severity, element, name and
-found text are in the baseline. The line number does not count. So an edit of other lines does not make a
-finding new, but a change of the found text does.
+found text are in the baseline. The line number is not compared. Therefore, an edit of other lines does not
+make a finding new, but a change of the found text does.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import Finding, Severity
 from urdfkin.urdf.sources import Text, as_word, is_xacro
 
-#: Version of the file format; it changes when a field changes its meaning or is removed.
+#: Version of the file format; the version changes when a field is removed or changes its meaning.
 BASELINE_VERSION = 1
 
 Key = tuple[str, ...]
@@ -57,8 +57,8 @@ class Baseline:
     """The number of known findings of each key.
 
     Attributes:
-        counts: Key -> number of known findings that no reported finding has matched yet.
-        root: The folder that file names are relative to.
+        counts: For each key: number of known findings that no reported finding has matched yet.
+        root: The folder to which file names are relative.
         met: The number of reported findings that matched a known finding.
     """
 
@@ -67,7 +67,7 @@ class Baseline:
     met: int = 0
 
     def knows(self, finding: Finding) -> bool:
-        """Return whether a finding is known. A known finding matches only once."""
+        """Return whether a finding is known; a known finding of the baseline matches only once."""
         key = key_of(finding, relative(finding.file, self.root))
         if self.counts[key] <= 0:
             return False
@@ -140,7 +140,7 @@ def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path)
     return json.dumps(document, indent=1) + "\n"
 
 
-#: Setting -> type.
+#: For each setting: its type.
 _KINDS = {
     "select": list, "ignore": list, "per-file-ignores": dict, "strict": bool, "notes": bool,
     "include": list, "exclude": list, "baseline": str,
@@ -163,7 +163,7 @@ class Settings:
 
     Attributes:
         file: The file with the table; None if there is none.
-        values: Setting -> value; the types are checked.
+        values: For each setting: its value, whose type was checked.
     """
 
     file: Path | None = None
@@ -171,7 +171,7 @@ class Settings:
 
     @property
     def root(self) -> Path:
-        """The folder that patterns are relative to."""
+        """The folder to which patterns are relative."""
         return Path() if self.file is None else self.file.parent
 
     def ignored_in(self, file: str) -> frozenset[str]:
@@ -206,7 +206,7 @@ def read_settings(file: Path) -> Settings:
 
     Raises:
         SourceError: the file cannot be read.
-        InputError: it has no such table, or a setting in it is wrong.
+        InputError: the file has no such table, or a setting in the table is wrong.
     """
     if (found := _table(file, pipes=True)) is None:
         raise InputError(
@@ -252,7 +252,7 @@ def _is_list_of_strings(value: Any) -> bool:
 
 
 def codes(words: Iterable[str]) -> frozenset[str]:
-    """Return the codes that `find_rules` finds for each of some words.
+    """Return all codes that `find_rules` finds for the given words.
 
     Raises:
         UnknownNameError: a word is neither a code nor a short name.
@@ -301,7 +301,9 @@ class Choice:
     baseline: Baseline | None = None
 
     def of(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
-        """Return a function that decides for each finding of a file, in file order, whether it is reported.
+        """Return a function that decides whether a finding is reported.
+
+        It is called with a file's findings in order.
 
         Args:
             text: The file.
@@ -312,13 +314,13 @@ class Choice:
 
         def is_reported(finding: Finding) -> bool:
             selected = finding.code in codes and (self.notes or finding.severity is not Severity.NOTE)
-            # sum instead of any, because each of the two baselines must count the match
+            # sum instead of any, because each of the two baselines must count the finding
             return selected and not sum(baseline.knows(finding) for baseline in known)
 
         return is_reported
 
     def again(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
-        """Return the same function as `of`, but with copies of the baselines.
+        """Return the same function as the method `of`, but with copies of the baselines.
 
         Checking a file a second time then changes no count of matches.
         """
@@ -332,7 +334,8 @@ class Choice:
 def known_before(text: Text, version: Version, look: Callable[[Text], Examined]) -> Baseline | None:
     """Return the findings of an older version of a file.
 
-    None: the file and the files it uses have not changed, so its findings are the same.
+    The result is None if the file and the files that it uses have not changed, so that its findings are the
+        same.
 
     If a file with the name of a mesh was deleted since then, the finding that the mesh is missing counts as
     new.
@@ -368,9 +371,10 @@ def collected(word: str, settings: Settings, include: Sequence[str], exclude: Se
 
     Args:
         word: A file, `-`, a catalogue name, a folder, or a pattern with `*`, `?`, `[`, `**`.
-        settings: The settings; patterns are relative to their folder.
+        settings: The settings; patterns are relative to the folder of the settings.
         include: Patterns of file names to select in a folder.
-        exclude: Patterns of files and folders to skip. A file that is itself the argument is not skipped.
+        exclude: Patterns of files and folders to skip. A file that the user names as the argument is not
+            skipped.
 
     Raises:
         SourceError: a folder or pattern contains no file.

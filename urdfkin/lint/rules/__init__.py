@@ -1,1 +1,4 @@
-"""The rules over the records of a URDF. A TOML file beside each module has the pages of its codes."""
+"""The rules that check the records of a URDF.
+
+A TOML file beside each module contains the pages of the module's codes.
+"""

@@ -152,7 +152,8 @@ def principal_moments(moments: Sequence[float]) -> tuple[float, float, float]:
 UNREADABLE = Rule("URDF704", "unreadable-extra", WARNING)
 GEOMETRY = Rule("URDF705", "geometry-incomplete", WARNING)
 
-#: Shape -> the attributes with its numbers. Each is (name, count of numbers, whether it is required).
+#: For each shape: its attributes with numbers. An attribute is (name, count of numbers, whether it is
+#: required).
 _SHAPES: dict[str, tuple[tuple[str, int, bool], ...]] = {
     "box": (("size", 3, True),),
     "sphere": (("radius", 1, True),),
@@ -283,13 +284,13 @@ MESH_REMOTE = Rule("URDF707", "mesh-remote", WARNING)
 
 
 def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
-    """Report each missing file, and each package that is not found. A package is reported once.
+    """Report each missing mesh file, and report once each package that is not found.
 
     Args:
         report: The reporter, which receives the findings.
         root: The root element of the document.
-        beside: The file of the URDF; None if the URDF is text. For text, only packages are searched, in the
-            search paths of the environment.
+        beside: The file of the URDF; None if the URDF is text. For text, only meshes in packages are
+            searched, in the search paths of the environment.
     """
     packages: dict[str, Path | None] = {}
     missing: dict[str, list[Element]] = {}
@@ -345,7 +346,7 @@ def _meshes(root: Element) -> Iterator[Element]:
 def _is_missing_file(filename: str, beside: Path | None) -> bool:
     """Return whether the address of a mesh is a file path that does not exist.
 
-    A path is relative to the URDF.
+    A relative path is relative to the folder of the URDF.
     """
     local = filename and ("://" not in filename or filename.startswith("file://"))
     if beside is None or not local:

@@ -1,4 +1,4 @@
-"""Check elements, attributes, names and comments: the dialect of a file."""
+"""Check the dialect of a URDF file, which consists of its elements, attributes, names and comments."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ _HARMLESS = "; kinematics does not use it"
 
 
 def _check_macros(report: Reporter, root: Element, macros: list[Element]) -> bool:
-    """Report unexpanded macros; return whether one may contain links or joints."""
+    """Report unexpanded xacro macros; return whether a macro may contain links or joints."""
     missed, harmless = _partition(macros, lambda m: m.parent in (None, root) or m.holder.tag == "joint")
     for group, severity in ((missed, None), (harmless, Severity.WARNING)):
         if group:
@@ -116,7 +116,7 @@ def _check_macros(report: Reporter, root: Element, macros: list[Element]) -> boo
 
 
 def _check_expressions(report: Reporter, root: Element) -> None:
-    """Report xacro expressions in attributes: an error where kinematics uses the attribute."""
+    """Report xacro expressions in attributes; the finding is an error if kinematics uses the attribute."""
     written = [
         (element, key)
         for element in outside_extensions(root)
@@ -139,7 +139,7 @@ def _check_expressions(report: Reporter, root: Element) -> None:
 
 
 def _moves(element: Element) -> bool:
-    """Return whether kinematics uses an element: `<link>` itself, and everything in a `<joint>`."""
+    """Return whether kinematics uses an element, as it uses `<link>` and everything in a `<joint>`."""
     holder = element.holder
     return holder.tag == "joint" or (holder is element and element.tag == "link")
 
@@ -224,7 +224,7 @@ _FOREIGN = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
 #: Attributes that have a meaning on other elements or in other formats. `--fix` does not remove them.
 _MEANT = frozenset().union(*ATTRIBUTES.values()) | _FOREIGN | EXTENSIONS
 
-#: Element -> child elements that may occur only once.
+#: For each element: the child elements that may occur only once.
 _ONCE = {
     **{tag: CHILDREN[tag] for tag in ("joint", "inertial", "visual", "collision", "geometry")},
     "link": frozenset({"inertial"}),
@@ -299,7 +299,7 @@ def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) ->
 
 
 def outside_extensions(element: Element) -> Iterator[Element]:
-    """Yield an element and all elements below it, except those in extensions."""
+    """Yield an element and all elements below this element, except elements in extensions."""
     stack = [element]
     while stack:
         element = stack.pop()
@@ -319,8 +319,8 @@ def _is_part(element: Element) -> bool:
 
 _PARTS = frozenset({"link", "joint"})
 
-#: Tags of this length or longer are similar neither to `link` nor to `joint`, because difflib's ratio is too
-#: small.
+#: Tags of this length or longer count as similar neither to `link` nor to `joint`, because difflib's ratio is
+#: too small.
 _LONGEST_PART = 8
 
 
@@ -392,7 +392,7 @@ UNDECLARED_PREFIX = Rule("URDF214", "undeclared-prefix", WARNING)
 #: Prefixes that XML declares itself.
 _PREDECLARED = ("xml", "xmlns")
 
-#: Prefixes that the rules URDF202 and URDF112 report; the check of undeclared prefixes skips them.
+#: Prefixes that the rules URDF202 and URDF112 report; the check of undeclared prefixes skips these prefixes.
 _REPORTED = ("xacro:", "xi:include")
 
 
@@ -420,7 +420,7 @@ def check_prefixes(report: Reporter, root: Element) -> None:
 
 
 def _undeclared_prefixes(root: Element) -> dict[str, _Use]:
-    """Return the undeclared prefixes with their uses."""
+    """Return the undeclared prefixes, each with its first use and the number of uses."""
     found: dict[str, _Use] = {}
     declared = Counter(_PREDECLARED)
     stack = [(root, False)]
@@ -465,8 +465,8 @@ def check_names(report: Reporter, robot: RobotRecord, root_joint: str | None) ->
     Args:
         report: The reporter, which receives the findings.
         robot: The records of the robot.
-        root_joint: Not None if the robot gets an additional joint `root_joint` whose parent is a link
-            `universe`.
+        root_joint: Kind of the additional joint `root_joint` whose parent is a link `universe`; None if the
+            robot gets no such joint.
     """
     links = list(robot.links.items())
     joints = [(joint.name, joint.element) for joint in robot.joints if joint.name]
@@ -565,11 +565,11 @@ _BETWEEN = re.compile(r"[,\s]+")
 
 
 def read_comments(report: Reporter, codes: Mapping[str, str]) -> None:
-    """Apply the comments of a document, and report invalid ones.
+    """Apply the comments that silence findings in a document, and report invalid comments.
 
     Args:
         report: The reporter of the file.
-        codes: Names of codes in lower case -> code.
+        codes: For each name of a rule in lower case: the code of the rule.
     """
     silences = Silences()
     for comment in report.comments:
@@ -605,7 +605,10 @@ def _read(report: Reporter, comment: Comment, codes: Mapping[str, str]) -> Silen
 
 
 def check_unused(report: Reporter) -> None:
-    """Report the codes of comments that silence no finding. Call this after all other rules."""
+    """Report the codes in comments that silence no finding.
+
+    This function must be called after all other rules.
+    """
     for silence in report.silences.all:
         for code in silence.codes:
             if code not in silence.used:

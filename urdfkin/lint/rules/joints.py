@@ -1,4 +1,4 @@
-"""Check joints: they connect the links to one tree, and have usable axes, limits and mimic rules.
+"""Check that joints connect all links in one tree and have usable axes, limits and mimic rules.
 
 The module also reports legal values that are probably mistakes: rounded pi, degrees, millimetres, equal
 joints. All functions are iterative, because a chain of 50,000 links would exceed the recursion
@@ -46,7 +46,7 @@ def check_structure(report: Reporter, robot: RobotRecord) -> bool:
 
 
 def _ends_exist(report: Reporter, robot: RobotRecord, joint: JointRecord) -> bool:
-    """Return whether a joint has two different links that exist; report them otherwise."""
+    """Return whether a joint has two different links that exist; otherwise report missing or equal links."""
     for tag, link in (("parent", joint.parent), ("child", joint.child)):
         if link is not None and link not in robot.links:
             nearest = report.nearest(link, robot.links)
@@ -74,7 +74,7 @@ def _ends_exist(report: Reporter, robot: RobotRecord, joint: JointRecord) -> boo
 
 
 def _no_loops_or_diamonds(report: Reporter, robot: RobotRecord, edges: list[JointRecord]) -> bool:
-    """Search depth first for links with several parents.
+    """Search depth first for links with several parent joints.
 
     A joint whose child is on the current path closes a loop. A joint whose child was visited on another path
     gives this child a second parent.
@@ -128,7 +128,7 @@ def _report_repeat(report: Reporter, joint: JointRecord, first: JointRecord | No
 
 
 def _one_root(report: Reporter, robot: RobotRecord) -> bool:
-    """Return whether exactly one link has no parent; report the others.
+    """Return whether exactly one link has no parent; report all further links without a parent.
 
     A link is not reported if a joint with an error may be its parent joint.
     """
@@ -139,7 +139,7 @@ def _one_root(report: Reporter, robot: RobotRecord) -> bool:
     if len(roots) < 2:
         return len(roots) == 1
     if not children <= robot.links.keys():
-        return False  # already reported: a joint with a missing or wrong child
+        return False  # a joint with a missing or wrong child was already reported
     parents = {joint.parent for joint in robot.joints}
     # The first root with children is the root of the robot. The other roots are disconnected from it.
     main = next((root for root in roots if root in parents), roots[0])
@@ -160,8 +160,8 @@ AXIS_LENGTH = Rule("URDF503", "axis-not-unit", WARNING)
 PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
 NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
-#: If the length of an axis differs from 1 by less than this, the cause is rounding of the last digits, and
-#: the finding is a note.
+#: If the length of an axis differs from 1 by less than this number, the cause is rounding of the last digits,
+#: and the finding is a note.
 LENGTH_ROUNDING = 2e-4
 
 #: Tolerance of a unit vector's length, the same as in `kinematics.inputs`.
@@ -171,10 +171,12 @@ _ONE = 1e-12
 _LEAN = 1e-9
 
 #: If an axis differs from a coordinate axis by less than this relative tolerance, Pinocchio uses the
-#: coordinate axis. It is the default tolerance of Eigen's isApprox, which compares squares of lengths.
+#: coordinate axis. The number is the default tolerance of Eigen's isApprox, which compares squares of
+#: lengths.
 _SNAPPED = 1e-12
 
-#: A tilt (rad) below this is not reported. It is within the rounding that `verify.bounds` allows for an axis.
+#: A tilt (rad) below this number is not reported, because `verify.bounds` allows such a rounding error of an
+#: axis.
 _TILT = 2.0**-52
 
 
@@ -252,7 +254,7 @@ def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], 
 
 
 def tilts(robot: RobotRecord) -> dict[str, float]:
-    """Return the angle (rad) between Pinocchio's axis and the file's axis, for each joint with URDF514."""
+    """Return the angle (rad) between Pinocchio's axis and the file's axis for joints with finding URDF514."""
     snapped = ((joint.name, _snap(joint.axis)) for joint in robot.joints if joint.kind in AXIAL)
     return {name: result[1] for name, result in snapped if result is not None}
 
@@ -260,7 +262,7 @@ def tilts(robot: RobotRecord) -> dict[str, float]:
 def _snap(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
     """Return the coordinate axis that Pinocchio uses for an axis, and the angle between them (rad).
 
-    Return None if Pinocchio uses the axis itself.
+    The result is None if Pinocchio uses the axis itself.
     """
     if axis is None:
         return None
@@ -372,7 +374,7 @@ MIMIC_CHAIN = Rule("URDF525", "mimic-chain", NOTE)
 MIMIC_SCALE = Rule("URDF526", "mimic-scale", WARNING)
 MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
-#: Largest plausible multiplier and offset (rad or m) of a mimic joint. Larger ones are reported.
+#: Largest plausible multiplier and offset (rad or m) of a mimic joint. Larger values are reported.
 LARGEST = 1e6
 #: Share of the mimicked joint's range that the limits of the mimic joint may exclude without a finding.
 #: Limits are often written with few digits.
@@ -524,7 +526,7 @@ class _MimicChecker:
     def resolved(self, mimic: MimicRecord) -> tuple[Mimic, JointRecord | None]:
         """Return the combined rule of a chain of mimic joints, and the joint at the end of the chain.
 
-        The joint is None if the chain is a circle, or names a joint that does not exist.
+        The joint is None if the chain of mimic rules is a circle, or names a joint that does not exist.
         """
         from urdfkin.model.tree import Mimic  # noqa: PLC0415
 
@@ -540,7 +542,7 @@ class _MimicChecker:
 
 
 def _range_of(joint: JointRecord) -> tuple[float, float] | None:
-    """Return the range of a joint: its limits, or one revolution; None without valid limits."""
+    """Return the range of a joint, which is its limits or one revolution; None if it has no valid limits."""
     if joint.kind == "continuous":
         return -math.pi, math.pi
     if joint.limit is None or joint.kind not in ("revolute", "prismatic"):
@@ -580,8 +582,8 @@ FAR = 100.0
 #: If the sum of all lengths of a robot is smaller than this (m), the robot was probably scaled twice.
 TINY = 1e-4
 
-#: If an angle is a whole number and at least `MANY`, it is probably in degrees, not in radians. Some
-#: exporters write an angle of at least `ENDLESS` for "no limit".
+#: An angle that is a whole number and at least `MANY` is probably in degrees, not in radians. Some exporters
+#: write an angle of at least `ENDLESS` to state that there is no limit.
 MANY, ENDLESS = 30.0, 1000.0
 
 #: If the rounding of a multiple of pi moves a tip by more than this (m), the finding is a warning.
@@ -590,8 +592,8 @@ NOTICEABLE = 1e-3
 #: If an angle differs from a multiple of pi by less than this (rad), it is not reported.
 ANGLE_ROUNDING = 1e-10
 
-#: Multiples of pi. Each has the smallest number of decimals that a written number must have to be recognized
-#: as this multiple.
+#: Multiples of pi, each with the smallest number of decimals with which a written number is recognized as
+#: this multiple.
 _MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
@@ -676,15 +678,17 @@ def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], rea
 
 
 def _replace_words(raw: str | None, words: list[str]) -> str:
-    """Return the raw value with other words; the white space between the words stays the same."""
+    """Replace the words in a raw attribute value, but keep the white space between the words."""
     blanks = re.split(r"[^ \t\r\n]+", raw or "")
-    if len(blanks) != len(words) + 1:  # the white space is written as character references
+    if len(blanks) != len(words) + 1:  # the white space in the raw value is written as character references
         return " ".join(words)
     return "".join(blank + word for blank, word in zip(blanks, [*words, ""], strict=True))
 
 
 def rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
-    """Return the multiple of pi that a decimal is probably rounded from, and its value; otherwise None.
+    """Return the multiple of pi whose rounding a decimal probably is, and the multiple's value.
+
+    Otherwise None.
 
     >>> rounded_pi("1.5708", 1.5708)
     (Fraction(1, 2), 1.5707963267948966)
@@ -741,7 +745,10 @@ def _check_lengths(report: Reporter, joint: JointRecord) -> None:
 
 
 def _check_neutral(report: Reporter, joint: JointRecord) -> None:
-    """Report a joint whose limits exclude zero, the neutral configuration. Mimic joints are not checked."""
+    """Report a joint whose limits exclude zero, its value in the neutral configuration.
+
+    Mimic joints are not checked.
+    """
     limit = joint.limit
     if limit is None or joint.kind not in ("revolute", "prismatic") or joint.mimic is not None:
         return
@@ -776,7 +783,7 @@ def _check_places(report: Reporter, robot: RobotRecord) -> None:
 
 
 def _reach(robot: RobotRecord) -> dict[str, float]:
-    """Return a bound (m) on the distance from each link to all links below it: the sum of lengths."""
+    """Return, for each link, a bound (m) on the distance to all links below it, which is a sum of lengths."""
     below: dict[str, list[JointRecord]] = {}
     for joint in robot.joints:
         below.setdefault(joint.parent or "", []).append(joint)

@@ -16,7 +16,7 @@ LEFT_OUT = Rule("MJCF102", "left-out", NOTE)
 def left_out(one: Listed, file: str) -> Finding:
     """Return a finding for a part of an MJCF file that the tree does not represent.
 
-    It is a warning if the part affects the motion, otherwise a note.
+    The finding is a warning if the part affects the motion, otherwise a note.
     """
     rule = LEFT_OUT_MOTION if one.moves else LEFT_OUT
     message = one.what if one.where is None else f"{one.where}: {one.what}"
