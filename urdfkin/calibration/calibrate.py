@@ -60,17 +60,18 @@ _GENERAL = 40
 #: If the residual noise differs from the stated noise by more than this number of standard deviations, a
 #: warning is given.
 _UNLIKELY = 4.0
-#: If a parameter's uncertainty exceeds its uncertainty with random configurations by more than this factor, a
-#: warning is given.
+#: A warning is given if the uncertainty of a parameter is more than this factor times the uncertainty that
+#: random configurations would give.
 _WEAK = 10.0
-#: Seed of the random configurations for this factor. It differs from the seed for `general`.
+#: Seed of the random configurations for this factor; the configurations for `general` have another seed.
 _OTHERS = 1
-#: A column with a diagonal entry of R below this share of the largest entry depends on the columns before it.
+#: If a column's diagonal entry of R is below this fraction of the largest entry, the column depends on the
+#: columns before it.
 _DEPENDENT = 1e-12
 #: The robot's size divided by these numbers gives x, y and z of a target in general position.
 _ASIDE = {"x": 5.0, "y": 6.0, "z": 7.0}
-#: Factor on `ParametricChain.rounding`, because Pinocchio computes both base and tip, and from rewritten
-#: origins.
+#: Factor on `ParametricChain.rounding`, because Pinocchio computes the pose of the base and the pose of the
+#: tip, and from rewritten origins.
 _READ_BACK = 4.0
 #: Number of parameters or poses that a warning names.
 _NAMED = 6
@@ -91,15 +92,16 @@ class Calibration:
         general: The parameters that are identifiable from random poses.
         fitted: The fit; None without poses.
         before: The fit of base and tool alone, with the robot's original parameters.
-        odd: Indices of the outliers among the poses.
+        odd: Indices of those poses that are outliers.
         without_odd: The fit without the outliers.
-        weak: Poorly observable parameters. Each has the ratio of its uncertainty to its uncertainty with the
-            same number of random configurations.
+        weak: Poorly observable parameters. For each parameter: its uncertainty, divided by the uncertainty
+            that the same number of random configurations would give.
         certificate: Pinocchio's check of the written model.
         stated: Whether the user stated the noise.
-        written_fit: The fit of only the written parameters; `fitted` if all are written.
-        significant: Indices of the parameters in `written_fit`.
-        plausibility: The objections to the fit; empty for a plausible one.
+        written_fit: The fit of only those parameters that are written; `fitted` if all parameters are
+            written.
+        significant: Indices of the parameters that `written_fit` fits.
+        plausibility: The objections to the fit; empty for a plausible fit.
     """
 
     robot: Robot
@@ -157,7 +159,7 @@ class Calibration:
 
     @property
     def origins(self) -> dict[str, FloatArray]:
-        """The new origins (4, 4) by joint, for joints that moved."""
+        """The new origin (4, 4) of each joint whose origin moved, by joint name."""
         return {} if self.written_fit is None else self.model.origins(self.written_fit.at)
 
     @property
@@ -177,7 +179,7 @@ class Calibration:
 
     @cached_property
     def written(self) -> Rewritten:
-        """The URDF's own text with the new origins, and the effect of the changes."""
+        """The original text of the URDF with the new origins, and the effect of the changes."""
         return Rewritten(self.robot, self.origins)
 
 
@@ -223,18 +225,18 @@ def calibrate(
     Args:
         source: A robot, a source for `load`, or a Denavit-Hartenberg table.
         q: (s, nq) configurations, rad and m; for a table (s, coordinates). None: only report which parameters
-            are identifiable.
+            could be identified.
         poses: (s, 4, 4) poses of the tip in the base, or (s, 3) positions alone, m.
-        tip: A link's or joint's name; the robot's tip when None.
-        base: A link's or joint's name; the robot's base frame when None.
+        tip: Name of a link or joint; the robot's tip when None.
+        base: Name of a link or joint; the robot's base frame when None.
         fit: Sets of parameters: "base" (pose of the instrument), "tool" (pose of the target on the tip),
             "offsets" (joint zeros), "origins" (six numbers of each joint of the path; all cells of a table),
             "gains" (scale factors of joint values).
         noise: Standard deviations of the measurements, for a position coordinate (m) and for a rotation about
             an axis (rad). None: the noise is estimated from the residuals.
-        drop_odd: Whether to exclude outlier poses; they are reported in any case.
-        complete: Used without poses: whether you will measure full poses, not positions alone.
-        radians: Whether joint angles above one turn are radians, although they look like degrees.
+        drop_odd: Whether to exclude outlier poses from the fit; outliers are always reported.
+        complete: Whether you will measure full poses and not only positions; used if `poses` is None.
+        radians: Whether joint angles of more than one turn are in radians, although they look like degrees.
         force: Whether to return a fit even if it is not plausible; the objections are then in `plausibility`.
             Joint values that look like degrees are refused in any case, unless `radians` is True.
         every: Whether to write all fitted parameters, including those with a change of less than two standard
@@ -338,7 +340,7 @@ def fitted_model(
 
 
 def _general_target(model: Model) -> FloatArray:
-    """Return the model's parameters (p,); if the target is fitted, it is put in general position."""
+    """Return the model's parameters (p,); a fitted target gets a general position, which is on no axis."""
     at = model.way.start.copy()
     for k, parameter in enumerate(model.way.parameters):
         if parameter.end and parameter.where == "tool" and parameter.unit == "m":
@@ -353,7 +355,7 @@ def _values(model: Model, robot: Robot, q: FloatArray) -> FloatArray:
 def _check_measured(
     robot: Robot, model: Model, q: ArrayLike, poses: ArrayLike
 ) -> tuple[FloatArray, Measured]:
-    """Return the coordinates (s, c) of the path, and the measurements there."""
+    """Return the coordinates (s, c) of the path at all configurations, and the measurements."""
     T = checked_poses(poses)
     if isinstance(model.source, DHTable):
         path_q = model.coupling.checked(q, "q")
@@ -415,7 +417,7 @@ def _fit(
 
 
 def _significant(model: Model, ended: Ended, stated: Noise | None) -> tuple[tuple[int, ...], Fit]:
-    """Return the parameters to write, always with base and tool, and the fit of these parameters."""
+    """Return the parameters to write, which always include base and tool, and the fit of these parameters."""
     kept, found = ended.identification.kept, ended.fitted
     fixed = [model.way.parameters[k].end for k in kept]
     moved = found.at[list(kept)] - model.way.start[list(kept)]
@@ -435,11 +437,11 @@ def _significant(model: Model, ended: Ended, stated: Noise | None) -> tuple[tupl
 def _add_identifiable(
     model: Model, measured: Measured, identification: Identification, stated: Noise | None, found: Fit
 ) -> tuple[Identification, Fit]:
-    """Add parameters that are identifiable at the fit, if they reduce the residuals more than chance would.
+    """Add parameters that are identifiable at the fitted values, if they significantly reduce the residuals.
 
     A nominal model is often a special case in which fewer parameters are identifiable. For example, the
     position of a tip on the last axis does not depend on the last joint's angle. The position of a tip beside
-    this axis does.
+    this axis depends on this angle.
     """
     again = identify(model, measured.values, complete=measured.complete, at=found.at)
     more = again.rank - identification.rank
@@ -467,7 +469,7 @@ def _parse_noise(noise: tuple[float, float]) -> Noise:
 def _weak(
     robot: Robot, model: Model, measured: Measured, kept: Sequence[int], at: FloatArray
 ) -> dict[int, float]:
-    """Return the parameters that the same number of random configurations would determine much better."""
+    """Return the parameters that random configurations of the same number would determine much better."""
     general = _values(model, robot, robot.sample(len(measured), seed=_OTHERS))
     sizes = []
     for values in (measured.values, general):
@@ -492,7 +494,7 @@ def _verify_written(found: Calibration, measured: Measured, q: ArrayLike) -> Cer
     at = fitted.at.copy()
     at[[p.end or p.what == "gain" for p in found.parameters]] = 0.0
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the first load gave these warnings
+        warnings.simplefilter("ignore")  # the same warnings were given when the robot was first loaded
         if (table := found.table) is not None:
             made = load(table)
             made.placement(made.neutral(), made.tip_frame)
@@ -587,14 +589,15 @@ def read_poses(
     units: Mapping[str, str] | None = None,
     rest: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
-    """Read configurations (s, nq), and poses (s, 4, 4) or positions (s, 3), metres.
+    """Read configurations (s, nq), and poses (s, 4, 4) or positions (s, 3) in metres, from a file.
 
     Args:
         path: The file; .npz by its suffix, else CSV.
         coordinates: Names of the coordinates of q.
         needed: Names of the required columns.
         unit: Unit of the positions: "m" or "mm".
-        units: Unit of each coordinate, from `column_units`: its heading may end with a unit.
+        units: Unit of each coordinate, from `column_units`; the heading of a coordinate's column may end with
+            a unit.
         rest: (nq,) values of coordinates without a column; None: zeros.
 
     Raises:

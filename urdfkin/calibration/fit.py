@@ -14,10 +14,10 @@ because the tool's orientation is not measured.
 
 The parameters that are not fitted are fixed. Orthogonal elimination chooses the fixed parameters joint by
 joint, from base to tip. Each parameter has a column in the Jacobian. The elimination finds the column that
-depends least on the columns already kept. Other columns may be nearly as independent as this column. From all
-these columns, the elimination keeps the one that comes first in the model's order of preference. As a result,
-no fitted parameter becomes large to compensate for a fixed parameter. Without this choice, four parameters of
-nearly parallel axes would become hundreds of metres long and cancel each other.
+depends least on the columns already kept. Other columns may be nearly as independent as this column. Of all
+these columns, the elimination keeps the column that comes first in the model's order of preference. As a
+result, no fitted parameter becomes large to compensate for a fixed parameter. Without this choice, four
+parameters of nearly parallel axes would become hundreds of metres long and cancel each other.
 
 **Fit.** Damped Gauss-Newton (`urdfkin.kinematics.least_squares`) minimizes the errors of the tip's poses.
 Each error is divided by the standard deviation of its noise. At the minimum, let J be the weighted Jacobian
@@ -63,8 +63,8 @@ from urdfkin.kinematics.roundings import NOT_ZERO
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singular_values import singular_values
 
-#: A column of the Jacobian counts as nearly as independent as the most independent column if its remaining
-#: length is at least this fraction of that column's remaining length.
+#: If the remaining length of a column of the Jacobian is at least this fraction of the largest remaining
+#: length, the column counts as nearly as independent as the most independent column.
 _AS_GOOD = 0.5
 #: The reason why a parameter is fixed names other parameters that have the same effect. `_NAMED` is the
 #: largest number of these names. A parameter is named only if it produces at least the fraction `_SHARE` of
@@ -77,9 +77,9 @@ class Identification:
     """The parameters that the measurements identify, and the parameters that stay fixed.
 
     Attributes:
-        kept: Indices of the fitted parameters. None of them can be left out.
+        kept: Indices of the fitted parameters; no fitted parameter can be left out.
         still: Indices of the fixed parameters, each with the reason.
-        numbers: Total number of measured coordinates. A position has 3, and a full pose has 6.
+        numbers: Total number of measured coordinates; a position has 3 coordinates, and a full pose has 6.
     """
 
     kept: tuple[int, ...]
@@ -169,8 +169,8 @@ def _reason(model: Model, J: FloatArray, error: FloatArray, kept: Sequence[int],
 
 #: A total redundancy below this number counts as no redundancy.
 _ONE_OR_MORE = 0.5
-#: A pose has several redundancies, one for each direction of its error. The fit fully absorbs an error in a
-#: direction with less than this fraction of the pose's largest redundancy.
+#: A pose has several redundancies, one for each direction of its error. If the redundancy in a direction is
+#: less than this fraction of the pose's largest redundancy, the fit fully absorbs an error in this direction.
 _FOLLOWED = 1e-9
 #: Largest number of repetitions of the noise estimate, and the relative change of the noise at which the
 #: repetitions end.
@@ -260,7 +260,10 @@ class Fit:
 
     @property
     def ratio(self) -> float:
-        """The ratio of the noise in the residuals to the stated noise; about 1, within 1/sqrt(2 freedom)."""
+        """The ratio of the noise in the residuals to the stated noise.
+
+        It is about 1, within 1/sqrt(2 freedom).
+        """
         if not self.is_judged:
             return math.nan
         whitened = self.errors / self.noise.of(self.errors.shape[1] == 6)
@@ -406,14 +409,14 @@ def odd_poses(
 def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]) -> NDArray[np.bool_]:
     """Select the parameters that moved by more than `SIGMAS` standard deviations, by backward elimination.
 
-    The function resets the least significant parameter to its old value. It then changes the other parameters
-    according to their covariance with the reset parameter. The elimination ends when all remaining parameters
-    are significant. If the measurements determine only a combination of two parameters, one of the two
-    remains selected.
+    The function resets the least significant parameter to its old value. Then the function changes the other
+    parameters according to their covariance with the reset parameter. The elimination ends when all remaining
+    parameters are significant. If the measurements determine only a combination of two parameters, one of
+    these two parameters remains selected.
 
     Args:
         moved: (k,) change of each parameter.
-        covariance: (k, k) covariance of the changes; inf where it is unknown.
+        covariance: (k, k) covariance of the changes; inf for entries that are unknown.
         fixed: (k,) whether a parameter is always selected, even if its change is not significant.
 
     >>> significant(np.array([3.0, 1.0]), np.eye(2), [False, False]).tolist()
@@ -494,7 +497,7 @@ def _from_poses(
 
 
 def _from_positions(T: FloatArray, p: FloatArray, base: bool, tool: bool) -> tuple[FloatArray, FloatArray]:
-    """Compute the base, and the position of the measured target on the tip, from positions alone."""
+    """Compute the base, and the position of the measured target on the tip, from measured positions."""
     B, X = np.eye(4), np.eye(4)
     for _ in range(_TURNS if base and tool else 1):
         if base:

@@ -1,16 +1,18 @@
-"""Models of a path with a URDF's origins or a table's cells as parameters, and the Jacobian by these.
+"""Model a path with a URDF's origins or a table's cells as parameters.
+
+Compute the Jacobian by the parameters.
 
 A model is a path (`urdfkin.model.path`), because both a URDF's origins and the rows of a Denavit-Hartenberg
-table are products of constants and elementary motions. The amount of a motion is a parameter or a joint's
-value. The gain g of a joint scales its value by (1 + g), so the column of g in the Jacobian is the joint's
-column times the joint's value.
+table are products of constants and elementary motions. The amount of an elementary motion is a parameter or a
+joint's value. The gain g of a joint scales its value by (1 + g), so the column of g in the Jacobian is the
+joint's column times the joint's value.
 
 **URDF.** Each joint of the path has six parameters of its origin. Let A be the rotation that maps the z axis
 to the joint's axis. The new origin is  T . A . Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry) Rz(rz) . A^-1. Therefore z
 shifts the origin along the joint's axis, and rz is the joint's zero, for every axis in the file. The other
 four parameters move the axis. The gain is a seventh parameter, which a URDF cannot store. `base` and `tool`
-have six parameters each. Those of `base` are before the first constant of the path and give the pose of the
-instrument. Those of `tool` are after the last constant and give the pose of the target.
+have six parameters each. The parameters of `base` are before the first constant of the path and give the pose
+of the instrument. The parameters of `tool` are after the last constant and give the pose of the target.
 
 **Table.** The parameters of a row are its cells. If the row's axis is parallel to the next axis within
 `PARALLEL`, the row also has beta, Hayati's fifth parameter. In such a row d has no separate effect, and alpha
@@ -63,7 +65,7 @@ class Drive(Motion):
     """An elementary motion, with the parameter or the joint that determines its amount.
 
     Attributes:
-        parameter: Index of the parameter, or of the joint's gain; None if there is none.
+        parameter: Index of the parameter or of the joint's gain; None if the motion has neither.
         joint: Index of the joint; None for a parameter.
         sense: -1 if the path passes the joint backwards, or if the table's row has the opposite sense.
     """
@@ -93,7 +95,10 @@ class ParametricChain:
 
     @property
     def size(self) -> float:
-        """Sum of all lengths of the model, metres; 1 if this sum is 0. It converts radians to metres."""
+        """Sum of all lengths of the model, metres; 1 if this sum is 0.
+
+        This length converts radians to metres.
+        """
         lengths = [
             float(np.linalg.norm(step[:3, 3])) for step in self.path.steps if not isinstance(step, Motion)
         ]
@@ -107,7 +112,7 @@ class ParametricChain:
         return self.path.poses(self._amounts(values, self.start if at is None else at)[0])
 
     def columns(self, values: FloatArray, at: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
-        """Return poses (s, 4, 4) and the Jacobian (s, 6, p), [linear; angular], by the parameters."""
+        """Return poses (s, 4, 4), and their Jacobian (s, 6, p), [linear; angular], by the parameters."""
         amounts, factors = self._amounts(values, self.start if at is None else at)
         T, twists = self.path.columns(amounts)
         columns = np.zeros((len(values), 6, len(self.parameters)))
@@ -127,7 +132,10 @@ class ParametricChain:
         return factors * numbers, factors
 
     def rounding(self, values: FloatArray) -> float:
-        """Bound the rounding error of a number of `columns`, metres; divided by `size`, radians."""
+        """Bound the rounding error (metres) of a number of `columns`.
+
+        Divide the bound by `size` for radians.
+        """
         slides = [drive.joint for drive in self._drives if drive.joint is not None and not drive.turns]
         slid = max((float(np.abs(values[:, j]).max(initial=0.0)) for j in slides), default=0.0)
         return 2.0 * ROUNDINGS * (len(self.path.steps) + 1) * EPS * (self.size + slid * len(slides))
@@ -145,8 +153,8 @@ FITTED = ("base", "tool", "offsets", "origins", "gains")
 SIX = (("x", False, 0), ("y", False, 1), ("z", False, 2), ("rx", True, 0), ("ry", True, 1), ("rz", True, 2))
 _ALL = tuple(what for what, *_ in SIX)
 #: Order of preference among parameters with the same effect, for a revolute or fixed joint (True) and for a
-#: prismatic joint (False): first the joint's zero, then parameters that move the joint's axis, then those
-#: that only move its frame.
+#: prismatic joint (False): first the joint's zero, then parameters that move the joint's axis, then
+#: parameters that only move the joint's frame.
 _KEPT = {True: ("rz", "x", "y", "rx", "ry", "z", "gain"), False: ("z", "rx", "ry", "x", "y", "rz", "gain")}
 _ROW = (("theta", True, 2), ("d", False, 2), ("a", False, 0), ("alpha", True, 0), ("beta", True, 1))
 _KEPT_CELLS = ("theta", "a", "alpha", "beta", "d", "gain")
@@ -173,13 +181,13 @@ class Model:
     source: KinematicTree | DHTable
 
     def end(self, which: str, at: FloatArray) -> FloatArray | None:
-        """Return the pose (4, 4) of the base or tool at parameters (p,); None if it is not fitted."""
+        """Return the pose (4, 4) of the base or tool at parameters (p,), or None if it is not fitted."""
         if not any(parameter.end and parameter.where == which for parameter in self.way.parameters):
             return None
         return self._push(which, at, end=True)
 
     def origins(self, at: FloatArray) -> dict[str, FloatArray]:
-        """Return the new origins (4, 4) of the URDF's joints that moved, by name, without any lock."""
+        """Return the new origins (4, 4) of the URDF's joints that moved, by joint name; locks are ignored."""
         found: dict[str, FloatArray] = {}
         if not isinstance(self.source, KinematicTree):
             return found
@@ -193,7 +201,7 @@ class Model:
         return found
 
     def table(self, at: FloatArray) -> DHTable | None:
-        """Return the table with its parameters at `at`; None for a URDF's model."""
+        """Return the table with its parameters set to `at`, or None if the model is a URDF's."""
         if not isinstance(self.source, DHTable):
             return None
         cells = {(p.where, p.what): float(at[k]) for k, p in enumerate(self.way.parameters) if not p.end}
@@ -238,12 +246,12 @@ class _Maker:
         return len(self.parameters) - 1
 
     def end(self, which: str) -> None:
-        """Add the six parameters of the base or the tool, if they are to be fitted."""
+        """Add the six parameters of the base or the tool, if these parameters shall be fitted."""
         if which in self.fit:
             self.push(which, _ALL, end=True)
 
     def push(self, where: str, only: Collection[str], *, backwards: bool = False, end: bool = False) -> None:
-        """Add the six parameters of a joint, base or tool, or some of them."""
+        """Add all or some of the six parameters of a joint, base or tool."""
         moves = [
             Drive(axis, turns, self.parameter(where, what, "rad" if turns else "m", end=end))
             for what, turns, axis in SIX

@@ -30,18 +30,18 @@ from urdfkin.calibration.parameters import Model, Parameter
 from urdfkin.comparison.result import angle, length
 from urdfkin.model.tree import LARGEST_ANGLE, FloatArray, JointKind, KinematicTree, far_outside
 
-#: Limits of the rms position error as shares of the reach. Above the first, a fit is refused. The second and
-#: third limits apply together with `_UNEXPLAINED` and `_HARDLY_BELOW`. Above the last, corrections of
-#: mistakes are tried.
-_MISSED, _CLOSE_BY, _NO_BETTER, _SUSPECT = 0.05, 0.01, 0.03, 0.002
-#: A fit is refused if its error exceeds both this share of the spread of measured positions and `_CLOSE_BY`
-#: of the reach.
-_UNEXPLAINED = 0.25
-#: A fit is refused if its error exceeds both this share of the error before the fit and `_NO_BETTER` of the
-#: reach.
-_HARDLY_BELOW = 0.7
-#: Limits of the rms orientation error, radians. Above the first, a fit is refused. Above the second,
+#: Limits of the rms position error as fractions of the reach. Above the first limit, a fit is refused. The
+#: second and third limits apply together with `_UNEXPLAINED` and `_HARDLY_BELOW`. Above the last limit,
 #: corrections of mistakes are tried.
+_MISSED, _CLOSE_BY, _NO_BETTER, _SUSPECT = 0.05, 0.01, 0.03, 0.002
+#: A fit is refused if its error exceeds this fraction of the spread of measured positions, and also
+#: `_CLOSE_BY` times the reach.
+_UNEXPLAINED = 0.25
+#: A fit is refused if its error exceeds this fraction of the error before the fit, and also `_NO_BETTER`
+#: times the reach.
+_HARDLY_BELOW = 0.7
+#: Limits of the rms orientation error, radians. Above the first limit, a fit is refused. Above the second
+#: limit, corrections of mistakes are tried.
 _MISTURNED, _SUSPECT_TURN = 0.2, 0.005
 #: Largest plausible tilt of a joint's axis, radians, and largest plausible gain.
 _TILTED, _GAINED = 0.5, 0.5
@@ -53,8 +53,8 @@ _UNCERTAIN = 5.0
 #: Largest ratio of the error after a correction to the error of the fit, for an accepted fit and for a
 #: refused one.
 _BETTER, _NOT_WORSE = 0.25, 1.5
-#: Number of corrections that are fitted, beginning with the most promising ones, and the shifts of q by rows
-#: that are tried.
+#: Number of corrections that are fitted, beginning with the most promising corrections; numbers of rows by
+#: which q is shifted in the trials.
 _FITTED, _SHIFTS = 4, (1, -1, 2, -2)
 #: Number of joints that an objection names.
 _NAMED = 4
@@ -65,9 +65,10 @@ class Plausibility:
     """The objections to a fit.
 
     Attributes:
-        objections: Reasons why the fit is refused; empty for a plausible one.
-        reason: The likeliest mistake and its remedy; None where no correction makes the fit plausible.
-        is_in_degrees: Whether joint angles look like degrees. Then only `radians` gives the fit.
+        objections: Reasons why the fit is refused; empty for a plausible fit.
+        reason: The likeliest mistake and its remedy; None if no correction makes the fit plausible.
+        is_in_degrees: Whether joint angles look like degrees. The fit is then returned only if `radians` is
+            true.
     """
 
     objections: tuple[str, ...] = ()
@@ -81,7 +82,7 @@ class Ended:
 
     Attributes:
         q: (s, c) coordinates of the path.
-        measured: The poses there.
+        measured: The poses that were measured at `q`.
         identification: The identifiable and the fixed parameters.
         before: The fit of base and tool alone.
         fitted: The fit of all identifiable parameters.
@@ -148,7 +149,7 @@ def _too_few(ended: Ended) -> list[str]:
 
 
 def _reach(model: Model, ended: Ended) -> float:
-    """Return the tip's largest distance (m) from the base or a joint's axis, in the original model."""
+    """Return the largest distance (m) of the tip from the base or any joint axis, in the original model."""
     T, columns = model.way.columns(ended.measured.values)
     turning = [k for k, p in enumerate(model.way.parameters) if p.what in ("rz", "theta")]
     levers = np.linalg.norm(columns[:, :3, turning], axis=1).max(initial=0.0)
@@ -189,7 +190,7 @@ def _extreme_parameters(model: Model, ended: Ended) -> Iterator[str]:
 
 
 def _turned_zeros(model: Model, ended: Ended) -> list[str]:
-    """Return the joints whose zero changed by half a turn, as after a reversed sign of the next joint."""
+    """Return the joints whose zero changed by half a turn, as if the sign of the next joint were reversed."""
     return [
         f"{parameter.where!r} by {angle(abs(moved))}"
         for parameter, moved, surely in _changes(model, ended)
@@ -198,7 +199,7 @@ def _turned_zeros(model: Model, ended: Ended) -> list[str]:
 
 
 def _changes(model: Model, ended: Ended) -> Iterator[tuple[Parameter, float, float]]:
-    """Yield each fitted parameter of a moving joint, its change, and the change minus its uncertainty.
+    """Yield each fitted parameter of a moving joint with its change, and this change minus its uncertainty.
 
     If only positions were measured, joints with an axis near the tip of the original model are skipped.
     """
@@ -219,9 +220,9 @@ def _changes(model: Model, ended: Ended) -> Iterator[tuple[Parameter, float, flo
 
 
 def _out_of_range(model: Model, q: FloatArray) -> tuple[list[str], list[str]]:
-    """Return the joints with values that look like degrees, and the others with values far outside limits.
+    """Return the joints with values that look like degrees, and other joints with values far outside limits.
 
-    A joint of which `configuration.warn_of_degrees` warns is among the first.
+    Joints about which `configuration.warn_of_degrees` warns belong to the first group.
     """
     largest = dict(zip(model.coupling.names, np.abs(q).max(axis=0, initial=0.0).tolist(), strict=True))
     turned, outside = dict[str, str](), dict[str, str]()
@@ -299,7 +300,7 @@ def _sign(names: Sequence[str]) -> str:
 
 
 def _likeliest(model: Model, ended: Ended, limit: float, reach: float) -> _Trial | None:
-    """Return the correction with a plausible fit and an error below the limit; None if there is none."""
+    """Return the correction with a plausible fit and an error below the limit, or None."""
     trials = [_Trial(model, ended, correction, reach) for correction in _corrections(model, ended.q)]
     trials.sort(key=lambda trial: trial.left_before)
     for trial in trials[:_FITTED]:
@@ -360,7 +361,7 @@ class _Trial:
         return Ended(self.correction.q, measured, found, before, fit)
 
     def is_plausible(self, limit: float) -> bool:
-        """Return whether the fit is plausible and has an error below the limit."""
+        """Return whether the fit after the correction is plausible and has an error below the limit."""
         try:
             ended = self.ended
         except np.linalg.LinAlgError:

@@ -8,8 +8,8 @@ disappear. The program writes the pose of each joint relative to the previous on
 The order of the rotations is ambiguous. The driver computes the angles from R = Rx(roll) Ry(pitch) Rz(yaw)
 (Eigen's `eulerAngles(0, 1, 2)`). The ROS description copies these angles into a URDF, where they mean Rz(yaw)
 Ry(pitch) Rx(roll). If one angle is a quarter turn and another angle is small, the two rotations differ by the
-small angle. It is 1e-5 to 1e-4 rad. The order "driver" agrees with the robot's controller. The order "urdf"
-agrees with the URDF that the ROS description makes from the same file.
+small angle, which is 1e-5 to 1e-4 rad. The order "driver" agrees with the robot's controller. The order
+"urdf" agrees with the URDF that the ROS description makes from the same file.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from urdfkin.system.files import read_text
 from urdfkin.urdf.sources import Source
 from urdfkin.verify.certificate import Certificate
 
-#: The links in the calibration file in the order of the arm, and the parent joint of each link.
+#: The links in the calibration file from base to tip, each with its parent joint.
 LINKS = {
     "shoulder": "shoulder_pan_joint",
     "upper_arm": "shoulder_lift_joint",

@@ -1,4 +1,4 @@
-"""Write new joint origins into a URDF's own text; all other bytes stay the same.
+"""Write new joint origins into the original text of a URDF; all other bytes stay the same.
 
 Names, meshes, comments and formatting are kept. `Rewritten` also reports how far each origin moved.
 """
@@ -28,8 +28,8 @@ from urdfkin.urdf.records import JointRecord, Vector
 from urdfkin.urdf.writer import before, numbers, with_attributes
 from urdfkin.verify.certificate import Certificate
 
-#: Number of decimals of written metres and radians. It is the precision of a double for lengths of a robot's
-#: size.
+#: Number of decimals of written metres and radians. This is the precision of a double for lengths of a
+#: robot's size.
 _DECIMALS = 15
 _SAME = 10.0**-_DECIMALS
 
@@ -90,7 +90,7 @@ def nearest_rpy(R: FloatArray, old: Vector) -> FloatArray:
     [3.1, 3.0, 3.1]
     """
     roll, pitch, yaw = rpy_of(R).tolist()
-    if math.cos(pitch) <= ANGLE * EPS:  # roll and yaw turn about one axis: only their combination is defined
+    if math.cos(pitch) <= ANGLE * EPS:  # roll and yaw have the same axis: only their combination is defined
         roll, yaw = old[0], yaw + (old[0] - roll) * math.copysign(1.0, pitch)
     turns = ([roll, pitch, yaw], [roll + math.pi, math.pi - pitch, yaw + math.pi])
     wrapped = [
@@ -106,7 +106,7 @@ class Rewritten:
 
     Attributes:
         robot: The original robot.
-        origins: The new origins (4, 4) by joint, of the joints that moved.
+        origins: The new origin (4, 4) of each joint that moved, by joint name.
         certificate: Pinocchio's check of the new text.
     """
 
@@ -116,7 +116,7 @@ class Rewritten:
 
     @cached_property
     def text(self) -> bytes:
-        """The URDF's own text with the new origins; every other byte is unchanged."""
+        """The original text of the URDF with the new origins; every other byte is unchanged."""
         return with_origins(self.robot.urdf.encode(), self.origins)
 
     @cached_property
@@ -130,7 +130,7 @@ class Rewritten:
 
     @cached_property
     def changes(self) -> Changes:
-        """The changes as `urdfkin.diff` lists them, with the frame that each joint's changes move most."""
+        """The changes as `urdfkin.diff` lists them; for each joint, the frame that moves most is named."""
         return diff(self.robot, self.loaded)
 
     @cached_property

@@ -64,7 +64,7 @@ SAMPLES, CORNERS = 512, 128
 STARTS, ALONG = 4, 13
 #: Frames that are searched in one batch.
 SEARCHED_TOGETHER = 24
-#: Share of its range over which a coordinate is varied, for each round of the search.
+#: For each round of the search: the fraction of a coordinate's range over which the coordinate is varied.
 WINDOWS = (1.0, 1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001)
 
 #: Function that computes the poses (n, frames, 4, 4) of a robot's frames at q.
@@ -168,7 +168,7 @@ class Search:
     def at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
     ) -> FloatArray:
-        """Return distances (n, frames) of the origins, metres, at configurations (n, nq) of each robot."""
+        """Return distances (n, frames) of matching frame origins (m) at configurations of A and B."""
         return _distances(*self.poses_at(q_a, q_b, frames, computed))
 
     def random(self, n: int) -> FloatArray:
@@ -177,7 +177,7 @@ class Search:
         return np.asarray(low + (high - low) * self.rng.random((n, len(self.names))))
 
     def metres(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return distances (n, frames) of the frames' origins, metres; arguments as for `poses`."""
+        """Return the distances (n, frames) between matching frame origins (m); arguments as for `poses`."""
         return _distances(*self.poses(z, frames))
 
     def seen(self, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
@@ -189,7 +189,7 @@ class Search:
         return self.metres(z, frames), z
 
     def worst(self, frames: Sequence[FramePair]) -> list[tuple[float, FloatArray]]:
-        """Return the largest distance found for each frame, metres, and the values of the variables there."""
+        """Return the largest distance (m) found for each frame, and the values of the variables at it."""
         found: list[tuple[float, FloatArray]] = []
         for first in range(0, len(frames), SEARCHED_TOGETHER):
             some = frames[first : first + SEARCHED_TOGETHER]
@@ -208,7 +208,7 @@ class Search:
         """Maximize each frame's distance by coordinate search.
 
         Args:
-            frames: The frames; each is searched separately, all in one batch.
+            frames: The frames; each frame has its own search, and all searches run in one batch.
             z: (frames, starts, variables) start values.
         """
         ways = [self._variables_of(frame) for frame in frames]
@@ -240,7 +240,10 @@ class Search:
         return [(float(best[n, m]), z[n, m]) for n, m in enumerate(at)]
 
     def _own_distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return distances (frames, starts, values), each frame at its own values; `z` has variables last."""
+        """Return distances (frames, starts, values).
+
+        Each frame has its own values of the variables in `z`.
+        """
         flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])  # also for robots without variables
         off = self.metres(flat, frames).reshape(*z.shape[:-1], len(frames))
         n = np.arange(len(frames))
@@ -332,7 +335,7 @@ def _second_derivatives(
 def _pass_to_front(
     vectors: _Vectors, steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables
 ) -> float:
-    """Return the largest d in front of all steps, given vectors behind the link pose L of the last step."""
+    """Return the largest length of d in front of all steps, from the vectors behind the last step's L."""
     vectors = before_it(steps[-1], *vectors)
     for step, pair in zip(reversed(steps[:-1]), reversed(pairs[: len(steps) - 1]), strict=True):
         slides = step.kind != "turns"
@@ -341,7 +344,7 @@ def _pass_to_front(
 
 
 def _derivatives(step: Step, pair: Pair, variables: Variables, d: Support, y: Support) -> _Vectors:
-    """Return the derivatives of d and y by a joint's value, behind the link pose L of the joint."""
+    """Return the derivatives of d and y by a joint's value, behind the rigid motion L of the joint."""
     if step.kind != "turns":
         u, other = step.axis.direction, step.other.direction
         return point(d.grid, other - u), point(d.grid, other)
@@ -350,7 +353,10 @@ def _derivatives(step: Step, pair: Pair, variables: Variables, d: Support, y: Su
 
 
 def _cross_products(step: Step, d: Support, y: Support) -> _Vectors:
-    """Return the cross product of u with d, corrected for different axes, and of u' with y."""
+    """Return bounds for the cross products of u with d and of u' with y.
+
+    The bound for d allows for a difference between the axes u and u'.
+    """
     G, axis, other = d.grid.points, step.axis, step.other
     most = 0.0
     if other is not axis:
@@ -363,7 +369,7 @@ def _cross_products(step: Step, d: Support, y: Support) -> _Vectors:
 
 
 def _as_free_vectors(step: Step) -> Step:
-    """Return the step with its effect on free vectors: the rotations without the translations."""
+    """Return the step with its effect on free vectors, which consists of rotations without translations."""
     axis = Screw(step.axis.direction, _ORIGIN)
     other = axis if step.other is step.axis else Screw(step.other.direction, _ORIGIN)
     before = IDENTITY if step.before is IDENTITY else pose(step.before[:3, :3])
@@ -377,12 +383,12 @@ TOGETHER = 2**16
 
 
 class Boxes:
-    """Bounds of one frame's distance in boxes of configurations.
+    """Bounds of the distance between a frame's origins in A and B, for boxes of configurations.
 
     Args:
         search: Both robots.
         frame: The frame.
-        names: Names of the variables that change the distance: see `moved_together`.
+        names: Names of the variables that change the distance (`moved_together` finds them).
     """
 
     def __init__(self, search: Search, frame: FramePair, names: Sequence[str]) -> None:
@@ -391,7 +397,7 @@ class Boxes:
         self.middle = search.ends.mean(axis=1)
         trees = [robot.tree for robot in search.robots]
         self.frames = trees[0].link_frames[frame.a], trees[1].link_frames[frame.b]
-        # B's robot and frame are expressed in A's root frame.
+        # Poses of B are expressed in A's root frame.
         q = search.configurations(self.middle[np.newaxis])[1]
         base = trees[1].link_frames[search.found.base[1]]
         self.seen = search.hold @ inverse(own_results(search.robots[1], q, [base])[0, 0])
@@ -434,7 +440,7 @@ class Boxes:
 
 
 def tightened(search: Search, frame: FramePair, target: float, upper: float, most: int = MOST) -> float:
-    """Return a bound of a frame's distance, metres: `target` if it can be proven, else at most `upper`.
+    """Return a proven bound (m) of a frame's distance: `target` if it can be proven, else at most `upper`.
 
     Args:
         search: Both robots.
@@ -490,7 +496,7 @@ def moved_together(
     first = len(steps) - len(behind_first(found, variables, frame)[0])
     for i in reversed(range(first)):
         if _variables(pairs[i : i + 1]) & _variables(pairs[first:]):
-            first = i  # the steps between the two are included too
+            first = i  # the steps between the first and the last such step are included too
     return steps[first:], pairs[first:]
 
 
@@ -505,7 +511,7 @@ def _longest(h: FloatArray, M: FloatArray) -> int:
 
 
 def _halvings(h: FloatArray, M: FloatArray, upper: float) -> int:
-    """Return how often a box must be halved until its bound can be below `upper`."""
+    """Return the number of times a box must be halved until its bound can be below `upper`."""
     h, count = h.copy(), 0
     while 0.5 * h @ M @ h >= upper:
         h[_longest(h, M)] /= 2.0

@@ -154,7 +154,7 @@ class Confirmed(TypedDict):
 
 
 class Certificate(Header):
-    """Whether two models are the same robot, with the data of the proof. Metres, radians."""
+    """The statement whether two models are the same robot, with the proof's data, in metres and radians."""
 
     a: Model
     b: Model
@@ -206,9 +206,9 @@ SAME = Layout(
 
 
 def certificate(found: Sameness, command: str | None = None) -> Certificate:
-    """Return the certificate: the joint map, the verdict, the differences and the interval of each frame.
+    """Return the certificate with the joint map, the verdict, the differences and the interval of each frame.
 
-    The value is null where there is no bound.
+    An entry of the certificate is null if there is no bound.
     """
     a, b = ({"name": name, "source": source} for name, source in zip(found.names, found.sources, strict=True))
     document = {
@@ -243,7 +243,9 @@ def words_of(entry: DifferenceEntry) -> str:
 
 
 def recheck(document: Certificate, a: Robot, b: Robot) -> list[str]:
-    """Return the statements of a certificate that are wrong for two models; empty if all are right.
+    """Return the statements of a certificate that are wrong for two models.
+
+    Empty if all statements are right.
 
     The recheck aligns the models as the certificate states, so it needs no search. First it checks that this
     alignment is allowed. The transforms must be rigid motions, the joints must exist, and the axes must allow
@@ -303,7 +305,7 @@ def _errors(document: Certificate, comparator: Comparator) -> Iterator[str]:
 
 
 def _statement_errors(document: Certificate, comparator: Comparator, said: Sameness) -> Iterator[str]:
-    """Yield the wrong statements in entries that need no proof: names, verdict, differences and others."""
+    """Yield the wrong statements in entries that need no proof, such as names, verdict and differences."""
     models = document["a"], document["b"]
     for which, model, robot in zip("AB", models, comparator.robots, strict=True):
         if model["name"] != robot.name:
@@ -360,7 +362,7 @@ def _confirmation_errors(
 ) -> Iterator[str]:
     """Yield the wrong statements about Pinocchio's confirmation.
 
-    A certificate without this confirmation makes no statement about it.
+    A certificate without a confirmation makes no statement about Pinocchio.
     """
     if claimed["reason"].startswith(REASONS) and claimed == {**_NOTHING, "reason": claimed["reason"]}:
         return
@@ -379,8 +381,8 @@ def _confirmation_errors(
 def _gauge(document: Certificate) -> Gauge:
     """Return the gauge in a certificate.
 
-    The gauge contains the choices that align B with A: the base's pose, the joints' senses and zeros, the
-    conversions of planar and floating joints, and the orders of joints.
+    The gauge contains the choices that align B with A. These are the base's pose, the joints' senses and
+    zeros, the conversions of planar and floating joints, and the orders of joints.
     """
     joints, base = document["joints"], document["base_links"]
     return Gauge(

@@ -37,9 +37,9 @@ class Change:
 
     Attributes:
         element: The element, for example "joint elbow" or "link tool".
-        what: The attribute, for example "origin x" or "mass"; "" where the whole element is new or gone.
-        old: The old value; None where the old version has none.
-        new: The new value; None where the new version has none.
+        what: The attribute, for example "origin x" or "mass"; "" if the whole element was added or removed.
+        old: The value in the old version; None if the old version has no value.
+        new: The value in the new version; None if the new version has no value.
     """
 
     element: str
@@ -66,7 +66,7 @@ def word(value: Value | None) -> str:
 
 
 def motion_words(frame: Interval, moves: str = "move", turns: str = "turn") -> str:
-    """Return words about how far changes move a frame, or how far they turn a frame that they do not move."""
+    """Return text about the distance by which changes move a frame, or the angle of a pure rotation."""
     if frame.lower == 0.0:
         return f"{turns} {frame.frame} by up to {up_to(angle, frame.radians_seen, frame.radians)}"
     return f"{moves} {frame.frame} by up to {up_to(length, frame.lower, frame.upper)}"
@@ -74,7 +74,7 @@ def motion_words(frame: Interval, moves: str = "move", turns: str = "turn") -> s
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """The effect of one joint's changes: the frame that they move most, and how far this frame moves."""
+    """The effect of one joint's changes: the frame that moves most, and the distance by which it moves."""
 
     element: str
     interval: Interval
@@ -93,7 +93,7 @@ class Changes:
     """The changes between two versions of a description; the result of `urdfkin.diff`.
 
     Attributes:
-        sources: The two sources, as given.
+        sources: The sources of the old and the new version, as the user gave them.
         changes: The changes of the robot's name, then of joints, then of links, in the order of the file.
         effects: For each joint with changes that move links, the effect of the changes of this joint alone.
         total: The frame that all changes together move most; None if no frame moves.
@@ -158,7 +158,7 @@ def _changes(old: str, new: str) -> Iterator[Change]:
 
 
 def _facts(element: Element, tag: str) -> dict[str, Value]:
-    """Return the values of the attributes of an element and of its children, by readable names."""
+    """Return the attribute values of an element and of the element's children, by readable names."""
     found = dict(_attributes(element, ""))
     found.pop("name", None)
     if tag == "joint":
@@ -191,7 +191,7 @@ def _value(text: str) -> Value:
 
 
 def _effect(old: Robot, new: Robot, element: str) -> Effect | None:
-    """Compute how far the changes of a single joint move the frames.
+    """Compute the distances by which the changes of a single joint move the frames.
 
     The old robot is compared with a copy of the old robot in which only this joint is the new robot's.
     """

@@ -1,4 +1,4 @@
-"""Compare how other libraries read a robot file: joints, their order, and the poses of all links.
+"""Compare how other libraries read a robot file: the joints, the order of the joints, and the link poses.
 
 Each library runs in a process of its own, with its adapter in `urdfkin/verify/adapters.py`. The differences
 of poses are attributed to joints: a joint differs if the pose of its child link in its parent link differs.
@@ -26,8 +26,9 @@ from urdfkin.verify.adapters import LIBRARIES, version
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
-#: Largest difference of a pose that counts as equal, for positions of at most 1 m; a multiple of it for
-#: larger ones. Libraries in double precision differ by rounding, below 1e-13; a misread element by more.
+#: Largest difference between two poses that count as equal, if positions are at most 1 m; for larger
+#: positions, a multiple of this number. Libraries that compute in double precision differ by less than 1e-13.
+#: A misread element causes a larger difference.
 _EQUAL = 1e-9
 #: Time limit of a library, in seconds.
 _PATIENCE = 60.0
@@ -59,14 +60,14 @@ class LibraryReading:
     """How a library reads a robot file.
 
     Attributes:
-        library: Its name.
-        version: Its version.
-        refused: Why it does not read the file; None if it does.
-        joints: Its joints with a coordinate, in its order.
-        same_order: Whether its joints are urdfkin's, in the same order.
-        missing: Links that its model does not have.
+        library: Name of the library.
+        version: Version of the library.
+        refused: Reason why the library does not read the file; None if it reads the file.
+        joints: The joints with a coordinate in the library, in the library's order.
+        same_order: Whether the library has the same joints as urdfkin, in the same order.
+        missing: Links that the library's model does not contain.
         worst: Largest difference of a link's pose in the root link; 0 if all are equal to rounding.
-        differences: The joints that it reads differently.
+        differences: The joints that the library reads differently from urdfkin.
     """
 
     library: str
@@ -100,13 +101,13 @@ def compare_readers(
 
     Args:
         robot: The robot. All its links are compared at q = 0 and at random configurations.
-        libraries: Names of libraries (`installed`). By default all that are installed.
+        libraries: Names of libraries (`installed`); by default all installed libraries.
         samples: Number of random configurations.
         seed: Seed of the configurations.
 
     Raises:
         UnknownNameError: a library has no adapter.
-        InputError: a library is not installed, a joint is locked, or a text of MJCF is not in a file.
+        InputError: a library is not installed, a joint is locked, or the robot is MJCF text without a file.
 
     >>> import urdfkin
     >>> from urdfkin.comparison.readers import compare_readers
@@ -144,7 +145,7 @@ def values_of(robot: Robot, q: FloatArray) -> dict[str, Any]:
 
 
 def _reading(robot: Robot, name: str, q: FloatArray, ours: FloatArray) -> LibraryReading:
-    """Return how one library reads the robot, from its process."""
+    """Run one library in a separate process, and return how the library reads the robot."""
     title, number = LIBRARIES[name].title, version(name) or ""
     source, form = _source(robot)
     if form not in LIBRARIES[name].forms:
@@ -166,7 +167,8 @@ def _reading(robot: Robot, name: str, q: FloatArray, ours: FloatArray) -> Librar
     if not shared:
         return LibraryReading(title, number, "its model has none of the links", tuple(answer["joints"]))
     both = np.array([[one[links[i]] for i in shared] for one in theirs])
-    # The text has no root joint that `load` added, so poses are compared in the first link that both have.
+    # The text does not contain a root joint that `load` added, so poses are compared relative to the first
+    # link that urdfkin and the library have.
     both = np.linalg.inv(both[:, :1]) @ both
     ours = np.linalg.inv(ours[:, shared[:1]]) @ ours
     worst = float(np.abs(both - ours[:, shared]).max())
@@ -208,7 +210,7 @@ def _without_shapes(text: str) -> str:
 
 
 def _elements(text: str) -> dict[str, Any]:
-    """Return the element of each joint."""
+    """Return the URDF element of each joint."""
     try:
         return {joint.get("name", ""): joint for joint in plain_xml(text).iterfind("joint")}
     except ExpatError:
@@ -224,7 +226,7 @@ def _differences(
     own: Sequence[str],
     equal: float,
 ) -> Iterator[Difference]:
-    """Yield the joints whose child link has another pose in its parent link."""
+    """Yield the joints whose child link has a different pose in the parent link."""
     for i, joint in enumerate(robot.tree.joints, 1):
         if i not in theirs or joint.parent not in theirs:
             continue
@@ -241,7 +243,8 @@ def _explained(
 ) -> tuple[str, str]:
     """Return the element that explains a difference, and the difference in words.
 
-    T and found are the poses of the child link in the parent link, first at q = 0.
+    T (urdfkin) and `found` (library) are the poses of the child link in the parent link; the first pose is at
+    q = 0.
     """
     off = np.abs(T - found)
     name, words = f"type {joint.kind.value}", "has no coordinate for it"
@@ -262,7 +265,7 @@ def _explained(
 
 
 def _motion(joint: Joint, T: FloatArray, found: FloatArray, equal: float) -> str:
-    """Return how a joint's motion differs, from its motions from q = 0."""
+    """Describe how a joint's motion from q = 0 differs between urdfkin and the library."""
     start = np.linalg.inv(T[0])
     mine, theirs = start @ T[1:], start @ found[1:]
     if joint.kind is JointKind.PRISMATIC:
@@ -286,7 +289,7 @@ def _motion(joint: Joint, T: FloatArray, found: FloatArray, equal: float) -> str
 
 
 def _sense(joint: Joint, mine: FloatArray) -> float:
-    """Return the sign of the joint's first motion about or along its axis, so that the axis has its sense."""
+    """Return the sign of the joint's first motion about or along its axis, which is the axis' sense."""
     own = mine[:3, 3]
     if joint.kind is not JointKind.PRISMATIC:
         own = np.array([mine[2, 1] - mine[1, 2], mine[0, 2] - mine[2, 0], mine[1, 0] - mine[0, 1]])

@@ -26,20 +26,21 @@ from urdfkin.system.lazy_import import hook
 if TYPE_CHECKING:
     from urdfkin.conventions import Convention
 
-#: `_TENTH` is the smallest number that is printed with a unit prefix: 0.1, after rounding to four digits. The
-#: unit without a prefix is used only from `_NINE` times this number on, which is 0.9.
+#: `_TENTH` is the smallest number that is printed with a unit prefix: it is 0.1 after rounding to four
+#: digits. The unit without a prefix is used only for numbers of at least `_NINE` times `_TENTH`, which is
+#: 0.9.
 _TENTH, _NINE = 0.09995, 9.0
 
 
 class Verdict(Enum):
-    """Verdict: the models are the same, or the same after the changes in `Sameness.up_to`, or different."""
+    """The verdict: two models are the same, the same after the changes in `Sameness.up_to`, or different."""
 
     SAME = "same"
     SAME_AFTER = "same after"
     DIFFERS = "differs"
 
 
-#: Kinds of changes that do not make two models different: models are equivalent if they agree after such
+#: Kinds of changes that do not make two models different. Two models are equivalent if they agree after such
 #: changes. The headline of a result names the kinds in this order.
 FREE = ("base", "zeros", "senses", "free joints", "tools")
 #: Kinds of differences for which the distance between each pair of matching frames can still be bounded.
@@ -101,8 +102,8 @@ class Difference:
         what: The parameter: "axis", "place", "mimic rule", "only in A", ...
         a: The parameter's value in A. None if the parameter has no value, for example a missing limit.
         b: The parameter's value in B. None if the parameter has no value.
-        radians: Angular part of the difference, radians; 0 if it has no angular part.
-        metres: Linear part of the difference, metres; 0 if it has no linear part.
+        radians: Angular part of the difference, radians; 0 if the difference has no angular part.
+        metres: Linear part of the difference, metres; 0 if the difference has no linear part.
         detail: "alone" if a joint's axis differs although the links moved by this joint agree. "converted" if
             the limits of B were converted to the coordinate of A. Otherwise empty.
     """
@@ -190,7 +191,7 @@ class Confirmation:
         by: Name and version of the oracle: "Pinocchio 4.1.0".
         configurations: Number of configurations at which the oracle computed the distances.
         metres: The largest of these distances.
-        reason: Reason why the oracle computed no distances; empty if it did.
+        reason: Reason why the oracle computed no distances; empty if the oracle computed distances.
     """
 
     by: str = ""
@@ -231,8 +232,8 @@ class Sameness(Displayable):
         sources: The two sources, as given.
         digests: SHA-256 of the two texts.
         verdict: `Verdict.SAME`, `SAME_AFTER` the changes in `after`, or `DIFFERS`.
-        after: The changes that bring B closest to A, with one line of text for each change. They are listed
-            even if the models still differ after these changes.
+        after: The changes that bring B closest to A, with one line of text for each change. The changes are
+            listed even if the models still differ after these changes.
         up_to: The kinds of the changes in `after`: "base", "zeros", "senses", "free joints", "tools".
         differences: The differences, ordered from the base to the tips.
         remarks: Differences that do not affect motion: joint limits, joint types, and links that only one
@@ -251,8 +252,8 @@ class Sameness(Displayable):
         as_written: The interval for the frame that is farthest apart without the changes in `after`. None if
             there are no changes.
         written: (m, rad) proven bound of the distance and the angle for all pairs of matching frames, without
-            the changes in `after`. It is infinite if there is no bound. If one model is a Denavit-Hartenberg
-            table, only frames with the same name in both models count.
+            the changes in `after`. The bound is infinite if no bound was proven. If one model is a
+            Denavit-Hartenberg table, only frames with the same name in both models count.
         narrowed: Mimicked joints that can drive a mimic joint out of the mimic joint's limits, with one line
             of text for each mimicked joint. The intervals still cover the whole range of the mimicked joint.
         checked: Pinocchio's confirmation, or the reason why there is none.
@@ -518,7 +519,7 @@ def demand_joint_names(tree: KinematicTree, names: list[str], which: str) -> Non
 def put_right(found: Alignment, rounding: Tolerance, *, tables: bool = False) -> tuple[tuple[str, str], ...]:
     """Correct the tools of an alignment, and return the changes that turn B into A.
 
-    Each change is a pair: a kind from `FREE`, and a line of text.
+    Each change is a pair of a kind from `FREE` and a line of text.
 
     Args:
         found: The alignment of the models; differing tools are corrected in it.
@@ -578,9 +579,9 @@ def _tools_put_right(found: Alignment, rounding: Tolerance, *, tables: bool) -> 
 def _around(found: Alignment) -> set[tuple[int, int]]:
     """Return the matching frames on the root body with a pose that only describes the robot's mounting.
 
-    There are two kinds. One kind is a link between the root and the first link to which a moving joint is
-    attached. The other kind is a link, such as a world or a table, that carries no moving joint and has the
-    same pose in the root frame of both models.
+    There are two kinds of such frames. The first kind is a link between the root and the first link to which
+    a moving joint is attached. The second kind is a link, such as a world or a table, that carries no moving
+    joint and has the same pose in the root frames of A and B.
     """
     if found.a.body_of[found.base[0]] or found.b.body_of[found.base[1]]:
         return set()
@@ -598,7 +599,7 @@ def _around(found: Alignment) -> set[tuple[int, int]]:
 
 
 def _beside_the_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
-    """Return the links of the root body from which all moving joints descend, and those from which none does.
+    """Return the links of the root body from which all moving joints descend, and those without any.
 
     A link of the first set has a fixed child link from which all moving joints descend. From a link of the
     second set no moving joint descends. Both sets are empty if no joint moves.
@@ -713,7 +714,7 @@ def _of_step(found: Alignment, variables: Variables, i: int) -> list[Difference]
 
 
 def _beyond(one: Step | FramePair, rounding: Tolerance) -> tuple[float, float]:
-    """Return the tilt (rad) and shift (m) of a joint or frame between A and B; rounding becomes 0."""
+    """Return the tilt (rad) and shift (m) of a joint or frame between A and B; rounding errors become 0."""
     return one.tilt if one.tilt > rounding.angle else 0.0, one.shift if one.shift > rounding.way else 0.0
 
 
@@ -757,5 +758,5 @@ def _close(x: float, y: float, share: float) -> bool:
 
 
 def _finite(x: float) -> float | None:
-    """Return a limit; None if there is none."""
+    """Return a limit, or None if the limit is infinite."""
     return x if math.isfinite(x) else None

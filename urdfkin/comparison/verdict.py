@@ -1,4 +1,4 @@
-"""Decide whether two models are the same robot. The module contains the function `same` and its steps."""
+"""Decide whether two models are the same robot; the module contains the function `same` and its steps."""
 
 from __future__ import annotations
 
@@ -51,8 +51,8 @@ from urdfkin.verify.sampling import checked_choice
 
 #: Number of configurations at which Pinocchio checks the distances between matching frames.
 CONFIRMED = 8
-#: The frame with the largest distance is searched only among some frames: those that are farthest apart at
-#: random configurations. This is the number of these frames.
+#: Number of frames among which the frame with the largest distance is searched; these are the frames that are
+#: farthest apart at random configurations.
 FARTHEST = 4
 #: Longest allowed path length, metres. The squares of longer lengths would overflow.
 LONGEST = 1e150
@@ -81,8 +81,8 @@ def same(
         b: The other robot, or a source for `load`.
         map: For each joint name of `a`, the name of the matching joint in `b`. Give the pairs of joints that
             names and axes do not determine.
-        bounds: Whether to bound the largest distances between frames. This takes most of the time if the
-            models differ.
+        bounds: Whether to bound the largest distances between frames. If the models differ, these bounds take
+            most of the computing time.
         boxes: Largest number of boxes of configurations that exist at the same time in branch and bound.
             Boxes give sharper bounds if the models differ in many places. With 0, no boxes are used.
         within: Distance (metres and radians) that you will pass to `Sameness.within`. The boxes are then used
@@ -317,7 +317,10 @@ class Comparator:
     def _most(
         self, written: Alignment, variables: Variables, farthest: Interval | None
     ) -> tuple[float, float]:
-        """Return one bound (m, rad) for all frames; sharpen it only if the proof of `within` needs this."""
+        """Return one bound (m, rad) for all frames.
+
+        The bound is sharpened only if the proof of `within` needs it.
+        """
         metres, radians = self.rounding(written, variables)
         uppers = self._uppers(written, variables)
         target = 0.0 if self.within is None else self.within - metres
