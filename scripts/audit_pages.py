@@ -1,9 +1,9 @@
-"""Check reports, comparisons, the documentation site and the viewer in Chromium, as readers use them.
+"""Check reports, comparisons, the documentation site and the viewer in Chromium, as a reader uses them.
 
-Each page is opened at four widths, in a light and a dark theme. The script runs axe and looks for serious
-violations, errors in the console, sideways scrolling and requests to other hosts. It walks through the page
-with the Tab key, checks the HTML, and prints the page to a PDF. `--output` keeps pictures of all screens and
-of the printed pages.
+Each page is opened at four widths, in a light and a dark theme. The script runs the accessibility checker
+axe, and looks for serious violations, errors in the console, sideways scrolling and requests to other hosts.
+It moves through the page with the Tab key, checks the HTML, and prints the page to a PDF. `--output` saves
+pictures of all screens and of the printed pages.
 
 The script needs Debian's chromium and chromium-driver. axe is in the extra `test`. A newer axe and the Nu
 HTML checker, which needs Java, are optional. Debian's poppler-utils draws the printed pages.
@@ -54,15 +54,15 @@ ROOT = Path(__file__).parents[1]
 #: Folder of npm's packages axe-core and vnu-jar.
 TOOLS = Path.home() / ".cache" / "urdfkin-audit" / "node_modules"
 WIDTHS = (390, 768, 1000, 1280)
-#: Violations that fail the audit. The others are printed.
+#: Severities of violations that fail the audit; violations of other severities are only printed.
 IMPACTS = ("serious", "critical")
 #: Code that unfolds everything on a page.
 UNFOLD = "document.querySelectorAll('details').forEach((part) => { part.open = true; })"
-#: Number of presses of the Tab key on a page, and of printed pages that are drawn.
+#: Number of presses of the Tab key on a page, and number of printed pages that are drawn.
 _PRESSES, _PAGES = 60, 12
 #: Errors of the HTML checker that the site's theme causes.
 FOREIGN = ("Attribute “autocomplete” is only allowed when the input type is",)
-#: A mouse: without one, the site's theme leaves out what a keyboard needs.
+#: A mouse for the browser, because without a mouse the site's theme omits elements that keyboard users need.
 _MOUSE = (
     "--blink-settings=primaryHoverType=2,availableHoverTypes=2,primaryPointerType=4,availablePointerTypes=4"
 )
@@ -75,12 +75,12 @@ axe.run({ resultTypes: ["violations"] })
     v.nodes.slice(0, 3).map((n) => n.target.join(" ") + " " + n.html.slice(0, 160)),
   ])), (error) => done([["critical", "axe failed: " + error, 1, []]]));
 """
-#: Tables that must fit every screen and do not: name, width, and width of the box around them.
+#: Tables that are wider than the screen: name, width, and width of the box around the table.
 _CUT = """const own = "body:not(:has(#robots, #history)) section > .scroll > table";  // the page of `same`
 return [...document.querySelectorAll(`#overview, .checks, #history, ${own}`)]
   .filter((t) => t.checkVisibility() && t.scrollWidth > t.parentElement.clientWidth)
   .map((t) => [t.id || t.className, t.scrollWidth, t.parentElement.clientWidth]);"""
-#: The element with the focus: a description, and whether an outline, border or shadow shows the focus.
+#: Describe the element with the focus, and whether an outline, border or shadow shows the focus.
 _FOCUS = """
 let e = document.activeElement;
 if (!e || e === document.body) return null;
@@ -102,18 +102,18 @@ class Page:
     own: tuple[str, ...] = ("file:", "data:", "blob:", "chrome")
     ready: str = ""
     printed: bool = True
-    large: bool = False  # axe takes a minute on such a page, and runs on two screens only
+    large: bool = False  # axe takes a minute on such a page, so it runs only on two screens
 
 
 @dataclass
 class Faults:
-    """The faults of one page, each with its screen."""
+    """The faults of one page, each with the screen on which it occurs."""
 
     page: str
     lines: list[str] = field(default_factory=list)
 
     def add(self, where: str, what: str) -> None:
-        """Note a fault once."""
+        """Record a fault, but only once for each screen."""
         line = f"{self.page}, {where}: {what}"
         if line not in self.lines:
             self.lines.append(line)
@@ -128,13 +128,13 @@ def axe_script() -> str | None:
 
 
 def html_checker() -> Path | None:
-    """Return the path of the Nu HTML checker; None if it or Java is missing."""
+    """Return the path of the Nu HTML checker; None if the checker or Java is missing."""
     path = TOOLS / "vnu-jar" / "build" / "dist" / "vnu.jar"
     return path if path.is_file() and shutil.which("java") else None
 
 
 def disagreement() -> Document:
-    """Return the report of a real disagreement: the oracle's velocities are bent by a millionth."""
+    """Return the report of a disagreement, for which the oracle's velocities are changed by a millionth."""
     right = PinocchioOracle.velocities
 
     def bent(*args: Any) -> Any:
@@ -232,7 +232,7 @@ def viewer() -> Iterator[Page]:
         Viewer(server, robot, np.array([0.4, 0.8]))
         host = f"127.0.0.1:{server.get_port()}"
         own = (f"http://{host}", f"ws://{host}", "data:", "blob:", "chrome")
-        ready = (  # a telephone's screen folds the controls
+        ready = (  # on the screen of a telephone, the controls are folded
             "return !!document.querySelector('canvas')"
             " && (!!document.getElementById('fold') || document.body.innerText.includes('verified'))"
         )
@@ -308,7 +308,7 @@ def _photograph(browser: Browser, path: Path, width: int, most: int = 6000) -> N
 
 
 def walk(browser: Browser, page: Page) -> list[str]:
-    """Walk through a page with the Tab key; return the faults: no focus in sight, no name, a trap."""
+    """Move through a page with the Tab key; return faults such as an invisible focus or a focus trap."""
     faults, seen = Faults(page.name), list[str]()
     browser.become(1280, 1000)
     load(browser, page)
@@ -344,7 +344,7 @@ def _border_changes(browser: Browser) -> bool:
 
 
 def html_errors(page: Page, jar: Path) -> list[str]:
-    """Return what the Nu HTML checker says of a file."""
+    """Return the messages of the Nu HTML checker about a file."""
     path = page.url.removeprefix("file://")
     done = subprocess.run(
         ["java", "-Xss4m", "-jar", str(jar), "--format", "json", "--errors-only", path],

@@ -2,9 +2,10 @@
 
     python scripts/benchmark.py [--quick] [--json FILE] [--plot FILE] [--only batch single ...] [--no-peers]
 
-Each round times every library once, so ratios are reliable also on a noisy machine; absolute times are not.
-The script prints medians, minima and ratios of medians. It compares the results first. A difference fails
-the run, a slow time never does. Libraries that are not installed are listed and left out.
+Each round times every library once. Ratios are therefore reliable even on a machine with other load, but
+absolute times are not. The script prints medians, minima and ratios of medians. The script compares the
+results first. A difference between results fails the run, but a slow time never fails it. Libraries that are
+not installed are listed and left out.
 
 `--only where` splits the time of a batch and of a single call into parts. `--only first` measures the first
 use of each quantity.
@@ -21,8 +22,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
-os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # idle threads of PyTorch must not slow the next library
+sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # idle threads of PyTorch must not slow other libraries
 
 from scripts.benchmarking.contenders import ALWAYS, PEERS, Contender
 from scripts.benchmarking.machine import USES, first_uses, machine, peak_over_output
@@ -57,7 +58,7 @@ class Plan:
         joints: Numbers of joints of the chains.
         numbers: Number of values in a chain's batch of Jacobians.
         frames: Numbers of frames whose placements are computed in one pass.
-        frame_configurations: Number of configurations of these batches.
+        frame_configurations: Number of configurations of the batches for `frames`.
         sizes: Sizes of batches.
         memory: Number of configurations for the measurement of memory.
     """
@@ -166,7 +167,7 @@ def main(words: Sequence[str] | None = None) -> int:
 
 if __name__ == "__main__":
     status = main()
-    if "roboticstoolbox" in sys.modules:  # its bindings print a hundred lines about leaks at exit
+    if "roboticstoolbox" in sys.modules:  # the bindings print a hundred lines about leaks at exit
         sys.stdout.flush()
         os._exit(status)
     sys.exit(status)

@@ -3,10 +3,10 @@
     python scripts/build_release.py dist                  # build into the folder dist
     python scripts/build_release.py --tag v0.1.0 dist     # also fail if the tag is not the version
 
-The script builds twice and compares the bytes: the sdist from the checkout, the wheel from the sdist. Then
-`twine check --strict` and `check-wheel-contents` check both files. The SBOM (CycloneDX, JSON) lists the
-packages that a new virtual environment with the wheel contains; `--sbom-of PYTHON` takes an existing
-environment instead, without network. SHA256SUMS has one line for each file. Exit 1: a check fails.
+The script builds the sdist from the checkout and the wheel from the sdist. It builds twice and compares the
+bytes. Then `twine check --strict` and `check-wheel-contents` check both files. The SBOM (CycloneDX, JSON)
+lists the packages that a new virtual environment with the wheel contains; `--sbom-of PYTHON` takes an
+existing environment instead, without network. SHA256SUMS has one line for each file. Exit 1: a check fails.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def _commit_time() -> str:
 
 
 def build(folder: Path) -> tuple[Path, Path]:
-    """Build the sdist from the checkout and the wheel from the sdist; return both paths."""
+    """Build the sdist from the checkout and the wheel from the sdist; return the paths of the two files."""
     build_: list[str | Path] = [sys.executable, "-m", "build", "--no-isolation", "--outdir", folder]
     time = _commit_time()
     _run(*build_, "--sdist", ROOT, SOURCE_DATE_EPOCH=time)
@@ -65,7 +65,7 @@ def check_reproducible(files: tuple[Path, Path]) -> None:
 
 
 def write_sbom(wheel: Path, target: Path, python: str | None) -> None:
-    """Write the SBOM of an environment; without one, make a new environment with the wheel."""
+    """Write the SBOM of an environment; if no environment is given, make a new environment with the wheel."""
     with tempfile.TemporaryDirectory() as folder:
         if python is None:
             venv.create(folder, with_pip=True)

@@ -2,10 +2,10 @@
 
     python scripts/changelog_gate.py [--base REVISION]
 
-The base is the commit at which the branch left `main` (or `origin/main`). Files that only moved do not
-count. If no user notices the change, add `No-changelog: REASON` to a commit of the branch. If there is
-nothing to compare with (main itself, a shallow clone, an unpacked archive, no git), the script reports it
-and passes.
+The base is the commit at which the branch left `main` (or `origin/main`). Files that were only moved do not
+count as changed. If no user notices the change, add `No-changelog: REASON` to a commit of the branch. If
+there is nothing to compare with (main itself, a shallow clone, an unpacked archive, no git), the script
+reports it and passes.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _ARGUED = re.compile(r"^No-changelog: +\S", re.MULTILINE | re.IGNORECASE)
 
 
 class CannotTellError(Exception):
-    """The branch cannot be compared; the message has the reason."""
+    """Error if the branch cannot be compared; the message states the reason."""
 
 
 def complaint(changed: Collection[str], messages: str) -> str | None:

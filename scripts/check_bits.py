@@ -1,4 +1,4 @@
-"""Check that results are equal to the last bit: single and in a batch, before and after a change.
+"""Check that results have equal bits: for a single configuration and in a batch, before and after a change.
 
     python scripts/check_bits.py [ROBOT ...]           # compare single, prepared, batched, joint, interpreted
     python scripts/check_bits.py --write before.npz    # also store the results
@@ -8,8 +8,9 @@
 The script checks every robot of the catalogue, every quantity and all three reference frames. Fused
 multiply-adds are explicit, and urdfkin has its own sine and cosine, so digests are equal on every machine.
 If results differ from the stored ones, the script prints the largest difference as a fraction of the stored
-bound. An enclosure must lie in the stored one. Exit 1: a bit differs unexpectedly, an interval is not within
-the stored one, or, with `--within SHARE`, a result differs by more than this fraction of its bound.
+bound. An enclosure must lie in the stored enclosure. Exit 1: a bit differs unexpectedly, an interval is not
+within the stored interval, or, with `--within SHARE`, a result differs by more than this fraction of its
+bound.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from typing import Any
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
+sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 import urdfkin
 from urdfkin.compiled.preload import Way, only
@@ -41,13 +42,13 @@ from urdfkin.verify.quantities import Quantity, recursive_quantities
 from urdfkin.verify.sampling import draw_base
 from urdfkin.verify.verifier import bound_of
 
-#: Sizes of batches: less than a block of eight, one block, more, and many blocks with a remainder.
+#: Sizes of batches: less than a block of eight, one block, a little more, and many blocks with a remainder.
 LENGTHS = (1, 2, 7, 8, 9, 100)
 #: Numbers of threads of a batch; None: urdfkin's default.
 THREADS = (None, 1, 2, 3)
 #: Number of stored configurations, and of stored frames.
 KEPT, FRAMES = 9, 6
-#: Index of the configuration that is computed with Python's numbers, and the names of the two ways to compute
+#: Index of the configuration that is computed with Python numbers, and the names of the two ways to compute
 #: it.
 INTERPRETED = 3
 WAYS: tuple[Way, ...] = ("interpreted", "compiled")
@@ -68,7 +69,7 @@ class Subject:
     def of(cls, name: str, stored: Arrays | None = None) -> Subject:
         """Make a subject with the inputs and frames of a file, or with new ones."""
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # warnings about the file do not matter here
+            warnings.simplefilter("ignore")  # this script does not use warnings about the file
             robot = urdfkin.load(name, mimic=catalogue()[name].mimic, verify=False)
         if stored is not None:
             inputs = tuple(stored[f"{name}/{x}"] for x in "qva")
@@ -110,7 +111,7 @@ def computed(
 
 
 def same(x: FloatArray, y: FloatArray) -> bool:
-    """Return whether two arrays are equal to the last bit; 0 and -0 differ."""
+    """Return whether two arrays have the same bits; 0 and -0 are different."""
     return x.shape == y.shape and x.tobytes() == y.tobytes()
 
 
@@ -118,7 +119,7 @@ def same(x: FloatArray, y: FloatArray) -> bool:
 
 
 def differing(subject: Subject) -> Iterator[str]:
-    """Yield the names of results that differ from those of single calls."""
+    """Yield the names of results that differ from the results of single calls."""
     frame = subject.frames[0]
     for what, quantity, reference, inputs in subject.results():
         rows = list(zip(*inputs, strict=True))
@@ -195,7 +196,7 @@ def digest(now: Arrays) -> str:
 def share(what: str, now: Arrays, stored: Arrays) -> float:
     """Return the difference from the stored result as a fraction of the stored bound.
 
-    It is 0 if all bits are equal.
+    The fraction is 0 if all bits are equal.
     """
     if same(now[what], stored[what]):
         return 0.0
@@ -207,7 +208,10 @@ def share(what: str, now: Arrays, stored: Arrays) -> float:
 
 
 def compared(name: str, now: Arrays, stored: Arrays) -> tuple[str, float]:
-    """Compare a robot's results with the stored ones; return a line and the largest fraction."""
+    """Compare a robot's results with stored results.
+
+    Return a line of text and the largest fraction of a bound.
+    """
     shares = {what: share(what, now, stored) for what in now if what.count("/") == 2}
     others = {what: x for what, x in shares.items() if x}
     if not others:

@@ -5,9 +5,9 @@
     python scripts/check_exports.py --tips       # only the leaf with the longest path of each robot
     python scripts/check_exports.py --sizes      # write the sizes of the code to docs/export.md
 
-Each function is compared with Pinocchio when it is written, and with results at fifty digits when it runs.
-It runs with GCC and Clang, where they are installed, for one configuration and in batches, and with NumPy.
-Exit 1: a number is outside the derived bound, or a compiler prints a warning.
+When a function is written, it is compared with Pinocchio. When it runs, it is compared with results at fifty
+digits. The function runs with NumPy, and with GCC and Clang if they are installed, for one configuration and
+in batches. Exit 1: a number is outside the derived bound, or a compiler prints a warning.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
+sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 import urdfkin
 from scripts.benchmarking.subject import chain_urdf
@@ -65,7 +65,7 @@ def shares(written: Code, folder: Path) -> Iterator[tuple[str, float]]:
 def subjects(tips: bool) -> Iterator[tuple[str, Robot, str]]:
     """Yield robots and frames.
 
-    The tips come first, so that a run that is stopped later has checked each robot at least once.
+    The tips come first, so that a run which is stopped later has checked each robot at least once.
     """
     robots = {name: urdfkin.load(name) for name in examples()}
     for name, robot in robots.items():
@@ -79,7 +79,8 @@ def subjects(tips: bool) -> Iterator[tuple[str, Robot, str]]:
 def found_of(robot: Robot, frame: str) -> dict[str, Any]:
     """Return the result of a leaf frame.
 
-    It has the largest errors as fractions of their bound, and states whether all errors are within it.
+    The result contains the largest errors as fractions of their bounds, and states whether all errors are
+    within the bounds.
     """
     wanted = QUANTITIES if robot.nv else ("placement",)
     with tempfile.TemporaryDirectory() as folder:

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
+sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 import urdfkin
 from scripts.forms.running import RUN, Job, Missing, elsewhere, too_wide
@@ -38,7 +38,7 @@ from urdfkin.verify.sampling import sample
 
 #: Number of configurations of each table.
 SAMPLES = 4
-#: Octave's symbolic package takes 20 s for six joints. It gets 6 tables of at most 4 joints.
+#: Octave's symbolic package takes 20 s for six joints, so it only computes 6 tables with at most 4 joints.
 FEW, SMALL = 6, 4
 
 
@@ -56,7 +56,7 @@ class Subject:
         return self.job.table
 
     def off(self, found: FloatArray) -> tuple[float, float]:
-        """Return the difference from Pinocchio in metres, and from the table as a fraction of the bound."""
+        """Return the distance from Pinocchio (m), and the deviation from the table divided by the bound."""
         apart = np.abs(found - self.table.placement(self.job.q))[:, :3].max(axis=(-1, -2))
         # urdfkin and Pinocchio round differently. A table without lengths still has rounding of its angles.
         allowed = 2.0 * np.maximum(self.table.rounding(self.job.q), EPS * of_rows(len(self.table.rows)))
@@ -82,7 +82,7 @@ def subject(robot: Robot, name: str, table: DHTable) -> Subject:
 
 
 def fits(form: str, table: DHTable) -> bool:
-    """Return whether the format can represent the table; code of `urdfkin export` can."""
+    """Return whether the format can represent the table; the code formats of `urdfkin export` always can."""
     if form in LANGUAGES:
         return True
     try:

@@ -1,4 +1,4 @@
-"""Measure how time and memory of a check grow with the file, in seconds and megabytes per megabyte.
+"""Measure how the time and the memory of a check grow with the size of the file (s and MB per MB).
 
     python scripts/check_growth.py                      # 1, 4, 16 and 64 MB of every kind of content
     python scripts/check_growth.py --sizes 1,4 number   # kinds with "number" in the name

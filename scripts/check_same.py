@@ -4,11 +4,11 @@
     python scripts/check_same.py --keep pairs.jsonl panda    # only some robots
     python scripts/check_same.py --keep pairs.jsonl --tell   # only print the figures of docs/same.md
 
-There are twenty-one changes; eleven of them leave a robot the same (`tests/comparison/pairs.py`). For a
-robot that is the same, all links must have the placements that `same` predicts at random configurations.
-For a different robot, an independent global search looks for the largest distance of the farthest frame.
-This distance is computed at fifty digits from the decimals of both texts, and must lie in the interval of
-`same`. Exit 1: a distance is outside its interval, or a verdict is wrong.
+There are twenty-one changes. After eleven of these changes, a robot is still the same
+(`tests/comparison/pairs.py`). For a robot that is the same, all links must have the placements that `same`
+predicts at random configurations. For a different robot, an independent global search looks for the largest
+distance of the farthest frame. This distance is computed at fifty digits from the decimals of both texts, and
+must lie in the interval of `same`. Exit 1: a distance is outside its interval, or a verdict is wrong.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
+sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 import urdfkin
 from tests.comparison.pairs import ALIKE, UNLIKE, changed, robot
@@ -41,7 +41,7 @@ ROUNDING = 1e-10
 
 
 def pair(name: str, what: str) -> dict[str, Any] | None:
-    """Check one change of one robot; None if the change does not apply."""
+    """Check one change of one robot; return None if the change cannot be made to this robot."""
     a, b = robot(name), changed(name, what)
     if b is None:
         return None
@@ -61,7 +61,7 @@ def pair(name: str, what: str) -> dict[str, Any] | None:
 def _farthest(found: Sameness) -> Interval | None:
     """Return the interval of the farthest frame.
 
-    Frames that are only different tools do not count. None: the interval has no upper end.
+    Frames that are only different tools do not count. The result is None if the interval has no upper end.
     """
     frames = [frame for frame in found.frames if frame.frame_b not in _tools(found) and frame.q_a]
     worst = max(frames, key=lambda frame: (frame.upper, frame.lower), default=None)
@@ -89,7 +89,7 @@ def _enclosed(found: Sameness, a: Robot, b: Robot, worst: Interval) -> dict[str,
 def _places_agree(found: Sameness, a: Robot, b: Robot) -> bool:
     """Return whether each link has the same placement in both robots.
 
-    A is at random configurations, and B at the corresponding ones.
+    A is at random configurations, and B at the corresponding configurations.
     """
     q, base = a.sample(5, 1), f"link:{found.base_links[1]}"
     links = [pair for pair in found.links if pair[1] not in _tools(found)]

@@ -1,7 +1,7 @@
-"""An extension of mkdocs that shows doctests in docstrings as blocks of code; mkdocs.yml refers to it.
+"""Extend mkdocs so that doctests in docstrings are shown as blocks of code; mkdocs.yml refers to this module.
 
-The docstrings of `Robot` are those that `help` shows, with the arguments that its methods share. The heading
-`Example:` is removed, because the site would draw a box around such a section.
+The docstrings of `Robot` are the same as in `help`, with the arguments that the methods of `Robot` share. The
+heading `Example:` is removed, because the site would draw a box around such a section.
 """
 
 from __future__ import annotations

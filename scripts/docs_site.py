@@ -20,11 +20,11 @@ import urdfkin
 from urdfkin.cli import cli
 
 LESSONS = "lessons/"
-#: The equations that a docstring's first line names.
+#: The equation numbers that the first line of a docstring contains.
 _EQUATIONS = re.compile(r" \(eq\. [^)]*\)")
 _ROBOT = "urdfkin.robot.Robot"
-#: Pages of the library: path -> (title, introduction, names). A name of the package or of a method of `Robot`
-#: stands for itself, another class has its full path.
+#: Pages of the library: path -> (title, introduction, names). A name of the package and the name of a method
+#: of `Robot` are given without a path; any other class has its full path.
 LIBRARY: dict[str, tuple[str, str, str]] = {
     "api/robot.md": (
         "Load a robot",
@@ -149,13 +149,16 @@ def on_page_content(content: str, **_: Any) -> str:
 
 
 def on_post_page(output: str, **_: Any) -> str:
-    """Name the search dialog, which the theme leaves without a name."""
+    """Give the search dialog a name for screen readers, because the theme gives it none."""
     dialog = 'data-md-component="search" role="dialog"'
     return output.replace(dialog, f'{dialog} aria-label="Search"')
 
 
 def notebook(page: str) -> dict[str, Any]:
-    """Convert a page to a notebook with text, code, and the output on the page, which a test compares."""
+    """Convert a page to a notebook with text, code and the output on the page.
+
+    A test compares this output.
+    """
     cells: list[dict[str, Any]] = []
     at = 0
     for block in _FENCE.finditer(page):
@@ -201,7 +204,7 @@ def subject_page(page: str) -> str:
     parts = [f"# {title}", words]
     for name in names.split():
         options = [f"heading: {_short(name)}", f"toc_label: {_short(name).removeprefix('Robot.')}"]
-        # The methods of `Robot` have headings of their own, on the pages of their subjects.
+        # The methods of `Robot` have their own headings, on the pages of their subjects.
         options += ["members: []"] if name == "Robot" else []
         lines = "\n".join(f"      {option}" for option in options)
         parts.append(f"::: {address(name)}\n    options:\n{lines}")

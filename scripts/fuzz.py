@@ -1,4 +1,4 @@
-"""Test urdfkin with random hostile files: no crash, no hang, no traceback, no unreported wrong number.
+"""Test with random hostile files that urdfkin never crashes, hangs or returns an unreported wrong number.
 
     python scripts/fuzz.py --mutants 20000 --robots 10000 --seed 0 --jobs 2
     python scripts/fuzz.py --family names --family followers --robots 5000
@@ -13,10 +13,11 @@ There are several families of files:
 | tables | Denavit-Hartenberg tables with damaged headers, to be rejected or compared |
 | calibrations | measured poses; joint angles in degrees and shifted rows of q must be rejected |
 
-Each robot passes through `check` and `load`. Every quantity is computed in every reference frame, on near
-and far bases, and compared with Pinocchio. A worker process does this; it is restarted after a crash or a
-timeout. File i of a family depends only on the seed, the family and i, so `--family names --only i` replays
-it. A file that causes a failure is stored, with a note about the failure. Exit 0: no failures.
+Each robot passes through `check` and `load`. Every quantity is computed in every reference frame, for bases
+near to and far from the origin, and compared with Pinocchio. The tests run in a worker process, which is
+restarted after a crash or a timeout. File i of a family depends only on the seed, the family and i, so
+`--family names --only i` tests this file again. A file that causes a failure is stored, with a note about the
+failure. Exit 0: no failures.
 """
 
 from __future__ import annotations
@@ -34,13 +35,13 @@ from collections.abc import Iterable, Sequence
 from functools import cache
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
+sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 from scripts.fuzzing import GOOD, Case, calibrations, mjcf, robots, tables
 from scripts.fuzzing.mutations import LARGEST, mutant
 from urdfkin.urdf.catalogue import catalogue
 
-#: The message of a worker that is ready; the first use compiles kernels, which takes a while.
+#: The message of a worker that is ready; a worker becomes ready after it has compiled its kernels.
 READY, FIRST_WAIT = "ready", 300.0
 
 MUTANTS = "mutants"
@@ -75,12 +76,12 @@ class Worker:
         self.lines: queue.Queue[str | None] = queue.Queue()
 
     def judge(self, family: str, number: int) -> tuple[str, str]:
-        """Test a document; return the outcome and its details. A crash and a hang are outcomes."""
+        """Test a document; return the outcome and its details; a crash and a hang are possible outcomes."""
         if self.process is None:
             self.start()
         assert self.process is not None
         assert self.process.stdin is not None
-        with contextlib.suppress(BrokenPipeError):  # the process has ended; the next line reports it
+        with contextlib.suppress(BrokenPipeError):  # the process has ended, which the next line detects
             self.process.stdin.write(f"{family} {number}\n")
             self.process.stdin.flush()
         try:
@@ -129,7 +130,7 @@ class Worker:
 
 
 def work(seed: int) -> None:
-    """Run as the worker: read a family and a number, write the outcome, repeat."""
+    """Run as the worker process: read a family and a number, write the outcome, and repeat."""
     from scripts.fuzzing.judge import judge  # noqa: PLC0415  only the worker needs the compiler
 
     answers = sys.stdout
@@ -146,7 +147,7 @@ def work(seed: int) -> None:
 def fuzz(
     asked: Iterable[tuple[str, int]], seed: int, jobs: int, timeout: float, keep: Path
 ) -> collections.Counter[str]:
-    """Test documents by family and number; store those with a failure; return the counts of outcomes."""
+    """Test documents by family and number, store documents that fail, and return the counts of outcomes."""
     waiting: queue.SimpleQueue[tuple[str, int]] = queue.SimpleQueue()
     for each in asked:
         waiting.put(each)
@@ -180,7 +181,10 @@ def fuzz(
 
 
 def shares(families: Sequence[str], mutants: int, whole: int) -> list[tuple[str, int]]:
-    """Return (family, number) of all mutants and of the random robots, which alternate between families."""
+    """Return (family, number) of all mutants and of all random robots.
+
+    The robots alternate between families.
+    """
     chosen = [family for family in families if family != MUTANTS]
     asked = [(MUTANTS, number) for number in range(mutants) if MUTANTS in families]
     return asked + [(chosen[i % len(chosen)], i // len(chosen)) for i in range(whole) if chosen]

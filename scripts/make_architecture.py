@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE, PICTURE = ROOT / "docs" / "architecture.md", ROOT / "docs" / "images" / "architecture.svg"
 PLAN = tomllib.loads((ROOT / "docs" / "architecture.toml").read_text(encoding="utf-8"))
 
-#: Foreign library -> the module or the packages that may import it.
+#: For each foreign library: the module or the packages that may import it.
 IMPORTERS: dict[str, list[str]] = PLAN["importers"]
 #: Folders whose imports count.
 _TREES = ("urdfkin", "scripts", "examples")
@@ -52,7 +52,7 @@ def _module(path: Path) -> str:
 
 
 def package_of(module: str) -> str:
-    """Return the package of a module; outside `urdfkin`, its folder.
+    """Return the package of a module; for a module outside `urdfkin`, return its folder.
 
     >>> package_of("urdfkin.robot"), package_of("urdfkin"), package_of("scripts.mutating.operators")
     ('robot', 'urdfkin', 'scripts')
@@ -102,7 +102,10 @@ def _of_ours(names: Iterable[str], known: Mapping[str, Path]) -> Iterator[str]:
 
 @cache
 def _reexported(package: str) -> frozenset[str]:
-    """Return the names that a package's `__init__` imports: they hide submodules of the same name."""
+    """Return the names that a package's `__init__` imports.
+
+    Such a name hides a submodule with the same name.
+    """
     path = modules().get(package)
     if path is None or path.name != "__init__.py":
         return frozenset()
@@ -133,7 +136,7 @@ def cycles() -> list[list[str]]:
 
 
 def _reached(module: str) -> set[str]:
-    """Return all modules that a module imports, directly or not."""
+    """Return all modules that a module imports directly or through other modules."""
     seen: set[str] = set()
     ahead = set(imports()[module])
     while ahead:

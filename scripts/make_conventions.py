@@ -4,7 +4,8 @@ For each row, the script compares a library's result with several candidate defi
 motion, and writes the one that matches. A test checks that the page is current.
 
 The tables of other tools come from urdfkin/conventions/conventions.toml. With --measure, the script first
-runs each installed library on all robots of the catalogue, in its convention, and writes the results there.
+runs each installed library, in the library's convention, on all robots of the catalogue. It writes the
+results to the same file.
 
     python scripts/make_conventions.py
     python scripts/make_conventions.py --measure
@@ -24,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
+sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 import urdfkin
 from urdfkin.conventions import Convention, find_convention
@@ -64,7 +65,8 @@ ARM = _robot(
     _joint("b", "revolute", "l1", "l2", _axis("0 1 0")),
     _joint("a", "revolute", "l2", "l3", _axis("0.6 0 0.8")),
 )
-#: A robot to find the order of coordinates: two limbs are on one base, and a third limb is on the first limb.
+#: A robot that shows the order of coordinates. Two limbs are on the base, and a third limb is on the first
+#: limb.
 LIMBS = _robot(
     _joint("z", "revolute", "base", "l1"),
     _joint("a", "revolute", "base", "l2"),
@@ -150,7 +152,7 @@ values are for joint velocities in rad/s and m/s, and the panels of `plot` and t
 URDF's names.
 
 """
-#: The tools of each table: libraries of kinematics, and simulators and formats.
+#: The tools in each table: libraries of kinematics in one table, simulators and formats in the other.
 _TABLES = (
     ("urdfkin", "pinocchio", "mujoco", "drake", "idyntree", "rtb", "kdl"),
     ("isaaclab", "isaaclab3", "isaacgym", "newton", "newton-usd", "usd", "ros"),
@@ -228,7 +230,7 @@ Readings = Mapping[str, FloatArray]
 
 
 def which(found: FloatArray, readings: Readings) -> str:
-    """Return the name of the only definition that matches a result.
+    """Return the name of the only candidate definition that matches a result.
 
     Raises:
         ValueError: no definition matches, or several do.
@@ -303,7 +305,8 @@ class MeasuredMotion:
     def velocity_readings(self) -> dict[str, FloatArray]:
         """Return candidate velocities.
 
-        They have two orders of the linear and angular parts, and three combinations of axes and point.
+        The candidates combine two orders of the linear and angular parts with three choices of axes and
+        point.
         """
         R, p, v, w, _, _ = self.motion()
         points = {
@@ -476,7 +479,7 @@ def _layout() -> list[Row]:
 
 
 def _reads(text: str) -> Callable[[str], str]:
-    """Return a function that tries whether a library reads a text."""
+    """Return a function that tests whether a library reads a text."""
     import mujoco  # noqa: PLC0415
     import pinocchio as pin  # noqa: PLC0415
 
@@ -620,7 +623,7 @@ def measure() -> None:
 
 
 def _measured(name: str, make: Callable[[Any, Path], Any]) -> str:
-    """Return on how many robots a library agrees, and the largest difference."""
+    """Return the number of robots on which a library agrees with urdfkin, and the largest difference."""
     from tests.conventions.test_libraries import _conversion, _differences, _loaded  # noqa: PLC0415
 
     agree, worst, share, robots = 0, 0.0, 0.0, sorted(catalogue())

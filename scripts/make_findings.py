@@ -1,7 +1,7 @@
 """Write docs/findings.md: the codes, and the warnings of the robots in the catalogue.
 
-Run it after a change of a code or a robot: `python scripts/make_findings.py`. A test compares the page with
-the output of this script.
+Run this script after a change of a code or a robot: `python scripts/make_findings.py`. A test compares the
+page with the output of this script.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ FAMILIES = {
     "7": "Inertials, geometry and materials",
 }
 
-#: Code of a finding -> the consequences of this warning for the robots of the catalogue that have it.
+#: For each code of a finding: the consequences of this warning for catalogue robots that have it.
 REMARKS = {
     "URDF207": "URDF has no origin in a link; every reader ignores this pose.",
     "URDF405": "A slash in a name is legal; urdfkin does not use names as paths.",

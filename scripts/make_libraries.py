@@ -3,10 +3,10 @@
     python scripts/make_libraries.py [LIBRARY ...] [--environments FOLDER]  # install, run, write both
     python scripts/make_libraries.py --page  # write the page from the JSON file
 
-Each library gets an environment of its own outside the repository, with the version in docs/libraries.toml.
-There its adapter (urdfkin/verify/adapters.py) reads the features of docs/libraries.toml. The expected poses
-are urdfkin's, which Pinocchio checks; tests/test_libraries.py compares them with a reader that was written
-from the URDF standard.
+Each library gets its own environment outside the repository; docs/libraries.toml states its version. In this
+environment, the library's adapter (urdfkin/verify/adapters.py) reads the features of docs/libraries.toml. The
+expected poses are urdfkin's, which Pinocchio checks; tests/test_libraries.py compares them with a reader that
+was written from the URDF standard.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 import platformdirs
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
+sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 import urdfkin
 from urdfkin.comparison.readers import values_of
@@ -38,10 +38,11 @@ PAGE, FIGURES, FEATURES = (DOCS / f"libraries.{suffix}" for suffix in ("md", "js
 DATA: dict[str, Any] = tomllib.loads(FEATURES.read_text("utf-8"))
 #: Number of random configurations of each feature.
 CONFIGURATIONS = 3
-#: Largest difference (m, and entries of a rotation matrix) of a right pose. Libraries that compute in double
-#: precision differ by rounding, below 1e-14 here; a misread element differs by more than 1e-3.
+#: Largest difference (m, and entries of a rotation matrix) of a pose that counts as right. Libraries that
+#: compute in double precision differ by less than 1e-14 for these robots. A misread element causes a
+#: difference of more than 1e-3.
 RIGHT = 1e-9
-#: Longest time of a library for all features that are left, in seconds.
+#: Longest time (seconds) that a library may take for all features that are left.
 _SECONDS = 60
 _QUOTED = 160
 _INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
@@ -99,7 +100,7 @@ def configurations(robot: urdfkin.Robot) -> list[dict[str, Any]]:
 
 
 def expected(robot: urdfkin.Robot) -> list[dict[str, Any]]:
-    """Return the poses of all links in the base, for each configuration; Pinocchio checks each."""
+    """Return the poses of all links in the base for each configuration; Pinocchio checks each pose."""
     q = robot.sample(CONFIGURATIONS, seed=0)
     links = list(robot.link_names)
     T = robot.placement(q, links)
@@ -109,7 +110,7 @@ def expected(robot: urdfkin.Robot) -> list[dict[str, Any]]:
 def cell(
     feature: Mapping[str, Any], robot: urdfkin.Robot, library: str, answer: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return the cell of a feature and a library: its verdict, and the largest difference or the message."""
+    """Return the cell of a feature and a library: a verdict, and the largest difference or a message."""
     if "error" in answer:
         return {"verdict": "refused", "message": answer["error"][:_QUOTED]}
     if any("tip" not in theirs for theirs in answer["poses"]):
@@ -136,7 +137,7 @@ def cell(
 
 
 def environment(folder: Path, library: str) -> Path:
-    """Return the Python of a library's environment; install it if it is missing."""
+    """Return the Python of a library's environment; install the environment if it is missing."""
     place, package = folder / library, LIBRARIES[library].package
     python = place / "bin" / "python"
     wanted = f"{package}=={DATA['versions'][library]}"
@@ -148,7 +149,10 @@ def environment(folder: Path, library: str) -> Path:
 
 
 def answers(python: Path, library: str, cases: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
-    """Yield a library's answer to each case; after a case that ends its process, start a new one."""
+    """Yield a library's answer to each case.
+
+    After a case that ends the library's process, start a new process.
+    """
     todo = list(cases)
     while todo:
         try:
@@ -167,7 +171,7 @@ def answers(python: Path, library: str, cases: list[dict[str, Any]]) -> Iterator
 
 
 def measure(folder: Path, libraries: list[str], before: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the figures: the versions and cells of these libraries, and those of the others from before."""
+    """Return the versions and cells of the given libraries, and the earlier ones of all other libraries."""
     robots = {feature["name"]: urdfkin.load(text_of(feature)) for feature in DATA["feature"]}
     cases = [
         {"name": f["name"], "text": text_of(f), "configurations": configurations(robots[f["name"]])}
@@ -246,7 +250,7 @@ def _documented(figures: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _reasons(cells: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the lines with the messages and the notes, one for each library and reason."""
+    """Yield the lines with messages and notes; each library and reason has a line."""
     yield "| Library | Features | Message, or the joints |\n|---|---|---|\n"
     for library, column in cells.items():
         reasons: dict[str, list[str]] = {}
@@ -264,7 +268,7 @@ def _joined(lines: list[str]) -> str:
 
 
 def main() -> None:
-    """Install and run the libraries, and write both files."""
+    """Install and run the libraries, and write the page and the JSON file."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("libraries", nargs="*", choices=[*LIBRARIES, []], help="libraries; by default all")
     parser.add_argument(

@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
+sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 from scripts.benchmarking.picture import draw
 from scripts.benchmarking.tables import Words, tables

@@ -86,11 +86,11 @@ def reference_frames() -> Any:
 
 
 def photograph_report(folder: Path) -> None:
-    """Make screenshots of a report about two robots, with the first one expanded: light and dark."""
+    """Make light and dark screenshots of a report about two robots, with the first robot expanded."""
     page = folder / "report.html"
     found = urdfkin.validate(["panda", "ur5"], samples=1000)
     text = as_html(found.as_dict())
-    installed = str(Path(urdfkin.load("panda").path or "").parents[2])  # leave out the name of the machine
+    installed = str(Path(urdfkin.load("panda").path or "").parents[2])  # do not show the name of the machine
     page.write_text(text.replace(installed, "example-robot-data"), encoding="utf-8")
     for theme, dark in THEMES:
         with opened(folder / f"report{theme}", width=1000, height=1250, dark=dark) as browser:
@@ -101,7 +101,7 @@ def photograph_report(folder: Path) -> None:
 
 
 def photograph_viewer(folder: Path) -> None:
-    """Make screenshots of the viewer with its controls, and on a phone: light and dark."""
+    """Make screenshots of the viewer with its controls, and on a phone, in light and dark themes."""
     server = new_server(port=8099)
     try:
         viewer = Viewer(server, urdfkin.load("panda"), POSE)

@@ -1,7 +1,7 @@
 """Write the layout of the JSON report into docs/reports.md, from its schema.
 
-Run it after a change of the schema: `python scripts/make_reports.py`. A test compares the page with the
-output of this script.
+Run this script after a change of the schema: `python scripts/make_reports.py`. A test compares the page with
+the output of this script.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 from urdfkin.validation.document import VALIDATION
 
 PAGE = Path(__file__).parents[1] / "docs" / "reports.md"
-#: This script writes the text after this line.
+#: The script replaces all text after this line of the page.
 MARK = "<!-- written by scripts/make_reports.py from the schema -->\n"
 
 
@@ -52,7 +52,7 @@ def _type(entry: dict[str, Any]) -> str:
 
 
 def _meaning(entry: dict[str, Any]) -> str:
-    """Return the description of an entry, or that of its type."""
+    """Return the description of an entry or, if it has none, the description of the entry's type."""
     name = entry.get("$ref", "").rpartition("/")[2]
     return str(entry.get("description") or VALIDATION.schema()["$defs"][name]["description"])
 

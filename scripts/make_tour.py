@@ -93,7 +93,7 @@ def one_link(figure: Any) -> None:
 
 
 def velocity_field(figure: Any) -> None:
-    """Draw the field w x p of a turning body, in a plane that is not perpendicular to the axis."""
+    """Draw the velocity field w x p of a rotating body, in a plane that is not perpendicular to the axis."""
     axes = figure.add_subplot(projection="3d")
     k = np.array([1.0, 0.4, 2.0]) / np.linalg.norm([1.0, 0.4, 2.0])
     x, y = np.meshgrid(np.linspace(-1, 1, 7), np.linspace(-1, 1, 7))
@@ -127,9 +127,9 @@ def draw_frame(axes: Any, R: FloatArray, size: float, names: str) -> None:
 
 
 def turning(first: int, second: int) -> Callable[[float], FloatArray]:
-    """Return the angular velocity w(t) of two turns, first about one axis of frame 0 and then about another.
+    """Return the angular velocity w(t) of a rotation about one axis of frame 0 and then about another axis.
 
-    Each is a quarter turn in one second.
+    Each of the two rotations is a quarter turn in one second.
     """
     return lambda t: np.pi / 2 * np.eye(3)[first if t < 1.0 else second]
 

@@ -1,4 +1,4 @@
-"""Measure the cost of a campaign: serial, two processes, with a store, and on a local cluster of two.
+"""Measure the cost of a campaign in four variants: serial, two processes, with a store, on a local cluster.
 
 The variants alternate, so that other load of the machine affects all of them. The script prints medians
 over rounds. Processor time includes all processes, and hardly depends on other load.
@@ -37,9 +37,9 @@ def store(*robots: Any, **how: Any) -> ValidationReport:
 
 
 def cluster(*robots: Any, **how: Any) -> ValidationReport:
-    """Validate with two local workers of dask; the time includes their exit, not their start."""
+    """Validate with two local Dask workers; the time includes the end of the workers, but not their start."""
     with connected("local:2") as two:
-        validate("planar_two_link", samples=400, executor=two)  # loads the modules of the workers
+        validate("planar_two_link", samples=400, executor=two)  # load the modules of the workers before
         chunks = len(Cut(how["samples"])) * len(robots[0])
         begin, before = time.perf_counter(), time.process_time()
         report = validate(*robots, executor=two, **how)
@@ -67,7 +67,7 @@ def main() -> None:
     parser.add_argument("--ways", default=",".join(WAYS))
     given = parser.parse_args()
     robots = list(examples()) if given.all else given.robots
-    validate("planar_two_link", samples=10)  # compiles and loads everything
+    validate("planar_two_link", samples=10)  # compile and load all kernels before the measurement
     wall: dict[str, list[float]] = {}
     processor: dict[str, list[float]] = {}
     for _ in range(given.rounds):

@@ -1,4 +1,4 @@
-"""Measure a report of thousands of robots: writing it, opening it in Chromium, searching, expanding a robot.
+"""Measure the times to write, open, search and expand a report of thousands of robots in Chromium.
 
 The robots in the report are copies of the robots of a real validation, with other names. The script prints
 medians over new browser profiles. It needs Debian's chromium and chromium-driver.
@@ -16,7 +16,7 @@ from itertools import cycle, islice
 from pathlib import Path
 from statistics import median
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
+sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 from tests.report.browser import Browser, opened
 from urdfkin.report.html import as_files

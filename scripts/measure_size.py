@@ -1,4 +1,4 @@
-"""Measure the size of an installation of urdfkin, and write it into docs/install.md.
+"""Measure the size of an installation of urdfkin, and write the size into docs/install.md.
 
     python scripts/measure_size.py           print the sizes, and write the page
     python scripts/measure_size.py --print   only print them
@@ -33,7 +33,7 @@ def closure(name: str, extras: Iterable[str] = (), without: str = "") -> dict[st
     Args:
         name: A package.
         extras: Extras of the package that are included.
-        without: A package that is left out, with the packages that only it needs.
+        without: A package that is left out, together with all packages that only this package needs.
 
     Raises:
         PackageNotFoundError: a package is not installed.

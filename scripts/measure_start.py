@@ -1,12 +1,12 @@
-"""Measure the processor time of a first result, and write it into docs/performance.md.
+"""Measure the processor time until a first result, and write this time into docs/performance.md.
 
     python scripts/measure_start.py            # measure, write the table; exit 1 if a bar is missed
     python scripts/measure_start.py --rounds 3
 
-Each row is a new process. Its time is compared with that of `import numpy, pinocchio` in the same round. The
-ratio is that of the two medians over all rounds. Other work on the machine slows both, so it hardly changes
-the ratio. The bytecode of all modules already exists, as after an installation. A fresh cache is an empty
-folder for compiled kernels.
+Each row is a new process, whose time is compared with the time of `import numpy, pinocchio` in the same
+round. The ratio is the quotient of the two medians over all rounds. Other load of the machine slows the two
+processes equally, so it hardly changes the ratio. The bytecode of all modules already exists, as after an
+installation. A fresh cache is an empty folder for compiled kernels.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
+sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "performance.md"
@@ -38,10 +38,10 @@ class Row:
     """A process to measure.
 
     Attributes:
-        what: Its name on the page.
+        what: Name of the process on the page.
         words: Arguments of the interpreter; ROBOT stands for a URDF that is not in the catalogue.
-        most: The bar: largest allowed time, in multiples of the time of `import numpy, pinocchio`. None:
-            there is no bar.
+        most: Largest allowed time (the bar), in multiples of the time of `import numpy, pinocchio`. None: the
+            time has no limit.
         fresh: Whether the process starts with an empty kernel cache.
     """
 
@@ -58,7 +58,7 @@ class Row:
 
 
 def rows() -> list[Row]:
-    """Return the rows of the page; the first is the base of all ratios."""
+    """Return the rows of the page; the first row is the denominator of all ratios."""
     jacobian = ("-c", _COMMAND, "jacobian", "ROBOT", "--q", "random")
     return [
         Row("`import numpy, pinocchio`", BASE),
@@ -77,7 +77,7 @@ def seconds(words: Sequence[str], cache: str | None) -> float:
 
     Args:
         words: Arguments of the interpreter.
-        cache: Folder for kernels; None: the user's.
+        cache: Cache folder for kernels; None: the cache folder of the user.
     """
     environ = {name: x for name, x in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     environ["PYTHONPATH"] = str(ROOT)

@@ -5,10 +5,10 @@
     python scripts/mutate.py --only urdfkin.validation.error_stats:17
     python scripts/mutate.py --named                       the mutants of tests/attacks/named_slips.toml
 
-The script runs the quick tests near the file, then, with --slow, the slow tests near it, and with --whole
-the whole suite. It prints every undetected mutant, and writes all results to --json. It skips the mutants
-that docs/mutation.md lists as harmless. Exit 0: all mutants are detected or harmless. 1: some are not, or
-there is no mutant. 2: a part does not exist.
+The script runs the quick tests near the mutated file. With --slow it then runs the slow tests near this file,
+and with --whole the whole test suite. It prints every undetected mutant, and writes all results to --json. It
+skips the mutants that docs/mutation.md lists as harmless. Exit 0: all mutants are detected or harmless. 1:
+some mutants are not detected, or there is no mutant. 2: a part does not exist.
 """
 
 from __future__ import annotations
@@ -31,27 +31,27 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
+sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 from scripts.mutating.arguments import argued
 from scripts.mutating.named import Named, named_slips
 from scripts.mutating.operators import function_at, slips
 from scripts.mutating.selection import ROOT, files, module_of, near_tests
 
-_NO_TESTS = 5  # pytest's exit code where nothing was collected
+_NO_TESTS = 5  # pytest's exit code if no test was collected
 _QUICK, _SLOW = "not slow and not browser", "slow and not browser"
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """A mistake in a file.
+    """A mistake that is made in a file.
 
     Attributes:
         name: Name for --only.
         file: The file.
         line: The line.
         what: The text before and after.
-        place: The function, which identifies the mutant also after a change of the file.
+        place: The function of the mutant; it identifies the mutant even after other changes of the file.
     """
 
     name: str
@@ -138,7 +138,7 @@ def _run(slip: dict[str, str], tests: list[str], timeout: float) -> tuple[str, s
 
 
 def _ask(slip: dict[str, str], tests: list[str], output: str) -> None:
-    """In the new process and its children, make the mistake and run the tests; exit with pytest's code."""
+    """Make the mistake in this new process and its children, run the tests, and exit with pytest's code."""
     import pytest  # noqa: PLC0415  only in child processes
 
     hook = ROOT / "scripts" / "mutating" / "hook"

@@ -1,4 +1,4 @@
-"""List words that readers did not understand, with a plain form, and sentences that are too long.
+"""List words that readers did not understand, each with a plain form, and list sentences that are too long.
 
     python scripts/plain_words.py [PATH ...]         # words of the list; exit 1 where there is one
     python scripts/plain_words.py --long [PATH ...]  # sentences of more than 30 words, for information
@@ -19,7 +19,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
-#: A pattern for text -> the plain form. In a blind test, a reader did not understand sentences with them.
+#: For each pattern: the plain form. In a blind test, a reader did not understand sentences that contain such
+#: a pattern.
 PLAIN = {
     r"\bwitness(es)?\b": "oracle",
     r"\b(stands?|stood) still\b": "fixed",
@@ -41,7 +42,7 @@ PLAIN = {
     r"\bwhat people (read|ask|write)\b": "a noun: printed text, questions, input",
     r"\b(is|are) said (to be|up to|of|by)\b": "is reported, is stated",
 }
-#: More words than this in a sentence make it long.
+#: A sentence with more words than this number is too long.
 LONGEST = 30
 _SUFFIXES = (".py", ".md", ".toml")
 _SKIPPED = {".venv", ".git", "site", "node_modules", "build", "dist", "data"}
@@ -53,8 +54,8 @@ class Passage(NamedTuple):
 
     Attributes:
         file: The file, relative to the repository.
-        line: Its first line.
-        text: Its words.
+        line: First line of the passage.
+        text: Words of the passage.
     """
 
     file: str

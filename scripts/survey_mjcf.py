@@ -1,4 +1,4 @@
-"""Load all MJCF files below a folder and count the results of the checks: the figures of docs/mjcf.md.
+"""Load all MJCF files below a folder, and count the results of the checks for docs/mjcf.md.
 
 pip install --no-deps --target models gymnasium==1.4.0 dm-control==1.0.50
 python scripts/survey_mjcf.py models
@@ -12,7 +12,7 @@ import warnings
 from collections import Counter
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
+sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 import urdfkin
 from urdfkin.errors import UrdfkinError
@@ -20,7 +20,7 @@ from urdfkin.urdf.mjcf import is_mjcf
 
 
 def said_of(path: Path) -> str:
-    """Return urdfkin's result and that of Pinocchio's MJCF reader for one file, or the reading error."""
+    """Return the results of urdfkin and of Pinocchio's MJCF reader for one file, or the reading error."""
     try:
         robot = urdfkin.load(path)
         robot.placement(robot.sample(2), robot.link_frames)

@@ -1,7 +1,7 @@
-"""Calls of a library that computes one configuration at a time, as lines of Python: in a loop, or one by one.
+"""Write the calls of a library for one configuration as lines of Python, which run in a loop or one by one.
 
-The lines become the body of a loop, with their names as local variables. So no library pays for a function
-call of the benchmark.
+The lines become the body of a loop, and their names become local variables. Therefore, the measured time of a
+library includes no function call of the benchmark.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ class Calls:
         lines: The calls; the last line is an expression whose value is the result.
         store: The lines for a batch, which write their result to `out[k]`. None: `lines` are used, and the
             value of the last line is stored in `out[k]`.
-        order: For each coordinate of the library, its index among urdfkin's coordinates. None: the order of
-            the coordinates is the same.
+        order: For each coordinate of the library, its index among urdfkin's coordinates. None: the library
+            and urdfkin have the same order.
         shape: Shape of one configuration's result in a batch; None: urdfkin's shape.
         read: Converts a batch's raw results to urdfkin's conventions.
         read_one: Converts the last line's value to an array like a row of the raw results.
@@ -94,7 +94,7 @@ def _rows(inputs: Any) -> Any:
 def _function(
     names: Mapping[str, Any], arguments: str, head: str, body: tuple[str, ...]
 ) -> Callable[..., Any]:
-    """Make a function with `names` as local variables. Its code is `head`, and inside this block `body`."""
+    """Make a function with `names` as local variables; its code is `head` with the block `body` inside."""
     here = {"rows": _rows, **names}
     parameters = ", ".join((arguments, *(f"{name}={name}" for name in here)))
     source = "\n".join([f"def function({parameters}):", f"    {head}", *(f"        {line}" for line in body)])

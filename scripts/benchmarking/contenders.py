@@ -37,9 +37,9 @@ class Contender:
     Attributes:
         library: Name of the distribution.
         module: Name of the module.
-        calls: Returns its calls for one configuration.
-        batches: Returns its works for a batch; None: the calls in a loop.
-        program: Another program that it needs.
+        calls: Returns the library's calls for one configuration.
+        batches: Returns the library's computations of a batch; None: the calls run in a loop.
+        program: Another program that the library needs.
     """
 
     library: str
@@ -50,7 +50,7 @@ class Contender:
 
     @property
     def missing(self) -> str | None:
-        """Return the reason to leave the library out, or None if it can run."""
+        """Return the reason why the library cannot run, or None if it can run."""
         if util.find_spec(self.module) is None:
             return "not installed"
         if self.program and shutil.which(self.program) is None:
@@ -59,7 +59,7 @@ class Contender:
 
     @property
     def state(self) -> str:
-        """Return the library's version, or the reason to leave the library out."""
+        """Return the library's version, or the reason why the library cannot run."""
         try:
             return self.missing or metadata.version(self.library)
         except metadata.PackageNotFoundError:
@@ -74,7 +74,7 @@ class Contender:
         return [one.batch(subject, quantity) for one in self.singles(subject, quantity)]
 
     def singles(self, subject: Subject, quantity: str) -> list[Calls]:
-        """Return its calls for one configuration."""
+        """Return the library's calls for one configuration."""
         return [] if self.missing or self.calls is None else list(self.calls(subject, quantity))
 
 
@@ -82,7 +82,7 @@ class Contender:
 
 
 def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
-    """Yield the batches with one thread, all threads and new memory, and one that only writes the output."""
+    """Yield batches with one thread, all threads and new memory, and a batch that only writes the output."""
     method = getattr(subject.robot, quantity)
     inputs = subject.inputs(quantity, subject.n)
     out = np.empty((subject.n, *subject.width(quantity)))
@@ -140,7 +140,10 @@ def _urdfkin_lines(
 
 
 def pinocchio_calls(urdf: str, frame: str, quantity: str) -> Calls:
-    """Return the fewest calls: `computeFrameJacobian`, or a recursion and `getFrameClassicalAcceleration`."""
+    """Return the cheapest calls.
+
+    These are `computeFrameJacobian`, or a recursion and `getFrameClassicalAcceleration`.
+    """
     model = pin.buildModelFromXML(urdf)
     names = {
         "model": model,

@@ -1,11 +1,12 @@
-"""Code generated for one robot, frame and quantity, as a limit for the speed of a general kernel.
+"""Generate code for one robot, frame and quantity; its speed is a limit for the speed of a general kernel.
 
 The textbook's equations run once on CasADi's symbols. The resulting expressions contain the robot's
-constants, without products with 0 and 1. CasADi writes them as straight-line C, and the system's compiler
-compiles it. Each number of the C code is a vector register of doubles, with one double for each of several
-configurations (`generated.c`). The time includes sine, cosine and the transposition of the arrays, which are
-the same for all contenders. The code does not check its inputs, so a non-finite number or an angle of a
-million turns gives nonsense. It also lacks urdfkin's correction of the last digit of sine and cosine.
+constants, without products with 0 and 1. CasADi writes these expressions as straight-line C code, which the
+system's compiler compiles. Each number of the C code is a vector register of doubles, with one double for
+each of several configurations (`generated.c`). The time includes sine, cosine and the transposition of the
+arrays, which are the same for all contenders. The code does not check its inputs, so a non-finite number or
+an angle of a million turns gives a wrong result. The generated code also lacks urdfkin's correction of the
+last digit of sine and cosine.
 """
 
 from __future__ import annotations
@@ -99,7 +100,7 @@ def _motions(plan: CompiledTree) -> list[Motion]:
 
 
 def _pose(row: FloatArray) -> tuple[list[list[float]], list[float]]:
-    """Return the constant rotation R and translation p in a row of a plan."""
+    """Return the constant rotation R and translation p in a row of a compiled tree."""
     return row[:9].reshape(3, 3).tolist(), row[9:12].tolist()
 
 
@@ -177,8 +178,8 @@ def _straight_line(plan: CompiledTree, quantity: str) -> str:
     whole = re.search(r"static int casadi_f0\(.*?\n}", generator.dump(), re.DOTALL)
     if whole is None:
         raise ValueError("CasADi wrote no function")
-    # CasADi's code computes with single doubles, and tests whether an argument is missing. Here the doubles
-    # become vectors, and the tests are removed.
+    # CasADi's code computes with single doubles, and tests whether an argument is missing. This script
+    # replaces the doubles by vectors, and removes the tests.
     text = re.sub(r"(arg\[\d+\])\? (\1\[\d+\]) : 0", r"\2", whole[0])
     text = text.replace("if (res[0]!=0) ", "")
     return re.sub(r"(a\d+)=(-?[\d.][\d.e+-]*);", r"\1=in_all_lanes(\2);", text)

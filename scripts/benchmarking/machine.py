@@ -24,10 +24,10 @@ from urdfkin.compiled.preload import only
 from urdfkin.robot import Robot
 
 ROOT = Path(__file__).parents[2]
-#: Keys of the two times of a first use. For the first time, the kernel cache is empty. For the second one,
+#: Keys of the two times of a first use. For the first time, the kernel cache is empty. For the second time,
 #: the compiled kernels are on disk.
 EMPTY, KEPT = "empty_ms", "kept_ms"
-#: Quantity whose first use compiles a kernel -> number of its inputs among q, v, a.
+#: For each quantity whose first use compiles a kernel: the number of its inputs among q, v and a.
 USES = {
     "placement": 1,
     "velocity": 2,
@@ -115,7 +115,7 @@ def _memory(robot: str, frame: str, quantity: str, count: str, kind: str) -> dic
         few = tuple(x[:64] for x in inputs)
         with only("compiled"):
             method(*few, frame, verify=False, threads=2)  # loads compiled code and starts threads
-        Path("/proc/self/clear_refs").write_text("5")  # reset the largest size
+        Path("/proc/self/clear_refs").write_text("5")  # reset the recorded largest memory size
         before = _bytes("VmRSS")
         result = method(*inputs, frame, out=out, verify=False)
         taken = _bytes("VmHWM") - before + (out.nbytes if out is not None else 0)

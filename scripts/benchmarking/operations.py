@@ -1,7 +1,8 @@
 """Count the additions and multiplications of one configuration by executing them.
 
-The functions of the forward recursion run on numbers that count their operations. A fused multiply-add
-counts as two, as in the machine's figures. Signs are free, and so are products with a known 0 or 1.
+The functions of the forward recursion run on numbers that count their operations. A fused multiply-add counts
+as two operations, as in the peak performance that is stated for a machine. Signs are free, and so are
+products with a known 0 or 1.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from urdfkin.compiled.program import KEPT_ROWS, WIDTH, Head, Op, program_of
 from urdfkin.kinematics.arithmetic import bound
 
 #: Operations to compute a sine and a cosine (`compiled.python_numbers`). The reduction of the angle needs 10.
-#: z and 1 - z/2 with their rounding errors need 8. The two polynomials need 20, and the last steps 13.
+#: z and 1 - z/2 with their rounding errors need 8. The two polynomials need 20 operations, and the last steps
+#: 13.
 _SINE_COSINE = 51
 
 
@@ -84,7 +86,7 @@ def count(results: Any) -> int:
 
 @dataclass
 class _Walk:
-    """Write the forward recursion and `outputs` with numbers that count their operations."""
+    """Run the forward recursion and the functions of `outputs` with numbers that count their operations."""
 
     written: list[Any] = field(default_factory=list)
 

@@ -1,4 +1,4 @@
-"""Calls of other libraries, as their users write them; a library is imported when it is needed.
+"""Write the calls of other libraries as users of these libraries do; a library is imported when it is needed.
 
 If a library has another order of rows or coordinates, inputs and results are reordered outside the measured
 time.
@@ -27,7 +27,7 @@ LINEAR_FIRST = [3, 4, 5, 0, 1, 2]
 
 
 def positions(ours: Sequence[str], theirs: Sequence[str]) -> list[int]:
-    """Return, for each of a library's coordinates, the index of the same name in urdfkin."""
+    """Return, for each coordinate of a library, the index of the coordinate with the same name in urdfkin."""
     index = {name: i for i, name in enumerate(ours)}
     return [index[name] for name in theirs]
 
@@ -35,7 +35,7 @@ def positions(ours: Sequence[str], theirs: Sequence[str]) -> list[int]:
 def spread(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
     """Return `J` (n, 6, m) as an array (n, 6, nv).
 
-    Its columns are at the indices `columns`; all other columns are zero.
+    The columns of `J` get the indices `columns`; all other columns are zero.
     """
     full = np.zeros((*J.shape[:-1], nv))
     full[..., list(columns)] = J
@@ -48,7 +48,7 @@ def spread(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
 def dynibo(subject: Subject, quantity: str) -> Iterator[Calls]:
     """Yield the calls of dynibo, a library in Rust.
 
-    Its rows are [angular; linear], its joints are sorted breadth first, and its matrices are stored column by
+    In dynibo, rows are [angular; linear], joints are sorted breadth first, and matrices are stored column by
     column.
     """
     import dynibo  # noqa: PLC0415
@@ -83,7 +83,7 @@ def breadth_first(urdf: str) -> list[str]:
     ends = [(_link(joint, "parent"), _link(joint, "child")) for joint in joints]
     links = sorted({parent for parent, _ in ends} - {child for _, child in ends})
     names = []
-    for link in links:  # the list grows in the loop
+    for link in links:  # the loop appends to this list
         for joint, (parent, child) in zip(joints, ends, strict=True):
             if parent == link:
                 links.append(child)
@@ -98,8 +98,8 @@ def _link(joint: ET.Element, tag: str) -> str:
 def mujoco(subject: Subject, quantity: str) -> Iterator[Calls]:
     """Yield the calls of MuJoCo.
 
-    Its accelerations are classical, with rows [angular; linear]. MuJoCo is told not to merge links that are
-    fixed to each other.
+    MuJoCo's accelerations are classical, with rows [angular; linear]. An option prevents MuJoCo from merging
+    links that are fixed to each other.
     """
     import mujoco  # noqa: PLC0415
 
@@ -147,7 +147,7 @@ def _mujoco_lines(quantity: str, rows: str, result: str) -> tuple[str, ...]:
 def drake(subject: Subject, quantity: str) -> Iterator[Calls]:
     """Yield the calls of Drake.
 
-    Its rows are [angular; linear]. An acceleration is J a plus the terms that depend on the velocities only.
+    Drake's rows are [angular; linear]. An acceleration is J a plus the terms that depend only on velocities.
     """
     from pydrake.multibody.parsing import Parser  # noqa: PLC0415
     from pydrake.multibody.plant import MultibodyPlant  # noqa: PLC0415
@@ -189,7 +189,7 @@ def toolbox(subject: Subject, quantity: str) -> Iterator[Calls]:
     import roboticstoolbox as rtb  # noqa: PLC0415
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the toolbox deprecates its own reader
+        warnings.simplefilter("ignore")  # the URDF reader of the toolbox is deprecated
         robot: Any = rtb.Robot.URDF(str(subject.file))
     path = robot.ets(end=subject.frame)
     moving = sorted((link for link in robot.links if link.jindex is not None), key=lambda x: x.jindex)
@@ -226,7 +226,7 @@ _SINGLE = 1e-6
 
 
 def torch(subject: Subject, quantity: str) -> Iterator[Work]:
-    """Yield the work of PyTorch Kinematics, once plain and once with `torch.compile`.
+    """Yield the computation by PyTorch Kinematics, once without and once with `torch.compile`.
 
     The library computes no accelerations.
     """
@@ -253,7 +253,9 @@ def torch(subject: Subject, quantity: str) -> Iterator[Work]:
 
 
 def jax(subject: Subject, quantity: str) -> Iterator[Work]:
-    """Yield the work of JAX in float64: code for one configuration, with `vmap` and compiled by XLA.
+    """Yield the computation by JAX in float64.
+
+    `vmap` and XLA turn code for one configuration into a compiled batch.
 
     This is typical fast code for one robot in JAX: the textbook's equations on JAX arrays, with the robot's
     constants folded in. Inputs and results are JAX arrays.

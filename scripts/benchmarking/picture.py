@@ -13,8 +13,8 @@ from typing import Any
 
 from urdfkin.view.figure import BLUE, GREEN, VERMILION, new_figure, save, style
 
-#: The start of a contender's name -> its colour, its hatch and its name in the legend. The last entry is for
-#: all other contenders.
+#: For each beginning of a contender's name: its colour, its hatch and its name in the legend. The last entry
+#: is for all other contenders.
 KINDS = {
     "urdfkin": (BLUE, "", "urdfkin"),
     "Pinocchio": (VERMILION, "////", "Pinocchio"),
@@ -59,7 +59,7 @@ def _light(svg: bytes) -> bytes:
 def _chosen(rows: Sequence[Entry], section: str, quantity: str) -> list[Entry]:
     """Return the rows of a section for one quantity.
 
-    If they are for several robots, return only those of the first robot.
+    If the rows are for several robots, only the rows of the first robot are returned.
     """
     found = [row for row in rows if row["section"] == section and row["quantity"] == quantity]
     return [row for row in found if section == "joints" or row["robot"] == found[0]["robot"]]

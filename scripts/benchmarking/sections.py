@@ -1,7 +1,7 @@
-"""The sections of the benchmark, each as rows of measurements.
+"""Measure the sections of the benchmark; a section consists of rows of measurements.
 
-All generators compare the results before they measure times, and raise `DifferenceError` for different
-results.
+Each generator compares the results of all contenders before it measures times, and raises `DifferenceError`
+if results differ.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def single_rows(n: int, contenders: Sequence[Contender], rounds: int) -> Iterato
 
 
 def verified_rows(n: int, rounds: int) -> Iterator[Row]:
-    """Measure the check of every result and of a sample, compared with Pinocchio's cheapest calls."""
+    """Measure calls that check all results or only a sample, compared with Pinocchio's cheapest calls."""
     for subject, quantity, table in _contests("verified", n):
         calls = pinocchio_calls(subject.urdf, subject.frame, quantity)
         stored = replace(calls.batch(subject, quantity), who=STORED)
@@ -88,7 +88,7 @@ def _verified(subject: Subject, quantity: str, verify: bool | str) -> Work:
 
 
 def _contests(section: str, n: int) -> Iterator[tuple[Subject, str, Table]]:
-    """Yield each subject and quantity with its table."""
+    """Yield each combination of a subject and a quantity, with its table."""
     for source in SUBJECTS:
         with Subject(*source, n) as subject:
             for quantity in QUANTITIES:
@@ -103,9 +103,10 @@ def _table(section: str, subject: Subject, quantity: str, size: int = 0) -> Tabl
 
 
 def joint_rows(joints: Sequence[int], numbers: int, rounds: int) -> Iterator[Row]:
-    """Measure the growth with the joints of a chain: the tip's Jacobian and acceleration, one thread.
+    """Measure how the time of the tip's Jacobian and acceleration grows with the joints of a chain.
 
-    Each batch has `numbers` numbers in its Jacobians, so that all of them have the same memory traffic.
+    One thread is used. The Jacobians of each batch contain `numbers` numbers, so that all batches have the
+    same memory traffic.
     """
     for size in joints:
         n = max(numbers // (6 * size), 16)
@@ -114,7 +115,7 @@ def joint_rows(joints: Sequence[int], numbers: int, rounds: int) -> Iterator[Row
 
 
 def size_rows(sizes: Sequence[int], rounds: int) -> Iterator[Row]:
-    """Measure the growth with the size of a batch: the first subject, one thread, with `out=`."""
+    """Measure how the time grows with the size of a batch, for the first subject, one thread and `out=`."""
     for size in sizes:
         with Subject(*SUBJECTS[0], size) as subject:
             yield from _growth("sizes", subject, size, rounds)
@@ -131,7 +132,7 @@ def _growth(section: str, subject: Subject, size: int, rounds: int) -> Iterator[
 
 
 def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
-    """Measure the growth with the frames of the humanoid: placements in one pass, and one call for each."""
+    """Measure how the time of placements grows with the number of frames, in one pass and in single calls."""
     with Subject(*SUBJECTS[-1], n) as subject:
         links = subject.robot.link_names
         for count in sorted({min(count, len(links)) for count in counts}):

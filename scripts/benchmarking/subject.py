@@ -17,9 +17,9 @@ from urdfkin.robot import Robot
 
 #: The quantities of the tables.
 QUANTITIES = ("jacobian", "acceleration")
-#: Robot and frame: two arms, and a humanoid with a path that is a small part of the tree.
+#: Robots and frames: two arms, and a humanoid whose frame has a path that is a small part of the tree.
 SUBJECTS = (("panda", "panda_hand"), ("ur5", "tool0"), ("talos", "gripper_left_base_link"))
-#: Number of configurations in a loop of calls; the time for one does not depend on it.
+#: Number of configurations in a loop of calls; the time for a single call does not depend on this number.
 LOOP = 2_000
 #: The frame at the end of a chain.
 TIP = "tip"
@@ -28,7 +28,7 @@ TIP = "tip"
 class Subject:
     """The common input of all contenders.
 
-    Mimic joints are free, so that every library has the same coordinates, each a single number.
+    Mimic joints are independent, so that every library has the same coordinates, each with a single number.
 
     Attributes:
         name: Name of the robot in the tables.
@@ -38,7 +38,7 @@ class Subject:
         q: (n, nq) configurations.
         v: (n, nv) joint velocities.
         a: (n, nv) joint accelerations.
-        stack: Closes open resources of the contenders.
+        stack: Exit stack that closes open resources of the contenders.
     """
 
     def __init__(self, source: str, frame: str, n: int, *, name: str | None = None) -> None:
@@ -112,8 +112,8 @@ def bare_urdf(urdf: str, *, flags: dict[str, str] | None = None) -> str:
     """Return a URDF with only the links and joints of `urdf`.
 
     All links get the same unit inertia, since some libraries need one; kinematics does not depend on it.
-    Mimic rules are dropped, so that all contenders have the same free coordinates. A link named world gets
-    another name, since some libraries have their own body of that name.
+    Mimic rules are removed, so that all contenders have the same independent coordinates. A link named world
+    gets another name, since some libraries have their own body of that name.
 
     Args:
         urdf: The text of a URDF.

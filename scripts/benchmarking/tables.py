@@ -21,7 +21,7 @@ Entry = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Words:
-    """One table as text: its section, title, column heads and rows; the first column has names."""
+    """One table as text, with section, title, column headings and rows; the first column contains names."""
 
     section: str
     title: str
@@ -120,7 +120,7 @@ def _generated(rows: Sequence[Entry]) -> float | None:
 
 
 def _summary(rows: list[Entry]) -> Words:
-    """Summarise one and all threads, compared with Pinocchio, generated code and the fastest other."""
+    """Summarise urdfkin with one thread and with all threads, compared with the fastest other contenders."""
     found = []
     for title, group in _tables_of(rows):
         who = {row["who"]: row for row in group}
@@ -153,7 +153,7 @@ def _summary(rows: list[Entry]) -> Words:
 
 
 def _floor(rows: list[Entry], operations: Mapping[str, int]) -> Words:
-    """Compare the time to write the output once and the number of operations with urdfkin's time."""
+    """Compare urdfkin's time with the time to write the output once and with the number of operations."""
     found = []
     for title, group in _tables_of(rows):
         who = {row["who"].partition(",")[0]: row for row in reversed(group)}
@@ -192,7 +192,7 @@ def _tables_of(rows: list[Entry]) -> Iterator[tuple[str, list[Entry]]]:
 
 
 def _where(title: str, entries: Sequence[Entry]) -> Words:
-    """Return one column for each robot and quantity: nanoseconds, and the fraction of the total."""
+    """Return a column for each robot and quantity, with nanoseconds and the fraction of the total time."""
     parts = dict.fromkeys(part for entry in entries for part in entry["parts"])
 
     def cell(entry: Entry, part: str) -> str:

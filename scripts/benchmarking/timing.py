@@ -1,9 +1,9 @@
 """Measure the times of contenders, and check that all of them compute the same numbers.
 
 Every contender is timed once in each round, so that other load affects all of them. Ratios of one run are
-therefore reliable also on a noisy machine; absolute times are not. The order changes in each round. Each
-contender computes once untimed before it is timed: its data are then in the cache, and the threads of the
-previous contender sleep.
+therefore reliable also on a noisy machine; absolute times are not. The order of the contenders changes in
+each round. Before a contender is timed, it computes once without timing. Its data are then in the cache, and
+the threads of the previous contender sleep.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ import numpy as np
 
 from urdfkin.model.tree import FloatArray
 
-#: Allowed difference of results in m, rad, m/s^2, rad/s^2: a guard against different work, not for accuracy.
+#: Allowed difference of results in m, rad, m/s^2, rad/s^2. The limit detects different computations, not
+#: errors of accuracy.
 TOLERANCE = 1e-9
 
 
@@ -30,10 +31,10 @@ class Work:
 
     Attributes:
         who: Name of the contender in the tables.
-        n: Number of configurations of `compute`, the first ones of the subject.
+        n: Number of configurations that `compute` computes; they are the first configurations of the subject.
         compute: The timed function.
         result: Returns the results in urdfkin's conventions, for the first configurations; not timed. None if
-            there is nothing to compare, as for the floor.
+            there are no results to compare, as for the work that only writes the output.
         tolerance: Allowed difference from Pinocchio.
         remark: A remark on the measurement.
     """
@@ -117,7 +118,10 @@ def agree(works: Sequence[Work], reference: Work, what: str) -> None:
 def times(
     works: Sequence[Work], rounds: int, clock: Callable[[], float] = time.perf_counter
 ) -> dict[str, list[float]]:
-    """Return the nanoseconds for one configuration; each of `works` runs once a round, in varying order."""
+    """Return the nanoseconds for one configuration.
+
+    Each of `works` runs once in each round, in varying order.
+    """
     found: dict[str, list[float]] = {work.who: [] for work in works}
     shuffled, order = list(works), random.Random(0)
     collecting = gc.isenabled()
@@ -147,9 +151,9 @@ def measure(
 
     Args:
         table: The common properties of the rows.
-        works: Contenders that have computed once, so that nothing is compiled here.
+        works: Computations that have run once before, so that no kernel is compiled during the measurement.
         rounds: Number of rounds, at least one.
-        baseline: The one of `works` that the others are compared with.
+        baseline: The element of `works` with which all others are compared.
         clock: Returns seconds.
     """
     found = times(works, rounds, clock)

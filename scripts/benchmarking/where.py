@@ -25,7 +25,7 @@ from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
-#: The parts of a batch -> their instructions, in the order in which they are added.
+#: For each part of a batch, in the order in which the parts are added: its instructions.
 PARTS: Mapping[str, frozenset[Op]] = {
     "reading inputs": frozenset(),
     "sines and cosines": frozenset(),
@@ -36,7 +36,7 @@ PARTS: Mapping[str, frozenset[Op]] = {
 
 
 def parts_of_batches(n: int, rounds: int) -> Iterator[dict[str, Any]]:
-    """Yield the time of each part of a batch, in ns for one configuration, one thread."""
+    """Yield the time of each part of a batch, in ns for one configuration, with one thread."""
     for subject, quantity in _subjects(n):
         program = program_of(subject.plan, turned=False, columns=quantity == "jacobian")
         works = [_core(subject, quantity, cut(program, end), part) for end, part in enumerate(PARTS, start=1)]
@@ -69,7 +69,7 @@ def _core(subject: Subject, quantity: str, program: Program, who: str) -> Work:
     staged = who == "writing results" and is_staged(out)
     task, memory = task_of(program, Reference.LOCAL_WORLD_ALIGNED, inputs, out, staged=staged)
     core = getattr(kernels, f"{quantity}s")
-    owners = program, memory, out, inputs  # the task stores their addresses
+    owners = program, memory, out, inputs  # the kernel arguments contain the addresses of these arrays
 
     def compute(_: object = owners) -> None:
         core(task.ctypes.data)
@@ -114,7 +114,7 @@ def _calls(subject: Subject, quantity: str) -> Iterator[Calls]:
         "out": np.empty(subject.width(quantity)),
     }
     for line in (
-        "q",  # an expression without a call: the cost of the loop
+        "q",  # an expression without a call measures the cost of the loop
         f"function({q_v_a}, out=out)",
         f"compute({q_v_a}, shape)",  # a tuple is rejected after the check of the arrays
         "empty(shape)",

@@ -5,7 +5,7 @@
 The file JOBS has a JSON list of {form, text, q}. The script writes a JSON file RESULTS with a list of poses
 for each entry of JOBS.
 
-It does not import urdfkin, since the Robotics Toolbox may have its own environment.
+The script does not import urdfkin, because the Robotics Toolbox may have its own environment.
 """
 
 from __future__ import annotations

@@ -48,12 +48,12 @@ _DOCUMENT = r"""\documentclass{article}
 
 
 class Missing(Exception):  # noqa: N818  it is reported, and the run continues
-    """An interpreter or library of a format is not installed."""
+    """Error if an interpreter or library of a format is not installed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A table and configurations of its own coordinates, (n, coordinates)."""
+    """A table, and configurations (n, coordinates) of the table's coordinates."""
 
     table: DHTable
     q: FloatArray
@@ -162,7 +162,7 @@ def _as_bodies(name: str, job: Job) -> list[str]:
 
 
 def read_back(form: str) -> Run:
-    """Read back the formats that urdfkin reads without loss."""
+    """Read exported tables back from the formats that urdfkin reads without loss."""
 
     def run(jobs: Sequence[Job], folder: Path) -> Poses:
         found, file = Poses(), folder / f"table.{form}"
@@ -179,7 +179,7 @@ def as_urdf(jobs: Sequence[Job], folder: Path) -> Poses:
     found = Poses()
     for job in jobs:
         base, *_, tip = link_names(job.table)
-        with warnings.catch_warnings():  # findings about the robot's own limits and axes
+        with warnings.catch_warnings():  # the warnings are about the limits and axes of the robot itself
             warnings.simplefilter("ignore", UrdfWarning)
             path = load(to_urdf(job.table), verify=False).chain(tip, base)
         order = [job.table.joint_names.index(name) for name in path.joint_names]
@@ -192,7 +192,7 @@ RUN: dict[str, Run] = {
     "c": in_c,
     "matlab": in_octave("matlab", _plainly),
     "matlab-symbolic": in_octave("matlab-symbolic", _symbolically, _PACKAGE),
-    # Substitutes for the toolbox's classes; this format has not been run in MATLAB.
+    # Octave uses substitutes for the toolbox's classes; this format has not been run in MATLAB.
     "matlab-rst": in_octave("matlab-rst", _as_bodies, f"addpath('{Path(__file__).parent / 'octave'}');"),
     **{form: read_back(form) for form in ("toml", "json", "csv")},
     "urdf": as_urdf,

@@ -1,7 +1,8 @@
 """Compute every quantity of a robot in each reference frame, single and in batches, on any base.
 
-urdfkin compares each call with Pinocchio. This module checks that the calls agree with each other to the
-last bit, since all use the same forward recursion, and that every name of a frame is accepted.
+urdfkin compares each call with Pinocchio. This module checks that the results of different calls have the
+same bits, because all calls use the same forward recursion. It also checks that every name of a frame is
+accepted.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from urdfkin.errors import InputError, RepresentationSingularityError, UnknownNa
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 
-#: Number of frames of a robot that are computed together and one by one.
+#: Number of frames of a robot that are computed both in one pass and one by one.
 TOGETHER, ALONE = 12, 2
 #: Number of names that are looked up.
 NAMES = 6
@@ -24,7 +25,7 @@ FAR = 1e6
 
 
 class MismatchError(Exception):
-    """Two computations of the same number return different results."""
+    """Error if two computations of the same number return different results."""
 
 
 def ask(robot: Robot, seed: int) -> Iterator[tuple[str, FloatArray]]:
@@ -59,7 +60,7 @@ def ask_prepared(robot: Robot, seed: int) -> None:
     """Compare a prepared frame's unchecked results with those of checked calls.
 
     Raises:
-        MismatchError: they differ.
+        MismatchError: a result of the prepared frame differs.
     """
     inputs = [x[0] for x in _inputs(robot, seed)]
     frame = robot.all_frames[-1]
@@ -138,7 +139,10 @@ def _together(
 
 
 def _names(robot: Robot, q: FloatArray, generator: np.random.Generator) -> Iterator[tuple[str, FloatArray]]:
-    """Yield placements of frames by name; urdfkin and Pinocchio look up the name independently."""
+    """Yield placements of frames that are given by name.
+
+    urdfkin and Pinocchio look up each name independently.
+    """
     links, joints = set(robot.link_names), {joint.name for joint in robot.tree.joints}
     own = sorted(links | joints)
     asked = [f"{prefix}{name}" for name in own for prefix in ("", "link:", "joint:")]

@@ -1,4 +1,4 @@
-"""Random measured poses of arms, correct ones and wrong ones: joint angles in degrees, shifted rows of q.
+"""Make random measured poses of arms: correct data, and data with degrees or with shifted rows of q.
 
 Correct data must be calibrated and verified; wrong data must be rejected. The data depend only on the seed
 and the number, and are stored as JSON.

@@ -17,7 +17,8 @@ from urdfkin.robot import Robot
 from urdfkin.urdf.mjcf import is_mjcf
 from urdfkin.verify.verifier import NotVerifiedWarning
 
-#: Findings about sizes beyond floating-point range; non-finite results are expected after them.
+#: Findings about sizes beyond the floating-point range; robots with such findings may have non-finite
+#: results.
 _SIZES = {"URDF526", "URDF603", "URDF606"}
 
 
@@ -70,7 +71,7 @@ def _judge_mjcf(case: Case) -> Outcome:
 
 
 def _computed(robot: Robot, findings: list[Finding], warned: list[warnings.WarningMessage]) -> Outcome | None:
-    """Return the outcome of computing everything; None if some results are not verified."""
+    """Compute all quantities and return the outcome; None if some results are not verified."""
     big = bool(_SIZES & {finding.code for finding in findings})
     too_large = "too large to compute, with a finding" if big else "a result is not a finite number"
     try:
@@ -95,7 +96,7 @@ def _computed(robot: Robot, findings: list[Finding], warned: list[warnings.Warni
 def _unverified(robot: Robot, findings: list[Finding], warned: list[warnings.WarningMessage]) -> Outcome:
     """Return the outcome if some results are not verified.
 
-    It is good if urdfkin reported the reason, and otherwise a failure.
+    The outcome is good if urdfkin reported the reason, and otherwise a failure.
     """
     marked = [finding for finding in findings if finding.oracle is not None]
     if marked:

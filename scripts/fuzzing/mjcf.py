@@ -1,4 +1,4 @@
-"""Random MJCF files: free bodies that MuJoCo aligns or fuses, chains of equalities, default classes.
+"""Make random MJCF files with free bodies that MuJoCo aligns or fuses, chains of equalities, and classes.
 
 A file depends only on the seed, its family and its number. MuJoCo computes the pose of each body and site
 and checks the equalities, independently of urdfkin's MJCF reader.
@@ -19,7 +19,8 @@ from urdfkin.robot import Robot
 
 FAMILIES = ("mjcf-free", "mjcf-equalities", "mjcf-classes")
 _CLASSES = ("outer", "inner", "other")
-#: Allowed relative difference of urdfkin's and MuJoCo's placements, or of the two sides of an equality.
+#: Allowed relative difference between urdfkin's and MuJoCo's placements, or between the two sides of an
+#: equality.
 _APART = 1e-12
 
 mujoco.set_mju_user_warning(
@@ -140,7 +141,7 @@ class _File:
         return f'<geom type="box" size="{sizes}" pos="{self.vector()}" {self.orientation()}/>'
 
     def orientation(self) -> str:
-        """Return no orientation, or one in a random notation of MJCF."""
+        """Return an orientation in a random notation of MJCF, or no orientation."""
         rng = self.rng
         angle = 90.0 if self.degrees else 1.5
         return rng.choice(
@@ -187,7 +188,7 @@ def compiled(data: bytes) -> mujoco.MjModel | None:
 def difference(robot: Robot, model: mujoco.MjModel, seed: int) -> str | None:
     """Return a message about a body, a site or a joint coupling that differs from MuJoCo's.
 
-    Return None if nothing differs.
+    The result is None if nothing differs.
     """
     data = mujoco.MjData(model)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)

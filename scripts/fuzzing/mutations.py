@@ -1,4 +1,4 @@
-"""Mutants of real URDFs; the same seed and number give the same bytes on any machine.
+"""Make mutants of real URDFs; the same seed and number give the same bytes on any machine.
 
 There are four families: bytes, tokens, attributes, and structure (new parents, closed loops, swapped names,
 changed types and mimic rules).
@@ -120,7 +120,7 @@ Mutator = Callable[[random.Random, bytes], bytes]
 
 
 def mutant(seed: int, number: int, files: Sequence[Path]) -> Case:
-    """Return the mutant with a given number: its description and its bytes."""
+    """Return the description and the bytes of the mutant with the given number."""
     rng = random.Random(f"{seed}:{number}")
     path = rng.choice(list(files))
     data = path.read_bytes()
@@ -400,5 +400,5 @@ FAMILIES: tuple[tuple[Mutator, ...], ...] = (
         )
     ),
 )
-# Mutants of the structure are three times as frequent: most other mutants are simply rejected.
+# Mutants of the structure are three times as frequent, because most other mutants are rejected.
 FAMILIES = (*FAMILIES, FAMILIES[3], FAMILIES[3])

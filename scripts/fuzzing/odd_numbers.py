@@ -1,4 +1,4 @@
-"""Random unusual numbers of a hostile URDF; most of them are legal."""
+"""Draw random unusual numbers for a hostile URDF; most of these numbers are legal."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _TURNS = (0.0, math.pi, -math.pi, math.pi / 2, 1.5708, 3.14159, 1e-9)
 def written(rng: random.Random, x: float) -> str:
     """Return a number as text in a random notation.
 
-    The text stands for the number itself or for one very close to it.
+    The text represents the number itself or a number very close to it.
     """
     plain = repr(x)
     if rng.random() < 0.85:
@@ -30,7 +30,7 @@ def tame_length(rng: random.Random) -> float:
 
 
 def odd_length(rng: random.Random) -> float:
-    """Return a length from 1e-320 to 1e300; sums of several usually do not overflow."""
+    """Return a length from 1e-320 to 1e300; the sum of several such lengths usually does not overflow."""
     exponent = rng.choice(
         (rng.uniform(-320, 300), rng.uniform(-20, 20), rng.uniform(-6, 8), rng.uniform(-320, -150), -310.0)
     )
@@ -43,7 +43,7 @@ def tame_angle(rng: random.Random) -> float:
 
 
 def odd_angle(rng: random.Random) -> float:
-    """Return an angle up to 1e15, a tiny one, or nearly a multiple of a quarter turn."""
+    """Return an angle (rad) that is up to 1e15, tiny, or nearly a multiple of a quarter turn."""
     near = rng.choice(_TURNS) + rng.choice((-1.0, 1.0)) * 10.0 ** rng.uniform(-18, -3)
     large = rng.choice((-1.0, 1.0)) * 10.0 ** rng.uniform(0, 15)
     return rng.choice((near, large, 10.0 ** rng.uniform(-320, 0), rng.uniform(-9.0, 9.0), 90.0, 180.0))
@@ -60,7 +60,7 @@ def direction(rng: random.Random) -> list[float]:
 
 
 def odd_axis(rng: random.Random) -> list[float]:
-    """Return an axis of unusual length, or one nearly along a coordinate axis."""
+    """Return an axis of unusual length, or an axis that is nearly along a coordinate axis."""
     axis = direction(rng)
     if rng.random() < 0.5:
         tilt = 10.0 ** rng.uniform(-20, -3)
@@ -69,7 +69,7 @@ def odd_axis(rng: random.Random) -> list[float]:
 
 
 def odd_quaternion(rng: random.Random) -> list[float]:
-    """Return a quaternion of any length, which may be zero. Its rotation is none, tiny or arbitrary."""
+    """Return a quaternion of any length, also zero, whose rotation is none, tiny or arbitrary."""
     numbers = rng.choice(
         (
             [0.0, 0.0, 0.0, 1.0],
@@ -85,7 +85,7 @@ def odd_quaternion(rng: random.Random) -> list[float]:
 def odd_size(rng: random.Random) -> float:
     """Return the length of a direction vector.
 
-    It is mostly about 1, and sometimes close to the smallest or largest double.
+    The length is mostly about 1, and sometimes close to the smallest or the largest double.
     """
     exponent = rng.choice((0.0, 0.0, rng.uniform(-1e-9, 1e-9), rng.uniform(-6, 6), rng.uniform(-170, 170)))
     return math.pow(10.0, rng.uniform(-320, 300) if rng.random() < 0.05 else exponent)
@@ -110,7 +110,7 @@ def odd_factor(rng: random.Random) -> float:
 
 
 def odd_range(rng: random.Random, turns: bool) -> tuple[float, float]:
-    """Return limits of a joint: equal, one ulp apart, far away or infinite; rarely reversed."""
+    """Return limits of a joint that are equal, one ulp apart, far apart or infinite, and rarely reversed."""
     a = odd_angle(rng) if turns else odd_length(rng)
     b = odd_angle(rng) if turns else odd_length(rng)
     if rng.random() < 0.02:
@@ -131,7 +131,7 @@ def odd_range(rng: random.Random, turns: bool) -> tuple[float, float]:
 
 
 def odd_limit(rng: random.Random) -> str:
-    """Return a limit of effort or jerk: mostly positive, sometimes a value that urdfdom rejects."""
+    """Return a limit of effort or jerk that is mostly positive; urdfdom rejects some of the other values."""
     refused = ("-1.0", "-5e-324", "inf", "nan", "", "1e400", "0x10", "1.0 ")
     fine = ("0", "-0.0", "1e300", "5e-324", "1e-400")
     return rng.choice(refused) if rng.random() < 0.03 else rng.choice((*fine, written(rng, rng.random())))

@@ -1,7 +1,7 @@
-"""Random robots: trees of all kinds of joints, with some unusual content.
+"""Make random robots, which are trees with all kinds of joints and some unusual content.
 
-Most robots are legal, because a rejected robot is not computed. A robot depends only on the seed, its
-family and its number.
+Most of these robots are legal, because no quantity is computed for a rejected robot. A robot depends only on
+the seed, its family and its number.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ class _Robot:
     def joint(self, i: int) -> str:
         """Return joint i, the parent of link i + 1."""
         rng, kind = self.rng, self.kinds[i]
-        # Mostly chains, since rounding errors add up along a chain.
+        # Most robots are chains, because rounding errors add up along a chain.
         parent = i if rng.random() < 0.7 else rng.randint(0, i)
         parts = [
             f"<parent link={quoteattr(self.links[parent])}/>",

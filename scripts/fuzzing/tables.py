@@ -16,7 +16,7 @@ from urdfkin.loading import load
 from urdfkin.model.chain import FrameChain
 
 FAMILY = "tables"
-#: Format of `urdfkin.dh.export` -> suffix of its files.
+#: For each format of `urdfkin.dh.export`: the suffix of its files.
 FORMS = {
     "csv": ".csv",
     "markdown": ".md",
@@ -34,7 +34,8 @@ PIECES = (
     "1e155",
     "(i-1)",
 )
-#: On average, one of this number of changes is anywhere in the table. The other changes are in the headings.
+#: On average, one of this number of changes is anywhere in the table, and all other changes are in the
+#: headings.
 _ANYWHERE = 3
 
 

@@ -20,7 +20,7 @@ class Cost:
     Attributes:
         megabytes: Size of the document.
         seconds: Processor time.
-        memory: Largest growth of the process in megabytes, including the memory of the findings.
+        memory: Largest growth of the process's memory in megabytes, including the memory of the findings.
         findings: Number of reported findings.
     """
 

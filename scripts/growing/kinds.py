@@ -1,4 +1,4 @@
-"""Make large URDFs.
+"""Make large URDFs with repeated content.
 
 Each function takes a size in bytes, and returns a URDF of about this size with one kind of repeated content.
 

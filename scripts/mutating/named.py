@@ -1,4 +1,7 @@
-"""Named mutants that were once not detected: a text of a file, its replacement, and the test that fails."""
+"""Read the named mutants, which were once not detected.
+
+Each replaces a text of a file and has a test that must fail.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,7 @@ class Named:
         claim: The mistake that must be detected.
         module: The module, such as `urdfkin.validation.error_stats`.
         before: A text that occurs exactly once in the module.
-        after: Its replacement.
+        after: The text that replaces `before`.
         test: The test that fails with the mutant and passes without it.
     """
 

@@ -1,4 +1,4 @@
-"""All mutants of a file: each changes one node of its syntax tree.
+"""Make all mutants of a file; each mutant changes one node of the file's syntax tree.
 
 The mutants are mistakes that tests often miss: a changed comparison, an inverted condition, another number,
 another sign, an omitted call, an error that is not raised. Texts, types and compiled kernels are not
@@ -56,7 +56,7 @@ class Slip:
 
     @contextmanager
     def made(self) -> Iterator[Any]:
-        """Change the tree in place until the end of the block; yield the previous value."""
+        """Change the tree in place until the end of the `with` block; yield the previous value."""
         old = self._put(self.value)
         try:
             yield old
@@ -78,7 +78,7 @@ class Slip:
 
 
 def slips(tree: ast.Module) -> list[Slip]:
-    """Return all mutants of a file in a fixed order; applying one changes this tree."""
+    """Return all mutants of a file in a fixed order; applying a mutant changes the given tree."""
     return [slip for node in _code(tree) for slip in (*_of_expression(node), *_of_statement(node))]
 
 
@@ -90,7 +90,7 @@ def mutated(source: str, number: int) -> ast.Module:
 
 
 def function_at(tree: ast.Module, line: int) -> str:
-    """Return the function or class of a line, such as `Tally.percentile`; empty outside of all."""
+    """Return the function or class around a line, such as `Tally.percentile`, or "" if there is none."""
     return ".".join(node.name for node in _definitions(tree) if node.lineno <= line <= (node.end_lineno or 0))
 
 
@@ -113,7 +113,7 @@ def rewritten(source: str, before: str, after: str) -> ast.Module:
 
 
 def _code(node: ast.AST) -> Iterator[ast.AST]:
-    """Yield the nodes that are executed: no types, texts and decorators."""
+    """Yield the nodes of a syntax tree that are executed, without types, texts and decorators."""
     yield node
     for name, value in ast.iter_fields(node):
         if name in ("annotation", "returns", "decorator_list", "format_spec", "type_params"):

@@ -16,13 +16,13 @@ _COMPILED = {
 }  # fmt: skip
 
 
-#: Tests that make their own mutants, in separate processes.
+#: Tests that make their own mutants in separate processes.
 _OF_SLIPS = ("test_mutate", "test_named_slips")
 _OF_ROBOTS = ("test_robot.py", "verify", "laws")
 
 
 def files(parts: list[str]) -> list[Path]:
-    """Return the package's files, or those with a path below the package that begins with one of the parts.
+    """Return the package's files, or only the files whose path in the package begins with one of the parts.
 
     Raises:
         ValueError: no path begins with one of the parts.
@@ -46,7 +46,7 @@ def _below(path: Path) -> str:
 def near_tests(path: Path) -> list[str]:
     """Return the tests near a module: first the tests that mention the module, then the tests of its package.
 
-    A part of the package without tests of its own is tested through robots, by the tests of all other parts.
+    If a part of the package has no tests of its own, the tests of all other parts are returned.
     """
     package, _, name = module_of(path).rpartition(".")
     named = re.compile(

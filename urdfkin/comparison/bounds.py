@@ -181,7 +181,7 @@ class Search:
         return _distances(*self.poses(z, frames))
 
     def seen(self, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
-        """Return distances (n, frames) at random values and at corners of the ranges, with these values."""
+        """Return distances (n, frames) at random values and at corners of the ranges, and these values."""
         low, high = self.ends.T
         z = self.random(SAMPLES)
         corners = np.where(self.rng.random((CORNERS, len(self.names))) < 0.5, low, high)

@@ -189,7 +189,7 @@ def _reading(robot: Robot, name: str, q: FloatArray, ours: FloatArray) -> Librar
 
 
 def _source(robot: Robot) -> tuple[str, str]:
-    """Return what a library reads: the URDF text without shapes, or an MJCF file's path; and the format."""
+    """Return a library's input (URDF text without shapes, or the path of an MJCF file), and the format."""
     source = robot.origin.source
     if is_mjcf(source):
         if is_text(source):

@@ -599,7 +599,7 @@ def _around(found: Alignment) -> set[tuple[int, int]]:
 
 
 def _beside_the_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
-    """Return the links of the root body from which all moving joints descend, and those without any.
+    """Return the root body's links from which all moving joints descend, and its links from which none does.
 
     A link of the first set has a fixed child link from which all moving joints descend. From a link of the
     second set no moving joint descends. Both sets are empty if no joint moves.
