@@ -2,8 +2,8 @@
 
 Each page is opened at four widths, in a light and a dark theme. The script runs the accessibility checker
 axe, and looks for serious violations, errors in the console, sideways scrolling and requests to other hosts.
-It moves through the page with the Tab key, checks the HTML, and prints the page to a PDF. `--output` saves
-pictures of all screens and of the printed pages.
+The script also moves through the page with the Tab key, checks the HTML, and prints the page to a PDF.
+`--output` saves pictures of all screens and of the printed pages.
 
 The script needs Debian's chromium and chromium-driver. axe is in the extra `test`. A newer axe and the Nu
 HTML checker, which needs Java, are optional. Debian's poppler-utils draws the printed pages.

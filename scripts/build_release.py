@@ -3,10 +3,11 @@
     python scripts/build_release.py dist                  # build into the folder dist
     python scripts/build_release.py --tag v0.1.0 dist     # also fail if the tag is not the version
 
-The script builds the sdist from the checkout and the wheel from the sdist. It builds twice and compares the
-bytes. Then `twine check --strict` and `check-wheel-contents` check both files. The SBOM (CycloneDX, JSON)
-lists the packages that a new virtual environment with the wheel contains; `--sbom-of PYTHON` takes an
-existing environment instead, without network. SHA256SUMS has one line for each file. Exit 1: a check fails.
+The script builds the sdist from the checkout and the wheel from the sdist. The script builds twice and
+compares the bytes. Then `twine check --strict` and `check-wheel-contents` check both files. The SBOM
+(CycloneDX, JSON) lists the packages that a new virtual environment with the wheel contains; `--sbom-of
+PYTHON` takes an existing environment instead, without network. SHA256SUMS has one line for each file. Exit 1:
+a check fails.
 """
 
 from __future__ import annotations

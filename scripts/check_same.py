@@ -35,8 +35,8 @@ from urdfkin.comparison.result import Interval, Sameness, Verdict
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import catalogue
 
-#: Largest rounding error of a placement in a robot of some metres. It is in metres for positions, and without
-#: a unit for the entries of rotation matrices.
+#: Largest rounding error of a placement in a robot of some metres. The unit is metres for positions; entries
+#: of rotation matrices have no unit.
 ROUNDING = 1e-10
 
 

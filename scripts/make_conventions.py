@@ -4,8 +4,8 @@ For each row, the script compares a library's result with several candidate defi
 motion, and writes the one that matches. A test checks that the page is current.
 
 The tables of other tools come from urdfkin/conventions/conventions.toml. With --measure, the script first
-runs each installed library, in the library's convention, on all robots of the catalogue. It writes the
-results to the same file.
+runs each installed library, in the library's convention, on all robots of the catalogue. The script writes
+the results to the same file.
 
     python scripts/make_conventions.py
     python scripts/make_conventions.py --measure

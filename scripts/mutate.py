@@ -6,9 +6,9 @@
     python scripts/mutate.py --named                       the mutants of tests/attacks/named_slips.toml
 
 The script runs the quick tests near the mutated file. With --slow it then runs the slow tests near this file,
-and with --whole the whole test suite. It prints every undetected mutant, and writes all results to --json. It
-skips the mutants that docs/mutation.md lists as harmless. Exit 0: all mutants are detected or harmless. 1:
-some mutants are not detected, or there is no mutant. 2: a part does not exist.
+and with --whole the whole test suite. The script prints every undetected mutant, and writes all results to
+--json. Mutants that docs/mutation.md lists as harmless are skipped. Exit 0: all mutants are detected or
+harmless. 1: some mutants are not detected, or there is no mutant. 2: a part does not exist.
 """
 
 from __future__ import annotations

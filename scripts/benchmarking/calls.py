@@ -61,7 +61,7 @@ class Calls:
     def loop(self) -> Callable[..., None]:
         """Return a function with the loop.
 
-        Its arguments are `out` and the batch of q, or the batches of q, v and a.
+        The arguments of the function are `out` and the batch of q, or the batches of q, v and a.
         """
         body = self.store or (*self.lines[:-1], f"out[k] = {self.lines[-1]}")
         return _function(self.names, "out, *inputs", "for k, (q, v, a) in enumerate(rows(inputs)):", body)
@@ -69,7 +69,7 @@ class Calls:
     def single(self, subject: Subject, quantity: str) -> Work:
         """Return the work of single calls.
 
-        Their results are not stored, and the rows of the inputs are prepared beforehand.
+        The results of these calls are not stored, and the rows of the inputs are prepared beforehand.
         """
         inputs = [list(self._ordered(x)) for x in subject.inputs(quantity, subject.loop)]
         rows = list(_rows(inputs))

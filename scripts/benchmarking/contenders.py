@@ -142,7 +142,7 @@ def _urdfkin_lines(
 def pinocchio_calls(urdf: str, frame: str, quantity: str) -> Calls:
     """Return the cheapest calls.
 
-    These are `computeFrameJacobian`, or a recursion and `getFrameClassicalAcceleration`.
+    The calls are `computeFrameJacobian`, or a recursion and `getFrameClassicalAcceleration`.
     """
     model = pin.buildModelFromXML(urdf)
     names = {

@@ -43,7 +43,7 @@ def columns(
 
     Args:
         plan: The compiled tree of one frame.
-        x: The coordinate of each joint. It may be any kind of number, such as a float or a symbol.
+        x: The coordinate of each joint, which may be any kind of number, such as a float or a symbol.
         sines: The sine of each coordinate.
         cosines: The cosine of each coordinate.
         eq: The textbook's equations, implemented for the same kind of number.

@@ -2,8 +2,8 @@
 
 Every contender is timed once in each round, so that other load affects all of them. Ratios of one run are
 therefore reliable also on a noisy machine; absolute times are not. The order of the contenders changes in
-each round. Before a contender is timed, it computes once without timing. Its data are then in the cache, and
-the threads of the previous contender sleep.
+each round. Before a contender is timed, it computes once without timing. The data of this contender are then
+in the cache, and the threads of the previous contender sleep.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Compute every quantity of a robot in each reference frame, single and in batches, on any base.
 
 urdfkin compares each call with Pinocchio. This module checks that the results of different calls have the
-same bits, because all calls use the same forward recursion. It also checks that every name of a frame is
-accepted.
+same bits, because all calls use the same forward recursion. The module also checks that every name of a frame
+is accepted.
 """
 
 from __future__ import annotations

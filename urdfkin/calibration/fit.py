@@ -8,9 +8,9 @@ of the decomposition. You do not have to choose a tolerance.
 
 The frame of a revolute joint can be shifted along the joint's axis and rotated about it, if the next frame
 compensates this change. The frame of a prismatic joint can be shifted anywhere and rotated about the joint's
-direction. So 4 of the 6 parameters of each revolute joint are identifiable, 2 of each prismatic joint, and 6
-of the tip (Everett, Driels and Mooring, 1987). From positions alone, 3 parameters fewer are identifiable,
-because the tool's orientation is not measured.
+direction. Therefore, 4 of the 6 parameters of each revolute joint are identifiable, 2 of the 6 parameters of
+each prismatic joint, and all 6 parameters of the tip (Everett, Driels and Mooring, 1987). From positions
+alone, 3 parameters fewer are identifiable, because the tool's orientation is not measured.
 
 The parameters that are not fitted are fixed. Orthogonal elimination chooses the fixed parameters joint by
 joint, from base to tip. Each parameter has a column in the Jacobian. The elimination finds the column that
@@ -235,8 +235,8 @@ class Fit:
         at: (p,) values of all parameters.
         errors: (s, 6) or (s, 3) residuals: measured minus computed, in the base, m and rad.
         noise: The standard deviations by which the residuals are divided.
-        covariance: (k, k) covariance of the fitted parameters, in the units of the parameters. It is infinite
-            if the redundancy is 0.
+        covariance: (k, k) covariance of the fitted parameters, in the units of the parameters. The covariance
+            is infinite if the redundancy is 0.
         left: (s, 6) or (s, 3) redundancy 1 - H_ii of each measured coordinate.
         odd: (s,) chi^2 statistic of each pose.
     """
@@ -262,7 +262,7 @@ class Fit:
     def ratio(self) -> float:
         """The ratio of the noise in the residuals to the stated noise.
 
-        It is about 1, within 1/sqrt(2 freedom).
+        For correct noise, the ratio is about 1, within 1/sqrt(2 freedom).
         """
         if not self.is_judged:
             return math.nan

@@ -8,8 +8,8 @@ the cosine of each joint value.
 
 **Branch and bound.** `urdfkin.model.mechanisms.upper_bound` adds the effects of all differences, each at its
 own worst configuration. If the models differ in many places, this sum is far above the largest distance.
-`Boxes` gives a sharper bound. It divides the space of all variables into boxes, and bounds D(q) = p_B - p_A
-in each box. In a box with middle c and half widths h,
+`Boxes` gives a sharper bound. `Boxes` divides the space of all variables into boxes, and bounds D(q) = p_B -
+p_A in each box. In a box with middle c and half widths h,
 
     |D(q)| <= max |D(c) + sum_i D_i(c) x_i| + (1/2) sum_ij M_ij h_i h_j,     |x_i| <= h_i.
 

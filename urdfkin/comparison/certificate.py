@@ -103,7 +103,7 @@ class JointEntry(TypedDict):
 
 
 class ToolEntry(TypedDict):
-    """A pair of matched links that are mounted differently, so that they count as different tools."""
+    """A pair of matched links that count as different end-effector frames, because their mounting differs."""
 
     a: Annotated[str, says("Link of A.")]
     b: Annotated[str, says("Link of B.")]
@@ -381,8 +381,8 @@ def _confirmation_errors(
 def _gauge(document: Certificate) -> Gauge:
     """Return the gauge in a certificate.
 
-    The gauge contains the choices that align B with A. These are the base's pose, the joints' senses and
-    zeros, the conversions of planar and floating joints, and the orders of joints.
+    The gauge contains the choices that align B with A. The choices are the base's pose, the joints' senses
+    and zeros, the conversions of planar and floating joints, and the orders of joints.
     """
     joints, base = document["joints"], document["base_links"]
     return Gauge(

@@ -70,7 +70,7 @@ class Interval:
     Attributes:
         frame: The link of A.
         frame_b: The link of B.
-        lower: Lower bound of the largest distance, metres. It is the distance at `q_a` and `q_b`.
+        lower: Lower bound of the largest distance, metres. The bound is the distance at `q_a` and `q_b`.
         upper: Proven upper bound of the distance, metres; inf if there is no bound.
         radians: Proven upper bound of the angle between the two orientations of the frame.
         radians_seen: The angle between the two orientations at `q_a` and `q_b`.
@@ -172,7 +172,10 @@ def _range(ends: Value) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """Two matched links that count as different tools: B's link `b` has the `pose` (4, 4) in A's link `a`."""
+    """Two matched links that count as different end-effector frames.
+
+    `pose` (4, 4) is that of B's `b` in A's `a`.
+    """
 
     a: str
     b: str
@@ -243,8 +246,8 @@ class Sameness(Displayable):
         tools: The matched links that count as different tools.
         orders: Groups of consecutive joints of B that are matched in another order than in B. The joints'
             axes must allow the exchange without a change of motion.
-        base: (4, 4) pose of B's root in A's root frame, in the zero configuration. It is the identity if the
-            two roots coincide.
+        base: (4, 4) pose of B's root in A's root frame, in the zero configuration. The pose is the identity
+            if the two roots coincide.
         base_links: A link of A and a link of B. The poses of A are compared relative to the first link, and
             those of B relative to the second. The two links belong to matching rigid bodies.
         rounding: (m, rad) largest distance and angle between matching frames that count as rounding.
@@ -322,7 +325,7 @@ class Sameness(Displayable):
     def worst_as_written(self) -> Interval | None:
         """The interval for the frame that is farthest apart without the changes in `after`.
 
-        Both models have equal coordinates in this comparison.
+        In this comparison, A and B have equal coordinates.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -602,7 +605,7 @@ def _beside_the_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
     """Return the root body's links from which all moving joints descend, and its links from which none does.
 
     A link of the first set has a fixed child link from which all moving joints descend. From a link of the
-    second set no moving joint descends. Both sets are empty if no joint moves.
+    second set no moving joint descends. The two sets are empty if no joint moves.
     """
     tree = mechanism.tree
     carried = [0] * len(tree.links)

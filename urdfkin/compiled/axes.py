@@ -32,7 +32,7 @@ def world_axes(own, world):
 def seen(axes, R, x):
     """Return a vector x, given in a link's own axes, in the axes that the function `axes` selects.
 
-    These are the link's own axes or the world axes.
+    The selected axes are the link's own axes or the world axes.
     """
     return axes(x, eq.rotate(R, x))
 

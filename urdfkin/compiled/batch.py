@@ -23,8 +23,8 @@ _WORTH_THREADS = 4096
 #: processor's cache.
 PART = 2048
 
-#: A function (inputs, out) that computes the rows of `out` from the rows of the inputs. It returns 1 if an
-#: input is nan, infinite or too large (see `ordinary` in `urdfkin.compiled.machine.memory`), else 0.
+#: A function (inputs, out) that computes the rows of `out` from the rows of the inputs. The function returns
+#: 1 if an input is nan, infinite or too large (see `ordinary` in `urdfkin.compiled.machine.memory`), else 0.
 Compute = Callable[[Sequence[FloatArray], FloatArray], int]
 
 
@@ -49,7 +49,7 @@ def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, t
     The result is 1 if an input is nan, infinite or too large, else 0.
 
     Args:
-        compute: The computation. It must release Python's global interpreter lock.
+        compute: The computation, which must release Python's global interpreter lock.
         inputs: C-contiguous arrays.
         out: C-contiguous array.
         threads: Largest number of threads; None for the number from `default_threads`.

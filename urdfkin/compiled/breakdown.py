@@ -12,14 +12,14 @@ terms of its acceleration. The sum of these terms over all joints, from the last
 | coriolis | 2 w_{k-1} x u_k | velocity of the joint while its link rotates |
 | sliding | a_k z | acceleration of a prismatic joint |
 
-The vector d leads from the joint's origin to the frame's origin. It is computed as the sum of the interorigin
-vectors after the joint, as in 7.110. A difference of two positions in the world would lose digits if the
-robot is far from the world's origin or has a long link.
+The vector d leads from the joint's origin to the frame's origin. This vector d is computed as the sum of the
+interorigin vectors after the joint, as in 7.110. A difference of two positions in the world would lose digits
+if the robot is far from the world's origin or has a long link.
 
-The angular acceleration follows from 7.129. Its term a_k z has the kind transverse, and its term v_k w_{k-1}
-x z has the kind coriolis. A planar or floating joint translates and rotates at the same time, and its axes of
-translation rotate with it. Let s be the joint's linear velocity and o its angular velocity. Such a joint then
-adds the term o x s, of the kind coriolis.
+The angular acceleration follows from 7.129. In 7.129, the term a_k z has the kind transverse, and the term
+v_k w_{k-1} x z has the kind coriolis. A planar or floating joint translates and rotates at the same time, and
+its axes of translation rotate with it. Let s be the joint's linear velocity and o its angular velocity. Such
+a joint then adds the term o x s, of the kind coriolis.
 """
 
 from __future__ import annotations

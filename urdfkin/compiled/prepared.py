@@ -23,8 +23,9 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.locks import importing
 
-#: A function of q, or q and v, or q, v and a, and of the output array or None. It returns the result, or None
-#: for arguments that it does not support. In that case `Robot` computes the result or raises the error.
+#: A function of q, or q and v, or q, v and a, and of the output array or None. The function returns the
+#: result, or None for arguments that it does not support. In that case `Robot` computes the result or raises
+#: the error.
 Fast = Callable[..., FloatArray | None]
 
 

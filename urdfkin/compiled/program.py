@@ -241,7 +241,7 @@ class _Writer:
     def _angles(self) -> list[int]:
         """Return the list of joint angles.
 
-        It has an entry of `ANGLE_WIDTH` numbers for each step with a rotation.
+        The list has an entry of `ANGLE_WIDTH` numbers for each step with a rotation.
         """
         angles = []
         for i, step in enumerate(self.plan.steps):

@@ -10,7 +10,7 @@ The state of a link consists of:
 
 The recursion expresses vectors in the axes of the requested result: world axes or the link's own axes. A
 rotation of the result at the end would add rounding errors. The equations are those of
-`urdfkin.kinematics.equations`. They are the same in world axes and in a link's own axes.
+`urdfkin.kinematics.equations`. The equations are the same in world axes and in a link's own axes.
 
 If an output does not need a part of the state, this part is `nothing()` and costs no time.
 

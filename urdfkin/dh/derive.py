@@ -237,7 +237,7 @@ def _reversed_axes(chain: FrameChain, flip: Collection[str]) -> list[FloatArray]
 def _use_freedom_of_prismatic_axes(
     chain: FrameChain, constants: list[FloatArray], choices: Choices, reach: float
 ) -> None:
-    """Choose the lines of prismatic joints; a prismatic joint defines only a direction.
+    """Choose the axis lines of prismatic joints; a prismatic joint defines only the direction of its axis.
 
     A prismatic motion commutes with every translation, so a shift of the joint's line changes no placement.
     The first joint's line passes through the base's origin, so that the base can be the identity. The last

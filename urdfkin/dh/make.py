@@ -2,9 +2,9 @@
 
 You can request a table with the same frames as a published table. The author of a table chooses the sense of
 each joint and the direction of each x axis. `reversed_like` derives a table for every pattern of senses that
-fits the published table approximately. It selects the pattern with the table that is closest to the published
-table. It compares first the cells, then the zeros, then base and tool. In the table of a Kinova arm, for
-example, the first joint has sense -1, and frame 0 is upright as in the data sheet.
+fits the published table approximately. The function selects the pattern whose table is closest to the
+published table. It first compares the cells of the two tables, then the zeros, then base and tool. In the
+table of a Kinova arm, for example, the first joint has sense -1, and frame 0 is upright as in the data sheet.
 """
 
 from __future__ import annotations

@@ -8,8 +8,8 @@ lines before and after the table may state the convention, names, base and tool.
 in this form. The result is plain data for `urdfkin.dh.rows`. The module never guesses. For example, a table
 without a convention is an error in `urdfkin.dh.rows`.
 
-`references` finds the reference tables in urdfkin. These are tables of vendors and textbooks, each with its
-source.
+`references` finds the reference tables in urdfkin. The reference tables come from vendors and textbooks, and
+each table states its source.
 """
 
 from __future__ import annotations

@@ -358,8 +358,8 @@ _TABLE_KEYS = (
     *("convention", "angles", "lengths", "robot", "base_frame", "tip_frame", "base", "tool"),
     *("coordinates", "rows"),
 )
-#: Keys that do not change the table. They contain information, for example the source of the numbers and the
-#: URDF of the same robot.
+#: Keys that do not change the table. Such keys contain information, for example the source of the numbers and
+#: the URDF of the same robot.
 NOTES = ("source", "source_kind", "note", "name", "urdf", "snap", "last", "fit_sign", "checked")
 
 

@@ -34,8 +34,8 @@ from urdfkin.model.path import Motion, Path
 from urdfkin.model.pose import pose
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, build_tree, frozen
 
-#: Tolerance of handwritten screws. It applies to the deviation of an axis' length from 1, and to the
-#: deviation of a pitch from 0 (m/rad).
+#: Tolerance of handwritten screws. The tolerance applies to the deviation of an axis' length from 1, and to
+#: the deviation of a pitch from 0 (m/rad).
 _WRITTEN = 1e-4
 
 

@@ -2,10 +2,10 @@
 
 `structure` reports which axes are parallel or intersect, each with the deviation from the exact property. The
 function also reports which closed-form solutions exist. The distance and the angle of two consecutive axes
-are the same in every configuration. They are therefore computed only in the zero configuration, from the
-screws (`urdfkin.dh.screws`). Pinocchio checks the screws. Pieper (1968): six revolute joints have a
-closed-form solution if three consecutive axes are parallel or intersect in one point. A calibrated robot has
-such a property only approximately. The deviation is given in radians and metres.
+are the same in every configuration. Therefore, the distance and the angle are computed only in the zero
+configuration, from the screws (`urdfkin.dh.screws`). Pinocchio checks the screws. Pieper (1968): six revolute
+joints have a closed-form solution if three consecutive axes are parallel or intersect in one point. A
+calibrated robot has such a property only approximately. The deviation is given in radians and metres.
 
 `opw_of` returns the seven parameters of an ortho-parallel arm with a spherical wrist (OPW, Brandstoetter et
 al., 2014). An OPW arm is the standard table

@@ -1,6 +1,6 @@
 """Check a URDF and return findings, each with a code and a position.
 
-Urdfkin checks every URDF before it uses it.
+urdfkin checks every URDF before it uses it.
 """
 
 from urdfkin.lint.runner import check, check_text

@@ -66,7 +66,8 @@ def mend(
     Args:
         text: The file.
         look: A function that checks a text and returns all findings.
-        choose: A function that returns a filter for the findings to fix. It is called once for each pass.
+        choose: A function that returns a filter for the findings to fix. This function is called once for
+            each pass.
     """
     now, fixed, kept = look(text), list[Finding](), dict[str, str]()
     for _ in range(PASSES):
@@ -149,7 +150,7 @@ def _difference(a: JointRecord, b: JointRecord, turns: float) -> str | None:
     return next((what for what, same in equal.items() if not same), None)
 
 
-#: Factor on the bound `Fix.turns`. It allows for the rounding errors of that bound, which is a sum of
+#: Factor on the bound `Fix.turns`. The factor allows for the rounding errors of that bound, which is a sum of
 #: doubles.
 _SLACK = 1 + Fraction(1, 2**50)
 

@@ -303,7 +303,7 @@ class Choice:
     def of(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
         """Return a function that decides whether a finding is reported.
 
-        It is called with a file's findings in order.
+        The returned function is called with the findings of a file in order.
 
         Args:
             text: The file.

@@ -20,7 +20,7 @@ class BaseMotion:
     fields store the numbers without changes, because Pinocchio receives the same numbers in a comparison.
 
     Attributes:
-        placement: (..., 4, 4) T_world_base. Its rotation matrix may be rounded, even to one digit; the
+        placement: (..., 4, 4) T_world_base. The rotation matrix may be rounded, even to one digit; the
             computation uses the nearest exact rotation matrix
             (`urdfkin.kinematics.rotation.nearest_rotation`).
         velocity: (..., 6) [linear; angular] of the base's origin, world axes, m/s and rad/s.

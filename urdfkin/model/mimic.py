@@ -65,7 +65,7 @@ class Coupling:
     def places(self, what: str = "q") -> CoordinateLayout:
         """Return the names and units of the numbers of the path's q, v or a.
 
-        They are needed to read values that are given by name.
+        The names and units are needed to read values that are given by name.
         """
         rules = list(zip(self.joints, self.mimics, self.kinds, strict=True))
         units = {joint: "rad" if kind.turns else "m" for joint, mimic, kind in rules if not mimic}

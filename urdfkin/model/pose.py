@@ -28,7 +28,7 @@ def pose(R: ArrayLike | None = None, p: ArrayLike | None = None) -> FloatArray:
 def is_rigid(T: FloatArray, tolerance: float) -> bool:
     """Return whether a matrix (4, 4) is a rigid transform.
 
-    Its upper left block must be a rotation within `tolerance`.
+    The upper left block of the matrix must be a rotation matrix within `tolerance`.
     """
     return bool(rotation_defect(T[:3, :3]) <= tolerance) and T[3].tolist() == [0.0, 0.0, 0.0, 1.0]
 

@@ -75,7 +75,7 @@ class Recursion:
     def seen(self, s: State, x: Vector) -> Vector:
         """Return a vector x, given in the link's own axes, in the axes that `own` selects.
 
-        These are the link's own axes or the world axes.
+        The selected axes are the link's own axes or the world axes.
         """
         return x if self.own else self.eq.rotate(s.R, x)
 

@@ -1,7 +1,7 @@
 """The robot model: a tree of links and joints, with the joint limits and mimic rules of the URDF.
 
-`KinematicTree` depends neither on XML nor on Pinocchio. Its links and joints are in Pinocchio's order (depth
-first, sibling joints by name), so `q` and `v` have the same order in urdfkin and in Pinocchio.
+`KinematicTree` depends neither on XML nor on Pinocchio. The links and joints of the tree are in Pinocchio's
+order (depth first, sibling joints by name), so `q` and `v` have the same order in urdfkin and in Pinocchio.
 """
 
 from __future__ import annotations
@@ -82,8 +82,8 @@ class Limit:
     effort: float
 
 
-#: Largest plausible joint angle, radians. It is more than one turn, because some industrial wrists turn 400
-#: degrees.
+#: Largest plausible joint angle, radians. The angle is more than one turn, because some industrial wrists
+#: turn 400 degrees.
 LARGEST_ANGLE = 2.5 * math.pi
 #: Smallest excess over a joint's limits that is far outside, in radians or metres, and as a share of the
 #: joint's range.
@@ -109,8 +109,8 @@ def is_bounded(limit: Limit | None) -> TypeGuard[Limit]:
 class Mimic:
     """The rule of a mimic joint: its value is `multiplier * q_leader + offset`.
 
-    `leader` is the name of the mimicked joint. It is not a mimic joint itself: chains of mimic joints are
-    resolved before a tree is built.
+    `leader` is the name of the mimicked joint. The mimicked joint is not a mimic joint itself, because chains
+    of mimic joints are resolved before a tree is built.
     """
 
     leader: str

@@ -84,8 +84,8 @@ def validate(
             report names the third library. This needs the extra `mujoco`.
         isolate: Run each robot in its own process, `jobs` processes at a time. If a process crashes, its
             robot is reported as not verified with the reason, and the other robots continue.
-        executor: Runs the chunks if they shall not run in local processes. It is an executor with the
-            interface of `concurrent.futures`, or a cluster (`urdfkin.validation.cluster.connected`).
+        executor: Runs the chunks if they shall not run in local processes. The argument is an executor with
+            the interface of `concurrent.futures`, or a cluster (`urdfkin.validation.cluster.connected`).
         store: A folder in which each finished chunk is saved. After any interruption, the same call resumes
             the run. The function `stored` makes a report from the folder at any time.
         retry: "failed": compute again the robots in the store that could not be checked. The texts of these

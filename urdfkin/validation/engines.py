@@ -91,7 +91,7 @@ class WorkQueue:
         return task
 
     def put_back(self, task: Task, row: Row) -> None:
-        """Put a task back into its row, for a worker without a robot."""
+        """Put a task back into its row, so that a worker without a robot can take this row."""
         row.put_back(task)
         self._begun.remove(row)
         self._waiting = chain([row], self._waiting)

@@ -1,9 +1,9 @@
 """Check a function of a user against urdfkin, the oracle and the derived bound.
 
-The function computes a row of the table of quantities from q, from q and v, or from q, v and a. It is called
-at random configurations, at the zero configuration and at the joint limits. First, urdfkin's results at these
-configurations are compared with the oracle's results. If they agree, the function is the cause of any later
-disagreement.
+The user's function computes a quantity from q, from q and v, or from q, v and a. The module calls this
+function at random configurations, at the zero configuration and at the joint limits. First, urdfkin's results
+at these configurations are compared with the oracle's results. If they agree, the function is the cause of
+any later disagreement.
 """
 
 from __future__ import annotations

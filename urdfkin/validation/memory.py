@@ -68,8 +68,8 @@ def _gigabytes(size: int) -> str:
 def _free() -> Iterator[int]:
     """Yield several numbers of free bytes.
 
-    These are the free bytes of the machine, of each control group of this process, and of the process's own
-    limit.
+    The numbers are the free bytes of the machine, of each control group of this process, and of the process's
+    own limit.
     """
     for line in _lines(_PROC / "meminfo"):
         if line.startswith("MemAvailable:"):

@@ -2,10 +2,10 @@
 
 A chunk runs in a separate process, not in the process of Dask's worker.
 
-Dask's worker imports no computing code, so a robot cannot crash the worker. It can only crash the separate
-process. A chunk that crashes its process is tried a second time in a new process. If the second process
-crashes too, the crash is the answer. Chunks and answers are transferred as bytes. The text of a robot is sent
-only once for all chunks of the robot.
+Dask's worker imports no computing code, so a robot can only crash the separate process and not the worker. A
+chunk that crashes its process is tried a second time in a new process. If the second process crashes too, the
+crash is the answer. Chunks and answers are transferred as bytes. The text of a robot is sent only once for
+all chunks of the robot.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from urdfkin.validation.worker_processes import WorkerProcess
 if TYPE_CHECKING:
     from urdfkin.validation.chunk import Chunk
 
-#: The result of a chunk on a worker. It is the pickle of the answer, the cause of the chunk's crashes, or the
-#: versions on the worker's machine.
+#: The result of a chunk on a worker. The result is the pickle of the answer, the cause of the chunk's
+#: crashes, or the versions on the worker's machine.
 Found = (
     tuple[Literal["answer"], bytes]
     | tuple[Literal["died"], str]

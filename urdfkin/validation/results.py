@@ -34,7 +34,8 @@ if TYPE_CHECKING:
 
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-#: Packages of urdfkin that only display results. Their code may change between two runs of a campaign.
+#: Packages of urdfkin that only display results. The code of these packages may change between two runs of a
+#: campaign.
 _SHOWING = ("cli", "motion", "report", "view")
 #: Libraries that compute results or read robots.
 LIBRARIES = ("urdfkin", "pin", "numpy", "numba", "llvmlite", "yourdfpy", "mujoco")

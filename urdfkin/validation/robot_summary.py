@@ -1,7 +1,7 @@
 """Summary of a robot for `urdfkin info --format json` and the validation report.
 
-The summary has the links and joints, the findings in the file, and Denavit-Hartenberg tables. It is plain
-data, which can be sent between processes and written as JSON.
+The summary has the links and joints, the findings in the file, and Denavit-Hartenberg tables. The summary is
+plain data, which can be sent between processes and written as JSON.
 
 The chains of a catalogue robot are the limbs in the catalogue. For other robots the chains are the paths from
 the base to the leaves, one path for each set of moving joints. The tables are exact, in both conventions, and

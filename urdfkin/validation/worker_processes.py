@@ -70,7 +70,7 @@ class WorkerProcess:
 def _interpreter(pipe: int) -> subprocess.Popen[bytes]:
     """Start an interpreter that imports the same packages as this one.
 
-    It does not import from the current folder, and does not import the main module of this process.
+    The new interpreter imports neither from the current folder nor the main module of this process.
 
     The new interpreter has its own process group. Ctrl-C in the terminal therefore interrupts only the parent
     process, which then saves the finished results.

@@ -10,8 +10,8 @@ The program reads a list of cases `{"name", "text", "configurations"}` and print
 case. A configuration gives values by the names of the independent joints: one number (rad or m), three for a
 planar joint (x, y, angle), seven for a floating joint (x, y, z, qx, qy, qz, qw).
 
-An adapter passes all inputs that the library's documentation requires. It sets no values of mimic joints,
-because the file contains the mimic rules. It does not correct wrong poses.
+An adapter passes all inputs that the library's documentation requires. The adapter sets no values of mimic
+joints, because the file contains the mimic rules. The adapter does not correct wrong poses.
 """
 
 from __future__ import annotations

@@ -5,8 +5,8 @@ The module computes eq. 7.122 a second time, as a check of results. It shares no
 
 An Euler sequence rotates about the coordinate axes i, then j, then k, so that R = R_i R_j R_k. The first axis
 of rotation is e_i and the third is R e_k. The middle axis, the line of nodes, is perpendicular to the first
-and to the third axis. It is +- n / |n| with n = e_i x R e_k. The range of the middle angle b determines the
-sign:
+and to the third axis. The middle axis is +- n / |n| with n = e_i x R e_k. The range of the middle angle b
+determines the sign:
 
 - k = i: b is in [0, pi], the sign is +1, and |n| = |sin b|.
 - k != i: b is in [-pi/2, pi/2], the sign is (e_j x e_i) . e_k, and |n| = |cos b|.

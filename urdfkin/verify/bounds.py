@@ -29,12 +29,12 @@ product with p (WORLD).
 Measured differences are a fraction of an eps for each joint, because rounding errors rarely add up in the
 worst way. Reports state these differences in multiples of eps * scale, which can be compared between robots.
 
-`magnitudes` runs the recursion on lengths. It evaluates eq. 7.58 and 7.127 to 7.130 with the number types of
-`urdfkin.kinematics.number_kinds`. With these number types, no intermediate value exceeds the result. One term
-is different in Pinocchio: eq. 7.129 has v_i w_{i-1} x z, Pinocchio has v_i w_i x z. The joint's own part of
-w_i is parallel to z and contributes only rounding, v_i^2 |z x z|. This rounding is relevant for fast joints
-with an oblique axis. The scale of alpha includes this rounding, because the equation receives the w of the
-link after the joint.
+`magnitudes` runs the recursion on lengths. The function evaluates eq. 7.58 and 7.127 to 7.130 with the number
+types of `urdfkin.kinematics.number_kinds`. With these number types, no intermediate value exceeds the result.
+One term is different in Pinocchio: eq. 7.129 has v_i w_{i-1} x z, Pinocchio has v_i w_i x z. The joint's own
+part of w_i is parallel to z and contributes only rounding, v_i^2 |z x z|. This rounding is relevant for fast
+joints with an oblique axis. The scale of alpha includes this rounding, because the equation receives the w of
+the link after the joint.
 """
 
 from __future__ import annotations
@@ -380,8 +380,9 @@ def jacobian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -
 def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
     """Return (n, frames, 6, nv), the size of the terms of J-dot.
 
-    A revolute column is at most as long as the frame's path. Its lever arm changes at most as fast as the
-    frame's origin moves. In LOCAL the numbers are components along the frame's axes, which rotate.
+    A revolute column is at most as long as the frame's path. The lever arm of the column changes at most as
+    fast as the frame's origin moves. In LOCAL the numbers are components along the frame's axes, which
+    rotate.
     """
     turning, sliding = column_weights(plan)
     w, p, vel = size.w[..., None], size.p[..., None], size.vel[..., None]
@@ -478,9 +479,9 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
 def quaternion_jacobian_bound(bound: Bound) -> Bound:
     """Return the bound of analytical Jacobians with quaternions, (n, frames, 7, nv); no singularity.
 
-    The position rows have the Jacobian's bound. A row of 4 q q^T is linear in R. Its error is below
-    4.6 delta and its length at least 2, so the error of q is below 2.3 delta. Half the product of w and q has
-    an error of (2.3 + 1) / 2 delta relative to w, which is below the Jacobian's two factors.
+    The position rows have the Jacobian's bound. A row of 4 q q^T is linear in R. The error of this row is
+    below 4.6 delta and its length at least 2, so the error of q is below 2.3 delta. Half the product of w and
+    q has an error of (2.3 + 1) / 2 delta relative to w, which is below the Jacobian's two factors.
     """
     return Bound(np.concatenate((bound.scale, bound.scale[..., 5:, :]), axis=-2), bound.k)
 

@@ -127,7 +127,7 @@ def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> Co
         ours: urdfkin's results. The first `axes` axes number the results; the other axes belong to a single
             result.
         theirs: The oracle's results, of the same shape.
-        bound: Bound on the difference. Its arrays `scale` and `k` broadcast against the results.
+        bound: Bound on the difference. The arrays `scale` and `k` of the bound broadcast against the results.
         axes: Number of leading axes that count results.
     """
     units = worst_of_each(ours, theirs, bound.scale, axes)

@@ -38,7 +38,8 @@ def check_analytical_jacobian(
         bound_of: Function for the bound of the velocity Jacobian.
         oracle: The oracle's model of the robot.
         x: The configurations.
-        ours: urdfkin's results. They determine the sign of a quaternion if rounding errors hide its sign.
+        ours: urdfkin's results. The results determine the sign of a quaternion if rounding errors hide its
+            sign.
         by: The oracle.
     """
     aligned = Reference.LOCAL_WORLD_ALIGNED
@@ -67,10 +68,11 @@ def check_relative_placement(
     """Return relative placements (n, frames, 4, 4) from an oracle, and their bound.
 
     The placement is that of frame b relative to frame a. Let s_a and s_b be the path lengths of the frames,
-    and k_a and k_b the roundings of their placements. The position is R_a^T (p_b - p_a). Its error is k_b s_b
-    + k_a s_a from the positions and k_a |p_b - p_a| from R_a. Since |p_b - p_a| <= s_a + s_b, the sum is at
-    most (2 k_a + k_b) (s_a + s_b). The error of the product of rotations is k_a + k_b. The difference and the
-    products add rounding errors of about 5 eps. The additional joint in each k covers these rounding errors.
+    and k_a and k_b the roundings of their placements. The position is R_a^T (p_b - p_a). The error of the
+    position is k_b s_b + k_a s_a from p_a and p_b, plus k_a |p_b - p_a| from R_a. Since |p_b - p_a| <= s_a +
+    s_b, the sum is at most (2 k_a + k_b) (s_a + s_b). The error of the product of rotations is k_a + k_b. The
+    difference and the products add rounding errors of about 5 eps. The additional joint in each k covers
+    these rounding errors.
 
     Args:
         bound_of: Function for the bound of placements in the world.

@@ -65,7 +65,10 @@ def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
 
 
 def _placements(model: Any, q: FloatArray, made: Modelled) -> FloatArray:
-    """Return the model's placements (n, links, 4, 4). Those of joints come first, then those of frames."""
+    """Return the model's placements (n, links, 4, 4).
+
+    Placements of joints come before placements of frames.
+    """
     pin = pinocchio()
     data = model.createData()
     out = np.empty((len(q), len(made.joints) + len(made.frames), 4, 4))

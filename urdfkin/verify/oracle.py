@@ -172,7 +172,7 @@ class OracleQuery:
         self._given, self._named, self._joints = inputs, named or [None] * len(inputs), joints
 
     def read(self) -> None:
-        """Convert the inputs now. They may be views of `out`, which the computation overwrites."""
+        """Convert the inputs now. The inputs may be views of `out`, which the computation overwrites."""
         _ = self._inputs
 
     @cached_property

@@ -1,7 +1,8 @@
 """Check roll-pitch-yaw angles and quaternions by converting them back to rotation matrices with Pinocchio.
 
 The comparison uses the matrices and not the angles or quaternions. Two correct programs may return different
-angles for the same rotation at gimbal lock. They may also return quaternions of opposite signs.
+angles for the same rotation at gimbal lock. Two correct programs may also return quaternions of opposite
+signs.
 """
 
 from __future__ import annotations
@@ -15,9 +16,10 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.certificate import VerificationError
 from urdfkin.verify.pinocchio_module import pinocchio
 
-#: Rounding errors of urdfkin and of Pinocchio together, in eps; each is less than 8 eps. They are counted in
-#: `roundings` in the same way as those of a joint. For angles, the operations are arctan2, sines, cosines and
-#: products of three numbers. For quaternions, they are a square root, a quotient and products of two numbers.
+#: Rounding errors of urdfkin and of Pinocchio together, in eps; each is less than 8 eps. In `roundings`,
+#: these errors are counted in the same way as the errors of a joint. For angles, the operations are arctan2,
+#: sines, cosines and products of three numbers. For quaternions, they are a square root, a quotient and
+#: products of two numbers.
 _ROUNDINGS = 16.0
 
 

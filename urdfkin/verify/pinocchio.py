@@ -1,8 +1,8 @@
 """The oracle Pinocchio.
 
-The oracle shares no code with urdfkin's computation. It reads the URDF text with its own parser.
-`urdfkin.verify.pinocchio_inputs` determines three things a second time from Pinocchio's model and the user's
-original numbers: the frame of a name, the joint of each number of q, and the motion of the base.
+The oracle shares no code with urdfkin's computation. The oracle reads the URDF text with Pinocchio's own
+parser. `urdfkin.verify.pinocchio_inputs` determines three things a second time from Pinocchio's model and the
+user's original numbers: the frame of a name, the joint of each number of q, and the motion of the base.
 
 Pinocchio's model is built without mimic joints, because Pinocchio 4.1 with mimic joints refuses four of the
 robots it ships with. `urdfkin.verify.pinocchio_inputs` reads the mimic rules from the text a second time.
@@ -46,8 +46,8 @@ _SHALLOW = 100
 #: below 2 GB.
 MOST_RATES = 315
 
-#: Number of Pinocchio's result values that are collected and then copied together. So many values fit into
-#: the processor's cache.
+#: Number of Pinocchio's result values that are collected and then copied together. The processor's cache is
+#: large enough for so many values.
 _AT_A_TIME = 16384
 #: Name of the free-flyer of a moving base.
 _BASE = "base"
@@ -262,7 +262,7 @@ class PinocchioOracle(Oracle):
         - Pinocchio returns the numbers in Eigen's order (the first index varies fastest), but in a NumPy
           array with C order (the last index varies fastest).
         - In LOCAL, entries [i, j] with i and j of the same joint are not 0 if another joint precedes this
-          joint. They must be 0, because the joint moves its own axes together with the frame.
+          joint. These entries must be 0, because the joint moves its own axes together with the frame.
         """
         pin, model, data = self._pin, self._model, self.data
         ids, wanted, nv = self._ids(x), self._reference(x.reference), model.nv
@@ -325,8 +325,8 @@ def _stacked(compute: Callable[[int], list[FloatArray]], *shape: int) -> FloatAr
     Pinocchio 4.1 crashes the process for a Jacobian without columns, and returns a vector for one column.
 
     Args:
-        compute: Function that returns the results of all frames for the next configurations. Its argument is
-            the largest number of these configurations.
+        compute: Function that returns the results of all frames for the next configurations. The argument of
+            the function is the largest number of these configurations.
         shape: Shape of all results.
     """
     out = np.empty(shape)

@@ -12,7 +12,7 @@ results disagree.
 | moving base | `free_flyer` and others | `BaseMotion` |
 
 Mimic rules: Pinocchio's model has no mimic joints (`urdfkin.verify.pinocchio`), so this module reads the
-rules. It parses the text again at the first check.
+rules. The module parses the text again at the first check.
 
 Layout of q: the joints are in Pinocchio's order. A revolute, continuous or prismatic joint has one number, a
 planar joint three, a floating joint seven, and a mimic joint none.

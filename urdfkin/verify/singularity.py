@@ -7,8 +7,8 @@ shows which joints cause the loss of rank. A geometric reason, such as parallel 
 columns satisfy its condition within the error bound of J.
 
 A column of a revolute joint is [a x z; z], where z is the axis and a leads from the frame's origin to a point
-of the axis. So two axes are collinear if their columns are equal up to sign, and an axis passes through the
-frame's origin if its linear rows are 0.
+of the axis. Therefore, two joint axes are collinear if their columns are equal up to sign. An axis passes
+through the frame's origin if the linear rows of its column are 0.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Check the URDF that urdfkin writes for a Denavit-Hartenberg table.
 
 Pinocchio checks a robot's results with the robot's URDF text. For a robot that was made from a table, urdfkin
-writes this text. This module checks the text itself. It compares Pinocchio's placements of the tip with the
-products of the table's own matrices (eq. 7.64).
+writes this text. This module checks the text itself. The module compares Pinocchio's placements of the tip
+with the products of the table's own matrices (eq. 7.64).
 """
 
 from __future__ import annotations

@@ -287,7 +287,10 @@ class Core(Kernel):
 
 
 def core(function: Callable[..., int]) -> Core:
-    """Decorate a function that takes an address. It is compiled at the first call and cached on disk."""
+    """Decorate a function that takes an address.
+
+    The function is compiled at the first call and cached on disk.
+    """
     return Core(function)
 
 

@@ -312,7 +312,7 @@ def _fetch(context: Any, x: Any, at: Any) -> Any:
 def fetch(x, at, count):
     """Load `count` numbers from `x[at]` on into the cache.
 
-    These are the inputs of the next block, which are loaded while this block is computed.
+    The numbers are the inputs of the next block, which are loaded while this block is computed.
     """
     if count <= _MOST_FETCHED:
         for number in range(at, at + count, LANES):
@@ -340,8 +340,8 @@ def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
 def stream(x, count, to, at, address):
     """Copy `count` numbers to the array `to`, from `to[at]` on, without writing them to the caches.
 
-    Before it writes a part of a cache line, a processor reads this line. It does not read a line that is
-    written as a whole. `address` is the address of `to[0]`.
+    Before it writes a part of a cache line, a processor reads this line. A processor does not read a cache
+    line that is written as a whole. `address` is the address of `to[0]`.
     """
     edge = -(address // 8 + at) % LANES
     lines = edge + (count - edge) // LANES * LANES

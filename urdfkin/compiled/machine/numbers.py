@@ -1,10 +1,10 @@
 """Number types for compiled code; a number consists of one double or of several doubles.
 
-A number of type `Lanes(8)` is eight doubles in one vector register; `Lanes(1)` is one double. Both are Numba
-types that use LLVM's vectors, so a number stays in a register from one equation to the next. A product is
-kept as its two factors until it is added. The sum x y + z is then one fused multiply-add, which is rounded
-once. This module, and not the compiler, decides which operations are fused. Results therefore have the same
-bits for one lane and for eight lanes, on every machine.
+A number of type `Lanes(8)` is eight doubles in one vector register; `Lanes(1)` is one double. `Lanes(8)` and
+`Lanes(1)` are Numba types that use LLVM's vectors, so a number stays in a register from one equation to the
+next. A product is kept as its two factors until it is added. The sum x y + z is then one fused multiply-add,
+which is rounded once. This module, and not the compiler, decides which operations are fused. Results
+therefore have the same bits for one lane and for eight lanes, on every machine.
 
 `zero()` and `one()` are the numbers 0 and 1, known at compile time. A product with one of these numbers, or a
 sum with zero, costs no time. If z = (0, 0, 1) is written with these numbers, the equations for any axis
@@ -90,7 +90,7 @@ class _KnownModel(models.OpaqueModel):
 
 
 class _Value:
-    """A number during compilation. It consists of its type and its LLVM value."""
+    """A number during compilation, which consists of a type and an LLVM value."""
 
     def __init__(self, context: Any, builder: Any, type_: Any, value: Any) -> None:
         self.context, self.builder, self.type = context, builder, type_

@@ -2,9 +2,9 @@
 
 A call through Numba checks the type of each argument and unpacks every array, which takes as long as the
 recursion itself. CPython calls a built-in function without these checks: it passes the addresses of the
-arguments. The compiled function of this module is such a function. It reads the few words of each array
-object that it needs, at the offsets that CPython and NumPy guarantee to C code. It holds Python's global
-interpreter lock for about a microsecond. It returns None for arguments that it does not support.
+arguments. The compiled function of this module is such a built-in function. It reads only a few words of each
+array object, at the offsets that CPython and NumPy guarantee to C code. The function holds Python's global
+interpreter lock for about a microsecond. For arguments that it does not support, the function returns None.
 
 A call marks its scratch memory as busy in one atomic operation, which is also safe in a Python without a
 global interpreter lock. If another thread is using the scratch memory, the function also returns None, and

@@ -83,7 +83,7 @@ def compare(
         digits: Precision of each cell in the table's file (`urdfkin.dh.rows.last_digits`).
 
     Returns:
-        The comparison. It contains the cells that differ, or the likely mistakes.
+        The comparison. The comparison contains the cells that differ, or the likely mistakes.
 
     Raises:
         InputError: the joints of the table differ in number or kind from those of the path.
@@ -132,8 +132,8 @@ def compare(
 def best_fit(chain: FrameChain, reference: DHTable, enough: float) -> tuple[float, float]:
     """Return the largest tip error on samples (metres, radians) after a fast fit of base, tool and offsets.
 
-    To be fast, the fit tries only a few patterns of joint senses and x directions. It also tries no opposite
-    rotations about nearly coinciding axes.
+    To be fast, the fit tries only a few patterns of joint senses and x directions. The fast fit also tries no
+    opposite rotations about nearly coinciding axes.
 
     Args:
         chain: The path.
@@ -329,8 +329,8 @@ def max_tip_error_bound(
 
     Args:
         path: The path; its mimic rules are ignored.
-        table: The table. Its variables are the path's joint values, and its rows contain the joint senses and
-            zeros.
+        table: The table. The variables of the table are the path's joint values, and its rows contain the
+            joint senses and zeros.
         slides: Ranges of the prismatic joints (metres).
     """
     mechanisms = Mechanism(_free(path, table, slides)), Mechanism(free_tree(table))

@@ -2,10 +2,10 @@
 
 The tip's error at each sampled configuration is a twist. A small change of any number in the table also moves
 the tip by a twist: a rotation about a line or a translation along a line. The Gauss-Newton method finds the
-changes that remove the error. Base, tool and joint offsets are the free parameters. They are fitted first and
-absorb as much error as possible. Changes of cells absorb the remaining error. Sometimes several cells can
-absorb the same error, for example offsets along parallel axes. A reweighted least-norm solution then changes
-as few cells as possible.
+changes that remove the error. Base, tool and joint offsets are the free parameters. The free parameters are
+fitted first and absorb as much error as possible. Changes of cells absorb the remaining error. Sometimes
+several cells can absorb the same error, for example offsets along parallel axes. A reweighted least-norm
+solution then changes as few cells as possible.
 
 **Free parameters.** `fit_freedoms` fits base, tool and joint offsets, with the cells unchanged. The method is
 damped least squares (`urdfkin.kinematics.least_squares`) on the tip's twists. Two joints with nearly
@@ -17,8 +17,8 @@ descent, the fit starts again with opposite rotations of such pairs of offsets.
 **Signs.** `align` finds the senses and the directions of x with which a reference table fits the URDF. The
 author of a table has three choices that do not change the robot: the sense of a joint, the direction of x
 along a common normal, and the zero of theta. The first two choices are signs, and they determine the zeros of
-theta. A beam search extends sign patterns joint by joint. It keeps the patterns that give cells closest to
-those of the reference table.
+theta. A beam search extends sign patterns joint by joint. The search keeps the patterns whose cells are
+closest to the cells of the reference table.
 """
 
 from __future__ import annotations

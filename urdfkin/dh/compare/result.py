@@ -142,8 +142,8 @@ class Comparison:
     """Result of a comparison of a table with a URDF.
 
     Attributes:
-        reference: The table with the URDF's joint names and with fitted base, tool, senses and offsets. Its
-            `placement` takes the URDF's coordinates.
+        reference: The table with the URDF's joint names and with fitted base, tool, senses and offsets. The
+            method `placement` of this table takes the URDF's coordinates.
         reach: Reach of the robot (metres). Rounding errors are relative to the reach, and angles are
             multiplied by the reach to compare them with lengths.
         fitted: Whether base, tool, senses and offsets were fitted.

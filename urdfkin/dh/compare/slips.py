@@ -9,10 +9,10 @@ and is fast to compute. Only the few readings with a shape that is closest to th
 `urdfkin.dh.rows`), and parses the data again. A reading with an impossible value, such as an angle of eighty
 turns, is rejected by the parser.
 
-`doubts` needs no URDF. It finds units that look wrong, and two columns that may be exchanged. The function
-uses two facts. First, most angles in the table of an arm are multiples of 30 degrees, and lengths hardly ever
-look like such angles. Second, the length of an arm is between some centimetres and some metres. If there is a
-URDF, `diagnose` decides by a fit.
+`doubts` needs no URDF. The function finds units that look wrong, and two columns that may be exchanged. The
+function uses two facts. First, most angles in the table of an arm are multiples of 30 degrees, and lengths
+hardly ever look like such angles. Second, the length of an arm is between some centimetres and some metres.
+If there is a URDF, `diagnose` decides by a fit.
 """
 
 from __future__ import annotations

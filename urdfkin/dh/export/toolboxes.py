@@ -9,8 +9,8 @@ ignore theta of a revolute joint and d of a prismatic joint, so they would lose 
 transforms also have no fifth parameter for Hayati rows. The code therefore sets each joint's frame by a
 matrix from the table, and the joint's axis is the z axis.
 
-The MATLAB code is tested in Octave with substitutes for the toolbox's classes (`scripts/forms/octave`). It
-has not been tested in MATLAB.
+The MATLAB code is tested in Octave with substitutes for the toolbox's classes (`scripts/forms/octave`). The
+code has not been tested in MATLAB.
 
 roboticstoolbox also accepts a sequence of elementary transforms (Haviland and Corke). Each elementary
 transform is a rotation, a translation or a joint. The fifth parameter of a Hayati row is an additional

@@ -19,13 +19,13 @@ INERTIAL_SCALE = Rule("URDF703", "inertial-scale", WARNING)
 #: are reported.
 HEAVIEST, FARTHEST = 1e9, 1e6
 
-#: A body with a smaller mass (kg) is a placeholder. Its moments of inertia are not checked.
+#: A body with a smaller mass (kg) is a placeholder, so its moments of inertia are not checked.
 NEGLIGIBLE = 1e-3
 
 #: Moments of inertia per kg (m^2) below this count as rounding errors. A body of 0.03 mm has such moments.
 ROUNDING = 1e-9
 
-#: Allowed relative rounding error of moments of inertia. It is large, because exporters write few digits.
+#: Allowed relative rounding error of moments of inertia, which is large because exporters write few digits.
 _WRITTEN = 1e-6
 
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")

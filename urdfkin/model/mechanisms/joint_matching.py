@@ -250,8 +250,8 @@ class Pairing:
 class _JointGeometry:
     """The geometry of a joint.
 
-    It consists of the joint's kind and axis, the shape of its subtree, and the origin and the z axis of its
-    frame.
+    The geometry consists of the joint's kind and axis, the shape of the subtree, and the origin and z axis of
+    the joint's frame.
     """
 
     kind: str
@@ -482,8 +482,8 @@ def _axis(mechanism: Mechanism, edge: Edge, seen: Screw | None = None) -> Axis:
     return Axis(screw, mechanism.joint(edge).kind.turns, seen or screw)
 
 
-#: A function that returns candidate poses of B's body behind two joints. Its arguments are the bodies behind
-#: the joints, the joints, and the pose of B's body before the joints.
+#: A function that returns candidate poses of B's body behind two joints. The arguments of the function are
+#: the bodies behind the joints, the joints, and the pose of B's body before the joints.
 Poses = Callable[[tuple[int, int], Pair, FloatArray], Iterable[FloatArray]]
 
 #: Largest number of joints on a path for the recursive search. Robots with longer paths are matched joint by

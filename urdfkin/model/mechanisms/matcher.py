@@ -1,7 +1,7 @@
 """Align mechanism B with mechanism A.
 
-The alignment matches the joints of A and B. It chooses the base of B, the order of B's joints, and the sense
-and the zero of each joint.
+The alignment matches the joints of A and B. The alignment chooses the base of B, the order of B's joints, and
+the sense and the zero of each joint.
 
 The matcher starts at a common body and goes outwards through A and B at the same time. At each joint it
 chooses the sense and the zero of B's joint. With this choice, as many of the later links and axes of B as
@@ -195,9 +195,9 @@ class MechanismMatcher:
     def _bases(self) -> Iterator[tuple[int, int]]:
         """Yield pairs of bodies at which the matcher may begin, one of A and one of B.
 
-        The first body is A's root body. Its partner is the body of B that has most link names in common with
-        it. If no body of B has a link name in common with A's root body, every body of B is tried as its
-        partner.
+        The first body is A's root body. The partner of this body is the body of B that has most link names in
+        common with it. If no body of B has a link name in common with A's root body, every body of B is tried
+        as its partner.
 
         If A's root body has no link names in common with B, B's root body is also yielded, with the body of A
         that has most link names in common. A's root may have no counterpart in B, for example before a
@@ -260,7 +260,7 @@ class MechanismMatcher:
     def _poses_behind(self, beyond: tuple[int, int], via: Pair, X: FloatArray) -> Iterator[FloatArray]:
         """Yield candidate poses of B's body behind two joints of the same kind.
 
-        They follow from the pose of B's body before the joint.
+        The candidates follow from the pose of B's body before the joint.
         """
         there = Place(beyond, via, -1, IDENTITY, X)
         kind, f = family(self.a.joint(via[0]).kind), via[1]
@@ -602,8 +602,8 @@ def _normals_apart(at: FloatArray, seen: FloatArray) -> tuple[FloatArray, float,
     return between(start, end.reversed() if start.direction @ end.direction < 0.0 else end, turns=False)
 
 
-#: Largest number of orders that are tried for commuting joints. It is the number of orders of five prismatic
-#: joints.
+#: Largest number of orders that are tried for commuting joints. This number is the number of orders of five
+#: prismatic joints.
 MOST_ORDERS = 120
 #: Total number of look-ahead steps of one search; all of them take seconds. Without names, TALOS needs 500
 #: steps and Baxter 1,000.
@@ -754,8 +754,8 @@ def _best_alignment(
 
 #: Numbers of full turns by which the zero of a mimicked joint may be changed.
 TURNS = (0, 1, -1)
-#: Tolerance of a zero that axes determine, as a multiple of the angle tolerance. It is large, because two
-#: axes that are close together determine a zero inexactly.
+#: Tolerance of a zero that axes determine, as a multiple of the angle tolerance. The tolerance is large,
+#: because two axes that are close together determine a joint zero inexactly.
 LEVER = 1e4
 
 

@@ -49,9 +49,9 @@ def along(screw: Screw, value: float, *, turns: bool) -> FloatArray:
 def between(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArray, float, float]:
     """Return the smallest motion from one joint axis to another, its tilt (rad) and its shift (m).
 
-    The motion tilts the axis about the first joint's origin and then shifts it perpendicular to itself. It
-    contains no rotation about the axis and no shift along it, because these belong to the joint's zero or
-    have no effect. The axis of a prismatic joint has no position, so its shift is 0.
+    The motion tilts the axis about the first joint's origin and then shifts it perpendicular to itself. The
+    motion contains no rotation about the axis and no shift along the axis, because these belong to the
+    joint's zero or have no effect. The axis of a prismatic joint has no position, so its shift is 0.
     """
     R, tilt = shortest_turn(start.direction, end.direction)
     across = np.zeros(3)

@@ -7,11 +7,11 @@ by these angles. If W translates, h'(u) is h(u) plus the largest product of u an
 function of the direction therefore describes the reach of a chain with any number of joints, and no search
 over joint values is needed.
 
-h is stored at the points of a grid on the surface of a cube. It is convex, and h(s u) = s h(u) for s >= 0, so
-interpolation between grid points gives an upper bound. For a rotation, the directions form an arc. The arc
-lies in a circumscribed polygon, and h on the polygon is largest at a corner. For each joint, the grid makes
-the bound too large by a fraction. This fraction decreases with the square of the distance between grid
-points.
+h is stored at the points of a grid on the surface of a cube. The function h is convex, and h(s u) = s h(u)
+for s >= 0, so interpolation between grid points gives an upper bound. For a rotation, the directions form an
+arc. The arc lies in a circumscribed polygon, and h on the polygon is largest at a corner. For each joint, the
+grid makes the bound too large by a fraction. This fraction decreases with the square of the distance between
+grid points.
 
 Recursion. Let y be the position of B's frame, as the joints behind joint i move it, and let d be y minus the
 position of A's frame. The joint and its L change d to
@@ -92,7 +92,7 @@ def _points(cells: int) -> FloatArray:
 class Support:
     """An upper bound on the support function of a set of points, in metres.
 
-    It is stored as values at the grid points.
+    The bound is stored as its values at the grid points.
     """
 
     grid: Grid
@@ -219,8 +219,8 @@ def upper_bounds(
 
     The bounds hold for all joint values within the limits.
 
-    The bounds are 0 if nothing differs on the path. They are inf in two cases: the difference grows without
-    bound with the value of an unlimited joint, or two matched joints are of different kinds.
+    The bounds are 0 if nothing differs on the path. The bounds are inf if the difference grows without bound
+    with the value of an unlimited joint, or if two matched joints are of different kinds.
     """
     steps, pairs = behind_first(found, variables, frame)
     if not steps and frame.end is IDENTITY:
@@ -253,7 +253,7 @@ def _radians(
 ) -> float:
     """Return a bound (rad) on the angle between a frame's orientations in A and B.
 
-    It is the sum of the angles of all rotations that differ.
+    The bound is the sum of the angles of all rotations that differ.
     """
     total = apart(IDENTITY, frame.end)[0]
     for step, pair in zip(steps, pairs, strict=True):

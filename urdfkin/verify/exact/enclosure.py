@@ -2,7 +2,7 @@
 
 `urdfkin.kinematics.equations` is evaluated with interval arithmetic (`urdfkin.verify.exact.numbers`). The
 inputs are the decimals in the URDF text and the exact values of q, v and a. An enclosure proves a bound on
-the rounding error. It does not prove the equations; the agreement with Pinocchio supports the equations.
+the rounding error. An enclosure does not prove the equations, but the agreement with Pinocchio supports them.
 """
 
 from __future__ import annotations
@@ -64,14 +64,14 @@ class Enclosure:
 
     @property
     def width(self) -> FloatArray:
-        """The difference `upper - lower`. It is 0 for each number whose true value is a double.
+        """The difference `upper - lower`. The width is 0 for each number whose true value is a double.
 
         For all other numbers, it is at least the distance between two neighbouring doubles.
         """
         return self.upper - self.lower
 
     def contains(self, x: ArrayLike) -> NDArray[np.bool_]:
-        """Return a bool array. It is True for each number of `x` that lies between `lower` and `upper`.
+        """Return a bool array, which is True for each number of `x` that lies between `lower` and `upper`.
 
         Args:
             x: Values, of the quantity's shape.

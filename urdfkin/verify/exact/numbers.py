@@ -163,7 +163,7 @@ def read_exact(text: str, tree: KinematicTree, among: Iterable[int] | None = Non
 
     Args:
         text: The URDF text.
-        tree: The tree of the same text. Its `root_joint`, if any, is not in the text.
+        tree: The tree of the same text. If the tree has a `root_joint`, this joint is not in the text.
         among: Indices of the joints to read; None: all.
 
     Raises:

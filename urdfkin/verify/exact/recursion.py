@@ -2,7 +2,7 @@
 
 The equations are those of `urdfkin.kinematics.equations`, in world axes as in the textbook. The inputs are
 the URDF's decimals and the exact values of q, v and a. The results are reference values that measure rounding
-errors. They do not check the equations; the comparison with Pinocchio does.
+errors. The reference values do not check the equations; the comparison with Pinocchio checks them.
 """
 
 from __future__ import annotations
