@@ -4,8 +4,8 @@
     python scripts/build_release.py --tag v0.1.0 dist     # also fail if the tag is not the version
 
 The script builds the sdist from the checkout and the wheel from the sdist. The script builds twice and
-compares the bytes. Then `twine check --strict` and `check-wheel-contents` check both files. The SBOM
-(CycloneDX, JSON) lists the packages that a new virtual environment with the wheel contains; `--sbom-of
+compares the bytes. Then `twine check --strict` and `check-wheel-contents` check the sdist and the wheel. The
+SBOM (CycloneDX, JSON) lists the packages that a new virtual environment with the wheel contains; `--sbom-of
 PYTHON` takes an existing environment instead, without network. SHA256SUMS has one line for each file. Exit 1:
 a check fails.
 """

@@ -7,10 +7,10 @@
 
 The script checks every robot of the catalogue, every quantity and all three reference frames. Fused
 multiply-adds are explicit, and urdfkin has its own sine and cosine, so digests are equal on every machine.
-If results differ from the stored ones, the script prints the largest difference as a fraction of the stored
-bound. An enclosure must lie in the stored enclosure. Exit 1: a bit differs unexpectedly, an interval is not
-within the stored interval, or, with `--within SHARE`, a result differs by more than this fraction of its
-bound.
+If results differ from the stored results, the script prints the largest difference as a fraction of the
+stored bound. An enclosure must lie in the stored enclosure. Exit 1: a bit differs unexpectedly, an interval
+is not within the stored interval, or, with `--within SHARE`, a result differs by more than this fraction of
+its bound.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class Subject:
 
     @classmethod
     def of(cls, name: str, stored: Arrays | None = None) -> Subject:
-        """Make a subject with the inputs and frames of a file, or with new ones."""
+        """Make a subject with the inputs and frames from a file, or with new inputs and frames."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # this script does not use warnings about the file
             robot = urdfkin.load(name, mimic=catalogue()[name].mimic, verify=False)

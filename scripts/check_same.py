@@ -7,8 +7,9 @@
 There are twenty-one changes. After eleven of these changes, a robot is still the same
 (`tests/comparison/pairs.py`). For a robot that is the same, all links must have the placements that `same`
 predicts at random configurations. For a different robot, an independent global search looks for the largest
-distance of the farthest frame. This distance is computed at fifty digits from the decimals of both texts, and
-must lie in the interval of `same`. Exit 1: a distance is outside its interval, or a verdict is wrong.
+distance of the farthest frame. This distance is computed with fifty digits from the decimals in the texts of
+the two robots, and must lie in the interval of `same`. Exit 1: a distance is outside its interval, or a
+verdict is wrong.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ def pair(name: str, what: str) -> dict[str, Any] | None:
     said = {"robot": name, "change": what, "verdict": found.verdict.value, "seconds": seconds}
     if what in ALIKE:
         return said | {"right": bool(found) and _places_agree(found, a, b)}
-    # Rounding to four digits may leave a file unchanged; the interval is right in both cases.
+    # Rounding to four digits may leave a file unchanged; the interval must be right in either case.
     right = found.verdict is Verdict.DIFFERS or what == "rounded"
     if (worst := _farthest(found)) is None:
         return said | {"right": right}
@@ -87,7 +88,7 @@ def _enclosed(found: Sameness, a: Robot, b: Robot, worst: Interval) -> dict[str,
 
 
 def _places_agree(found: Sameness, a: Robot, b: Robot) -> bool:
-    """Return whether each link has the same placement in both robots.
+    """Return whether each link has the same placement in A and in B.
 
     A is at random configurations, and B at the corresponding configurations.
     """

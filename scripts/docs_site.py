@@ -23,8 +23,8 @@ LESSONS = "lessons/"
 #: The equation numbers that the first line of a docstring contains.
 _EQUATIONS = re.compile(r" \(eq\. [^)]*\)")
 _ROBOT = "urdfkin.robot.Robot"
-#: Pages of the library: path -> (title, introduction, names). A name of the package and the name of a method
-#: of `Robot` are given without a path; any other class has its full path.
+#: Pages of the library. For each path: title, introduction, and names. A name of the package and the name of
+#: a method of `Robot` are given without a path; any other class has its full path.
 LIBRARY: dict[str, tuple[str, str, str]] = {
     "api/robot.md": (
         "Load a robot",

@@ -1,7 +1,7 @@
 """Write docs/conventions.md: the conventions of urdfkin, Pinocchio and MuJoCo, determined by experiment.
 
 For each row, the script compares a library's result with several candidate definitions, on a random robot and
-motion, and writes the one that matches. A test checks that the page is current.
+motion. It writes the definition that matches. A test checks that the page is current.
 
 The tables of other tools come from urdfkin/conventions/conventions.toml. With --measure, the script first
 runs each installed library, in the library's convention, on all robots of the catalogue. The script writes

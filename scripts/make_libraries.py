@@ -171,7 +171,7 @@ def answers(python: Path, library: str, cases: list[dict[str, Any]]) -> Iterator
 
 
 def measure(folder: Path, libraries: list[str], before: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the versions and cells of the given libraries, and the earlier ones of all other libraries."""
+    """Return the versions and cells of the given libraries; all other libraries keep their earlier values."""
     robots = {feature["name"]: urdfkin.load(text_of(feature)) for feature in DATA["feature"]}
     cases = [
         {"name": f["name"], "text": text_of(f), "configurations": configurations(robots[f["name"]])}

@@ -121,7 +121,7 @@ def photograph_viewer(folder: Path) -> None:
                 time.sleep(5)
                 browser.js(
                     "window.requestAnimationFrame = () => 0"
-                )  # a frame takes seconds; keep the last one
+                )  # a frame takes seconds; keep only the last frame
                 time.sleep(2)
                 keep(browser, f"{name}{theme}")
     finally:

@@ -1,4 +1,4 @@
-"""Measure the time of the parts of a batch and of a single call, by leaving each part out.
+"""Measure how the time of a batch, and of a single call, is divided among its parts.
 
 The forward recursion is a program of a few instructions (`urdfkin.compiled.program`). To measure a part, the
 program runs with the instructions of this part and without them. The difference of the two times is the time
@@ -82,7 +82,7 @@ def _core(subject: Subject, quantity: str, program: Program, who: str) -> Work:
 
 
 def parts_of_calls(n: int, rounds: int) -> Iterator[dict[str, Any]]:
-    """Yield the time of each part of a single call of a prepared frame and of the robot's method, in ns."""
+    """Yield the time (ns) of each part of a single call, for a prepared frame and for the robot's method."""
     for subject, quantity in _subjects(n):
         calls = list(_calls(subject, quantity))
         works = [call.single(subject, quantity) for call in calls]

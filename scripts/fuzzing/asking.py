@@ -16,7 +16,7 @@ from urdfkin.errors import InputError, RepresentationSingularityError, UnknownNa
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 
-#: Number of frames of a robot that are computed both in one pass and one by one.
+#: Number of frames of a robot that are computed in one pass and also one by one.
 TOGETHER, ALONE = 12, 2
 #: Number of names that are looked up.
 NAMES = 6
@@ -57,7 +57,7 @@ def ask(robot: Robot, seed: int) -> Iterator[tuple[str, FloatArray]]:
 
 
 def ask_prepared(robot: Robot, seed: int) -> None:
-    """Compare a prepared frame's unchecked results with those of checked calls.
+    """Compare the unchecked results of a prepared frame with the results of checked calls.
 
     Raises:
         MismatchError: a result of the prepared frame differs.

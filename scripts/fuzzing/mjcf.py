@@ -159,7 +159,7 @@ class _File:
         return " ".join(repr(odd.tame_length(self.rng)) for _ in range(3))
 
     def equalities(self) -> str:
-        """Return constraints between joints: chains, cycles, duplicates, inactive and nonlinear ones."""
+        """Return constraints between joints, such as chains, cycles, duplicates and nonlinear constraints."""
         rng, made = self.rng, []
         count = rng.randint(1, 5) if self.family == "mjcf-equalities" else rng.randint(0, 1)
         for i in range(count if len(self.joints) > 1 else 0):

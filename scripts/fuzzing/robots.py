@@ -170,7 +170,7 @@ class _Robot:
         return f"<limit {' '.join(words)}/>"
 
     def mimic(self, i: int) -> str:
-        """Return a mimic rule of joint i; it refers to an earlier or a later joint."""
+        """Return a mimic rule of joint i, which refers to an earlier or a later joint."""
         rng = self.rng
         if "followers" not in self.strange or self.kinds[i] not in _ONE_COORDINATE or rng.random() < 0.35:
             return ""

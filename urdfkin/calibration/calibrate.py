@@ -239,8 +239,8 @@ def calibrate(
         radians: Whether joint angles of more than one turn are in radians, although they look like degrees.
         force: Whether to return a fit even if it is not plausible; the objections are then in `plausibility`.
             Joint values that look like degrees are refused in any case, unless `radians` is True.
-        every: Whether to write all fitted parameters, including those with a change of less than two standard
-            deviations.
+        every: Whether to write all fitted parameters, including parameters that changed by less than two
+            standard deviations.
 
     Raises:
         InputError: an array has a wrong shape, there are too few poses, or the positions are not in metres.
@@ -684,7 +684,7 @@ def _with_quaternions(p: FloatArray, quat: FloatArray, where: str) -> FloatArray
 
 
 def _with_exact_rotations(T: FloatArray, where: str) -> FloatArray:
-    """Return the poses with exact rotations; their digits may be rounded."""
+    """Return measured poses with exact rotations, because their rotations may be rounded."""
     R = T[:, :3, :3]
     bad = rotation_defect(R) > _WRITTEN
     if bad.any():

@@ -2,8 +2,8 @@
 
 Compute the Jacobian by the parameters.
 
-A model is a path (`urdfkin.model.path`), because both a URDF's origins and the rows of a Denavit-Hartenberg
-table are products of constants and elementary motions. The amount of an elementary motion is a parameter or a
+A model is a path (`urdfkin.model.path`), because a URDF's origins and the rows of a Denavit-Hartenberg table
+are products of constants and elementary motions. The amount of an elementary motion is a parameter or a
 joint's value. The gain g of a joint scales its value by (1 + g), so the column of g in the Jacobian is the
 joint's column times the joint's value.
 
@@ -153,7 +153,7 @@ FITTED = ("base", "tool", "offsets", "origins", "gains")
 SIX = (("x", False, 0), ("y", False, 1), ("z", False, 2), ("rx", True, 0), ("ry", True, 1), ("rz", True, 2))
 _ALL = tuple(what for what, *_ in SIX)
 #: Order of preference among parameters with the same effect, for a revolute or fixed joint (True) and for a
-#: prismatic joint (False): first the joint's zero, then parameters that move the joint's axis, then
+#: prismatic joint (False). The joint's zero comes first, then parameters that move the joint's axis, then
 #: parameters that only move the joint's frame.
 _KEPT = {True: ("rz", "x", "y", "rx", "ry", "z", "gain"), False: ("z", "rx", "ry", "x", "y", "rz", "gain")}
 _ROW = (("theta", True, 2), ("d", False, 2), ("a", False, 0), ("alpha", True, 0), ("beta", True, 1))

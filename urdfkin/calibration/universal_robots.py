@@ -121,9 +121,9 @@ def calibrated_tree(origins: Mapping[str, FloatArray]) -> KinematicTree:
 def universal_robots(robot: Robot | Source, path: Path, order: str = "driver") -> Rewritten:
     """Apply a calibration file to the URDF of a Universal Robots arm.
 
-    In the current ROS description all six joints turn about z. The joint origins are then replaced by those
-    of the calibration file. In another URDF, such as the older description, the joint origins are fitted. The
-    fitted arm then has the same poses of `tool0` in `base` as the calibrated arm.
+    In the current ROS description all six joints turn about z. The joint origins are then replaced by the
+    origins in the calibration file. In another URDF, such as the older description, the joint origins are
+    fitted. The fitted arm then has the same poses of `tool0` in `base` as the calibrated arm.
 
     Args:
         robot: The arm.
@@ -193,7 +193,7 @@ def _is_the_descriptions(robot: Robot, prefix: str) -> bool:
 
 
 def _verify_written(result: Rewritten, calibrated: FrameChain, prefix: str) -> Certificate:
-    """Compare the poses of the new URDF with those of the calibration file; Pinocchio checks the new URDF."""
+    """Compare poses of the new URDF with poses of the calibration file; Pinocchio checks the new URDF."""
     written = result.loaded
     q = written.sample(_FITTED, seed=_CHECKED_SEED)
     T = written.placement(q, [f"{prefix}base", f"{prefix}tool0"])

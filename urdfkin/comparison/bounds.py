@@ -23,8 +23,8 @@ frame. Their derivatives by a joint value are
     y_i = u' x (Y - o'),    d_i = u x (Y - e(S t) (y - d)) + (u' - u) x (Y - o') + u x (o - o'),
 
 with Y = e(S' t') y. Here S, u, o and t are the screw, axis, point and value of the joint in A, and S', u', o'
-and t' are those in B. The joints between the base and this joint transform the derivatives as free vectors
-(`urdfkin.model.mechanisms.upper_bound`).
+and t' are the screw, axis, point and value of the matched joint in B. The joints between the base and this
+joint transform the derivatives as free vectors (`urdfkin.model.mechanisms.upper_bound`).
 """
 
 from __future__ import annotations
@@ -59,8 +59,8 @@ from urdfkin.verify.sampling import sample
 #: Number of random configurations at the start of a search, and number of configurations with each variable
 #: at an end of its range.
 SAMPLES, CORNERS = 512, 128
-#: Number of configurations (the worst ones) that the search starts from, and number of values tried along a
-#: coordinate.
+#: Number of configurations from which the search starts, which are the worst random configurations; number of
+#: values that are tried along a coordinate.
 STARTS, ALONG = 4, 13
 #: Frames that are searched in one batch.
 SEARCHED_TOGETHER = 24
@@ -77,7 +77,7 @@ class Search:
     Args:
         robots: A and B.
         found: The alignment of the robots.
-        variables: The variables that move both robots.
+        variables: The variables that move A and B.
         seed: Seed of the random configurations.
     """
 

@@ -505,7 +505,8 @@ def _not_attained(
 ) -> Iterator[str]:
     """Yield the reasons why the lower bound of an interval is wrong.
 
-    The interval's configurations may be invalid, or urdfkin or Pinocchio may compute another distance there.
+    The interval's configurations may be invalid. At these configurations, urdfkin or Pinocchio may also
+    compute another distance.
     """
     place = f"frame {claim['frame']}"
     q_a, q_b = np.array([claim["q_a"]]), np.array([claim["q_b"]])

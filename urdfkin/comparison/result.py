@@ -249,14 +249,14 @@ class Sameness(Displayable):
         base: (4, 4) pose of B's root in A's root frame, in the zero configuration. The pose is the identity
             if the two roots coincide.
         base_links: A link of A and a link of B. The poses of A are compared relative to the first link, and
-            those of B relative to the second. The two links belong to matching rigid bodies.
+            the poses of B relative to the second link. The two links belong to matching rigid bodies.
         rounding: (m, rad) largest distance and angle between matching frames that count as rounding.
         frames: The interval for each pair of matching links, after the changes in `after`.
         as_written: The interval for the frame that is farthest apart without the changes in `after`. None if
             there are no changes.
         written: (m, rad) proven bound of the distance and the angle for all pairs of matching frames, without
             the changes in `after`. The bound is infinite if no bound was proven. If one model is a
-            Denavit-Hartenberg table, only frames with the same name in both models count.
+            Denavit-Hartenberg table, only frames with the same name in A and B count.
         narrowed: Mimicked joints that can drive a mimic joint out of the mimic joint's limits, with one line
             of text for each mimicked joint. The intervals still cover the whole range of the mimicked joint.
         checked: Pinocchio's confirmation, or the reason why there is none.
@@ -377,8 +377,8 @@ class Sameness(Displayable):
     def to_b(self, q: ArrayLike) -> FloatArray:
         """Return B's configurations (..., nq) for A's configurations (..., nq).
 
-        At these configurations both models have the same poses, except for `base`. Coordinates that only B
-        has get their values in the neutral configuration.
+        At these configurations A and B have the same poses, except for `base`. Coordinates that only B has
+        get their values in the neutral configuration.
 
         Raises:
             InputError: q does not have A's length.
@@ -393,9 +393,9 @@ class Sameness(Displayable):
     def convention(self) -> Convention:
         """Return B's joint names, order, senses and zeros as a convention of A.
 
-        A's `robot.convention(...)` then converts q, v, a and Jacobians of A to those of B. At a configuration
-        of A and the converted configuration of B, both models have the same poses, except for `base` and
-        `tools`.
+        A's `robot.convention(...)` then converts q, v, a and Jacobians of A to q, v, a and Jacobians of B. At
+        a configuration of A and the converted configuration of B, A and B have the same poses, except for
+        `base` and `tools`.
 
         Raises:
             InputError: a coordinate of one model has no matching coordinate in the other model, or a planar
@@ -645,7 +645,7 @@ def _rounded(x: float, rounding: float) -> float:
 
 
 def _is_tool(found: Alignment, frame: FramePair) -> bool:
-    """Return whether a frame is fixed and has no children in both models."""
+    """Return whether a frame is fixed and has no children, in A as well as in B."""
     for tree, link in ((found.a.tree, frame.a), (found.b.tree, frame.b)):
         if link == 0 or tree.joints[link - 1].kind.nv or any(joint.parent == link for joint in tree.joints):
             return False

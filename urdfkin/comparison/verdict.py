@@ -395,7 +395,7 @@ class Comparator:
     def _confirm(self, found: Alignment, variables: Variables, frames: tuple[Interval, ...]) -> Confirmation:
         """Check the bounds with Pinocchio at some configurations.
 
-        Pinocchio reads the texts of both models itself.
+        Pinocchio reads the texts of A and B with its own parser.
         """
         if not all(checked_choice(robot.verifier.policy) for robot in self.robots):
             return Confirmation(reason=f"{NOT_ASKED}loaded with verify=False")

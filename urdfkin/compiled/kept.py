@@ -1,4 +1,4 @@
-"""The cache folder of compiled kernels, and messages about compilations; this module does not import Numba.
+"""Find the cache folder of compiled kernels, and send messages about compilations, without importing Numba.
 
 Compiling a kernel takes seconds, and reading it from disk takes almost no time. Functions called listeners
 receive an event for each compilation that this process waits for.

@@ -19,8 +19,8 @@ from urdfkin.kinematics import equations as eq
 _LOCAL, _WORLD, _ALIGNED = REFERENCES.values()
 _FRAMES, _NV = int(Head.FRAMES), int(Head.NV)
 
-#: Indices of rows of scratch memory: those for the numbers of a 4 by 4 pose, row by row, and those for the
-#: six numbers of [linear; angular].
+#: Indices of rows of scratch memory: 16 rows for the numbers of a 4 by 4 pose, and six rows for the numbers
+#: of [linear; angular].
 _POSE = np.array([*range(OUT_ROW, OUT_ROW + 12), ZERO_ROW, ZERO_ROW, ZERO_ROW, ONE_ROW])
 _SIX = np.arange(OUT_ROW, OUT_ROW + 6)
 

@@ -102,9 +102,9 @@ class CompiledTree:
             the frame.
         places_q: Indices of the coordinates that the recursion needs.
         parents: (steps,) the step before each step, -1 for the base.
-        lengths: (steps + frames,) metres: sum of the lengths of all URDF offsets, including those of fixed
-            joints. The first numbers are the lengths from the parent step to each step. The other numbers are
-            the lengths from the step to each frame (in the order of `frames`).
+        lengths: (steps + frames,) metres: sum of the lengths of all URDF offsets, including the offsets of
+            fixed joints. The first numbers are the lengths from the parent step to each step. The other
+            numbers are the lengths from the step to each frame (in the order of `frames`).
         depth: (frames,) number of URDF joints between the root and each frame, in output order.
         tilts: (frames,) sum (rad) of `Joint.tilt` over the joints that `depth` counts, in output order.
     """

@@ -53,7 +53,7 @@ class Head(IntEnum):
     NQ = 1
     NV = 2
     FRAMES = 3
-    BLOCKS_Q = 4  # index of the list of the blocks of eight coordinates that the program needs
+    BLOCKS_Q = 4  # index of the list of needed blocks of eight coordinates
     BLOCKS_V = 5
     BLOCKS_END = 6
     ANGLES = 7  # index of the list of joint angles
@@ -69,11 +69,11 @@ class Head(IntEnum):
 LANES = 8
 #: Number of integers in an instruction: the operation, three operands, and the index of its constants.
 WIDTH = 5
-#: Number of integers in an entry of the list of angles: the row of the angle, the row of its sine, the index
-#: of the mimic rule, and whether there is a mimic rule.
+#: Number of integers in an entry of the list of angles. They are the row of the angle, the row of the sine,
+#: the index of the mimic rule, and whether there is a mimic rule.
 ANGLE_WIDTH = 4
-#: Reserved scratch rows: a row for the number 0, one for the number 1, rows for a result before it is
-#: written, and one for an angle. The last value is the first free row.
+#: Reserved scratch rows: a row for the number 0, a row for the number 1, rows for a result before it is
+#: written, and a row for an angle. The last value is the first free row.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, KEPT_ROWS, COLUMN_ROWS = 24, 12, 6
 #: Number of integers in an entry of a list of pairs. An entry describes a Jacobian column: the column's row,
@@ -181,7 +181,7 @@ class _Writer:
                     c += 1
                 self._save(step, last, k + 1)
             elif frame is not None and self._frame(frame):
-                now = -2  # the current state is now that of the frame
+                now = -2  # the current state is now the state of the frame
 
     def _events(self) -> Iterator[tuple[int, int | None, int | None]]:
         """Yield the events of the recursion in order: each is a step or a frame.
@@ -199,7 +199,7 @@ class _Writer:
     def _save(self, step: int, last: Mapping[int, int], following: int) -> None:
         """Write an instruction that saves the state after a step, if it is needed again later.
 
-        The state is needed again if an event after the one with index `following` starts from it.
+        The state is needed again if an event with an index above `following` starts from this state.
         """
         if last.get(step, -1) > following:
             self._put(Op.SAVE, self._slot(step))

@@ -411,8 +411,8 @@ def _phi_of_coinciding(pairs: Sequence[PairLike], steps: Sequence[Step], i: int,
 def _closer_direction(step: Step, pair: PairLike, phi_in: float = 0.0) -> Step:
     """Return the step; reverse the direction of x if the reversed step is closer to the other table.
 
-    The function compares the cells a, alpha and beta with those of the other table. If both directions of x
-    are equally close, theta decides.
+    The function compares the cells a, alpha and beta with the same cells of the other table. If the two
+    directions of x are equally close, theta decides.
     """
     row = pair.row
 

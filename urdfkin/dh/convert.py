@@ -14,8 +14,8 @@ other convention and back gives the original table.
 In a tree, each joint's frame is a Denavit-Hartenberg frame. In a standard table z_{i-1} is the axis of joint
 i, so the frame of joint i is frame i - 1. S_i X_i with the joint at zero leads to frame i: d_{i-1,i} = d_i
 z_{i-1} + a_i x_i (7.64). In a modified table z_i is the axis of joint i, so the frame of joint i is frame i,
-and X_{i-1} S_i leads to frame i. urdfkin computes the motion of a table on this tree, and `to_urdf` writes
-the tree as a URDF.
+and X_{i-1} S_i leads to frame i. The motion of a table is computed on this tree, and `to_urdf` writes the
+tree as a URDF.
 """
 
 from __future__ import annotations
@@ -74,9 +74,9 @@ UNBOUNDED_SLIDE = Limit(-1000.0, 1000.0, 1000.0, 1000.0)
 def to_tree(table: DHTable) -> KinematicTree:
     """Return the table's robot as a tree from the base frame to the tip.
 
-    Joint names, senses, limits and mimic rules are those of the rows. If a mimicked joint is not on the path,
-    it becomes a separate joint on the base, so that the tree has the same coordinates as the table. A
-    revolute joint without limits becomes continuous. A prismatic joint without limits gets -1 km to 1 km,
+    The tree has the joint names, senses, limits and mimic rules of the rows. If a mimicked joint is not on
+    the path, it becomes a separate joint on the base, so that the tree has the same coordinates as the table.
+    A revolute joint without limits becomes continuous. A prismatic joint without limits gets -1 km to 1 km,
     because URDF requires limits.
 
     Args:

@@ -378,7 +378,7 @@ def _has_no_tool(table: DHTable) -> bool:
 def _first_like(
     row: DHRow, base: FloatArray, first: tuple[float, float]
 ) -> tuple[FloatArray, tuple[float, float]]:
-    """Set theta of the first row to that of another table, and d to 0 if the other table has d = 0.
+    """Set theta of the first row to theta in another table; set d to 0 if the other table has d = 0.
 
     The base contains the remaining rotation and the remaining offset.
     """

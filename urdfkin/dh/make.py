@@ -56,8 +56,8 @@ def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tu
     ends = replace(there, base=np.eye(4), tool=np.eye(4))
     names = [joint.name for joint in chain.joints]
     patterns = [one.senses for one in align(chain, ends)]
-    # Base and tool can absorb the sense of the first and of the last joint. Therefore both senses of these
-    # joints are tried.
+    # Base and tool can absorb the sense of the first and of the last joint. Therefore, the two senses of each
+    # of these joints are tried.
     patterns += [(-first, *rest) for first, *rest in patterns]
     patterns += [(*rest, -last) for *rest, last in patterns]
     best, flip = (math.inf, 0, 0, 0.0, 0), tuple[str, ...]()
@@ -138,22 +138,21 @@ def dh_table(
         snap: Tolerance in radians. An angle that differs by at most this tolerance from a multiple of 15
             degrees becomes that multiple. The table's attribute `snap` reports the effect. 0 leaves every
             angle as it is in the file.
-        last: "tip" lets the last row reach the tip where four parameters suffice; "flange" puts the transform
-            from the last axis to the tip into the tool.
-        parallel_offset: Row that takes the offset along a run of parallel axes: "last" is the first row after
-            the run, "first" is the first row of the run; with "each", every row takes the offset of its own
-            link.
-        flip: Names of joints to reverse; their rows have sense -1.
-        first: "base" puts the transform from the base to the first axis into d_1 and theta_1 where possible;
-            "joint" puts it into the base, so that d_1 and theta_1 are zero (Craig's frame 0).
+        last: "tip": the last row reaches the tip if four parameters suffice. "flange": the tool contains the
+            transform from the last axis to the tip.
+        parallel_offset: Row that takes the offset along a run of parallel axes. "last": the first row after
+            the run. "first": the first row of the run. "each": every row takes the offset of its own link.
+        flip: Names of joints to reverse; the rows of these joints have sense -1.
+        first: "base": if possible, d_1 and theta_1 contain the transform from the base to the first axis.
+            "joint": the base contains this transform, so that d_1 and theta_1 are zero (Craig's frame 0).
         sign: Direction of x: "theta" keeps theta within a right angle; "a" and "alpha" make the cell of that
             name not negative.
         slide: Line of a prismatic joint, because a prismatic joint defines only a direction. "drawn": the
             line through the joint's origin in the URDF. "minimal": the line through the origin of the next
             revolute joint, so that a is 0.
         like: A published table. The result takes from it the senses, directions of x, zeros of the first and
-            last joint, and offsets along parallel axes. The lengths, angles, base and tool are those of the
-            URDF. `flip`, `first`, `last`, `sign` and `parallel_offset` are then ignored.
+            last joint, and offsets along parallel axes. The lengths, the angles, the base and the tool come
+            from the URDF. `flip`, `first`, `last`, `sign` and `parallel_offset` are then ignored.
 
     Raises:
         UnknownNameError: a frame or a joint does not exist.

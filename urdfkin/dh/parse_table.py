@@ -48,7 +48,7 @@ _POSE_LINES = 6
 _SETTING = re.compile(r"^\W*(convention|angles|lengths|robot|base_frame|tip_frame)\s*[:=]\s*(.+)$")
 #: In a CSV file each line `# key: value` is a setting. `table_from_mapping` rejects an unknown key.
 _KEY = re.compile(r"^#?\s*(\w+)\s*:\s*([^,;\t].*)$")
-#: Names of columns that urdfkin writes; they have no synonyms.
+#: Names of columns that urdfkin writes; these names have no synonyms.
 _OWN = ("leader", "multiplier", "lower", "upper", "velocity", "effort", "sense")
 _NAMES = {
     **dict.fromkeys(("a", "link length", "length"), "a"),
@@ -336,9 +336,9 @@ def _rigid(rows: list[list[float]], end: str) -> list[list[float]]:
 
 
 def _named_coordinates(lines: list[str]) -> list[str]:
-    """Return the joint names in `with q1 = left, q2 = right`.
+    """Return the joint names in a text such as `with q1 = left, q2 = right`.
 
-    urdfkin prints this text if the coordinates are not the rows' joints in row order.
+    Such a text is printed if the coordinates are not the rows' joints in row order.
     """
     line = next((line for line in lines if line.startswith("with q1 = ")), "")
     return [_unescaped(name).strip("`") for name in re.findall(r"q[0-9]+ = ([^,]+)", line)]
@@ -369,7 +369,7 @@ def _row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
 
 
 def _number(cell: str, column: _Column, where: str, commas: bool) -> str:
-    """Return a cell as text with a unit: that of the cell, or else that of the column's heading.
+    """Return a cell as text with a unit, which comes from the cell or else from the column's heading.
 
     An invalid cell raises InputError.
     """

@@ -11,10 +11,10 @@ All formats are converted to the same mapping:
     rows = [{joint = "j1", kind = "revolute", a = 0, alpha = "-pi/2", d = 0.3, theta = 0}, ...]
 
 A row may also be a list [a, alpha, d, theta, "R" or "P"]. `theta` and `d` are the constant parts, without the
-joint's value. In a modified table a and alpha of row i are a_{i-1} and alpha_{i-1}. A row's `mimic` is
-{leader, multiplier, offset}; its `limit` is {lower, upper, velocity, effort}. The units apply to cells,
-limits, offsets of mimic joints, and the positions of base and tool. A multiplier is a ratio of values in SI
-units; an effort is in N or N m.
+joint's value. In a modified table a and alpha of row i are a_{i-1} and alpha_{i-1}. The entry `mimic` of a
+row is {leader, multiplier, offset}; the entry `limit` is {lower, upper, velocity, effort}. The units apply to
+cells, limits, offsets of mimic joints, and the positions of base and tool. A multiplier is a ratio of values
+in SI units; an effort is in N or N m.
 
 `last_digits` returns the precision of each number as it is written: half a unit of its last digit. For
 example, 311.1 mm in a data sheet is uncertain by 0.05 mm. A number without a decimal point (90 degrees, zero)
@@ -143,7 +143,7 @@ def refuse_other_order(rows: Sequence[Any]) -> None:
     second column is.
 
     Raises:
-        InputError: the columns look like the other order; the message names both orders.
+        InputError: the columns look like the other order; the message names the two orders.
     """
     lists = [row for row in rows if isinstance(row, Sequence) and not isinstance(row, str)]
     if len(lists) < len(rows) or not all(_has_order(row) for row in lists):

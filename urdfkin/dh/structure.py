@@ -23,7 +23,7 @@ solver. The difference between this result and the arm's placement is the error 
 
 P_i is the step from a point on one axis to a point on the next axis. The formula is correct for any choice of
 these points. The solvers detect two intersecting axes by a zero step between their points. This module
-therefore uses the intersection as the point of both axes.
+therefore uses the intersection as the point of each of the two axes.
 """
 
 from __future__ import annotations
@@ -262,7 +262,7 @@ def _solvers(letters: str, kinds: list[Kind], pairs: tuple[Pair, ...]) -> list[s
 
 
 def _origin(screws: ProductOfExponentials) -> FloatArray:
-    """Return the point of the first axis nearest to the second axis, if both joints are revolute.
+    """Return the point of the first axis nearest to the second axis, if the first two joints are revolute.
 
     For other joints the result is the first point in `screws.points`.
     """
@@ -438,7 +438,7 @@ def _read(table: DHTable) -> Opw:
 def axes_and_steps(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
     """Return the unit axes H (n, 3), and the steps P (n + 1, 3) between points on these axes, in metres.
 
-    The first step begins at the base; the last one ends at the tip.
+    The first step begins at the base, and the last step ends at the tip.
 
     Args:
         screws: A path of revolute joints.
@@ -450,8 +450,8 @@ def axes_and_steps(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArra
 def _points(screws: ProductOfExponentials) -> FloatArray:
     """Return an (n, 3) array with a point of each axis; intersecting axes have the same point.
 
-    If an axis has several intersections, the intersection of three axes has priority over that of two axes.
-    The wrist has priority over the shoulder.
+    If an axis has several intersections, the intersection of three axes has priority over the intersection of
+    two axes. The wrist has priority over the shoulder.
     """
     points, taken, n = screws.points.copy(), set[int](), len(screws.joints)
     for size in (3, 2):

@@ -248,7 +248,8 @@ class SnapChange:
         angle: Rotation of the rest of the chain (rad).
         lever: Largest distance of the tip from the pivot of the rotation, with the prismatic joints at zero
             (metres).
-        sliders: Names of the prismatic joints after the pivot; their travel adds to the lever.
+        sliders: Names of the prismatic joints after the pivot; the travel of these joints increases the
+            distance.
     """
 
     row: int

@@ -8,10 +8,10 @@ pose of frame j in the antecedent's frame is
     T(i, j) = Rz(gamma) Tz(b) . Tx(d) Rx(alpha) Ry(beta) . Rz(theta) Tz(r)
 
 The common normal to the first moving child of link i defines x_i, so gamma and b of this child are zero. For
-a chain without branches, the rows are those of the modified table, with a(i-1) = d and d(i) = r. sigma is the
-joint's kind: 0 revolute (theta), 1 prismatic (r), 2 fixed. A fixed joint uses all six numbers, so every frame
-of the robot is exact. beta is not part of the original notation. beta is zero except between nearly parallel
-axes (Hayati), where the other numbers would need offsets of kilometres.
+a chain without branches, the rows are the rows of the modified table, with a(i-1) = d and d(i) = r. The
+number sigma is the joint's kind: 0 revolute (theta), 1 prismatic (r), 2 fixed. A fixed joint uses all six
+numbers, so every frame of the robot is exact. The angle beta is not part of the original notation. It is zero
+except between nearly parallel axes (Hayati), where the other numbers would need offsets of kilometres.
 
 `document`, `as_csv` and `as_mapping` return the table as a document, as CSV and as plain data.
 """

@@ -191,8 +191,8 @@ def locked_values(
 
     Raises:
         UnknownNameError: there is no such joint or pose.
-        InputError: a joint to lock has several coordinates, is a mimic joint, is fixed or is named twice; or
-            a value is not a number or is outside the joint's limits.
+        InputError: a joint to lock is fixed, is a mimic joint, has several coordinates or is named twice. A
+            value is not a number, or is outside the joint's limits.
     """
     layout = places(tree, "q")
     values, pose = layout.named(lock, "lock")
@@ -352,8 +352,8 @@ def _violations(tree: KinematicTree, q: FloatArray) -> Iterator[tuple[Joint, str
 def _degrees(joint: Joint, value: float) -> str:
     """Return the hint "degrees?" if the value looks like degrees, else "".
 
-    A value looks like degrees if it is far outside the limits of a revolute joint, beyond `LARGEST_ANGLE`,
-    and within the limits when it is read as degrees.
+    A value looks like degrees if two conditions hold. The value is far outside the limits of a revolute joint
+    and beyond `LARGEST_ANGLE`. The value in degrees is within the limits.
     """
     if not (joint.kind.turns and is_bounded(joint.limit) and abs(value) > LARGEST_ANGLE):
         return ""

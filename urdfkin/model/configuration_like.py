@@ -134,11 +134,11 @@ keeps: 'neutral, elbow=...'
         return not is_pose and all(_pair(cell)[0] is None for cell in cells)
 
     def demand_names(self, names: Sequence[str], where: str) -> None:
-        """Check that each name is that of a coordinate, or of a joint with several coordinates.
+        """Check that each name belongs to a coordinate or to a joint with several coordinates.
 
         Raises:
             UnknownNameError: there is no such coordinate.
-            InputError: a name is that of a fixed joint or a mimic joint, or a name is not a string.
+            InputError: a name belongs to a fixed joint or a mimic joint, or a name is not a string.
         """
         for name in names:
             if not isinstance(name, str) or (name not in self.names and name not in self.spans):

@@ -71,7 +71,7 @@ def values_within(ranges: Sequence[tuple[float, float]], count: int, seed: int =
 def own_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
     """Return the range of each joint that has exactly one coordinate.
 
-    Only the joint's own limits are used, and not those of joints that mimic it.
+    Only the joint's own limits are used, and not the limits of joints that mimic this joint.
     """
     return {joint.name: _own_range(joint) for joint in tree.joints if joint.nq == 1}
 

@@ -299,12 +299,15 @@ class KinematicTree:
 
     @cached_property
     def q_index(self) -> tuple[int, ...]:
-        """Index of each joint's first coordinate in `q`; for a mimic joint, that of its mimicked joint."""
+        """Index of each joint's first coordinate in `q`.
+
+        A mimic joint has the index of the joint it mimics.
+        """
         return self._offsets([joint.nq for joint in self.joints])
 
     @cached_property
     def v_index(self) -> tuple[int, ...]:
-        """Index of each joint's first velocity in `v`; for a mimic joint, that of its mimicked joint."""
+        """Index of each joint's first velocity in `v`; a mimic joint has the index of the joint it mimics."""
         return self._offsets([joint.nv for joint in self.joints])
 
     def _offsets(self, sizes: Sequence[int]) -> tuple[int, ...]:

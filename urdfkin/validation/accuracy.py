@@ -123,11 +123,11 @@ def judge(robot: Robot, *, samples: int = 5, seed: int = 0, base: BaseMotion | N
     acceleration.
 
     The study contains one line for the analytical Jacobians of all twelve sequences of Euler angles, and one
-    line for those of quaternions. Sequences about fixed axes are left out, because they have the same
-    Jacobians with the rows in reverse order. Samples nearer to a singularity than `Robot.analytical_jacobian`
-    accepts are skipped. Samples in which rounding hides the sign of the quaternion are skipped too. Pinocchio
-    computes no analytical Jacobians. Therefore, the rotation and the Jacobian of each library are inserted
-    into (7.122).
+    line for the analytical Jacobians of quaternions. Sequences about fixed axes are left out, because they
+    have the same Jacobians with the rows in reverse order. Samples nearer to a singularity than
+    `Robot.analytical_jacobian` accepts are skipped. Samples in which rounding hides the sign of the
+    quaternion are skipped too. Pinocchio computes no analytical Jacobians. Therefore, the rotation and the
+    Jacobian of each library are inserted into (7.122).
 
     Args:
         robot: The loaded robot.
@@ -256,7 +256,7 @@ def _one(base: BaseNumbers, k: int) -> BaseNumbers:
 def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.object_]:
     """Return the unit quaternions (m, 4) of rotations (m, 3, 3).
 
-    The signs of the results are those of the quaternions `near`.
+    Each result has the sign of the corresponding quaternion in `near`.
     """
     K = davenport(R)
     q = (K @ near[..., np.newaxis])[..., 0] + near  # K + I is 4 q q^T

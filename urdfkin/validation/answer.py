@@ -35,7 +35,7 @@ class Failure:
     Attributes:
         verdict: BAD_INPUT if the robot's file has an error, NOT_VERIFIED otherwise.
         reason: The reason as text.
-        portrait: Summary of the robot; it contains only the parts of the robot that could be read.
+        portrait: Summary of the robot, with only the parts of the robot that could be read.
         error: The traceback of an unexpected error; None otherwise.
         passing: Whether the process or the cluster caused the failure, and not the robot. Such a failure is
             not stored, so that a resumed run computes the chunk again.

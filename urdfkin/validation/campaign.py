@@ -69,9 +69,9 @@ def validate(
 
     Args:
         robots: One robot or several: anything that `load` accepts, or loaded robots.
-        samples: Number of random configurations within the limits for each robot. The neutral configuration
-            and both ends of the limits are added. Every eighth sample has joint velocities and joint
-            accelerations a hundred times larger.
+        samples: Number of random configurations within the limits for each robot. The neutral configuration,
+            the lower limits and the upper limits are added. Every eighth sample has joint velocities and
+            joint accelerations a hundred times larger.
         seed: Seed of the samples. The same seed gives the same numbers for every `jobs` and `executor`.
         jobs: Number of local processes. If a process crashes, its robot is tried once more, alone in a
             process. Other robots are not affected.
@@ -99,8 +99,8 @@ def validate(
         error. An interrupt ends the run; finished results stay in the report.
 
     Raises:
-        InputError: The number of samples or the seed is negative; `jobs` is below one; the oracle is not
-            installed; the store belongs to another campaign, or another process uses it.
+        InputError: The number of samples or the seed is negative, or `jobs` is below one. The oracle is not
+            installed. The store belongs to another campaign, or another process uses it.
         InstallationError: Pinocchio is missing, or another project is installed under its name.
         SourceError: The store cannot be made.
 

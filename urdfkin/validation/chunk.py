@@ -1,8 +1,8 @@
 """Chunks of a validation: a range of samples of one robot.
 
 A sample depends only on the seed and on the index of the sample. Inputs and results of a chunk are plain
-data, so a chunk can run in this process, in another one or on another machine. Samples 0, 1 and 2 of a robot
-are the neutral configuration and the two ends of the limits.
+data, so a chunk can run in this process, in another process or on another machine. Samples 0, 1 and 2 of a
+robot are the neutral configuration and the two ends of the limits.
 
 Samples are drawn 25 at a time, each draw with its own seed. A chunk compares several draws together. The
 number of draws in a chunk does not change any result; it only changes the cost of distributing and storing
@@ -31,7 +31,7 @@ from urdfkin.verify.sampling import Samples, draw
 
 #: Samples in one draw.
 DRAWN = 25
-#: Number of special configurations before the random ones.
+#: Number of special configurations before the random configurations.
 SPECIAL = 3
 #: Minimum number of chunks of a robot, so that several workers can share the robot. A robot with fewer draws
 #: has fewer chunks.
@@ -63,7 +63,7 @@ class Chunk:
 
     @property
     def configurations(self) -> int:
-        """Number of samples, including the special ones."""
+        """Number of samples, including the special configurations."""
         return self.samples + (SPECIAL if self.first == 0 else 0)
 
     @property

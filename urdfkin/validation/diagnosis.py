@@ -150,7 +150,7 @@ class Mistakes:
         return self.conversion is not None and self.conversion.angular_first
 
     def all(self, case: Diagnosis) -> Iterator[Mistake]:
-        """Yield all mistakes, the simplest ones first."""
+        """Yield all mistakes that can be tested, beginning with the simplest mistakes."""
         yield from self._of_references(case)
         if self.row.name == "acceleration":
             yield from self._of_accelerations(case)

@@ -219,14 +219,14 @@ class Tally:
         return replace(joined, by_frame=self.by_frame + other.by_frame)
 
     def percentile(self, percent: float) -> float:
-        """Return a percentile of the disagreements; its accuracy is the width of a histogram bin (26 %)."""
+        """Return a percentile of the disagreements, with the accuracy of a histogram bin's width (26 %)."""
         return percentile(self.histogram, HISTOGRAM_EDGES, self.worst, percent)
 
 
 def percentile(
     histogram: Sequence[int], edges: Sequence[float] | FloatArray, worst: float, percent: float
 ) -> float:
-    """Return a percentile of the values in a histogram; its accuracy is the width of a bin."""
+    """Return a percentile of the values in a histogram; the accuracy of the result is the width of a bin."""
     counts = np.cumsum(histogram)
     if not counts[-1]:
         return 0.0

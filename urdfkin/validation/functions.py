@@ -261,7 +261,7 @@ def verify_function(
     batch: bool = False,
     **options: Any,
 ) -> FunctionCheck:
-    """Compare the results of your function with those of urdfkin and of the oracle, within the derived bound.
+    """Compare the results of your function with urdfkin's and the oracle's results, within the derived bound.
 
     The function receives q (nq,), and v and a (nv,) if the quantity needs them, in rad, m and seconds. The
     values are random within the limits; the zero configuration and the joint limits come first. In every

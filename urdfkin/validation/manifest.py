@@ -91,7 +91,7 @@ class Manifest:
     def differences(self, other: Manifest) -> list[str]:
         """Return the differences from another manifest, each with the values in the two manifests.
 
-        The result is empty if both manifests define the same chunks.
+        The result is empty if the two manifests define the same chunks.
         """
         own, theirs = (
             {"samples": m.samples, "seed": m.seed, "number of robots": len(m.robots)} | m.provenance

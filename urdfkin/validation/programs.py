@@ -52,7 +52,9 @@ class ProgramError(Exception):
 
 
 class Program:
-    """A program that computes one quantity of one frame; it is called like a function of q, v and a.
+    """A program that computes one quantity of one frame.
+
+    Python calls the program like a function of q, v and a.
 
     Args:
         command: The program and its arguments. No shell is involved.

@@ -68,7 +68,7 @@ class WorkerProcess:
 
 
 def _interpreter(pipe: int) -> subprocess.Popen[bytes]:
-    """Start an interpreter that imports the same packages as this one.
+    """Start a Python interpreter that imports the same packages as this process.
 
     The new interpreter imports neither from the current folder nor the main module of this process.
 
@@ -196,7 +196,7 @@ class _Crew:
             try:
                 worker = worker or self._start()
             except Exception as error:
-                if self._workers:  # no other process can be started, so continue with the running ones
+                if self._workers:  # no further process can be started, so continue with the running processes
                     self._queue.put_back(task, row)
                     return
                 self._enter_answer(task, lost("no process could be started", error))

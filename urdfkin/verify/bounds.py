@@ -66,8 +66,8 @@ class Magnitudes:
         vel: (n, frames) linear velocity, m/s.
         alpha: (n, frames) angular acceleration, rad/s^2.
         acc: (n, frames) linear acceleration, m/s^2.
-        roundings: (n, frames) roundings of one factor: those of each URDF joint on the path, of a rotated
-            base, and of one additional joint.
+        roundings: (n, frames) roundings of one factor. They are the roundings of each URDF joint on the path,
+            of a rotated base, and of one additional joint.
     """
 
     p: FloatArray
@@ -418,8 +418,8 @@ def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) ->
     - two more to move the other column there, (v - p x w) x w
 
     These counts give the numbers five, two and three in `_PAIR_TERMS`. urdfkin needs the single product z x
-    (z x d), or the two products of c_1 x c_2. In LOCAL urdfkin rotates both columns by R first. urdfkin's two
-    products of five factors (R, z, R, z, d) are below the allowed three products of four factors.
+    (z x d), or the two products of c_1 x c_2. In LOCAL, R rotates the two columns first. The two products of
+    five factors (R, z, R, z, d) in urdfkin are below the allowed three products of four factors.
     """
     shape = len(plan.frames), plan.nv, plan.nv
     turning, mixed, angular = np.zeros(shape), np.zeros(shape), np.zeros(shape)
@@ -523,8 +523,9 @@ def _column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
 def movable(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.bool_]:
     """Return (frames, 6, nv), True for the numbers of a Jacobian that are not 0 for every q and base.
 
-    The linear rows of a revolute column are z x d. There d is 0 for every q if the path has no length and no
-    prismatic joint. In WORLD the path leads from the root to the joint, else from the joint to the frame.
+    The linear rows of a revolute column are z x d. The vector d is 0 for every q if the path has no length
+    and no prismatic joint. In WORLD the path leads from the root to the joint, else from the joint to the
+    frame.
     """
     found = np.zeros((len(plan.frames), 6, plan.nv), dtype=bool)
     turns, multipliers = plan.steps[:, Step.KIND] == Motion.TURN, plan.geometry[:, Geometry.MULTIPLIER :]

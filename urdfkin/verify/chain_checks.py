@@ -27,9 +27,9 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
 
     Pinocchio's frame of a joint is the frame of its child link. Along the chain, this frame comes after the
     joint's motion if the chain passes the joint from parent to child. The frame comes before the motion if
-    the chain passes the joint from child to parent. Pinocchio computes from the root to both ends of the
-    chain; urdfkin computes from one end to the other. The bound uses the joints and lengths of the two paths
-    from the root to the ends of the chain. Neither computation uses more joints or lengths than these.
+    the chain passes the joint from child to parent. Pinocchio computes from the root to the two ends of the
+    chain; urdfkin computes from one end to the other end. The bound uses the joints and lengths of the two
+    paths from the root to the ends of the chain. Neither computation uses more joints or lengths than these.
 
     Args:
         verifier: Verifier of the robot.

@@ -82,8 +82,9 @@ def answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     """Yield the answers to a request.
 
     Args:
-        request: `path` or `text`; `name`, the file's name in messages; `samples`, the number of random
-            configurations for MuJoCo besides the zero configuration, or 0 for no configuration at all.
+        request: Mapping with `path` or `text`, with `name` (the file's name in messages), and with `samples`.
+            This is the number of random configurations in addition to the zero configuration; 0 means no
+            configuration.
     """
     path, samples = request["path"], int(request["samples"])
     source = path if path is not None else request["text"]
@@ -106,7 +107,7 @@ def answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
 
 
 def _configurations(read: Mjcf, samples: int) -> FloatArray:
-    """Return configurations (n, nq): the zero configuration and `samples` random ones.
+    """Return configurations (n, nq): the zero configuration and `samples` random configurations.
 
     If `samples` is 0, there are no configurations.
     """

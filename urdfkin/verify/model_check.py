@@ -26,7 +26,7 @@ _SAMPLES = 8
 
 
 def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
-    """Compare the placements of a robot with those of the Pinocchio model from which it was made.
+    """Compare a robot's placements with the placements of the Pinocchio model from which it was made.
 
     Args:
         verifier: Verifier of the robot.

@@ -31,7 +31,7 @@ def check_orientations(numbers: FloatArray, R: FloatArray, frame: str, again: Ca
 
     Args:
         numbers: (n, 3) roll, pitch, yaw in rad, or (n, 4) quaternions, scalar last.
-        R: (n, 3, 3) rotations from which the numbers were computed; they were checked before.
+        R: (n, 3, 3) rotations from which the numbers were computed; these rotations were checked before.
         frame: Name of the frame, for the message.
         again: Function that returns a shell command, or lines of Python, to compute a sample again.
 

@@ -250,7 +250,7 @@ class Frames:
         """Return the index of the frame with a name.
 
         Raises:
-            OracleError: no frame has this name, or a body and an unrelated joint both have it.
+            OracleError: no frame has this name, or a body and an unrelated joint have this name.
         """
         if isinstance(name, LinkFrame):
             return self._known(self._bodies, name, str(name)[5:])

@@ -1,15 +1,15 @@
 """Read a robot's URDF a second time with yourdfpy, and compare yourdfpy's tree with urdfkin's tree.
 
 Pinocchio checks the computed results. This module checks the data of the robot itself: links, joint kinds,
-origins, axes, limits and mimic rules. yourdfpy and urdfkin's reader share no code.
+origins, axes, limits and mimic rules. The readers of yourdfpy and urdfkin share no code.
 
-yourdfpy (0.0.60) is known to differ from the URDF specification in two ways. The report names them as known
+Two faults of yourdfpy (0.0.60) with respect to the URDF specification are known. The report names these known
 faults and does not count them as differences:
 
-- It ignores the attribute `quat_xyzw` of an origin.
-- It does not normalise an axis.
+- The reader yourdfpy ignores the attribute `quat_xyzw` of an origin.
+- The reader yourdfpy does not normalise axes.
 
-yourdfpy returns None for a missing number. The default of the specification replaces this None before the
+For a missing number, yourdfpy returns None. The default of the specification replaces this None before the
 comparison.
 """
 

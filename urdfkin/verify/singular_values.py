@@ -2,8 +2,8 @@
 
 Let s_k be the k-th singular value. By Weyl's inequality, |s_k(J + E) - s_k(J)| <= |E|. The inequality holds
 for every norm that is at least the spectral norm; this module uses the Frobenius norm. E is the sum of two
-errors. The first error is that of J; `urdfkin.verify.bounds` computes its bound. The second error is the
-residual of the decomposition, J - U S V^T.
+errors. The first error is the error of J, for which `urdfkin.verify.bounds` computes a bound. The second
+error is the residual of the decomposition, J - U S V^T.
 
 The computed U and V are not exactly orthogonal. Let |U^T U - I| <= a and |V^T V - I| <= b. By Ostrowski's
 theorem, each singular value of U S V^T is a singular value of S times a factor between (1 - a)^(1/2) (1 -
@@ -11,8 +11,8 @@ b)^(1/2) and (1 + a)^(1/2) (1 + b)^(1/2).
 
 The computed residuals have rounding errors too. The error of a sum of m products is at most m eps times the
 sum of the absolute values of the products. Two measures keep every intermediate value in the range of
-doubles. For a norm, all numbers are first divided by the largest one. For a product, mantissas and exponents
-are computed separately.
+doubles. For a norm, all numbers are first divided by the largest number. For a product, mantissas and
+exponents are computed separately.
 """
 
 from __future__ import annotations

@@ -43,8 +43,8 @@ class FrameColumns:
         error: (..., 6, nv) bound on the error of each number of J.
         frame: Name of the frame.
         joints: (nv,) name of each column.
-        turns: (nv,) True for the column of a revolute joint, False for that of a prismatic joint; None for a
-            column that does not belong to a single joint axis.
+        turns: (nv,) True for the column of a revolute joint, False for the column of a prismatic joint. None
+            for a column that does not belong to a single joint axis.
         active: (6, nv) False for numbers of the Jacobian that are 0 for every q.
         samples: Function that returns Jacobians (n, 6, nv) at random configurations on a fixed base.
         moving_base: Whether the user gives the base's motion. The samples have a fixed base, so lost

@@ -257,8 +257,8 @@ def read_rows(m, x, at, stride, count, s, row):
 def write_rows(m, s, rows, first, count, to, at, stride):
     """Write `count` rows of scratch memory to the array `to`, from `to[at]` on.
 
-    The indices of the rows are `rows[first]` and the following ones. If `m` is 1, only one configuration is
-    written, else eight.
+    The indices of the rows are `rows[first]` and the following elements of `rows`. If `m` is 1, only one
+    configuration is written, else eight.
     """
     i = 0
     if m == 1:

@@ -8,8 +8,9 @@ therefore have the same bits for one lane and for eight lanes, on every machine.
 
 `zero()` and `one()` are the numbers 0 and 1, known at compile time. A product with one of these numbers, or a
 sum with zero, costs no time. If z = (0, 0, 1) is written with these numbers, the equations for any axis
-simplify to those for the axis z. A rotation about x then does not compute the x component. `nothing()` stands
-for a number that is not needed. A result that is computed from it is also `nothing()` and costs no time.
+simplify to the equations for the axis z. A rotation about x then does not compute the x component.
+`nothing()` stands for a number that is not needed. A result that is computed from it is also `nothing()` and
+costs no time.
 """
 
 from __future__ import annotations

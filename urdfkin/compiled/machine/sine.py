@@ -1,7 +1,7 @@
 """Sine and cosine of several angles at once, to 0.65 units in the last place.
 
 The angle is reduced to [-pi/4, pi/4] by Cody and Waite's method; the rounding error of the reduction is
-computed too. The polynomials are those of fdlibm (Sun Microsystems, k_sin.c and k_cos.c). Below 2^20 quarter
+computed too. The polynomials come from fdlibm (Sun Microsystems, k_sin.c and k_cos.c). Below 2^20 quarter
 turns it is enough to represent pi/2 by two doubles, because the multiplications and additions are fused. Near
 a multiple of pi/2, the sine or the cosine is near 0, and this small value has an error of up to 1e-27. The
 sine and the cosine of a larger angle are computed by the C library. Only the lane with this angle uses the C
@@ -69,7 +69,7 @@ def _of_small(context: Any, x: Any) -> Any:
         quarters = builder.bitcast(shifted, whole)
         n = builder.fsub(shifted, all_lanes(NO_FRACTION))
         # This difference is exact, because the two terms are multiples of 2^-53 and differ by less than 1.
-        # The rounding error of r is `lost`, that of z is `z_lost`.
+        # The rounding error of r is `lost`, and the rounding error of z is `z_lost`.
         near = fused(builder, n, all_lanes(-PI_2), x)
         r = fused(builder, n, all_lanes(-PI_2_REST), near)
         lost = fused(builder, n, all_lanes(-PI_2_REST), builder.fsub(near, r))

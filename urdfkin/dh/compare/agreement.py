@@ -74,8 +74,8 @@ def compare(
     """Compare a reference table with a path of a URDF.
 
     Args:
-        chain: The path, from base to tip. The base and tip frames of the table may differ from those of the
-            path if they are fixed to the same links.
+        chain: The path, from base to tip. The base and tip frames of the table may differ from the base and
+            tip frames of the path, if they are fixed to the same links.
         reference: The table in either convention, with a row for each moving joint in the path's order.
         tolerance: Tolerance at the tip (metres).
         fit: Whether to fit base, tool, and the zeros and senses of the joints. If False, the table is

@@ -45,8 +45,8 @@ CELLS = ("theta", "d", "a", "alpha", "beta")
 _ROW = (Motion(2, True), Motion(2, False), Motion(0, False), Motion(0, True), Motion(1, True))
 #: Largest step of the fit, in radians for angles, and in metres per metre of reach for lengths.
 LONGEST_STEP = 0.5
-#: Limits of the fit of cells: the largest number of steps, the smallest relative improvement after which the
-#: fit continues, and the mean error that counts as zero.
+#: Limits for the fit of cells: largest number of steps, smallest relative improvement to continue, and mean
+#: error that counts as zero.
 _ROUNDS, _BETTER, _SOLVED = 40, 1e-9, 1e-14
 #: A singular value counts as zero if it is below this fraction of the largest singular value: `_FREE` for
 #: free parameters, `_CELLS` for cells.
@@ -70,7 +70,7 @@ class Model:
 
     Attributes:
         cells: (n, 5) theta, d, a, alpha, beta of each row.
-        turns: (n,) 1 for revolute rows, 0 for prismatic ones.
+        turns: (n,) 1 for revolute rows, 0 for prismatic rows.
         senses: (n,) +1 or -1.
         base: (4, 4) T_base_0 (metres).
         tool: (4, 4) T_n_tip (metres).
@@ -221,7 +221,7 @@ def _sparse(
 ) -> FloatArray:
     """Return the changes of cells that remove the error left by the free parameters.
 
-    As few cells as possible differ from those of `start` after these changes.
+    After these changes, as few cells as possible differ from the cells of `start`.
     """
     Q = _span(freedoms)
     cells_left = cells - Q @ (Q.T @ cells)
@@ -269,9 +269,9 @@ def moved(model: Model, free: FloatArray, scale: float, change: FloatArray | Non
     for i, own in enumerate(free[12:]):
         k = model.own(i)
         cells[i, k] += own * per_cell[k]
-    # The base is changed in the frame of the first revolute joint, and the tool in the frame of the last one.
-    # A rotation of the base or the tool may have the same effect as a joint offset. The two are then exactly
-    # equal, not only to first order.
+    # The base is changed in the frame of the first revolute joint, and the tool in the frame of the last
+    # revolute joint. A rotation of the base or the tool may have the same effect as a joint offset. The two
+    # are then exactly equal, not only to first order.
     base = _apply_twist(model.base @ model.first, free[:6], scale) @ np.linalg.inv(model.first)
     tool = np.linalg.inv(model.last) @ _apply_twist(np.eye(4), free[6:12], scale) @ model.last
     return replace(model, cells=cells, base=np.asarray(base), tool=np.asarray(model.tool @ tool))
@@ -479,8 +479,8 @@ class _Partial:
 
     Attributes:
         cost: Sum of the differences so far (metres).
-        senses: Senses of the joints up to this one.
-        offsets: Offsets of the joints before this one.
+        senses: Senses of all joints up to this joint.
+        offsets: Offsets of all joints before this joint.
         phi_in: Rotation from this joint's DH frame to its URDF frame (rad).
         carry: Offset from this joint's DH frame to its URDF frame (metres).
         base: (4, 4) part of the base that comes from the first row's offset.
@@ -618,10 +618,10 @@ def _steps(
     """Yield the possible steps between two axes, each step with each of the two directions of x.
 
     If the axes are nearly parallel in the URDF and in the reference table, a Hayati step at the d of the
-    reference table is also tried. In this step x is free if the distance of the axes is nearly zero. x is
-    also free if a joint is prismatic, because its axis has no fixed line; `placed` is then False. For
-    prismatic axes, a step along the common normal is also tried, because the direction of the normal does not
-    depend on the line.
+    reference table is also tried. In this step the direction of x is free if the distance of the axes is
+    nearly zero. The direction of x is also free if a joint is prismatic, because its axis has no fixed line;
+    `placed` is then False. For prismatic axes, a step along the common normal is also tried, because the
+    direction of the normal does not depend on the line.
     """
     steps = []
     sine = math.hypot(A[0, 2], A[1, 2])

@@ -67,7 +67,7 @@ class Search:
 
         A table that agrees only after a fit of base, tool and zeros has other frames than the URDF, or it has
         a mistake. The fit cannot distinguish these two cases. A change of such a table is a likely mistake
-        only if, after this change, only the base or only the tool must be fitted, or neither.
+        only if the changed table needs no fit, or only a fit of the base, or only a fit of the tool.
 
         Args:
             reference: The table.

@@ -204,8 +204,8 @@ class ConventionHypothesis:
         convention: Standard or modified; None if the table names no convention.
         lengths: Metres or millimetres.
         angles: Radians or degrees.
-        columns: What the table's columns contain according to this reading. The columns are those with the
-            names a, alpha, d and theta, or unnamed columns in this order.
+        columns: What the table's columns contain according to this reading. The columns have the names a,
+            alpha, d and theta, or are unnamed and in this order.
     """
 
     convention: Convention | None

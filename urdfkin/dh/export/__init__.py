@@ -12,7 +12,8 @@ from urdfkin.system.lazy_import import hook
 if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
 
-#: Format name -> (module with `write_NAME`, or "" for a language of `urdfkin export`; one-line summary).
+#: For each format: the module with the function `write_NAME` ("" for a language of `urdfkin export`), and a
+#: summary in one line.
 FORMATS: dict[str, tuple[str, str]] = {
     "terminal": ("urdfkin.dh.export.text", "aligned text"),
     "markdown": ("urdfkin.dh.export.text", "a Markdown table"),

@@ -57,7 +57,7 @@ def check_dialect(report: Reporter, root: Element) -> None:
 
 
 def _prefixes(root: Element) -> dict[str, str]:
-    """Return all namespace declarations in the document: prefix -> namespace."""
+    """Return all namespace declarations in the document, as a mapping from prefixes to namespaces."""
     return {
         key.removeprefix("xmlns:"): value
         for element in root.walk()

@@ -13,7 +13,7 @@ with S'_i = S_i, t'_i = t_i and L_i = 1 for each joint at which A and B agree. T
 motion if and only if nothing differs. There is one exception: two revolute joints on a common line can divide
 the sum of their rotations differently.
 
-**Variables.** The joint values of both models are linear functions of shared variables. Each coordinate of A
+**Variables.** The joint values of A and of B are linear functions of shared variables. Each coordinate of A
 is a variable. The coordinates of B are computed from these variables, with the senses and zeros of the
 joints. Each joint value of A or B is therefore a constant plus a multiple of one variable. A motion that only
 B has is a separate variable. Examples are a joint of B that is a mimic joint in A, and a joint of B that is
@@ -57,8 +57,8 @@ class Step:
             increases.
         offset: B's value is sense * A's value + offset, rad or m.
         before: (4, 4) the rigid motion L that is inserted before B's joint, in A's zero configuration.
-        axis: Screw of A's joint in the zero configuration; its sign is that for the motion of the body
-            farther from the base.
+        axis: Screw of A's joint in the zero configuration. The sign of the screw describes the motion of the
+            body that is farther from the base.
         other: Screw of B's joint, with the same rule for its sign. If the two screws agree, `other` is the
             same Python object as `axis`.
         tilt: Angle (rad) between the axes of the two joints, or between the normals of two planar joints.
@@ -268,8 +268,8 @@ class Gauge:
             the bodies by names.
         X: (4, 4) pose of B's root in A's root frame.
         zeros: Sense and offset of each joint of A whose sense and offset differ from (1, 0.0).
-        conversions: For each planar or floating joint of A whose coordinates differ from those in B: the
-            conversion from A's coordinates to B's.
+        conversions: For each planar or floating joint whose coordinates in A and B differ: the conversion
+            from A's coordinates to B's coordinates.
         orders: New orders of consecutive joints of B. Each entry lists some consecutive joints in their new
             order.
     """
@@ -461,9 +461,10 @@ class _Maker:
     def _ranges(self, pairs: list[Pair | None]) -> dict[str, tuple[float, float]]:
         """Return the range of each coordinate, computed from the limits of all joints that it moves.
 
-        If a coordinate moves joints of both models, its range is the intersection of their limits, or A's
-        limits if the intersection is empty. The limits of a mimic joint are used only for a coordinate that
-        has no limits of its own, because a mimic joint follows its rule even beyond its limits.
+        If a coordinate moves a joint of A and a joint of B, its range is the intersection of their limits. If
+        this intersection is empty, the range consists of A's limits. The limits of a mimic joint are used
+        only for a coordinate that has no limits of its own, because a mimic joint follows its rule even
+        beyond its limits.
         """
         first: dict[str, tuple[float, float]] = {}
         own: dict[str, tuple[float, float]] = {}

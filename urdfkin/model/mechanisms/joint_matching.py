@@ -495,7 +495,7 @@ MOST_ASSIGNMENTS = 5000
 IDENTITY = np.eye(4)
 
 #: For each coordinate of A: the corresponding coordinate of B, and the velocity of B's coordinate divided by
-#: that of A's. The ratio is negative if the two coordinates have opposite senses.
+#: the velocity of A's coordinate. The ratio is negative if the two coordinates have opposite senses.
 Rates = Mapping[str, tuple[str, float]]
 
 

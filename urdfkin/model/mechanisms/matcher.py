@@ -4,9 +4,9 @@ The alignment matches the joints of A and B. The alignment chooses the base of B
 the sense and the zero of each joint.
 
 The matcher starts at a common body and goes outwards through A and B at the same time. At each joint it
-chooses the sense and the zero of B's joint. With this choice, as many of the later links and axes of B as
-possible coincide with those of A. `align` calls the
-matcher for several starting bodies and joint orders, and returns the best result.
+chooses the sense and the zero of B's joint. With this choice, as many as possible of B's later links and axes
+coincide with links and axes of A. `align` calls the matcher for several starting bodies and joint orders, and
+returns the best result.
 
 Most joint zeros are determined by axes or link frames. If neither an axis nor a common link frame follows a
 joint, only a mimic rule determines the joint's zero. Let v = m w + c be a rule of A and v' = m' w' + c' a
@@ -605,8 +605,8 @@ def _normals_apart(at: FloatArray, seen: FloatArray) -> tuple[FloatArray, float,
 #: Largest number of orders that are tried for commuting joints. This number is the number of orders of five
 #: prismatic joints.
 MOST_ORDERS = 120
-#: Total number of look-ahead steps of one search; all of them take seconds. Without names, TALOS needs 500
-#: steps and Baxter 1,000.
+#: Total number of look-ahead steps of one search; so many steps take some seconds. Without names, TALOS needs
+#: 500 steps and Baxter 1,000.
 MOST_AHEAD = 2000
 #: Larger tolerances that are tried when the exact match fails: an angle in rad, and a distance as a fraction
 #: of the robot's size.
@@ -682,7 +682,7 @@ def _by_rules(best: Alignment) -> Alignment:
 
 
 def _exchanged(best: Alignment, given: Mapping[str, str]) -> Alignment:
-    """Try to exchange the partners of two joint pairs, for example those of two mirrored arms.
+    """Try to exchange the partners of two joint pairs, for example of the joints in two mirrored arms.
 
     Partners are exchanged only between joints at the same body, and only in pairs of joints with different
     names.

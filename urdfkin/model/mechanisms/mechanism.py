@@ -5,14 +5,14 @@ pose H are those of the zero configuration, in one common frame. The links betwe
 this product, so links that are fixed to each other may be merged or split. Any body may serve as the root: a
 path from another body passes some joints backwards, with reversed screws.
 
-The coordinates of a planar or floating joint are a pose P. If B's joint is in another frame, or the body
-behind it has another frame, the motions are equal for
+The coordinates of a planar or floating joint are a pose P. If the frame of B's joint, or the frame of the
+body behind this joint, is another than in A, the motions are equal for
 
     P_b = M P_a N,      or      M P_a^-1 N if one model's joint is reversed.
 
 For a floating joint any rigid M and N are valid. For a planar joint, M P N must be in the plane for every P
-in the plane. This requires that M raises the plane by as much as N lowers it, and that both or neither turn
-it over.
+in the plane. This requires that M raises the plane by as much as N lowers it. Either M and N both turn the
+plane over, or neither of them does.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ def angle_from_to(u: FloatArray, x: FloatArray, y: FloatArray) -> float | None:
 
 #: Relative tolerance for the entries of a computed pose.
 NEARLY = 1e-9
-#: A generic planar configuration: translated along both axes, and rotated.
+#: A generic pose (x, y, angle) of a planar joint, which is translated along x and y and is rotated.
 _AWAY = np.array([1.0, 2.0, 3.0])
 _Z = np.array([0.0, 0.0, 1.0])
 

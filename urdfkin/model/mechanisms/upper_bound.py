@@ -3,15 +3,15 @@
 Support functions. The support function of a set W of points is h(u) = max over p in W of u . p. A bound on
 distances needs only h, and a joint changes h in a simple way. Suppose that W rotates about an axis by any
 angle of a range. The new h'(u) is then the largest h over the directions that result when u is rotated back
-by these angles. If W translates, h'(u) is h(u) plus the largest product of u and the translation. One
-function of the direction therefore describes the reach of a chain with any number of joints, and no search
-over joint values is needed.
+by these angles. If W translates, h'(u) is h(u) plus the largest product of u and the translation. Therefore,
+one function of the direction describes the reach of a chain with any number of joints, without a search over
+joint values.
 
-h is stored at the points of a grid on the surface of a cube. The function h is convex, and h(s u) = s h(u)
-for s >= 0, so interpolation between grid points gives an upper bound. For a rotation, the directions form an
-arc. The arc lies in a circumscribed polygon, and h on the polygon is largest at a corner. For each joint, the
-grid makes the bound too large by a fraction. This fraction decreases with the square of the distance between
-grid points.
+The values of h are stored at the points of a grid on the surface of a cube. The function h is convex, and h(s
+u) = s h(u) for s >= 0, so interpolation between grid points gives an upper bound. For a rotation, the
+directions form an arc. The arc lies in a circumscribed polygon, and h on the polygon is largest at a corner.
+For each joint, the grid makes the bound too large by a fraction. This fraction decreases with the square of
+the distance between grid points.
 
 Recursion. Let y be the position of B's frame, as the joints behind joint i move it, and let d be y minus the
 position of A's frame. The joint and its L change d to

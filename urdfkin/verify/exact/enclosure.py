@@ -50,7 +50,7 @@ class Enclosure:
 
     Attributes:
         quantity: Name of the quantity.
-        lower: Lower bounds. The shape is that of the result of the method of `Robot`.
+        lower: Lower bounds, in the shape of the result that the method of `Robot` returns.
         upper: Upper bounds, in the same shape.
         urdfkin: urdfkin's result.
         pinocchio: Pinocchio's result; None if Pinocchio cannot compute it.
