@@ -64,7 +64,8 @@ compares them with a second reader, which was written from the standard alone (`
 Each library is used in its own convention, in the order of its own joints, by an adapter of about 20 lines
 (`urdfkin/verify/adapters.py`). The adapter sets the independent joints only. If a library leaves a mimic
 joint free, the joint stays at zero. This table says nothing about other qualities of a library, and nothing
-about other versions.
+about other versions. pytorch_kinematics is missing because it needs PyTorch, whose package installs
+CUDA's libraries. PyRoki is missing because pip found no release of it.
 
 """
 _FOOT = """

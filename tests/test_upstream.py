@@ -48,9 +48,11 @@ def outcome(at: int) -> tuple[np.ndarray, np.ndarray]:
 )
 @pytest.mark.parametrize("title", PROGRAMS)
 def test_the_library_has_no_defect_any_more(title: str) -> None:
+    if title.startswith("Robotics Toolbox"):
+        pytest.importorskip("roboticstoolbox")
     found, expected = outcome(PROGRAMS[title])
     np.testing.assert_allclose(found, expected, atol=1e-4)
 
 
 def test_every_entry_has_a_program() -> None:
-    assert len(PROGRAMS) == 9
+    assert len(PROGRAMS) == 10

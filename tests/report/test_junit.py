@@ -15,10 +15,15 @@ from urdfkin.validation.document import Document
 SCHEMA = etree.XMLSchema(etree.parse(Path(__file__).parents[1] / "fixtures" / "junit-10.xsd"))
 
 
-def read(document: Document) -> etree._Element:
-    root = etree.fromstring(as_junit(document))
+def junit_of(data: bytes) -> etree._Element:
+    """Return JUnit XML that conforms to the schema."""
+    root = etree.fromstring(data)
     SCHEMA.assertValid(root)
     return root
+
+
+def read(document: Document) -> etree._Element:
+    return junit_of(as_junit(document))
 
 
 @pytest.mark.parametrize("make", [arms, failing, hostile])

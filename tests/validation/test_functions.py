@@ -17,7 +17,9 @@ import pytest
 
 import urdfkin
 from tests.cli.running import urdfkin as run
+from tests.report.test_junit import junit_of
 from tests.robots.odd_urdfs import random_tree
+from urdfkin.report.junit import functions_as_junit
 from urdfkin.robot import Robot
 from urdfkin.validation.diagnosis import _HALVES
 from urdfkin.validation.functions import FunctionCheck, verify_function
@@ -352,6 +354,8 @@ def test_a_robot_that_no_oracle_can_check_is_compared_with_a_note() -> None:
     found = verify_function(lambda q: arm.jacobian(q, "tip", verify=False), arm, samples=5)
     assert found.oracle_share is None
     assert "NOT checked" in str(found)
+    failures = [case.get("type") for case in junit_of(functions_as_junit([found])).iter("failure")]
+    assert failures == ["not verified"]
 
 
 @pytest.mark.parametrize(
@@ -533,7 +537,12 @@ def test_all_functions_of_a_file_are_checked(tmp_path: Path) -> None:
     assert done.code == 1
     found = {check["function"]: check["agrees"] for check in done.data["checks"]}
     assert found == {"tool_jacobian": True, "placement": True, "velocity": False, "partial": False}
-    text = run("verify", str(file), "ur5", "--samples", "10").text
+    junit = tmp_path / "checks.xml"
+    text = run("verify", str(file), "ur5", "--samples", "10", "--junit", str(junit)).text
+    root = junit_of(junit.read_bytes())
+    failed = [case.get("name") for case in root.iter("testcase") if case.find("failure") is not None]
+    assert failed == ["velocity by velocity", "acceleration by partial"]
+    assert root.get("tests") == "4"
     assert "tool_jacobian: agrees" in text
     assert "velocity: DISAGREES" in text
 

@@ -22,7 +22,7 @@ from urdfkin.cli.options import (
     robot_argument,
     seed_option,
 )
-from urdfkin.cli.output import TEXTS, Answer, answering, compiling
+from urdfkin.cli.output import TEXTS, Answer, answering, check_writable, compiling, write_file
 from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
 from urdfkin.errors.display import Strong, TextDocument
 
@@ -67,6 +67,11 @@ _QUANTITIES = ("placement", "velocity", "jacobian", "jacobian-rate", "hessian", 
     show_default=True,
     help="Longest time for an answer of the program, in seconds.",
 )
+@click.option(
+    "--junit",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Write JUnit XML, with a test case for each function.",
+)
 @oracle_option
 @answering(*TEXTS, "json")
 def verify_command(
@@ -82,6 +87,7 @@ def verify_command(
     batch: bool,
     program: bool,
     timeout: float,
+    junit: Path | None,
     oracle: Any,
 ) -> Answer:
     """Check a function or a program of yours against urdfkin, Pinocchio and the derived bound.
@@ -98,6 +104,7 @@ def verify_command(
     from urdfkin.validation.functions import verify_function  # noqa: PLC0415  keeps --help fast
     from urdfkin.validation.programs import Program  # noqa: PLC0415
 
+    check_writable(junit)
     loaded = load_robot(robot, oracle=oracle)
     checks: list[FunctionCheck] = []
     with ExitStack() as stack:
@@ -131,6 +138,10 @@ def verify_command(
                 batch=batch,
             )
             checks.append(check)
+    if junit is not None:
+        from urdfkin.report.junit import functions_as_junit  # noqa: PLC0415
+
+        write_file(junit, functions_as_junit(checks))
     codes = [(3 if check.oracle_share is None else 0) if check.agrees else 1 for check in checks]
     code = 1 if 1 in codes else max(codes)
     return Answer(lambda: _document(checks), {"json": lambda: _data(checks)}, "", code)

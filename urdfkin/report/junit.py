@@ -1,4 +1,7 @@
-"""JUnit XML: a test suite for each robot, with a test case for each quantity and reference frame.
+"""JUnit XML of a report, and of the checks of `urdfkin verify`.
+
+A report has a test suite for each robot, with a test case for each quantity and reference frame. `verify`
+has one suite, with a test case for each function.
 
 The layout conforms to the schema of Jenkins, junit-10.xsd. GitLab, GitHub actions and other programs read
 this layout. Some of these programs ignore the attributes of a failure. The text of the failure therefore
@@ -8,6 +11,7 @@ contains all information.
 from __future__ import annotations
 
 import re
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
 from urdfkin.report.words import (
@@ -21,6 +25,11 @@ from urdfkin.report.words import (
 )
 from urdfkin.validation.document import Case, Check, Document, Robot, outcome_of
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from urdfkin.validation.functions import FunctionCheck
+
 #: Characters that XML 1.0 forbids, even escaped.
 _FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
@@ -33,12 +42,42 @@ def as_junit(document: Document) -> bytes:
     counts = {name: str(sum(int(suite.get(name, "0")) for suite in suites)) for name in _COUNTS}
     root = ET.Element("testsuites", {"name": "urdfkin validate", "time": _time(document["seconds"])} | counts)
     root.extend(suites)
+    return _bytes(root)
+
+
+def _bytes(root: ET.Element) -> bytes:
     ET.indent(root)
     return (
         b'<?xml version="1.0" encoding="UTF-8"?>\n'
         + _clean(ET.tostring(root, encoding="unicode")).encode()
         + b"\n"
     )
+
+
+def functions_as_junit(checks: Sequence[FunctionCheck]) -> bytes:
+    """Return the checks of `urdfkin verify` as a JUnit XML file.
+
+    Each function has a test case. It fails if the function disagrees, or if no oracle confirms the reference.
+    """
+    cases = [_function_case(check) for check in checks]
+    failures = str(sum(case.find("failure") is not None for case in cases))
+    counts = {"tests": str(len(cases)), "failures": failures, "errors": "0"}
+    root = ET.Element("testsuites", {"name": "urdfkin verify"} | counts)
+    ET.SubElement(root, "testsuite", {"name": _clean(checks[0].robot)} | counts).extend(cases)
+    return _bytes(root)
+
+
+def _function_case(check: FunctionCheck) -> ET.Element:
+    text = str(check)
+    title = text.partition("\n")[0]
+    name = f"{check.quantity} by {check.function}"
+    case = ET.Element("testcase", {"name": _clean(name), "classname": f"urdfkin.{_clean(check.robot)}"})
+    if check.agrees and check.oracle_share is not None:
+        ET.SubElement(case, "system-out").text = _clean(text)
+    else:
+        kind = "not verified" if check.agrees else "disagreement"
+        ET.SubElement(case, "failure", {"type": kind, "message": _clean(title)}).text = _clean(text)
+    return case
 
 
 _COUNTS = ("tests", "failures", "errors")
