@@ -1,6 +1,7 @@
 """A locked robot is the whole robot at the locked values, without the locked columns."""
 
 import copy
+import itertools
 import math
 import pickle
 import warnings
@@ -146,6 +147,28 @@ def test_any_tree_with_any_joints_locked_is_the_whole_tree_at_these_values(data:
             warnings.simplefilter("ignore", urdfkin.NotVerifiedWarning)
             locked.placement(locked.sample(2), locked.link_frames, verify=True)
             locked.jacobian(locked.sample(2), locked.link_frames, verify=True)
+
+
+@pytest.mark.parametrize("links", list(itertools.permutations("012")))
+@pytest.mark.parametrize("multiplier", [None, 0.0, 2.0])
+@pytest.mark.parametrize("lock", ["0", "1", "01"])
+def test_a_link_may_have_the_name_of_a_locked_joint(
+    links: tuple[str, ...], multiplier: float | None, lock: str
+) -> None:
+    rule = "" if multiplier is None else f'<mimic joint="0" multiplier="{multiplier}"/>'
+    joints = "".join(
+        f'<joint name="{i}" type="revolute"><parent link="{links[i]}"/><child link="{links[i + 1]}"/>'
+        f'<origin xyz="0 0 1"/><axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="1" velocity="1"/>'
+        f"{rule if i else ''}</joint>"
+        for i in range(2)
+    )
+    text = f'<robot name="r">{"".join(f"<link name={name!r}/>" for name in links)}{joints}</robot>'
+    locked_joints = lock if multiplier is None else "0"  # a mimic joint has no value of its own
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)  # the multiplier is 0
+        locked = urdfkin.load(text).locked(dict.fromkeys(locked_joints, 0.3))
+    locked.placement(locked.sample(2), locked.link_frames)
+    assert locked.certificate().verified
 
 
 def test_a_slide_that_is_locked_back_to_its_parent_keeps_its_rounding_in_the_bound() -> None:

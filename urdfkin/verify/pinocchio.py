@@ -52,6 +52,9 @@ _AT_A_TIME = 16384
 #: Name of the free-flyer of a moving base.
 _BASE = "base"
 
+#: Precedes the names of links while Pinocchio reduces a model.
+_LINK_MARK = "\x01"
+
 
 def build_model(
     text: str,
@@ -105,7 +108,15 @@ def _reduced(model: Any, text: str, lock: Mapping[str, float], *, coupled: bool)
             raise OracleError("Pinocchio has no such joint to lock", where=str(model.name), found=repr(name))
         at, numbers = model.joints[i].idx_q, model.joints[i].nq  # 0 for a mimic joint of a coupled model
         q[at : at + numbers] = (value,) if numbers == 1 else (np.cos(value), np.sin(value))[:numbers]
-    return pin.buildReducedModel(model, ids, q)
+    # `buildReducedModel` looks frames up by name alone, but a link may have the name of a joint. A mark that
+    # XML forbids in a name makes the names of the links different.
+    bodies = [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
+    for frame in bodies:
+        frame.name = _LINK_MARK + frame.name
+    reduced = pin.buildReducedModel(model, ids, q)
+    for frame in reduced.frames:
+        frame.name = frame.name.removeprefix(_LINK_MARK)
+    return reduced
 
 
 def _parse(text: str, tree: KinematicTree, root_joint: str | None, mimic: bool) -> Any:
