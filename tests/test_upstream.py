@@ -55,4 +55,4 @@ def test_the_library_has_no_defect_any_more(title: str) -> None:
 
 
 def test_every_entry_has_a_program() -> None:
-    assert len(PROGRAMS) == 10
+    assert len(PROGRAMS) == 11
