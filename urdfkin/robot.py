@@ -36,7 +36,7 @@ from urdfkin.errors.validators import (
 )
 from urdfkin.export import QUANTITIES as EXPORTED
 from urdfkin.kinematics.inputs import scalars, vectors
-from urdfkin.kinematics.rotation.euler import NEAREST
+from urdfkin.kinematics.rotation import NEAREST
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model import configuration, integration
 from urdfkin.model.base_motion import BaseMotion

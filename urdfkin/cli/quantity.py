@@ -476,7 +476,7 @@ def analytical_jacobian_command(representation: str, nearest: float | None, **_:
     The table has one row for each joint velocity. A row lists the derivatives of the frame's position and
     orientation (Euler angles or a quaternion). `urdfkin jacobian` has angular velocities instead.
     """
-    from urdfkin.kinematics.rotation.euler import NEAREST  # noqa: PLC0415  keeps --help fast
+    from urdfkin.kinematics.rotation import NEAREST  # noqa: PLC0415  keeps --help fast
 
     x, nearest = _read(), NEAREST if nearest is None else nearest
     with compiling():

@@ -16,7 +16,7 @@ from urdfkin.dh.units import units_of
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Displayable, TextDocument
 from urdfkin.errors.escape import log_line
-from urdfkin.kinematics.rotation.euler import rpy_of
+from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.configuration import checked, neutral
 from urdfkin.model.mechanisms.alignment import IDENTITY, Alignment, FramePair, Step, Variables, limits
 from urdfkin.model.mechanisms.mechanism import JointTransform, Mechanism, Tolerance, apart, tolerance_of

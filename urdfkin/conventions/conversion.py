@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from urdfkin.conventions.convention import Convention, JointRule, spelled
 from urdfkin.errors import InputError, Question, UnknownNameError
 from urdfkin.kinematics.inputs import scalars
-from urdfkin.kinematics.rotation.quaternion import NORM_TOLERANCE, rotation_of
+from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_of
 from urdfkin.model import configuration
 from urdfkin.model.configuration_like import CoordinateLayout, Given
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree

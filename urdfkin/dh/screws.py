@@ -24,8 +24,7 @@ from urdfkin.errors import InputError
 from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.errors.escape import log_line
 from urdfkin.kinematics.inputs import rotation_defect
-from urdfkin.kinematics.rotation import axis_aligning
-from urdfkin.kinematics.rotation.matrix import ROUNDED, polar_factor
+from urdfkin.kinematics.rotation import ROUNDED, axis_aligning, polar_factor
 from urdfkin.kinematics.roundings import EPS, of_rows
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.configuration_like import Given

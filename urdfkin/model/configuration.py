@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from urdfkin.errors import DegreesWarning, InputError, NotFiniteError, Question, warn_caller
 from urdfkin.kinematics.inputs import floats
-from urdfkin.kinematics.rotation.quaternion import NORM_TOLERANCE, unit_quaternions
+from urdfkin.kinematics.rotation import NORM_TOLERANCE, unit_quaternions
 from urdfkin.model.configuration_like import CoordinateLayout, Given, Hint, by_name, listed
 from urdfkin.model.ranges import coordinate_ranges, narrowed_ranges
 from urdfkin.model.tree import (

@@ -19,8 +19,7 @@ from numpy.typing import ArrayLike
 from urdfkin.errors import InputError, Question, UnknownNameError
 from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.inputs import FloatArray, floats
-from urdfkin.kinematics.rotation.axis_angle import rotation_about
-from urdfkin.kinematics.rotation.euler import coordinate_rotation
+from urdfkin.kinematics.rotation import coordinate_rotation, rotation_about
 from urdfkin.model.frame_names import FrameName, JointFrame, LinkFrame
 
 __all__ = [

@@ -34,7 +34,7 @@ from urdfkin.errors import InputError, SourceError
 from urdfkin.errors.numbers import UNITS, in_radians, parse_float, parse_quantity, remedy
 from urdfkin.errors.validators import real_number, whole_number
 from urdfkin.kinematics.inputs import FloatArray, scalars
-from urdfkin.kinematics.rotation.quaternion import angular_velocity_from_quaternion_rates, rotation_of
+from urdfkin.kinematics.rotation import angular_velocity_from_quaternion_rates, rotation_of
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.configuration import checked, places
 from urdfkin.model.configuration_like import Given, listed, wrong_count

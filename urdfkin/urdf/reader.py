@@ -12,8 +12,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.kinematics.rotation.euler import coordinate_rotation, rpy_of
-from urdfkin.kinematics.rotation.quaternion import rotation_of
+from urdfkin.kinematics.rotation import coordinate_rotation, rotation_of, rpy_of
 from urdfkin.model.tree import (
     FloatArray,
     Joint,

@@ -18,8 +18,13 @@ from numpy.typing import NDArray
 
 from urdfkin.errors import InputError
 from urdfkin.kinematics.bodies import QUATERNION, analytical_jacobian
-from urdfkin.kinematics.rotation.euler import NEAREST, SEQUENCES, euler_of, singularity_distance
-from urdfkin.kinematics.rotation.quaternion import quaternion_of
+from urdfkin.kinematics.rotation import (
+    NEAREST,
+    SEQUENCES,
+    euler_of,
+    quaternion_of,
+    singularity_distance,
+)
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.recursion import Number

@@ -17,7 +17,7 @@ rules. It parses the text again at the first check.
 Layout of q: joints in Pinocchio's order; one number for a revolute, continuous or prismatic joint, three for
 a planar joint, seven for a floating joint, none for a mimic joint.
 
-Moving base: its rotation is the one nearest to the given matrix M (`urdfkin.kinematics.rotation.matrix`).
+Moving base: its rotation is the one nearest to the given matrix M (`urdfkin.kinematics.rotation`).
 urdfkin computes it with a Newton step. This module uses Davenport's q-method: among unit quaternions,
 q^T K q = trace(R(q)^T M) is largest for the nearest rotation. So q is the eigenvector of K for the largest
 eigenvalue.

@@ -12,7 +12,7 @@ import numpy as np
 from urdfkin.compiled.plan import IntArray
 from urdfkin.errors import InputError
 from urdfkin.errors.validators import safe_repr
-from urdfkin.kinematics.rotation.quaternion import rotation_of
+from urdfkin.kinematics.rotation import rotation_of
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.configuration import neutral
 from urdfkin.model.ranges import coordinate_ranges, own_ranges

@@ -26,9 +26,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from urdfkin.kinematics.rotation.axis_angle import exp_rotation, rotation_about
-from urdfkin.kinematics.rotation.matrix import axis_aligning
-from urdfkin.kinematics.rotation.quaternion import quaternion_of, rotation_of
+from urdfkin.kinematics.rotation import (
+    axis_aligning,
+    exp_rotation,
+    quaternion_of,
+    rotation_about,
+    rotation_of,
+)
 from urdfkin.kinematics.roundings import EPS, of_two_texts
 from urdfkin.model.chain import LEAST_SIZE
 from urdfkin.model.pose import is_rigid, pose
