@@ -4,8 +4,7 @@ from urdfkin.lint import UrdfError
 from urdfkin.lint.runner import read_urdf
 from urdfkin.model.tree import KinematicTree
 from urdfkin.urdf.findings import Reporter
-from urdfkin.urdf.reader import read_tree
-from urdfkin.urdf.records import RobotRecord
+from urdfkin.urdf.records import RobotRecord, read_tree
 
 
 def records(data: bytes) -> RobotRecord:

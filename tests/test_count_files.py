@@ -8,7 +8,7 @@ from urdfkin.urdf.catalogue import catalogue
 
 def test_load_of_a_urdf_file_runs_through_at_most_18_files() -> None:
     files = files_of_load(A)
-    assert {"loading.py", "urdf/parser.py", "lint/rules/joints.py", "urdf/reader.py"} <= set(files)
+    assert {"loading.py", "urdf/parser.py", "lint/rules/joints.py", "urdf/records.py"} <= set(files)
     assert len(files) <= 18, files
 
 

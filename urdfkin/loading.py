@@ -20,7 +20,7 @@ from urdfkin.robot import Robot
 from urdfkin.system.files import at_home, read_bytes
 from urdfkin.urdf.findings import Finding, PinocchioReading, Reporter, Severity, UrdfError, UrdfWarning
 from urdfkin.urdf.parser import NEWER_VERSION
-from urdfkin.urdf.reader import read_tree
+from urdfkin.urdf.records import read_tree
 from urdfkin.urdf.sources import Origin, Source, Text, as_word, entry_of, is_urdf_path, read_source
 from urdfkin.urdf.writer import to_urdf as write_urdf
 from urdfkin.verify.oracles import OracleName, oracle_library

@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.compiled.batch import in_parts
 from urdfkin.compiled.plan import CompiledTree, compile_tree
 from urdfkin.compiled.prepared import PreparedFrame
 from urdfkin.errors import InputError, RangeError, RepresentationSingularityError
@@ -42,10 +41,9 @@ from urdfkin.model import configuration, integration
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.configuration_like import Given, listed
-from urdfkin.model.frame_names import FrameName, LinkFrame
 from urdfkin.model.reference import Reference
 from urdfkin.model.summary import Joints, described
-from urdfkin.model.tree import FloatArray, KinematicTree, with_locks
+from urdfkin.model.tree import FloatArray, FrameName, KinematicTree, LinkFrame, with_locks
 from urdfkin.system.lazy_import import hook
 from urdfkin.system.locks import importing
 from urdfkin.urdf.findings import Finding, Findings
@@ -1125,6 +1123,9 @@ class Robot(Displayable):
                     J[part] = ANALYTICAL_JACOBIAN.compute(representation, Rs[part], Js_v[part], nearest)
             except RepresentationSingularityError as error:
                 near.append((error.distance, part.start + error.sample[0]))
+
+        with importing:
+            from urdfkin.compiled.evaluate import in_parts  # noqa: PLC0415  few calls need this import
 
         in_parts(compute, call.n, threads)
         if near:

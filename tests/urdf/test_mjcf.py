@@ -20,8 +20,7 @@ from tests.cli.running import urdfkin as command
 from tests.lint.cases.arm import arm
 from urdfkin.errors import InputError, OracleError
 from urdfkin.lint.pages import find_rule, page
-from urdfkin.model.pose import pose
-from urdfkin.model.tree import FloatArray
+from urdfkin.model.tree import FloatArray, pose
 from urdfkin.system.processes import ask_python
 from urdfkin.urdf import mjcf
 from urdfkin.urdf.mjcf import Mjcf, is_mjcf

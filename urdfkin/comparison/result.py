@@ -18,8 +18,19 @@ from urdfkin.errors.display import Displayable, TextDocument
 from urdfkin.errors.escape import log_line
 from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.configuration import checked, neutral
-from urdfkin.model.mechanisms.alignment import IDENTITY, Alignment, FramePair, Step, Variables, limits
-from urdfkin.model.mechanisms.mechanism import JointTransform, Mechanism, Tolerance, apart, tolerance_of
+from urdfkin.model.mechanisms.mechanism import (
+    IDENTITY,
+    Alignment,
+    FramePair,
+    JointTransform,
+    Mechanism,
+    Step,
+    Tolerance,
+    Variables,
+    apart,
+    limits,
+    tolerance_of,
+)
 from urdfkin.model.tree import FloatArray, Joint, KinematicTree, Mimic
 from urdfkin.system.lazy_import import hook
 

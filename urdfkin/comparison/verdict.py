@@ -30,20 +30,22 @@ from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.validators import real_number, whole_number
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.loading import load
-from urdfkin.model.mechanisms.alignment import (
+from urdfkin.model.configuration import WIDEST, narrowed_ranges
+from urdfkin.model.mechanisms.matcher import align
+from urdfkin.model.mechanisms.mechanism import (
     AS_WRITTEN,
     IDENTITY,
     Alignment,
     FramePair,
+    Mechanism,
+    Tolerance,
     Variables,
+    apart,
+    tolerance_of,
     variables_of,
 )
-from urdfkin.model.mechanisms.matcher import align
-from urdfkin.model.mechanisms.mechanism import Mechanism, Tolerance, apart, tolerance_of
 from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
-from urdfkin.model.pose import inverse
-from urdfkin.model.ranges import WIDEST, narrowed_ranges
-from urdfkin.model.tree import FloatArray, KinematicTree
+from urdfkin.model.tree import FloatArray, KinematicTree, inverse
 from urdfkin.robot import Robot
 from urdfkin.urdf.sources import Source
 from urdfkin.verify.oracles import PINOCCHIO
@@ -112,7 +114,7 @@ def same(
         within = real_number(within, "within")
     for which, robot, names in (("A", robots[0], list(given)), ("B", robots[1], list(given.values()))):
         demand_joint_names(robot.tree, names, which)
-    # The copies have separate ledgers, so results computed here are not counted as the user's results.
+    # The compiled trees of a comparison are many, and the copies own them, not the user's robots.
     return Comparator((copy(robots[0]), copy(robots[1])), given, bounds, boxes, within).judged()
 
 

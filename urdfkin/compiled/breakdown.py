@@ -32,8 +32,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from urdfkin.compiled.batch import in_parts
-from urdfkin.compiled.evaluate import placements, velocities
+from urdfkin.compiled.evaluate import in_parts, placements, velocities
 from urdfkin.compiled.plan import CompiledTree, compile_tree
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.errors.display import Displayable, Table, TextDocument

@@ -1,6 +1,6 @@
 """The recursions, one function for each quantity.
 
-A function takes its arguments in the form that the module `kernel_args` describes. It returns 1 if an input
+A function takes its arguments in the form that `KernelArgs` describes. It returns 1 if an input
 is nan, infinite or too large, else 0.
 
 Python can run these functions without a compiler; they then take lists instead of addresses. The compiled

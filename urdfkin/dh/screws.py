@@ -30,8 +30,17 @@ from urdfkin.model.chain import FrameChain
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.mimic import Coupling, coupling_of
 from urdfkin.model.path import Motion, Path
-from urdfkin.model.pose import pose
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, build_tree, frozen
+from urdfkin.model.tree import (
+    FloatArray,
+    Joint,
+    JointKind,
+    KinematicTree,
+    Limit,
+    Mimic,
+    build_tree,
+    frozen,
+    pose,
+)
 
 #: Tolerance of handwritten screws. It applies to the deviation of an axis' length from 1, and to the
 #: deviation of a pitch from 0 (m/rad).

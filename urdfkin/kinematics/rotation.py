@@ -10,7 +10,8 @@
 | `quaternion_of`, `quaternion_rates` and others: unit quaternions | 7.2.5: 7.57 |
 | `axis_aligning` | 7.4 |
 
-Every function accepts any leading batch shape. `w_0_1` is the angular velocity of frame 1 relative to frame 0.
+Every function accepts any leading batch shape. `w_0_1` is the angular velocity of frame 1 relative to
+frame 0.
 
 A user's matrix often has only a few digits, so its columns are only approximately orthogonal. Such a matrix
 can be converted to a rotation by a quaternion, by angles or column by column. The results differ in the last

@@ -27,8 +27,7 @@ import numpy as np
 
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import rotation_about, rotation_of
-from urdfkin.model.pose import pose
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, build_tree
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, build_tree, pose
 from urdfkin.system.files import at_home, read_start
 from urdfkin.urdf.mujoco import compiled, library
 

@@ -42,8 +42,7 @@ from urdfkin.verify.bounds import (
 from urdfkin.verify.call import Call
 from urdfkin.verify.exact.numbers import DIGITS, enough_digits, exact, precision, read_exact
 from urdfkin.verify.exact.recursion import move, on_base
-from urdfkin.verify.oracle import BaseRows
-from urdfkin.verify.pinocchio_inputs import BaseNumbers, davenport
+from urdfkin.verify.oracle import BaseNumbers, BaseRows, davenport
 from urdfkin.verify.quantities import ANALYTICAL_JACOBIAN, JACOBIAN, PLACEMENT, Quantity, validated
 from urdfkin.verify.sampling import Samples, draw
 from urdfkin.verify.verifier import bound_of, oracle_results, own_results

@@ -19,7 +19,7 @@ from urdfkin.dh import DHRow, DHTable
 from urdfkin.dh.make import dh_table
 from urdfkin.errors import InputError
 from urdfkin.lint import Finding
-from urdfkin.model.ranges import NarrowedRange, narrowed_ranges
+from urdfkin.model.configuration import NarrowedRange, narrowed_ranges
 from urdfkin.robot import Robot
 from urdfkin.system.documents import plain
 from urdfkin.urdf.catalogue import catalogue

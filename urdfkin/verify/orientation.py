@@ -13,7 +13,7 @@ import numpy as np
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.certificate import VerificationError
-from urdfkin.verify.pinocchio_module import pinocchio
+from urdfkin.verify.pinocchio import pinocchio
 
 #: Rounding errors of urdfkin and of Pinocchio together, in eps; each is less than 8 eps. They are counted as
 #: for a joint in `roundings`. For angles, the operations are arctan2, sines, cosines and products of three

@@ -14,8 +14,7 @@ from urdfkin.errors import InputError
 from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.rotation import rotation_of
 from urdfkin.model.base_motion import BaseMotion
-from urdfkin.model.configuration import neutral
-from urdfkin.model.ranges import coordinate_ranges, own_ranges
+from urdfkin.model.configuration import coordinate_ranges, neutral, own_ranges
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
 #: Range of positions of planar and floating joints, +- m.

@@ -22,7 +22,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.motion.frame_motion import FrameMotion
 from urdfkin.motion.trajectory import Trajectory
 from urdfkin.robot import Robot
-from urdfkin.verify.pinocchio_module import version
+from urdfkin.verify.pinocchio import version
 from urdfkin.view.figure import BAD, COLOURS, label, new_figure, style
 
 if TYPE_CHECKING:

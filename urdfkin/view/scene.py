@@ -19,8 +19,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from urdfkin.kinematics.rotation import rotation_from_rpy
-from urdfkin.model.pose import pose
-from urdfkin.model.tree import FloatArray
+from urdfkin.model.tree import FloatArray, pose
 from urdfkin.robot import Robot
 from urdfkin.system.files import read_bytes
 from urdfkin.urdf.catalogue import catalogue, find_package, split_uri

@@ -26,7 +26,7 @@ from urdfkin.model.tree import FloatArray, Joint
 from urdfkin.motion.frame_motion import FrameMotion, frame_motion
 from urdfkin.motion.trajectory import Trajectory
 from urdfkin.robot import Robot
-from urdfkin.verify.pinocchio_module import version
+from urdfkin.verify.pinocchio import version
 from urdfkin.view.player import Player, as_png
 from urdfkin.view.scene import Shape
 from urdfkin.view.stage import (

@@ -23,8 +23,7 @@ from urdfkin.dh.snapping import rotation_angle
 from urdfkin.dh.table import Convention, DHRow, DHTable
 from urdfkin.kinematics.rotation import log_rotation, polar_factor
 from urdfkin.model.chain import FrameChain
-from urdfkin.model.pose import pose
-from urdfkin.model.tree import FloatArray
+from urdfkin.model.tree import FloatArray, pose
 
 #: Two angles with a smaller difference (rad) count as equal.
 _SAME_ANGLE = 1e-9

@@ -37,8 +37,7 @@ from urdfkin.model.mechanisms.mechanism import (
     between,
     between_lines,
 )
-from urdfkin.model.pose import inverse
-from urdfkin.model.tree import FloatArray, JointKind
+from urdfkin.model.tree import FloatArray, JointKind, inverse
 
 Pair = tuple[Edge, Edge]
 Via = tuple[Edge | None, Edge | None]
