@@ -18,8 +18,8 @@ import pytest
 import urdfkin
 from urdfkin.compiled import evaluate
 from urdfkin.compiled.program import LANES
-from urdfkin.motion.trajectory import line
 from urdfkin.robot import Robot
+from urdfkin.robot.trajectory import line
 
 ODD: dict[str, Any] = {
     "None": None,

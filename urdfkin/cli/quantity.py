@@ -57,7 +57,7 @@ from urdfkin.verify.replay import replay_line
 
 if TYPE_CHECKING:
     from urdfkin.compiled.breakdown import AccelerationBreakdown
-    from urdfkin.conventions import Conversion
+    from urdfkin.model.conventions import Conversion
     from urdfkin.model.tree import FloatArray
     from urdfkin.robot import Robot
     from urdfkin.verify.singular_values import SingularValues
@@ -108,7 +108,7 @@ def _along(
     """Read the samples of a trajectory; compute v and a by differences only if the command needs them."""
     import numpy as np  # noqa: PLC0415  keeps --help fast
 
-    from urdfkin.motion.trajectory import read_samples, with_rates  # noqa: PLC0415
+    from urdfkin.robot.trajectory import read_samples, with_rates  # noqa: PLC0415
 
     context = click.get_current_context()
     reject_unused_options(context, ("q", "v", "a", "seed"), "along a --trajectory")
@@ -522,7 +522,7 @@ def imu_command(gravity: str, **_: Any) -> Answer:
     .npz file. With --root-joint floating, the pose of the base is part of --q. For details, run `urdfkin
     explain gravity-in-an-acceleration`.
     """
-    from urdfkin.motion.trajectory import numbers  # noqa: PLC0415  keeps --help fast
+    from urdfkin.robot.trajectory import numbers  # noqa: PLC0415  keeps --help fast
 
     x = _read()
     g = numbers(gravity.split(","), "--gravity", ("x", "y", "z"))

@@ -35,7 +35,7 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Lock
 from urdfkin.system.lazy_import import hook
 
 if TYPE_CHECKING:
-    from urdfkin.conventions import Convention
+    from urdfkin.model.conventions import Convention
 
 #: `_TENTH` is the smallest number that is printed with a unit prefix: 0.1, after rounding to four digits. The
 #: unit without a prefix is used only from `_NINE` times this number on, which is 0.9.
@@ -422,7 +422,7 @@ class Sameness(Displayable):
         >>> found.convention().joints[:2]
         ('shoulder_pan_joint', 'shoulder_lift_joint')
         """
-        from urdfkin.conventions import Convention, Conversion, JointRule  # noqa: PLC0415  keeps same light
+        from urdfkin.model.conventions import Convention, Conversion, JointRule  # noqa: PLC0415  keeps same light
 
         tree_a, tree_b = self.trees
         of_b = {one.b: one for one in self.joints}

@@ -29,7 +29,6 @@ from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.validators import real_number, whole_number
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.loading import load
 from urdfkin.model.configuration import WIDEST, narrowed_ranges
 from urdfkin.model.mechanisms.matcher import align
 from urdfkin.model.mechanisms.mechanism import (
@@ -47,6 +46,7 @@ from urdfkin.model.mechanisms.mechanism import (
 from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
 from urdfkin.model.tree import FloatArray, KinematicTree, Lock, inverse
 from urdfkin.robot import Robot
+from urdfkin.robot.loading import load
 from urdfkin.urdf.sources import Source
 from urdfkin.verify.oracles import PINOCCHIO
 from urdfkin.verify.sampling import checked_choice

@@ -21,7 +21,8 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limi
 from urdfkin.urdf.findings import Finding, Severity
 from urdfkin.urdf.mjcf import UNBOUNDED
 from urdfkin.urdf.parser import QUATERNION
-from urdfkin.urdf.records import Element, JointRecord, LimitRecord, MimicRecord, joint_rows, root_link
+from urdfkin.urdf.reader import joint_rows, root_link
+from urdfkin.urdf.records import Element, JointRecord, LimitRecord, MimicRecord
 from urdfkin.urdf.writer import to_urdf
 
 if TYPE_CHECKING:

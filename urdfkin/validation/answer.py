@@ -18,8 +18,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from urdfkin.errors import OracleError, UrdfkinError
-from urdfkin.lint import UrdfError
 from urdfkin.system.documents import as_data, typed
+from urdfkin.urdf.lint import UrdfError
 from urdfkin.validation.chunk import Chunk, ChunkResult, run_chunk
 from urdfkin.validation.error_stats import Key, Tally
 from urdfkin.validation.outcome import Verdict

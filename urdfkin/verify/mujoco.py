@@ -30,8 +30,8 @@ import numpy as np
 from urdfkin.errors import OracleError
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree, Mimic
+from urdfkin.system.plain_xml import plain_xml
 from urdfkin.urdf.mujoco import compiled, library
-from urdfkin.urdf.plain_xml import plain_xml
 from urdfkin.verify.oracle import (
     WORLD,
     Frames,

@@ -7,7 +7,7 @@ disagreement.
 
 | Part | Here | urdfkin's own |
 |---|---|---|
-| mimic rules | `rules_of_text` | `urdfkin.lint`, `urdfkin.urdf.records` |
+| mimic rules | `rules_of_text` | `urdfkin.urdf.lint`, `urdfkin.urdf.reader` |
 | names, batch shapes | `OracleQuery` | `urdfkin.verify.call` |
 | order of q, v and a | `Layout` | `KinematicTree` |
 | frame of a name | `Frames` | `KinematicTree.frame_link` |
@@ -48,7 +48,7 @@ from urdfkin.errors import OracleError
 from urdfkin.errors.numbers import parse_float, parse_quantity
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointFrame, KinematicTree, LinkFrame, Mimic
-from urdfkin.urdf.plain_xml import plain_xml
+from urdfkin.system.plain_xml import plain_xml
 from urdfkin.verify.mimic_columns import Places, coupled
 
 

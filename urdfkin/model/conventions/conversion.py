@@ -17,14 +17,14 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from urdfkin.conventions.convention import Convention, JointRule, spelled
 from urdfkin.errors import InputError, Question, UnknownNameError
 from urdfkin.kinematics.inputs import scalars
 from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_of
 from urdfkin.model import configuration
 from urdfkin.model.configuration_like import CoordinateLayout, Given
+from urdfkin.model.conventions.convention import Convention, JointRule, spelled
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
-from urdfkin.urdf.plain_xml import plain_xml
+from urdfkin.system.plain_xml import plain_xml
 
 #: Largest allowed difference (rad or m) between a mimic joint's given value and the value from its mimic
 #: rule.

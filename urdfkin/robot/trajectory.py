@@ -43,7 +43,7 @@ from urdfkin.model.tree import Joint, JointKind, KinematicTree, frozen
 from urdfkin.system.files import MOST_DATA, read_bytes, read_text
 
 if TYPE_CHECKING:
-    from urdfkin.conventions import Convention, Conversion
+    from urdfkin.model.conventions import Convention, Conversion
     from urdfkin.robot import Robot
 
 

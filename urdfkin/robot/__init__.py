@@ -69,11 +69,12 @@ from urdfkin.verify.verifier import Verifier
 
 if TYPE_CHECKING:
     from urdfkin.compiled.breakdown import AccelerationBreakdown
-    from urdfkin.conventions import Convention, ConventionRobot, Conversion
     from urdfkin.dh.screws import ProductOfExponentials
     from urdfkin.dh.table import DHTable
     from urdfkin.dh.tree_parameters import TreeParameters
     from urdfkin.export.compiled_frame import CompiledFrame
+    from urdfkin.model.conventions import Convention, Conversion
+    from urdfkin.robot.convention_robot import ConventionRobot
     from urdfkin.verify.exact.enclosure import Enclosures
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
@@ -184,7 +185,7 @@ class Robot(Displayable):
 
     def _sheet(self) -> TextDocument:
         with importing:
-            from urdfkin.urdf.plain_xml import order_words  # noqa: PLC0415
+            from urdfkin.system.plain_xml import order_words  # noqa: PLC0415
 
         order = order_words(self.urdf, self.joint_names)
         return described(self.tree, self.base_frame, self.tip_frame, order)
@@ -654,7 +655,7 @@ class Robot(Displayable):
         (12,)
         """
         with importing:
-            from urdfkin.conventions import Conversion, find_convention  # noqa: PLC0415  nothing is paid without one
+            from urdfkin.model.conventions import Conversion, find_convention  # noqa: PLC0415  nothing is paid without one
 
         return Conversion(self.tree, self.urdf, find_convention(name), joints)
 
@@ -671,7 +672,7 @@ class Robot(Displayable):
         [0.0, 0.0, 1.0, 0.0, 0.9, 0.0]
         """
         with importing:
-            from urdfkin.conventions import ConventionRobot  # noqa: PLC0415
+            from urdfkin.robot.convention_robot import ConventionRobot  # noqa: PLC0415
 
         return ConventionRobot(self, self.convention(name, joints))
 

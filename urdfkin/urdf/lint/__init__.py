@@ -1,7 +1,7 @@
 """Check a URDF: each finding has a code and a position. Every URDF is checked before it is used."""
 
-from urdfkin.lint.runner import check, check_text
 from urdfkin.urdf.findings import Finding, PinocchioReading, Severity, UrdfError, UrdfWarning
+from urdfkin.urdf.lint.runner import check, check_text
 from urdfkin.urdf.records import DEFAULT_LIMITS, Limits
 
 __all__ = [

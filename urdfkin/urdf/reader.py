@@ -1,0 +1,154 @@
+"""Build a `KinematicTree` from the records of a URDF.
+
+`urdfkin.urdf.parser` reads the records, and `urdfkin.urdf.lint` checks them. This module normalises the axes,
+resolves chains of mimic joints, and sorts the joints in Pinocchio's order.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.kinematics.rotation import coordinate_rotation, rotation_of, rpy_of
+from urdfkin.model.tree import (
+    FloatArray,
+    Joint,
+    JointKind,
+    KinematicTree,
+    Limit,
+    Mimic,
+    build_tree,
+    with_root_joint,
+)
+from urdfkin.urdf.records import JointRecord, LimitRecord, MimicRecord, RobotRecord
+
+
+def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None = None) -> KinematicTree:
+    """Return the kinematic tree of a URDF.
+
+    Args:
+        urdf: The records of the URDF, without errors (see `urdfkin.urdf.lint`).
+        mimic: True: mimic joints follow their mimicked joints, as URDF defines. False: they move freely.
+        root_joint: `"floating"` or `"planar"` adds a joint `root_joint` of this kind above the root link.
+
+    Raises:
+        InputError: the joints form no tree, mimic joints form a circle, or `root_joint` has another value.
+        UnknownNameError: the mimicked joint of a mimic joint does not exist.
+    """
+    name = urdf.element.attributes.get("name", "")
+    tree = build_tree(name, root_link(name, urdf.links, urdf.joints), joint_rows(urdf.joints, mimic=mimic))
+    return tree if root_joint is None else with_root_joint(tree, _root_kind(root_joint))
+
+
+def joint_rows(joints: Sequence[JointRecord], *, mimic: bool = True) -> list[tuple[Joint, str, str]]:
+    """Return each joint with its mimic rule, its parent link and its child link.
+
+    Raises:
+        InputError: mimic joints form a circle.
+        UnknownNameError: the mimicked joint of a mimic joint does not exist.
+    """
+    rules = _rules(joints) if mimic else {}
+    return [(_joint(one, rules.get(one.name)), str(one.parent), str(one.child)) for one in joints]
+
+
+def root_link(name: str, links: Iterable[str], joints: Sequence[JointRecord]) -> str:
+    """Return the link without a parent.
+
+    Raises:
+        InputError: there is none, or more than one.
+    """
+    roots = set(links) - {joint.child for joint in joints}
+    if len(roots) != 1:
+        raise InputError(
+            "a robot must have one root link", where=name, found=", ".join(sorted(roots)) or "none"
+        )
+    return roots.pop()
+
+
+def _root_kind(word: str) -> JointKind:
+    if word not in ("floating", "planar"):
+        raise InputError("root_joint must be 'floating', 'planar' or None", found=repr(word))
+    return JointKind(word)
+
+
+def _joint(joint: JointRecord, rule: Mimic | None) -> Joint:
+    kind = JointKind(joint.kind)
+    quaternion = joint.quaternion
+    roll, pitch, yaw = np.array(joint.rpy) if quaternion is None else rpy_of_quaternion(quaternion)
+    # The parser has already checked the numbers. `rotation_from_rpy` would check them again for each joint.
+    T = np.eye(4)
+    T[:3, :3] = coordinate_rotation(2, yaw) @ coordinate_rotation(1, pitch) @ coordinate_rotation(0, roll)
+    T[:3, 3] = joint.xyz
+    return Joint(
+        name=joint.name,
+        kind=kind,
+        parent=0,
+        T_parent_joint=T,
+        axis=_unit(np.array(joint.axis), joint.name) if kind.has_axis else np.array([1.0, 0.0, 0.0]),
+        limit=_limit(joint.limit, kind),
+        mimic=rule,
+    )
+
+
+def rpy_of_quaternion(quaternion: Sequence[float]) -> FloatArray:
+    """Return roll, pitch and yaw (rad) of a quaternion (x, y, z, w) of any length, as in URDF 1.1."""
+    scaled = np.asarray(quaternion) / np.abs(quaternion).max()
+    return rpy_of(rotation_of(scaled / np.linalg.norm(scaled)))
+
+
+def _unit(axis: FloatArray, joint: str) -> FloatArray:
+    """Divide an axis by its length, as Pinocchio does; return a unit vector unchanged."""
+    length = math.hypot(*axis)
+    if not 0.0 < length < math.inf:
+        raise InputError("a joint's axis has no direction", where=f"joint {joint}", found=str(axis.tolist()))
+    return axis if length == 1.0 else axis / length
+
+
+def _limit(limit: LimitRecord | None, kind: JointKind) -> Limit | None:
+    if limit is None or kind.nv == 0:
+        return None
+    # A missing position limit is zero, as in urdfdom. By the specification, the position limits of a
+    # continuous joint have no effect.
+    return Limit(
+        lower=(limit.lower or 0.0) if kind.bounded else -math.inf,
+        upper=(limit.upper or 0.0) if kind.bounded else math.inf,
+        velocity=math.inf if limit.velocity is None else limit.velocity,
+        effort=math.inf if limit.effort is None else limit.effort,
+    )
+
+
+def _rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
+    """Return the mimic rule of each mimic joint, in terms of a joint that is not a mimic joint.
+
+    A chain of rules is composed into one: y = m2 (m1 x + b1) + b2. The composition begins at the joint that
+    is not a mimic joint. Each joint is visited once. The operations have the same order as in the oracle, so
+    that urdfkin and the oracle have equal rounding errors.
+    """
+    named = {joint.name: joint for joint in joints}
+    resolved: dict[str, Mimic] = {}
+    for start in joints:
+        joint, pending = start, dict[str, MimicRecord]()
+        while (rule := _rule(joint)) is not None and joint.name not in resolved:
+            pending[joint.name] = rule
+            if rule.leader not in named:
+                raise UnknownNameError(
+                    "mimicked joint",
+                    str(rule.leader),
+                    named,
+                    where=f"joint {joint.name} (mimic=False, --no-mimic, lets it move freely)",
+                )
+            if rule.leader in pending:
+                raise InputError("mimic joints follow each other in a circle", where=f"joint {start.name}")
+            joint = named[rule.leader]
+        end = resolved.get(joint.name, Mimic(joint.name, 1.0, 0.0))
+        for name, rule in reversed(pending.items()):
+            offset = rule.multiplier * end.offset + rule.offset
+            end = resolved[name] = Mimic(end.leader, rule.multiplier * end.multiplier, offset)
+    return resolved
+
+
+def _rule(joint: JointRecord) -> MimicRecord | None:
+    return None if JointKind(joint.kind) is JointKind.FIXED else joint.mimic
