@@ -216,7 +216,7 @@ def _names_and_units(
     for joint in tree.joints:
         if not joint.nv:
             continue
-        if joint.kind not in of:
+        if joint.kind.has_axis:
             yield joint.name, "rad" if joint.kind.turns else "m"
             continue
         taken = taken or {other.name for other in tree.joints}

@@ -439,6 +439,8 @@ def _rates(tree: KinematicTree, q: FloatArray, t: FloatArray) -> FloatArray:
             R = rotation_of(quaternion)
             v[:, to : to + 3] = (R.swapaxes(-1, -2) @ slopes[:, at : at + 3, np.newaxis])[..., 0]
             v[:, to + 3 : to + 6] = angular_velocity_from_quaternion_rates(quaternion, rates, "body")
+        elif joint.nv:
+            raise NotImplementedError(f"the velocity of a {joint.kind} joint from its coordinates")
     return v
 
 

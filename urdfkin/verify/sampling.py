@@ -54,15 +54,21 @@ def _uniform(
 
 
 def _sample_joint(joint: Joint, n: int, rng: np.random.Generator) -> FloatArray:
-    if joint.kind is JointKind.PLANAR:
-        return np.hstack((rng.uniform(-_RANGE, _RANGE, (n, 2)), rng.uniform(-math.pi, math.pi, (n, 1))))
-    return _sample_floating(n, rng)
+    return _SAMPLED[joint.kind](n, rng)
+
+
+def _sample_planar(n: int, rng: np.random.Generator) -> FloatArray:
+    return np.hstack((rng.uniform(-_RANGE, _RANGE, (n, 2)), rng.uniform(-math.pi, math.pi, (n, 1))))
 
 
 def _sample_floating(n: int, rng: np.random.Generator) -> FloatArray:
     quaternion = rng.standard_normal((n, 4))
     quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
     return np.hstack((rng.uniform(-_RANGE, _RANGE, (n, 3)), quaternion))
+
+
+#: The samples of a joint with several coordinates.
+_SAMPLED = {JointKind.PLANAR: _sample_planar, JointKind.FLOATING: _sample_floating}
 
 
 def special(tree: KinematicTree) -> FloatArray:

@@ -232,8 +232,10 @@ class Conversion:
         elif joint.kind is JointKind.PLANAR:
             self._refuse_rule(joint)
             self._add_planar(i, name, q, v)
-        else:
+        elif joint.kind.has_axis:
             self._add_axis(joint, rule, name, q, v)
+        else:
+            raise NotImplementedError(f"a {joint.kind} joint in another convention")
         return name
 
     def _refuse_rule(self, joint: Joint) -> None:
@@ -633,6 +635,7 @@ class Conversion:
             B[..., 1, 0], B[..., 0, 1] = np.sin(angle), -np.sin(angle)
             B[..., 2, 2] = unit
             return B
+        assert block.joint.kind is JointKind.FLOATING
         R = rotation_of(q[..., block.q + 3 : block.q + 7])
         A = R if how.linear == "parent" else np.broadcast_to(np.eye(3), R.shape)
         turn = R if how.angular == "parent" else np.eye(3)
@@ -647,6 +650,7 @@ class Conversion:
             B[..., 0, 0] = B[..., 1, 1] = -np.sin(angle) * w
             B[..., 1, 0], B[..., 0, 1] = np.cos(angle) * w, -np.cos(angle) * w
             return B
+        assert block.joint.kind is JointKind.FLOATING
         R = rotation_of(q[..., block.q + 3 : block.q + 7]) @ _cross(v[..., 3:])
         A = R if how.linear == "parent" else np.zeros_like(R)
         turn = R if how.angular == "parent" else np.zeros_like(R)

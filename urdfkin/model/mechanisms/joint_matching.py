@@ -48,7 +48,17 @@ def family(kind: JointKind) -> str:
 
     Joints of different kinds are never paired.
     """
-    return "turns" if kind.turns else kind.value
+    return _FAMILIES[kind]
+
+
+_FAMILIES = {
+    JointKind.REVOLUTE: "turns",
+    JointKind.CONTINUOUS: "turns",
+    JointKind.PRISMATIC: "prismatic",
+    JointKind.FIXED: "fixed",
+    JointKind.PLANAR: "planar",
+    JointKind.FLOATING: "floating",
+}
 
 
 class Pairing:
