@@ -423,8 +423,9 @@ def _numbers(x: Inputs, T: FloatArray, written: str, *, verify: bool) -> FloatAr
 
     from urdfkin.kinematics.rotation import quaternion_of, rpy_of  # noqa: PLC0415
 
-    of: Callable[[Any], FloatArray] = rpy_of if written == "rpy" else quaternion_of
-    orientation = of(R := T[:, :3, :3])
+    of: Mapping[str, Callable[[Any], FloatArray]]
+    of = {"rpy": rpy_of, "quaternion": quaternion_of, "wxyz": quaternion_of}
+    orientation = of[written](R := T[:, :3, :3])
     if verify and x.robot.certificate().verified:
         from urdfkin.verify.orientation import check_orientations  # noqa: PLC0415
 
