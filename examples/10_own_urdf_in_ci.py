@@ -4,7 +4,7 @@ Learn: `check` checks the text, `validate` the numbers. Commands with the same n
 """
 
 import urdfkin
-from urdfkin.lint import Severity
+from urdfkin.urdf.lint import Severity
 
 URDF = """<robot name="mine">
   <link name="base"/><link name="arm"/>

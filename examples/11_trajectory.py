@@ -6,7 +6,7 @@ Learn: a motion from rest to rest, one call for the whole motion of a frame, and
 import numpy as np
 
 import urdfkin
-from urdfkin.motion.trajectory import line
+from urdfkin.robot.trajectory import line
 
 robot = urdfkin.load("ur5")
 start = np.array([0.0, -1.5, 1.2, -1.0, -1.5, 0.0])

@@ -48,8 +48,8 @@ LIBRARY: dict[str, tuple[str, str, str]] = {
     "api/trajectories.md": (
         "Trajectories",
         "Samples of a log, and the motion of a frame along them, compared with Pinocchio.",
-        "read_trajectory frame_motion urdfkin.motion.trajectory.Trajectory "
-        "urdfkin.motion.frame_motion.FrameMotion",
+        "read_trajectory frame_motion urdfkin.robot.trajectory.Trajectory "
+        "urdfkin.robot.frame_motion.FrameMotion",
     ),
     "api/singularities.md": (
         "Singular values",

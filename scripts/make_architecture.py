@@ -54,11 +54,13 @@ def _module(path: Path) -> str:
 def package_of(module: str) -> str:
     """Return the package of a module; for a module outside `urdfkin`, return its folder.
 
+    The modules `urdfkin` and `urdfkin.__main__` are the package `urdfkin`.
+
     >>> package_of("urdfkin.robot"), package_of("urdfkin"), package_of("scripts.mutating.operators")
     ('robot', 'urdfkin', 'scripts')
     """
     tree, *rest = module.split(".")
-    return rest[0] if tree == "urdfkin" and rest else tree
+    return rest[0] if tree == "urdfkin" and rest and rest != ["__main__"] else tree
 
 
 def named(text: str) -> Iterator[str]:

@@ -3,9 +3,9 @@
 For each row, the script compares a library's result with several candidate definitions, on a random robot and
 motion. It writes the definition that matches. A test checks that the page is current.
 
-The tables of other tools come from urdfkin/conventions/conventions.toml. With --measure, the script first
-runs each installed library, in the library's convention, on all robots of the catalogue. The script writes
-the results to the same file.
+The tables of other tools come from urdfkin/model/conventions/conventions.toml. With --measure, the script
+first runs each installed library on all robots of the catalogue, in the library's convention. It writes the
+results to the same file.
 
     python scripts/make_conventions.py
     python scripts/make_conventions.py --measure
@@ -28,13 +28,13 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 import urdfkin
-from urdfkin.conventions import Convention, find_convention
-from urdfkin.conventions.convention import _built_in, spelled
+from urdfkin.model.conventions import Convention, find_convention
+from urdfkin.model.conventions.convention import _built_in, spelled
 from urdfkin.model.tree import FloatArray
 from urdfkin.urdf.catalogue import catalogue
 
 PAGE = Path(__file__).parents[1] / "docs" / "conventions.md"
-DATA = Path(__file__).parents[1] / "urdfkin" / "conventions" / "conventions.toml"
+DATA = Path(__file__).parents[1] / "urdfkin" / "model" / "conventions" / "conventions.toml"
 
 _LIMIT = '<limit lower="-2" upper="2" effort="1" velocity="1"/>'
 _BODY = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
@@ -186,7 +186,7 @@ these reasons:
 *Sources*: no library runs here. A test compares the convention with what the sources state
 (`tests/conventions/test_statements.py`), and the orders of Isaac Lab and Isaac Gym with published lists
 (`tests/conventions/test_published_orders.py`). The file of the convention,
-`urdfkin/conventions/conventions.toml`, says what each source is for, and what is in doubt.
+`urdfkin/model/conventions/conventions.toml`, says what each source is for, and what is in doubt.
 
 `isaaclab` and `isaaclab3` assume that the importer merges fixed joints. Without that option, a fixed joint
 counts as a level: use `order = "breadth first, with fixed joints"` in a file.
@@ -210,7 +210,7 @@ unit = 4096                  # steps of one turn
 zero = 2048                  # the motor's value where the joint is at 0
 ```
 
-The other keys are those of `urdfkin/conventions/conventions.toml`, such as `quaternion = "wxyz"`, or
+The other keys are those of `urdfkin/model/conventions/conventions.toml`, such as `quaternion = "wxyz"`, or
 `names = "usd"`, `"identifier"` and `"isaacsim"` for three spellings of names in USD.
 
 `urdfkin same A B --write-map FILE` writes such a file for A, with the joint names, order, senses and zeros of

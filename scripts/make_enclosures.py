@@ -11,7 +11,7 @@ import urdfkin
 from urdfkin.compiled.preload import only
 from urdfkin.robot import Robot
 from urdfkin.verify.exact.enclosure import Enclosure, Enclosures
-from urdfkin.verify.pinocchio_module import version
+from urdfkin.verify.pinocchio import version
 
 PAGE = Path(__file__).parents[1] / "docs" / "enclosures.md"
 #: The robots on the page: arms, a hand with mimic joints, humanoids, a quadruped, and a hobby arm.

@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from urdfkin.lint import DEFAULT_LIMITS, Finding, Severity, check
-from urdfkin.lint.pages import RULES
-from urdfkin.lint.pages import page as page_of
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import WRITTEN_OUT, shortened
+from urdfkin.urdf.lint import DEFAULT_LIMITS, Finding, Severity, check
+from urdfkin.urdf.lint.pages import RULES
+from urdfkin.urdf.lint.pages import page as page_of
 
 PAGE = Path(__file__).parents[1] / "docs" / "findings.md"
 

@@ -12,7 +12,7 @@ from urdfkin.report.words import nearer_counts
 from urdfkin.system.documents import plain
 from urdfkin.validation.accuracy import Judgement, Line, judge
 from urdfkin.verify.exact.numbers import DIGITS
-from urdfkin.verify.pinocchio_module import version
+from urdfkin.verify.pinocchio import version
 from urdfkin.verify.sampling import draw_base
 
 PAGE = Path(__file__).parents[1] / "docs" / "judge.md"

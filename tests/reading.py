@@ -1,9 +1,9 @@
 """A text read as `urdfkin.load` reads it, whatever is found in it."""
 
-from urdfkin.lint import UrdfError
-from urdfkin.lint.runner import read_urdf
 from urdfkin.model.tree import KinematicTree
 from urdfkin.urdf.findings import Reporter
+from urdfkin.urdf.lint import UrdfError
+from urdfkin.urdf.lint.runner import read_urdf
 from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.records import RobotRecord
 

@@ -11,8 +11,8 @@ from urdfkin.compiled.program import LANES
 from urdfkin.errors import InputError, NotFiniteError
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.tree import FloatArray
-from urdfkin.motion.frame_motion import frame_motion
 from urdfkin.robot import Robot
+from urdfkin.robot.frame_motion import frame_motion
 
 Compute = Callable[..., object]
 

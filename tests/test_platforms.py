@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from urdfkin.compiled.batch import default_threads
+from urdfkin.compiled.evaluate import default_threads
 from urdfkin.export import compiled_frame
 from urdfkin.urdf import confinement
 from urdfkin.validation import memory

@@ -16,7 +16,7 @@ from tests.pages import DOCS
 from urdfkin.cli.explain import answer_to, answers, as_text
 from urdfkin.errors import Question, UrdfkinError
 from urdfkin.urdf import xacro
-from urdfkin.verify.pinocchio_module import _impostor
+from urdfkin.verify.pinocchio import _impostor
 
 WHEEL = """<robot name="wheel"><link name="a"/><link name="b"/><link name="c"/>
 <joint name="axle" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint>

@@ -20,15 +20,15 @@ if TYPE_CHECKING:
     from urdfkin.comparison.verdict import same
     from urdfkin.dh import DHRow, DHTable, read_table, table_from_rows
     from urdfkin.errors import DegreesWarning, InputError, SourceError, UnknownNameError, UrdfkinError
-    from urdfkin.lint import Finding, UrdfError, UrdfWarning, check
-    from urdfkin.loading import load
     from urdfkin.model.base_motion import BaseMotion
     from urdfkin.model.chain import FrameChain
     from urdfkin.model.reference import Reference
-    from urdfkin.motion.frame_motion import frame_motion
-    from urdfkin.motion.trajectory import read_trajectory
     from urdfkin.robot import Robot
+    from urdfkin.robot.frame_motion import frame_motion
+    from urdfkin.robot.loading import load
+    from urdfkin.robot.trajectory import read_trajectory
     from urdfkin.urdf.catalogue import robots
+    from urdfkin.urdf.lint import Finding, UrdfError, UrdfWarning, check
     from urdfkin.validation.campaign import validate
     from urdfkin.validation.functions import verify_function
     from urdfkin.verify.certificate import Certificate, VerificationError
@@ -42,7 +42,7 @@ _HOMES = {
     "DHRow": "urdfkin.dh",
     "DHTable": "urdfkin.dh",
     "DegreesWarning": "urdfkin.errors",
-    "Finding": "urdfkin.lint",
+    "Finding": "urdfkin.urdf.lint",
     "FrameChain": "urdfkin.model.chain",
     "InputError": "urdfkin.errors",
     "NotVerifiedWarning": "urdfkin.verify.verifier",
@@ -51,17 +51,17 @@ _HOMES = {
     "SourceError": "urdfkin.errors",
     "TableError": "urdfkin.verify.tables",
     "UnknownNameError": "urdfkin.errors",
-    "UrdfError": "urdfkin.lint",
-    "UrdfWarning": "urdfkin.lint",
+    "UrdfError": "urdfkin.urdf.lint",
+    "UrdfWarning": "urdfkin.urdf.lint",
     "UrdfkinError": "urdfkin.errors",
     "VerificationError": "urdfkin.verify.certificate",
     "calibrate": "urdfkin.calibration.calibrate",
-    "check": "urdfkin.lint",
+    "check": "urdfkin.urdf.lint",
     "diff": "urdfkin.comparison.diff",
-    "frame_motion": "urdfkin.motion.frame_motion",
-    "load": "urdfkin.loading",
+    "frame_motion": "urdfkin.robot.frame_motion",
+    "load": "urdfkin.robot.loading",
     "read_table": "urdfkin.dh",
-    "read_trajectory": "urdfkin.motion.trajectory",
+    "read_trajectory": "urdfkin.robot.trajectory",
     "robots": "urdfkin.urdf.catalogue",
     "same": "urdfkin.comparison.verdict",
     "table_from_rows": "urdfkin.dh",
@@ -73,7 +73,7 @@ _HOMES = {
 register_hook("a table in a form", lazy_import("urdfkin.dh.export:export"))
 register_hook("code of a robot", lazy_import("urdfkin.export.forms:code_of_robot"))
 register_hook("code of a chain", lazy_import("urdfkin.export.forms:code_of_chain"))
-register_hook("a robot of a source", lazy_import("urdfkin.loading:load"))
+register_hook("a robot of a source", lazy_import("urdfkin.robot.loading:load"))
 register_hook("code in a language", lazy_import("urdfkin.export:write"))
 register_hook("a report as a page", lazy_import("urdfkin.report.html:as_html"))
 register_hook("a report as a comment", lazy_import("urdfkin.report.markdown:as_markdown"))

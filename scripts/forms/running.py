@@ -22,10 +22,10 @@ from urdfkin.dh import DHTable, export, read_table, to_urdf
 from urdfkin.dh.convert import link_names, to_tree
 from urdfkin.dh.export.code import plain
 from urdfkin.export import LANGUAGES
-from urdfkin.lint import UrdfWarning
-from urdfkin.loading import load
 from urdfkin.model.configuration import coordinate_names
 from urdfkin.model.tree import FloatArray
+from urdfkin.robot.loading import load
+from urdfkin.urdf.lint import UrdfWarning
 
 _STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror")
 _MAIN = """

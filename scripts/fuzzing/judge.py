@@ -12,8 +12,8 @@ import urdfkin
 from scripts.fuzzing import Case, mjcf
 from scripts.fuzzing.asking import MismatchError, ask, ask_prepared
 from urdfkin.errors import InputError, RangeError, UrdfkinError
-from urdfkin.lint import Finding, Severity, UrdfError
 from urdfkin.robot import Robot
+from urdfkin.urdf.lint import Finding, Severity, UrdfError
 from urdfkin.urdf.mjcf import is_mjcf
 from urdfkin.verify.verifier import NotVerifiedWarning
 

@@ -13,8 +13,7 @@ import numpy as np
 
 from scripts.fuzzing import Case
 from scripts.fuzzing import odd_numbers as odd
-from urdfkin.model.frame_names import LinkFrame
-from urdfkin.model.tree import FloatArray, JointKind
+from urdfkin.model.tree import FloatArray, JointKind, LinkFrame
 from urdfkin.robot import Robot
 
 FAMILIES = ("mjcf-free", "mjcf-equalities", "mjcf-classes")

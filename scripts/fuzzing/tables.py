@@ -12,8 +12,8 @@ from urdfkin.dh.compare import compare
 from urdfkin.dh.export import export
 from urdfkin.dh.parse_table import read_table, reference_path, table_from_text
 from urdfkin.errors import UrdfkinError
-from urdfkin.loading import load
 from urdfkin.model.chain import FrameChain
+from urdfkin.robot.loading import load
 
 FAMILY = "tables"
 #: For each format of `urdfkin.dh.export`: the suffix of its files.

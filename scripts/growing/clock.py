@@ -10,7 +10,7 @@ import time
 from dataclasses import asdict, dataclass
 
 from scripts.growing.kinds import KINDS
-from urdfkin.lint import check_text
+from urdfkin.urdf.lint import check_text
 
 
 @dataclass(frozen=True, slots=True)

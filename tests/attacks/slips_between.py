@@ -50,11 +50,11 @@ from urdfkin.urdf.sources import Origin
 #: Where a user's numbers pass on their way to the result, and on their way to Pinocchio.
 MODULES = (
     "verify.oracle", "verify.call", "model.chain", "model.configuration", "model.mimic",
-    "dh.convert", "model.configuration_like", "verify.pinocchio_inputs", "model.frame_names",
-    "verify.table_check", "kinematics.bodies", "verify.pinocchio", "model.base_motion", "compiled.batch",
+    "dh.convert", "model.configuration_like",
+    "verify.table_check", "kinematics.bodies", "verify.pinocchio", "model.base_motion",
     "compiled.evaluate", "compiled.plan", "compiled.program", "model.reference", "robot",
-    "kinematics.rotation.matrix", "kinematics.inputs", "kinematics.rotation.euler",
-    "kinematics.rotation.quaternion", "model.path", "model.tree", "urdf.reader", "urdf.writer",
+    "kinematics.rotation", "kinematics.inputs",
+    "model.path", "model.tree", "urdf.reader", "urdf.writer",
     "verify.bounds", "verify.derived", "verify.certificate", "verify.sampling", "verify.analytical_reference",
     "verify.quantities", "verify.tables", "verify.verifier",
 )  # fmt: skip

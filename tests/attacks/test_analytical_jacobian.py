@@ -15,8 +15,7 @@ import pytest
 import urdfkin
 from urdfkin.errors import RepresentationSingularityError
 from urdfkin.kinematics import bodies as module
-from urdfkin.kinematics.rotation.euler import SEQUENCES, rotation_from_euler
-from urdfkin.kinematics.rotation.quaternion import quaternion_of
+from urdfkin.kinematics.rotation import SEQUENCES, quaternion_of, rotation_from_euler
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.tree import FloatArray
@@ -290,7 +289,7 @@ def in_place(name: str, wrong: ast.Module) -> Iterator[None]:
 
 
 def _forget() -> None:
-    importlib.import_module("urdfkin.kinematics.rotation.euler")._sequence.cache_clear()
+    importlib.import_module("urdfkin.kinematics.rotation")._sequence.cache_clear()
 
 
 def outcome(robot: Robot, q: FloatArray, representation: str) -> FloatArray | None:

@@ -12,8 +12,7 @@ from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import freed
 from urdfkin.robot import Robot
 from urdfkin.urdf.sources import Origin
-from urdfkin.verify.oracle import QueryBatch
-from urdfkin.verify.pinocchio_inputs import rules_of_text
+from urdfkin.verify.oracle import QueryBatch, rules_of_text
 
 pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 

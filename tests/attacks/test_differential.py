@@ -12,8 +12,8 @@ import pinocchio as pin
 import pytest
 
 from tests.reading import tree_of
-from urdfkin.lint import Finding, PinocchioReading, Severity, check_text
 from urdfkin.model.tree import JointKind, KinematicTree
+from urdfkin.urdf.lint import Finding, PinocchioReading, Severity, check_text
 
 #: Slot -> what may stand there; the first is plain.
 SLOTS: dict[str, list[str]] = {

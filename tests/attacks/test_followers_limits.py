@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import urdfkin
-from urdfkin.model.ranges import narrowed_ranges
+from urdfkin.model.configuration import narrowed_ranges
 from urdfkin.report.html import as_html
 from urdfkin.robot import Robot
 from urdfkin.validation.campaign import validate

@@ -14,7 +14,7 @@ import urdfkin
 from tests.reading import tree_of
 from urdfkin.robot import Robot
 from urdfkin.urdf.sources import Origin
-from urdfkin.verify.pinocchio_inputs import rules_of_text
+from urdfkin.verify.oracle import rules_of_text
 
 
 def chain_of_followers(rules: list[tuple[int, float, float]]) -> str:

@@ -143,6 +143,6 @@ def test_every_lock_and_pool_of_the_package_is_made_for_forks() -> None:
     }
     assert found == {
         "system/locks.py: threading.RLock",
-        "compiled/batch.py: ThreadPoolExecutor",  # forgotten in the child
+        "compiled/evaluate.py: ThreadPoolExecutor",  # forgotten in the child
         "view/viewer.py: threading.RLock",  # a server that does not fork
     }

@@ -15,11 +15,11 @@ from scripts.growing.kinds import KINDS
 from tests.lint.cases.arm import arm
 from tests.reading import tree_of
 from urdfkin.errors import nearest
-from urdfkin.lint import Finding, Severity, UrdfError, check_text
-from urdfkin.lint.formats import as_json
 from urdfkin.urdf.findings import ERRORS_SHOWN, WRITTEN_OUT, Reporter
+from urdfkin.urdf.lint import Finding, Severity, UrdfError, check_text
+from urdfkin.urdf.lint.formats import as_json
 from urdfkin.urdf.parser import read_document
-from urdfkin.verify.pinocchio_inputs import rules_of_text
+from urdfkin.verify.oracle import rules_of_text
 
 #: Four times the size takes four times the time; sixteen times would be the square. Between them, and in
 #: seconds, there is room for a busy machine.

@@ -19,7 +19,7 @@ from urdfkin.model import base_motion as recursion_base
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.bounds import magnitudes
-from urdfkin.verify.pinocchio_inputs import free_flyer, free_flyer_rates, nearest_quaternion
+from urdfkin.verify.oracle import free_flyer, free_flyer_rates, nearest_quaternion
 
 ARM = (
     '<robot name="arm"><link name="a"/><link name="b"/><joint name="j" type="continuous"><parent link="a"/>'

@@ -17,8 +17,7 @@ import urdfkin
 from scripts.fuzzing.robots import LIKE_OURS as POOL
 from urdfkin import BaseMotion
 from urdfkin.errors import InputError, OracleError, UnknownNameError
-from urdfkin.model.frame_names import JointFrame, LinkFrame
-from urdfkin.model.tree import KinematicTree
+from urdfkin.model.tree import JointFrame, KinematicTree, LinkFrame
 from urdfkin.robot import Robot
 from urdfkin.validation.accuracy import judge
 from urdfkin.verify.oracle import QueryBatch

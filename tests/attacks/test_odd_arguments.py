@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 
 import urdfkin
-from urdfkin.compiled import batch
+from urdfkin.compiled import evaluate
 from urdfkin.compiled.program import LANES
-from urdfkin.motion.trajectory import line
 from urdfkin.robot import Robot
+from urdfkin.robot.trajectory import line
 
 ODD: dict[str, Any] = {
     "None": None,
@@ -185,13 +185,13 @@ def test_many_threads_are_no_more_work_than_the_batch_and_the_processors(
 ) -> None:
     """Ten million threads made ten million parts, for 3.5 s."""
     counted = []
-    parts = batch._parts
+    parts = evaluate._parts
 
     def counting(n: int, threads: int) -> list[tuple[int, int]]:
         counted.append(threads)
         return parts(n, threads)
 
-    monkeypatch.setattr(batch, "_parts", counting)
+    monkeypatch.setattr(evaluate, "_parts", counting)
     q = robot.sample(1000)
     many = robot.jacobian(q, "c", verify=False, threads=10**7)
     np.testing.assert_array_equal(many, robot.jacobian(q, "c", verify=False, threads=1))

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 import urdfkin
 from tests.lint.cases.arm import arm
-from urdfkin.lint import Finding, Severity
 from urdfkin.robot import Robot
+from urdfkin.urdf.lint import Finding, Severity
 from urdfkin.validation.accuracy import judge
 from urdfkin.view.scene import shapes
 

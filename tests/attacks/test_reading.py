@@ -20,7 +20,7 @@ import pytest
 import urdfkin
 from tests.cli.running import urdfkin as command
 from urdfkin.errors import SourceError
-from urdfkin.motion.trajectory import read_arrays
+from urdfkin.robot.trajectory import read_arrays
 from urdfkin.system import files
 from urdfkin.system.cache import get
 from urdfkin.system.files import MOST, read_bytes, read_if_there, read_start
@@ -35,11 +35,11 @@ PACKAGE = Path(urdfkin.__file__).parent
 #: Who opens files besides the reader, and which: no stranger can put another in their place.
 OTHERS = {
     "cli/streams.py": "/dev/null",
-    "conventions/convention.py": "urdfkin's own data; a user's file by the reader",
+    "model/conventions/convention.py": "urdfkin's own data; a user's file by the reader",
     "export/c.py": "urdfkin's own frames of code",
     "export/compiled_frame.py": "/proc, and what the compiler has just made in a folder of its own",
     "kinematics/registry/__init__.py": "urdfkin's own data",
-    "lint/pages.py": "urdfkin's own pages",
+    "urdf/lint/pages.py": "urdfkin's own pages",
     "report/html.py": "urdfkin's own pages",
     "system/files.py": "the reader",
     "system/processes.py": "the current folder, to return to it",

@@ -9,7 +9,7 @@ import pytest
 
 import urdfkin as library
 from tests.cli.running import urdfkin
-from urdfkin.motion.trajectory import read_trajectory
+from urdfkin.robot.trajectory import read_trajectory
 
 #: What Python's float takes, and nobody means.
 NOT_MEANT = [

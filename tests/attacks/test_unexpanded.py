@@ -6,7 +6,7 @@ import pytest
 
 import urdfkin
 from tests.lint.cases.arm import MESH, arm
-from urdfkin.lint import Severity
+from urdfkin.urdf.lint import Severity
 
 
 @pytest.mark.slow

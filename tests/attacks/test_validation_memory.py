@@ -15,13 +15,14 @@ import pytest
 import urdfkin
 from urdfkin.compiled import evaluate
 from urdfkin.compiled.plan import compile_tree
+from urdfkin.errors import OracleError
 from urdfkin.validation import chunk as chunk_module
 from urdfkin.validation import comparison, memory
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.chunk import chunks, run_chunk
 from urdfkin.validation.outcome import Verdict
 from urdfkin.validation.robot_input import subject
-from urdfkin.verify.pinocchio import OracleError, PinocchioOracle
+from urdfkin.verify.pinocchio import PinocchioOracle
 
 GB = 10**9
 

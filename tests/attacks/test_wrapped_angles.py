@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 import urdfkin
 from tests.cli import running
-from urdfkin.kinematics.rotation.quaternion import rotation_of
-from urdfkin.motion.frame_motion import frame_motion
-from urdfkin.motion.trajectory import Trajectory, read_trajectory
+from urdfkin.kinematics.rotation import rotation_of
 from urdfkin.robot import Robot
+from urdfkin.robot.frame_motion import frame_motion
+from urdfkin.robot.trajectory import Trajectory, read_trajectory
 from urdfkin.view.plot import foot
 
 JOINT = (

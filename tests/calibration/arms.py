@@ -8,9 +8,9 @@ import numpy as np
 
 from urdfkin.calibration.parameters import Model, urdf_model
 from urdfkin.kinematics.rotation import exp_rotation
-from urdfkin.loading import load
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
+from urdfkin.robot.loading import load
 
 #: Revolute, prismatic and continuous joints, about and along axes of every kind, on two branches.
 BRANCHED = """<?xml version="1.0"?>

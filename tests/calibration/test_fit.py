@@ -16,10 +16,10 @@ from urdfkin.calibration.parameters import table_model
 from urdfkin.dh.table import Convention
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.rotation import log_rotation
-from urdfkin.loading import load
 from urdfkin.model.tree import FloatArray
 from urdfkin.report.calibration import document
 from urdfkin.report.listing import print_document
+from urdfkin.robot.loading import load
 
 ENDS = ("base", "tool")
 

@@ -8,7 +8,7 @@ import pytest
 from tests.calibration.arms import BRANCHED, bench
 from urdfkin.calibration.calibrate import calibrate, doubts
 from urdfkin.calibration.fit import stacked
-from urdfkin.loading import load
+from urdfkin.robot.loading import load
 
 ARMS = {"ur5": ("tool0", "base"), "panda": ("panda_hand", "panda_link0"), BRANCHED: ("hand", "b")}
 

@@ -13,8 +13,8 @@ from tests.calibration.arms import BRANCHED, pose
 from urdfkin.calibration.write_back import nearest_rpy, with_origins
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import rotation_from_rpy
-from urdfkin.loading import load
 from urdfkin.model.tree import FloatArray
+from urdfkin.robot.loading import load
 from urdfkin.system.files import Edit, edited
 
 ORIGINS = {name: pose(k, 0.5) for k, name in enumerate(["one", "two", "three", "fix"])}

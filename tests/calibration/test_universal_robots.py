@@ -19,10 +19,10 @@ from urdfkin.dh.rows import table_from_rows
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.rotation import euler_of
-from urdfkin.loading import load
 from urdfkin.model.chain import chain
 from urdfkin.model.path import elementary
 from urdfkin.model.tree import FloatArray
+from urdfkin.robot.loading import load
 
 #: theta, d, a, alpha of a real UR10e, from the driver's documentation: the upper arm is 439 m out.
 CONTROLLER = np.array(

@@ -13,10 +13,9 @@ from urdfkin.calibration.parameters import Model, table_model, urdf_model
 from urdfkin.dh.table import Convention, DHRow, DHTable
 from urdfkin.kinematics import equations as eq
 from urdfkin.kinematics.rotation import axis_aligning
-from urdfkin.loading import load
-from urdfkin.model.pose import inverse
 from urdfkin.model.recursion import IDENTITY, ZERO, Matrix, Number, Vector
-from urdfkin.model.tree import FloatArray, JointKind
+from urdfkin.model.tree import FloatArray, JointKind, inverse
+from urdfkin.robot.loading import load
 from urdfkin.verify.exact.numbers import ExactJoint, about, exact, precision, read_exact
 from urdfkin.verify.exact.recursion import move
 

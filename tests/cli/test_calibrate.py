@@ -14,7 +14,7 @@ from urdfkin.calibration.parameters import table_model
 from urdfkin.dh.export import export
 from urdfkin.dh.parse_table import read_table
 from urdfkin.dh.table import Convention
-from urdfkin.loading import load
+from urdfkin.robot.loading import load
 
 
 def test_measured_poses_become_a_urdf_and_data(tmp_path: Path) -> None:

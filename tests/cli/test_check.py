@@ -91,7 +91,7 @@ def test_explain_prints_a_page_and_lists_all_codes() -> None:
 
 def test_checking_imports_neither_yourdfpy_nor_pinocchio_nor_a_compiler() -> None:
     program = (
-        "import sys; from urdfkin.lint import check; check('<robot/>');"
+        "import sys; from urdfkin.urdf.lint import check; check('<robot/>');"
         "print({'numba', 'yourdfpy', 'pinocchio', 'lxml', 'trimesh'} & set(sys.modules))"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)

@@ -13,7 +13,7 @@ import pytest
 
 from tests.cli.running import Done, urdfkin
 from tests.lint.cases import CASES
-from urdfkin.lint import check as lint
+from urdfkin.urdf.lint import check as lint
 
 LONG = """<robot name="r">
   <link name="a"/><link name="b"/>

@@ -22,8 +22,8 @@ from tests.cli.running import urdfkin
 from urdfkin.cli import commands
 from urdfkin.dh.parse_table import references
 from urdfkin.kinematics.registry import equations
-from urdfkin.lint.pages import RULES
 from urdfkin.urdf.catalogue import catalogue
+from urdfkin.urdf.lint.pages import RULES
 
 Offered = Callable[[str], list[str]]
 

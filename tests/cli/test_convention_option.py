@@ -114,7 +114,7 @@ def test_a_batch_without_the_option_runs_no_line_of_conventions() -> None:
     code = (
         "import sys\nfrom tests.cli.running import urdfkin\n"
         f"done = urdfkin(*{words})\n"
-        "loaded = [name for name in sys.modules if name.startswith('urdfkin.conventions')]\n"
+        "loaded = [name for name in sys.modules if name.startswith('urdfkin.model.conventions')]\n"
         "print(done.code, len(done.text.splitlines()) > 100, loaded)\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -16,8 +16,8 @@ import urdfkin as library
 from tests.cli.running import process, urdfkin
 from tests.robots.odd_urdfs import urdf_of
 from urdfkin.cli import _ABSENT, _SYNONYMS, cli, commands, groups
-from urdfkin.loading import load
 from urdfkin.robot import Robot
+from urdfkin.robot.loading import load
 from urdfkin.system.resources import robots_dir
 from urdfkin.urdf.catalogue import catalogue
 

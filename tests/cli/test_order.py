@@ -11,7 +11,7 @@ import pytest
 
 import urdfkin
 from tests.cli.running import urdfkin as run
-from urdfkin.conventions import BUILT_IN
+from urdfkin.model.conventions import BUILT_IN
 
 TOOLS = [name for name in BUILT_IN if name != "idyntree"]
 

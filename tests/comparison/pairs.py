@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike
 
 import urdfkin
 from urdfkin.kinematics.rotation import exp_rotation, rotation_from_rpy, rpy_of
-from urdfkin.model.pose import inverse
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, build_tree
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, build_tree, inverse
 from urdfkin.robot import Robot
 from urdfkin.urdf.writer import to_urdf
 

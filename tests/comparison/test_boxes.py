@@ -16,8 +16,8 @@ from urdfkin.comparison.bounds import Boxes, Search, curvature, moved_together, 
 from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Verdict
 from urdfkin.comparison.verdict import Comparator
-from urdfkin.model.mechanisms.alignment import FramePair, variables_of
 from urdfkin.model.mechanisms.matcher import align
+from urdfkin.model.mechanisms.mechanism import FramePair, variables_of
 from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
 from urdfkin.model.tree import FloatArray
 

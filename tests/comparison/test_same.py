@@ -17,7 +17,7 @@ import urdfkin
 from tests.cli.running import urdfkin as run
 from tests.comparison import pairs
 from tests.comparison.pairs import changed, robot
-from urdfkin.comparison.certificate import SAME, certificate, recheck
+from urdfkin.comparison.certificate import SAME, certificate, recheck, words_of
 from urdfkin.comparison.result import Verdict
 from urdfkin.model.mechanisms.mechanism import JointTransform, Mechanism
 from urdfkin.model.tree import JointKind
@@ -441,3 +441,67 @@ def test_the_schema_is_printed_and_is_one() -> None:
     Draft202012Validator.check_schema(done.data)
     made = run("same", "elbow", "elbow", "--format", "json").data
     Draft202012Validator(done.data).validate(made)
+
+
+_IDLE = (
+    '<robot name="r"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>'
+    '<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>{limit}</joint>'
+    '<joint name="k" type="{kind}"><parent link="b"/><child link="c"/><origin xyz="{x} 0 0" rpy="0 {y} 0"/>'
+    '<axis xyz="0 1 0"/>{rest}</joint>'
+    '<joint name="l" type="revolute"><parent link="c"/><child link="d"/><origin xyz="0 1 0"/>'
+    '<axis xyz="1 0 0"/>{limit}</joint></robot>'
+)
+_RANGE = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
+
+
+def _idle(kind: str, offset: float) -> urdfkin.Robot:
+    rest = f'{_RANGE}<mimic joint="j" multiplier="0" offset="{offset}"/>'
+    return urdfkin.load(_IDLE.format(limit=_RANGE, kind=kind, x=1, y=0, rest=rest))
+
+
+@pytest.mark.parametrize(
+    ("idle", "kind", "offset", "place", "words"),
+    [
+        ("revolute", "fixed", 0.0, {"x": 1, "y": 0}, "fixes it at 0 rad"),
+        ("revolute", "fixed", 0.25, {"x": 1, "y": 0.25}, "fixes it at 0.25 rad"),
+        ("continuous", "fixed", 3.0, {"x": 1, "y": 3.0}, "fixes it at 3 rad"),
+    ],
+)
+def test_a_mimic_joint_with_multiplier_zero_is_a_fixed_joint_at_its_offset(
+    idle: str, kind: str, offset: float, place: dict[str, float], words: str
+) -> None:
+    """In either order, and the certificate states it and holds."""
+    models = [_idle(idle, offset), urdfkin.load(_IDLE.format(limit=_RANGE, kind=kind, rest="", **place))]
+    for which, (a, b) in zip("AB", (models, models[::-1]), strict=True):
+        found = urdfkin.same(a, b)
+        assert found.verdict is Verdict.SAME, found
+        remark = f"joint k never moves in {which}: its mimic rule has the multiplier 0 and {words}"
+        assert remark in [one.words for one in found.remarks]
+        assert found.exit_code(strict=True) == 1
+        document = certificate(found)
+        assert remark in [words_of(one) for one in document["remarks"]]
+        assert recheck(document, a, b) == []
+        document["remarks"] = []
+        assert recheck(document, a, b) != []
+
+
+def test_a_mimic_joint_with_multiplier_zero_and_a_joint_fixed_elsewhere_differ() -> None:
+    fixed = urdfkin.load(_IDLE.format(limit=_RANGE, kind="fixed", x=1, y=0.2, rest=""))
+    found = urdfkin.same(_idle("revolute", 0.25), fixed)
+    assert found.verdict is Verdict.DIFFERS
+    assert found.worst is not None
+    assert found.worst.radians == pytest.approx(0.05)
+    assert not any("only in" in one.what for one in found.differences)
+
+
+def test_a_mimic_joint_with_multiplier_zero_and_an_independent_joint_differ_in_the_rule() -> None:
+    free = urdfkin.load(_IDLE.format(limit=_RANGE, kind="revolute", x=1, y=0, rest=_RANGE))
+    assert [one.what for one in urdfkin.same(_idle("revolute", 0.0), free).differences] == ["mimic rule"]
+
+
+def test_a_prismatic_joint_that_never_moves_is_stated_in_metres() -> None:
+    rest = f'{_RANGE}<mimic joint="j" multiplier="0" offset="0.5"/>'
+    a = urdfkin.load(_IDLE.format(limit=_RANGE, kind="prismatic", x=1, y=0, rest=rest))
+    found = urdfkin.same(a, urdfkin.load(a.urdf.replace(rest, "").replace('"prismatic"', '"fixed"')))
+    assert found.verdict is Verdict.DIFFERS
+    assert "fixes it at 0.5 m" in str(found.remarks[0].words)

@@ -33,11 +33,11 @@ from xml.etree.ElementTree import SubElement, tostring
 import numpy as np
 import pytest
 
-from urdfkin.conventions.convention import transcoded
 from urdfkin.kinematics.roundings import EPS, MUJOCO, ROUNDINGS
+from urdfkin.model.conventions.convention import transcoded
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.urdf.plain_xml import plain_xml
+from urdfkin.system.plain_xml import plain_xml
 
 #: Roundings of Newton's single precision, derived above.
 SINGLE = 30.0

@@ -10,10 +10,10 @@ import pytest
 
 import urdfkin
 from tests.conventions.libraries import LIBRARIES
-from urdfkin.conventions import BUILT_IN, Convention, find_convention
-from urdfkin.conventions import convention as module
-from urdfkin.conventions.convention import spelled
 from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.model.conventions import BUILT_IN, Convention, find_convention
+from urdfkin.model.conventions import convention as module
+from urdfkin.model.conventions.convention import spelled
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 

@@ -12,11 +12,11 @@ import urdfkin
 from tests.cli.running import urdfkin as run
 from tests.comparison.pairs import disguised, loaded, robot
 from urdfkin.comparison.result import Sameness
-from urdfkin.conventions import BUILT_IN, Convention, Conversion, as_toml, find_convention
-from urdfkin.conventions.convention import JointRule, read_convention
 from urdfkin.errors import InputError
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.conventions import BUILT_IN, Convention, Conversion, as_toml, find_convention
+from urdfkin.model.conventions.convention import JointRule, read_convention
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot

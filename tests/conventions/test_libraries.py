@@ -18,13 +18,13 @@ import pytest
 
 import urdfkin
 from tests.conventions.libraries import LIBRARIES, Library
-from urdfkin.conventions import Conversion, find_convention
 from urdfkin.kinematics.roundings import ROUNDINGS
 from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.conventions import Conversion, find_convention
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.urdf.plain_xml import plain_xml
+from urdfkin.system.plain_xml import plain_xml
 from urdfkin.verify.bounds import magnitudes
 from urdfkin.verify.quantities import JACOBIAN, PLACEMENT, VELOCITY
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import urdfkin
-from urdfkin.conventions import find_convention
+from urdfkin.model.conventions import find_convention
 
 LEGS = ("LF", "LH", "RF", "RH")
 SIDES = ("left", "right")

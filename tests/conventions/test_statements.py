@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 import urdfkin
 from tests.conventions.libraries import LIBRARIES
 from tests.conventions.test_libraries import MISTAKES
-from urdfkin.conventions import BUILT_IN, Convention, find_convention
+from urdfkin.model.conventions import BUILT_IN, Convention, find_convention
 from urdfkin.robot import Robot
 
 Rows = list[tuple[str, str, str]]

@@ -15,8 +15,8 @@ from tests.random_chains import configurations, trees
 from urdfkin.dh import DHTable, convert, dh_table, read_table, table_from_rows, to_tree, to_urdf
 from urdfkin.dh.parse_table import references
 from urdfkin.errors import InputError
-from urdfkin.loading import load
 from urdfkin.model.tree import FloatArray, KinematicTree
+from urdfkin.robot.loading import load
 from urdfkin.urdf import writer
 from urdfkin.validation.campaign import validate
 from urdfkin.verify.tables import TableError

@@ -17,7 +17,7 @@ from tests.random_chains import configurations, rotation, shift, trees
 from urdfkin.dh.make import dh_table
 from urdfkin.dh.table import Convention, DHTable
 from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.kinematics.rotation.euler import rotation_from_rpy
+from urdfkin.kinematics.rotation import rotation_from_rpy
 from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit
 

@@ -18,9 +18,9 @@ from urdfkin.dh import Convention, DHTable, dh_table, export, read_table, table_
 from urdfkin.dh.convert import to_convention
 from urdfkin.dh.parse_table import published, read_mapping, reference_path, references
 from urdfkin.errors import InputError
-from urdfkin.loading import load
 from urdfkin.model.chain import chain
 from urdfkin.model.tree import KinematicTree
+from urdfkin.robot.loading import load
 
 
 @pytest.mark.slow

@@ -17,8 +17,8 @@ from urdfkin.dh import DHTable, dh_table, read_table, table_from_rows, units_of
 from urdfkin.dh.compare import Comparison, compare, document
 from urdfkin.dh.convert import to_tree
 from urdfkin.dh.parse_table import reference_path, references
-from urdfkin.loading import load
 from urdfkin.model.chain import FrameChain, chain
+from urdfkin.robot.loading import load
 
 pytestmark = pytest.mark.slow
 

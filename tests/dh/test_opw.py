@@ -13,7 +13,7 @@ from tests.cli.test_dh import run_any
 from urdfkin.dh import DHTable, table_from_rows
 from urdfkin.dh.structure import opw_of
 from urdfkin.errors import InputError
-from urdfkin.loading import load
+from urdfkin.robot.loading import load
 
 H = math.pi / 2
 NAMES = ("a1", "a2", "b", "c1", "c2", "c3", "c4")

@@ -19,9 +19,9 @@ from urdfkin.dh.export.toolboxes import write_screws
 from urdfkin.dh.screws import ProductOfExponentials, screws_from, screws_of
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import exp_rotation
-from urdfkin.loading import load
 from urdfkin.model.chain import chain
 from urdfkin.model.tree import FloatArray, KinematicTree
+from urdfkin.robot.loading import load
 from urdfkin.verify.chain_checks import check_screws
 from urdfkin.verify.tables import TableError
 

@@ -24,8 +24,8 @@ from urdfkin.dh.parse_table import (
 from urdfkin.dh.rows import last_digits
 from urdfkin.dh.units import NoCellError, cell_of
 from urdfkin.errors import InputError
-from urdfkin.loading import load
 from urdfkin.model.tree import KinematicTree
+from urdfkin.robot.loading import load
 
 #: A file -> its convention and its rows: a, alpha, d, theta, R or P.
 SHEETS: dict[str, tuple[str, str, list[tuple[float, float, float, float, str]]]] = {

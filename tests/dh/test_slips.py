@@ -18,8 +18,8 @@ from urdfkin.dh.compare.slips import as_said, doubts, other_readings
 from urdfkin.dh.parse_table import reference_path
 from urdfkin.dh.rows import ORDER
 from urdfkin.errors import InputError
-from urdfkin.loading import load
 from urdfkin.model.chain import chain
+from urdfkin.robot.loading import load
 from urdfkin.urdf.findings import UrdfWarning
 
 SWAPPED_A_D = ("d", "alpha", "a", "theta")

@@ -16,9 +16,9 @@ from tests.dh.test_opw import NAMES, table
 from urdfkin.dh import export
 from urdfkin.dh.export.toolboxes import write_screws
 from urdfkin.dh.structure import opw_of, structure
-from urdfkin.loading import load
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
+from urdfkin.robot.loading import load
 
 TIPS = {"ur5": "tool0", "ur10": "tool0", "kinova": "j2s6s200_end_effector"}
 Solve = Callable[[FloatArray], Sequence[Any]]

@@ -14,9 +14,9 @@ from tests.random_chains import rotation, shift
 from urdfkin.dh import DHTable, table_from_rows, to_tree
 from urdfkin.dh.screws import screws_of
 from urdfkin.dh.structure import Structure, structure
-from urdfkin.loading import load
 from urdfkin.model.chain import chain
 from urdfkin.model.tree import KinematicTree
+from urdfkin.robot.loading import load
 from urdfkin.verify.oracle import QueryBatch
 
 H = math.pi / 2

@@ -21,7 +21,7 @@ from urdfkin.export import recursion
 from urdfkin.export.c import framed
 from urdfkin.export.expression import Graph, Node, needed
 from urdfkin.kinematics import roundings
-from urdfkin.kinematics.rotation.euler import rotation_from_rpy
+from urdfkin.kinematics.rotation import rotation_from_rpy
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import FloatArray
 

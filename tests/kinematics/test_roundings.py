@@ -13,7 +13,7 @@ from tests.counted import Counted, Matrix, all_conspiring, deviation, eq, matrix
 from urdfkin.dh.snapping import _round_rotation, rotation_angle
 from urdfkin.dh.table import nearest_twelfth
 from urdfkin.kinematics import roundings
-from urdfkin.kinematics.rotation.euler import rotation_from_rpy
+from urdfkin.kinematics.rotation import rotation_from_rpy
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import FloatArray
 

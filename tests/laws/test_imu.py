@@ -11,10 +11,10 @@ import urdfkin
 from tests.laws.subjects import EPS, NAMES, moved, robot_of, rotation_vector, state
 from urdfkin.compiled import evaluate
 from urdfkin.errors import InputError
-from urdfkin.kinematics.rotation.quaternion import rotation_of
+from urdfkin.kinematics.rotation import rotation_of
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.tree import FloatArray
-from urdfkin.verify.pinocchio_inputs import free_flyer, free_flyer_rates, free_flyer_second_rates
+from urdfkin.verify.oracle import free_flyer, free_flyer_rates, free_flyer_second_rates
 
 G = np.array([0.3, -0.2, -9.81])
 _INERTIA = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'

@@ -17,6 +17,7 @@ import urdfkin
 from tests.laws.subjects import robot_of, state
 from tests.strategies import trees
 from urdfkin.compiled.plan import CompiledTree
+from urdfkin.errors import OracleError
 from urdfkin.kinematics.rotation import rotation_from_rpy
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.base_motion import STILL_STATE
@@ -27,7 +28,6 @@ from urdfkin.urdf.writer import to_urdf
 from urdfkin.verify.bounds import magnitudes
 from urdfkin.verify.certificate import VerificationError
 from urdfkin.verify.oracles import MUJOCO, PINOCCHIO, OracleLibrary
-from urdfkin.verify.pinocchio import OracleError
 from urdfkin.verify.quantities import QUANTITIES, recursive_quantities
 
 #: Robots, and the joints to lock; None: every second joint. There are mimic joints, slides, continuous

@@ -2,7 +2,7 @@
 
 
 def document(example: str) -> str:
-    """An example as a URDF; see `urdfkin.lint.pages.Page`."""
+    """An example as a URDF; see `urdfkin.urdf.lint.pages.Page`."""
     text = example.strip("\n")
     if not text.startswith(("<joint", "<link", "<material", "<!--")):
         return example

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.lint.cases import CASES
-from urdfkin.lint import check_text
+from urdfkin.urdf.lint import check_text
 
 DOCUMENTS = [case.data for case in CASES if len(case.data) < 5_000]
 

@@ -7,7 +7,7 @@ import pytest
 
 from tests.lint.cases import CASES
 from tests.lint.cases.arm import Case
-from urdfkin.lint import Finding, Severity, check
+from urdfkin.urdf.lint import Finding, Severity, check
 
 SNAPSHOT = Path(__file__).with_name("messages.txt")
 EVERY_CASE = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)

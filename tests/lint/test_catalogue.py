@@ -6,8 +6,8 @@ from types import ModuleType
 
 import pytest
 
-from urdfkin.lint import Severity, check
 from urdfkin.urdf.catalogue import catalogue
+from urdfkin.urdf.lint import Severity, check
 
 SCRIPT = Path(__file__).parents[2] / "scripts" / "make_findings.py"
 

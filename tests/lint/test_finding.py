@@ -6,9 +6,9 @@ import pickle
 import pytest
 
 from urdfkin.errors import UrdfkinError
-from urdfkin.lint import Finding, PinocchioReading, Severity, UrdfError, check, check_text
-from urdfkin.lint.runner import read_urdf
 from urdfkin.urdf.findings import Reporter
+from urdfkin.urdf.lint import Finding, PinocchioReading, Severity, UrdfError, check, check_text
+from urdfkin.urdf.lint.runner import read_urdf
 
 FINDING = Finding(
     "URDF502", Severity.ERROR, "the axis is zero", 'xyz="0 0 0"', "turn it", "a.urdf", 3, 7, "joint", "j"

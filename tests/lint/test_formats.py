@@ -8,9 +8,9 @@ import jsonschema
 import pytest
 
 from tests.lint.cases import CASES
-from urdfkin.lint import Finding, Severity, check
-from urdfkin.lint.formats import as_github, as_json, as_sarif, summary
-from urdfkin.lint.pages import RULES
+from urdfkin.urdf.lint import Finding, Severity, check
+from urdfkin.urdf.lint.formats import as_github, as_json, as_sarif, summary
+from urdfkin.urdf.lint.pages import RULES
 
 
 @pytest.fixture(scope="module")

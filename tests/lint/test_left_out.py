@@ -6,7 +6,7 @@ import pytest
 
 import urdfkin
 from tests.lint.cases.left_out import CASES, Mjcf
-from urdfkin.lint.pages import OF_MJCF
+from urdfkin.urdf.lint.pages import OF_MJCF
 
 pytest.importorskip("mujoco")
 

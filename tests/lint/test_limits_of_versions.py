@@ -6,7 +6,7 @@ import pinocchio as pin
 import pytest
 
 from tests.lint.cases.arm import arm
-from urdfkin.lint import Severity, check
+from urdfkin.urdf.lint import Severity, check
 from urdfkin.urdf.records import FURTHER_LIMITS
 
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "planar", "floating")

@@ -17,13 +17,13 @@ from hypothesis import strategies as st
 import urdfkin
 from tests.lint.cases import CASES
 from tests.lint.cases.arm import Case, arm, axis, limit
-from urdfkin.lint import Finding, Severity
-from urdfkin.lint.autofix import TILT, Mended, differences, mend
-from urdfkin.lint.rules.joints import unit_vector
-from urdfkin.lint.runner import Examined, examine
 from urdfkin.system.files import Edit
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import WRITTEN_OUT, Fix
+from urdfkin.urdf.lint import Finding, Severity
+from urdfkin.urdf.lint.autofix import TILT, Mended, differences, mend
+from urdfkin.urdf.lint.rules.joints import unit_vector
+from urdfkin.urdf.lint.runner import Examined, examine
 from urdfkin.urdf.sources import Text, read_source
 
 

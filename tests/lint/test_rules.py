@@ -10,9 +10,9 @@ import pytest
 from tests.lint.examples import document
 from tests.lint.others import ask
 from urdfkin.errors import UnknownNameError
-from urdfkin.lint import DEFAULT_LIMITS, Limits, check, rules
-from urdfkin.lint.pages import RULES, TOPICS, Page, explain, find_rule, page, page_files, topic_pages
 from urdfkin.urdf.findings import Rule
+from urdfkin.urdf.lint import DEFAULT_LIMITS, Limits, check, rules
+from urdfkin.urdf.lint.pages import RULES, TOPICS, Page, explain, find_rule, page, page_files, topic_pages
 
 HERE = Path(rules.__file__).parent
 EVERY_RULE = pytest.mark.parametrize("rule", RULES.values(), ids=lambda rule: rule.id)

@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from urdfkin.lint import Finding, Limits, check_text
+from urdfkin.urdf.lint import Finding, Limits, check_text
 
 pytestmark = pytest.mark.long
 

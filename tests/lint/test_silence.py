@@ -8,8 +8,8 @@ import pytest
 
 import urdfkin
 from tests.lint.cases.arm import arm
-from urdfkin.lint import check
 from urdfkin.urdf.findings import WRITTEN_OUT
+from urdfkin.urdf.lint import check
 
 COMMENT = "<!-- urdfkin: ignore[{}] as drawn -->\n"
 

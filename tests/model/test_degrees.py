@@ -13,8 +13,8 @@ from tests.cli.running import urdfkin as command
 from urdfkin.calibration.calibrate import ImplausibleError
 from urdfkin.model.configuration import degrees_lines
 from urdfkin.model.tree import KinematicTree
-from urdfkin.motion.trajectory import line
 from urdfkin.robot import Robot
+from urdfkin.robot.trajectory import line
 
 #: A pose of the ur5 in degrees.
 DEGREES = [0.0, -90.0, 90.0, -45.0, 30.0, 0.0]

@@ -15,18 +15,22 @@ import urdfkin
 from urdfkin.cli.options import REFERENCES
 from urdfkin.cli.quantity import REPRESENTATIONS
 from urdfkin.compiled.breakdown import acceleration_breakdown
-from urdfkin.compiled.kernel_args import REFERENCES as IN_KERNELS
 from urdfkin.compiled.machine.single import single
 from urdfkin.compiled.plan import compile_tree
+from urdfkin.compiled.program import REFERENCES as IN_KERNELS
 from urdfkin.export.function import function_of
 from urdfkin.export.recursion import QUANTITIES as EXPORTED
 from urdfkin.kinematics.bodies import QUATERNION
 from urdfkin.kinematics.rotation import SEQUENCES
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.mechanisms.mechanism import coordinates_of, pose_of
+from urdfkin.model.recursion import IDENTITY, ZERO
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import JointKind
+from urdfkin.robot.trajectory import _rates
 from urdfkin.verify.bounds import magnitudes, movable
+from urdfkin.verify.exact.numbers import ExactJoint
+from urdfkin.verify.exact.recursion import move
 from urdfkin.verify.oracle import QueryBatch
 from urdfkin.verify.oracles import ORACLES
 from urdfkin.verify.quantities import QUANTITIES, Quantity
@@ -169,6 +173,18 @@ def test_poses_refuse_a_new_joint_kind(branch: str) -> None:
 METHODS: Mapping[str, Callable[[urdfkin.Robot, Any], object]] = {
     "recursion": lambda robot, x: robot.placement(x, robot.tip_frame, verify=False),
     "split": lambda robot, x: robot.acceleration_breakdown(x, x, x, robot.tip_frame, verify=False),
+    "size of terms": lambda robot, x: magnitudes(
+        compile_tree(robot.tree, [len(robot.tree.joints)]), x, x, x, STILL_STATE
+    ),
+    "sample": lambda robot, _: robot.sample(1),
+    "names": lambda robot, _: robot.coordinate_names,
+    "convention": lambda robot, _: robot.convention("mujoco"),
+    "export": lambda robot, _: function_of(
+        compile_tree(robot.tree, [len(robot.tree.joints)]), QUANTITIES["velocity"], Reference.WORLD
+    ),
+    "same": lambda robot, _: urdfkin.same(robot, robot),
+    "digits": lambda robot, x: move(robot.tree, {0: ExactJoint(IDENTITY, ZERO, IDENTITY[0], 1, 0)}, x, x, x),
+    "velocities": lambda robot, x: _rates(robot.tree, np.stack((x, x, x)), np.arange(3.0)),
     "integrate": lambda robot, x: robot.integrate(x, x),
     "difference": lambda robot, x: robot.difference(x, x),
 }

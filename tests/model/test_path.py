@@ -6,7 +6,7 @@ import numpy as np
 
 from urdfkin.kinematics.rotation import exp_rotation, log_rotation
 from urdfkin.model.path import Motion, Path, elementary
-from urdfkin.model.pose import pose
+from urdfkin.model.tree import pose
 
 A = pose(exp_rotation([0.3, -0.4, 0.5]), [0.1, 0.2, 0.3])
 MOTIONS = tuple(Motion(axis, turns) for turns in (True, False) for axis in range(3))

@@ -11,8 +11,8 @@ import pytest
 import urdfkin
 from tests.laws.test_imu import moving_base
 from tests.verify.test_singular_values import SLIDE
-from urdfkin.motion.frame_motion import FrameMotion, frame_motion
 from urdfkin.robot import Robot
+from urdfkin.robot.frame_motion import FrameMotion, frame_motion
 from urdfkin.verify.pinocchio import PinocchioOracle
 
 N = 7

@@ -9,8 +9,8 @@ import pytest
 
 import urdfkin
 from urdfkin.errors import InputError, SourceError
-from urdfkin.motion.trajectory import line, read_columns, read_trajectory
 from urdfkin.robot import Robot
+from urdfkin.robot.trajectory import line, read_columns, read_trajectory
 
 END = np.array([1.0, -1.2, 0.8, 0.4, -0.3, 2.0])
 

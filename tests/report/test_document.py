@@ -13,8 +13,8 @@ from jsonschema import Draft202012Validator
 
 from tests.report.documents import arms, failing, hostile
 from urdfkin.errors import InputError, SourceError
-from urdfkin.loading import load
 from urdfkin.report.reading import checked, read_document
+from urdfkin.robot.loading import load
 from urdfkin.validation.accuracy import judge
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.document import VALIDATION, Document

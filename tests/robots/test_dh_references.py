@@ -12,7 +12,7 @@ from urdfkin.dh import read_table
 from urdfkin.dh.compare import compare
 from urdfkin.dh.parse_table import reference_path, references
 from urdfkin.errors import UnknownNameError
-from urdfkin.loading import load
+from urdfkin.robot.loading import load
 
 #: Reference -> (snap, last) with which the table is the vendor's, and metres that the tip may then move.
 EXACT = {

@@ -7,7 +7,7 @@ import pytest
 from urdfkin.dh.common_normals import left_out
 from urdfkin.dh.make import dh_table
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.loading import load
+from urdfkin.robot.loading import load
 from urdfkin.urdf.catalogue import examples
 
 #: Tables of each robot that is checked in the fast subset.

@@ -11,9 +11,9 @@ import pytest
 
 import urdfkin
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.lint import Severity, check
 from urdfkin.model.tree import FloatArray, KinematicTree, freed, with_tilts
 from urdfkin.robot import Robot
+from urdfkin.urdf.lint import Severity, check
 from urdfkin.verify.oracle import QueryBatch
 
 KINDS = {"revolute": "R", "continuous": "RUB", "prismatic": "P"}

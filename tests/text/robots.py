@@ -20,8 +20,8 @@ from tests.high_precision import (
     turn,
 )
 from urdfkin.kinematics.inputs import FloatArray
-from urdfkin.loading import load
 from urdfkin.robot import Robot
+from urdfkin.robot.loading import load
 
 HALF_PI = mp.pi / 2
 

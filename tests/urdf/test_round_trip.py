@@ -11,9 +11,9 @@ from tests.reading import tree_of
 from tests.strategies import rotation, rotations, trees
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import rpy_of
-from urdfkin.lint import Severity, UrdfWarning, check_text
-from urdfkin.loading import load
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree
+from urdfkin.robot.loading import load
+from urdfkin.urdf.lint import Severity, UrdfWarning, check_text
 from urdfkin.urdf.reader import rpy_of_quaternion
 from urdfkin.urdf.writer import to_urdf
 from urdfkin.verify.verifier import NotVerifiedWarning

@@ -17,8 +17,7 @@ from urdfkin import BaseMotion
 from urdfkin.compiled import evaluate
 from urdfkin.errors import InputError
 from urdfkin.kinematics import equations as eq
-from urdfkin.kinematics.rotation.euler import SEQUENCES
-from urdfkin.kinematics.rotation.quaternion import quaternion_of
+from urdfkin.kinematics.rotation import SEQUENCES, quaternion_of
 from urdfkin.model import base_motion as recursion_base
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray

@@ -12,8 +12,8 @@ import pytest
 from tests.cli.running import urdfkin
 from urdfkin.cli.validate import judge_all
 from urdfkin.errors import InputError
-from urdfkin.loading import load
 from urdfkin.robot import Robot
+from urdfkin.robot.loading import load
 from urdfkin.validation import accuracy
 from urdfkin.validation.accuracy import Judgement
 from urdfkin.validation.accuracy_store import AccuracyResult, NotJudged, StudySettings

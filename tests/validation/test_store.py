@@ -127,14 +127,14 @@ def test_changed_code_never_meets_old_results(monkeypatch: pytest.MonkeyPatch, t
 def test_the_digest_of_the_code_is_of_what_computes_and_not_of_what_shows(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    for place in ("kinematics/equations.py", "cli/validate.py", "lint/rules/joints.toml"):
+    for place in ("kinematics/equations.py", "cli/validate.py", "urdf/lint/rules/joints.toml"):
         (tmp_path / place).parent.mkdir(parents=True)
         (tmp_path / place).write_text("1")
     monkeypatch.setattr(results, "_PACKAGE", tmp_path)
     before = results._code()
     (tmp_path / "cli" / "validate.py").write_text("2")
     assert results._code() == before
-    for place in ("kinematics/equations.py", "lint/rules/joints.toml"):
+    for place in ("kinematics/equations.py", "urdf/lint/rules/joints.toml"):
         (tmp_path / place).write_text("2")
         assert results._code() != before
         before = results._code()

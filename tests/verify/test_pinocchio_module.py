@@ -11,7 +11,7 @@ import pytest
 import urdfkin
 from tests.cli.running import Done, process
 from urdfkin.errors import InstallationError
-from urdfkin.verify.pinocchio_module import pinocchio, version
+from urdfkin.verify.pinocchio import pinocchio, version
 
 #: As PyPI's project `pinocchio` has it: plugins for nose.
 IMPOSTOR = '__version__ = "0.1"\n'

@@ -19,10 +19,10 @@ from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.registry import equations
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.motion.frame_motion import frame_motion
 from urdfkin.report.html import as_html
 from urdfkin.report.markdown import as_markdown
 from urdfkin.robot import Robot
+from urdfkin.robot.frame_motion import frame_motion
 from urdfkin.verify import bounds
 from urdfkin.verify.bounds import Magnitudes
 from urdfkin.verify.oracle import Oracle, QueryBatch

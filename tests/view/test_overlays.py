@@ -7,7 +7,7 @@ import pytest
 
 import urdfkin
 from urdfkin.kinematics.rotation import rotation_of
-from urdfkin.motion.frame_motion import FrameMotion, frame_motion
+from urdfkin.robot.frame_motion import FrameMotion, frame_motion
 from urdfkin.view.stage import acceleration_arrows, jacobian_arrows, velocity_ellipsoid
 from urdfkin.view.viewer import numbers
 

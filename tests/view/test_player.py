@@ -16,7 +16,7 @@ from PIL import Image
 import urdfkin
 from tests.report.browser import opened, require_chromium
 from tests.view.test_viewer import _PRESS, _until, free_port
-from urdfkin.motion.trajectory import line
+from urdfkin.robot.trajectory import line
 from urdfkin.view.player import Player, as_gif, as_png
 from urdfkin.view.server import new_server
 from urdfkin.view.viewer import Viewer

@@ -46,11 +46,11 @@ from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.validators import as_bool, as_choice, as_names, as_str, real_number, safe_repr
 from urdfkin.kinematics.inputs import rotation_defect, scalars
 from urdfkin.kinematics.rotation import rotation_of
-from urdfkin.loading import load
 from urdfkin.model.configuration import checked
 from urdfkin.model.tree import FloatArray
-from urdfkin.motion.trajectory import read_arrays, read_columns
 from urdfkin.robot import Robot
+from urdfkin.robot.loading import load
+from urdfkin.robot.trajectory import read_arrays, read_columns
 from urdfkin.system.files import MOST_DATA, read_text
 from urdfkin.urdf.sources import Source
 from urdfkin.verify.certificate import Certificate

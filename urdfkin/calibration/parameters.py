@@ -36,8 +36,7 @@ from urdfkin.kinematics.roundings import EPS, ROUNDINGS
 from urdfkin.model.chain import FrameChain, chain, steps_between
 from urdfkin.model.mimic import Coupling
 from urdfkin.model.path import Motion, Path, elementary
-from urdfkin.model.pose import inverse
-from urdfkin.model.tree import FloatArray, Joint, KinematicTree
+from urdfkin.model.tree import FloatArray, Joint, KinematicTree, inverse
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,12 +27,11 @@ from urdfkin.calibration.write_back import Rewritten
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.errors.numbers import parse_float
 from urdfkin.kinematics.rotation import rotation_from_euler
-from urdfkin.loading import load
 from urdfkin.model.chain import FrameChain, chain
-from urdfkin.model.pose import pose
-from urdfkin.model.ranges import values_within
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, build_tree
+from urdfkin.model.configuration import values_within
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, build_tree, pose
 from urdfkin.robot import Robot
+from urdfkin.robot.loading import load
 from urdfkin.system.files import read_text
 from urdfkin.urdf.sources import Source
 from urdfkin.verify.certificate import Certificate

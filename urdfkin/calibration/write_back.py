@@ -18,12 +18,12 @@ from urdfkin.comparison.diff import Changes, diff
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import log_rotation, quaternion_of, rpy_of
 from urdfkin.kinematics.roundings import ANGLE, EPS
-from urdfkin.lint.runner import read_urdf
-from urdfkin.loading import load
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
+from urdfkin.robot.loading import load
 from urdfkin.system.files import Edit, edited
 from urdfkin.urdf.findings import Reporter, Severity
+from urdfkin.urdf.lint.runner import read_urdf
 from urdfkin.urdf.records import JointRecord, Vector
 from urdfkin.urdf.writer import before, numbers, with_attributes
 from urdfkin.verify.certificate import Certificate

@@ -235,7 +235,7 @@ def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None
     if not wanted:
         return
     from urdfkin.system.lazy_import import own_version  # noqa: PLC0415
-    from urdfkin.verify.pinocchio_module import pinocchio, version  # noqa: PLC0415
+    from urdfkin.verify.pinocchio import pinocchio, version  # noqa: PLC0415
 
     click.echo(f"urdfkin {own_version()}, Pinocchio {version()}")
     pinocchio()  # raises an error with the cause and the remedy if it is missing

@@ -196,7 +196,7 @@ def _run(context: click.Context, robot: Robot) -> Calibration:
     from urdfkin.calibration.calibrate import fitted_model, read_poses  # noqa: PLC0415
     from urdfkin.dh.parse_table import is_table_file, read_table_or_screws  # noqa: PLC0415
     from urdfkin.dh.table import DHTable  # noqa: PLC0415
-    from urdfkin.motion.trajectory import column_units  # noqa: PLC0415
+    from urdfkin.robot.trajectory import column_units  # noqa: PLC0415
 
     options = context.params
     tip, base = options["tip"], options["base"]
@@ -237,7 +237,7 @@ def _run(context: click.Context, robot: Robot) -> Calibration:
 
 
 def _noise(text: str | None) -> tuple[float, float] | None:
-    from urdfkin.motion.trajectory import numbers  # noqa: PLC0415
+    from urdfkin.robot.trajectory import numbers  # noqa: PLC0415
 
     if text is None:
         return None

@@ -25,12 +25,16 @@ from urdfkin.cli.options import (
 )
 from urdfkin.cli.streams import command_lines, harmless, say, say_file, say_styled
 from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
-from urdfkin.lint import Finding, Limits, Severity
-from urdfkin.lint.autofix import mend, patch
-from urdfkin.lint.formats import as_github, as_json, as_sarif, statistics, summary
-from urdfkin.lint.pages import RULES, page
-from urdfkin.lint.runner import Examined, examine, file_of
-from urdfkin.lint.settings import (
+from urdfkin.system.files import demand_regular, write_file
+from urdfkin.system.git import Version, version_before
+from urdfkin.system.lazy_import import installed_version
+from urdfkin.urdf.findings import Excerpts
+from urdfkin.urdf.lint import Finding, Limits, Severity
+from urdfkin.urdf.lint.autofix import mend, patch
+from urdfkin.urdf.lint.formats import as_github, as_json, as_sarif, statistics, summary
+from urdfkin.urdf.lint.pages import RULES, page
+from urdfkin.urdf.lint.runner import Examined, examine, file_of
+from urdfkin.urdf.lint.settings import (
     INCLUDE,
     Choice,
     Settings,
@@ -42,10 +46,6 @@ from urdfkin.lint.settings import (
     read_baseline,
     read_settings,
 )
-from urdfkin.system.files import demand_regular, write_file
-from urdfkin.system.git import Version, version_before
-from urdfkin.system.lazy_import import installed_version
-from urdfkin.urdf.findings import Excerpts
 from urdfkin.urdf.sources import Text, is_xacro, read_source
 from urdfkin.urdf.xacro import XacroError
 

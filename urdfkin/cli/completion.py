@@ -58,7 +58,7 @@ def complete_table(_context: click.Context, _parameter: click.Parameter, incompl
 
 def complete_code(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
     """Return the codes of findings and their short names."""
-    from urdfkin.lint.pages import RULES  # noqa: PLC0415  only for completion
+    from urdfkin.urdf.lint.pages import RULES  # noqa: PLC0415  only for completion
 
     return _offered((name for rule in RULES.values() for name in (rule.id, rule.slug)), incomplete)
 

@@ -13,10 +13,10 @@ import click
 from urdfkin.cli.completion import complete_topic
 from urdfkin.errors import UnknownNameError
 from urdfkin.kinematics.registry import explain as explain_equation
-from urdfkin.lint.pages import OF_MJCF, RULES, WIDTH, explain, find_rule, page
 from urdfkin.system.files import read_text
 from urdfkin.system.resources import questions_page
 from urdfkin.urdf.findings import Rule
+from urdfkin.urdf.lint.pages import OF_MJCF, RULES, WIDTH, explain, find_rule, page
 
 _LINK = re.compile(r"\[([^\]]+)\]\([^)\s]+\)")
 _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)

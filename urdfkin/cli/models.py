@@ -107,7 +107,7 @@ def same_command(
         how_many = MOST if boxes is None else boxes
         found = same(*robots, map=parse_map(pairs), boxes=how_many, within=within)
     from urdfkin.comparison.certificate import certificate  # noqa: PLC0415
-    from urdfkin.conventions import as_toml  # noqa: PLC0415
+    from urdfkin.model.conventions import as_toml  # noqa: PLC0415
     from urdfkin.report.same import as_html, command_of, document, markdown_of  # noqa: PLC0415
 
     question = Question(within, strict)

@@ -23,11 +23,11 @@ from urdfkin.model.reference import Reference
 from urdfkin.system.files import MOST_DATA, read_standard_input, read_text, shortened
 
 if TYPE_CHECKING:
-    from urdfkin.conventions import Conversion
     from urdfkin.model.base_motion import BaseMotion
+    from urdfkin.model.conventions import Conversion
     from urdfkin.model.tree import FloatArray
-    from urdfkin.motion.trajectory import Trajectory
     from urdfkin.robot import Robot
+    from urdfkin.robot.trajectory import Trajectory
     from urdfkin.verify.oracles import OracleName
 
 
@@ -323,7 +323,7 @@ def conversion_of(robot: Robot, name: str | None) -> Conversion | None:
 
 def read_motion(robot: Robot, path: Path, convention: str | None) -> Trajectory:
     """Read a trajectory with joint velocities and accelerations, and write its notes to stderr."""
-    from urdfkin.motion.trajectory import read_trajectory  # noqa: PLC0415  keeps --help fast
+    from urdfkin.robot.trajectory import read_trajectory  # noqa: PLC0415  keeps --help fast
 
     motion = read_trajectory(robot, path, convention=convention)
     tell_notes(motion)
@@ -402,7 +402,7 @@ class Inputs:
 
 def load_robot(source: str, *, verify: bool = True, oracle: OracleName = "pinocchio", **how: Any) -> Robot:
     """Load a command's robot with the command's options or `how`; write each warning to stderr as a line."""
-    from urdfkin.loading import load  # noqa: PLC0415  keeps --help fast
+    from urdfkin.robot.loading import load  # noqa: PLC0415  keeps --help fast
     from urdfkin.urdf.findings import UrdfWarning  # noqa: PLC0415
 
     with warnings.catch_warnings(record=True) as caught:
@@ -476,7 +476,7 @@ def _values(
 ) -> FloatArray:
     """Return the (n, width) values of one option, in the given convention."""
     from urdfkin.model.configuration import places  # noqa: PLC0415  keeps --help fast
-    from urdfkin.motion.trajectory import column_units  # noqa: PLC0415
+    from urdfkin.robot.trajectory import column_units  # noqa: PLC0415
     from urdfkin.verify.sampling import sample  # noqa: PLC0415
 
     known = conversion or robot
@@ -514,7 +514,7 @@ def read_batch(
     """
     import numpy as np  # noqa: PLC0415  keeps --help fast
 
-    from urdfkin.motion.trajectory import read_columns, width_of  # noqa: PLC0415
+    from urdfkin.robot.trajectory import read_columns, width_of  # noqa: PLC0415
 
     text = _standard_input() if str(path) == "-" else read_text(path, MOST_DATA, pipes=True)
     width = width_of(text, str(path)) if len(layouts) > 1 else None
@@ -607,7 +607,7 @@ def _rows(text: str, option: str, layouts: Sequence[Sequence[str]]) -> tuple[Flo
     """Return the (n, width) numbers, and the layout that has as many columns."""
     import numpy as np  # noqa: PLC0415
 
-    from urdfkin.motion.trajectory import numbers  # noqa: PLC0415
+    from urdfkin.robot.trajectory import numbers  # noqa: PLC0415
 
     if text.startswith("@"):
         return read_batch(Path(text[1:]), option, layouts)

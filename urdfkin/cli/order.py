@@ -13,7 +13,7 @@ from urdfkin.errors.display import Table, TextDocument
 from urdfkin.errors.escape import csv_cell
 
 if TYPE_CHECKING:
-    from urdfkin.conventions import Conversion
+    from urdfkin.model.conventions import Conversion
     from urdfkin.robot import Robot
 
 EXAMPLE = "urdfkin order a1 --from isaaclab --to mujoco"
@@ -42,7 +42,7 @@ def command(robot: str, start: str | None, end: str | None) -> Answer:
 
 
 def _table(robot: Robot) -> Answer:
-    from urdfkin.conventions import BUILT_IN, find_convention  # noqa: PLC0415  keeps --help fast
+    from urdfkin.model.conventions import BUILT_IN, find_convention  # noqa: PLC0415  keeps --help fast
 
     found = {name: robot.convention(name) for name in BUILT_IN if find_convention(name).order != "given"}
     cells = {name: _cells(robot, conversion) for name, conversion in found.items()}
@@ -102,7 +102,7 @@ def _as_json(conversion: Conversion) -> dict[str, Any]:
 
 
 def _code(start: Conversion, end: Conversion) -> Answer:
-    from urdfkin.conventions import reordering  # noqa: PLC0415
+    from urdfkin.model.conventions import reordering  # noqa: PLC0415
 
     a, b = start.convention.name, end.convention.name
     found = {letter: reordering(letter, start, end) for letter in "qv"}

@@ -25,8 +25,8 @@ from urdfkin.cli.streams import say
 from urdfkin.errors import InputError
 
 if TYPE_CHECKING:
-    from urdfkin.motion.trajectory import Trajectory
     from urdfkin.robot import Robot
+    from urdfkin.robot.trajectory import Trajectory
 
 #: A copy of the names in `urdfkin.view.plot`: importing it would slow --help down.
 PANELS = (
@@ -108,7 +108,7 @@ def command(
     """
     if (trajectory is None) == (end is None):
         raise click.UsageError("give either --trajectory FILE.csv, or --to VALUES for a line in joint space")
-    from urdfkin.motion.frame_motion import frame_motion  # noqa: PLC0415
+    from urdfkin.robot.frame_motion import frame_motion  # noqa: PLC0415
     from urdfkin.view.figure import save  # noqa: PLC0415  keeps --help fast
     from urdfkin.view.plot import foot, sheet  # noqa: PLC0415
 
@@ -135,7 +135,7 @@ def _line(
     convention: str | None,
 ) -> Trajectory:
     from urdfkin.cli.options import read_inputs  # noqa: PLC0415
-    from urdfkin.motion.trajectory import line  # noqa: PLC0415
+    from urdfkin.robot.trajectory import line  # noqa: PLC0415
 
     given = (("--from", start), ("--to", end))
     how = conversion_of(robot, convention)

@@ -7,7 +7,7 @@ and write their data in the same way.
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import product
@@ -57,7 +57,7 @@ from urdfkin.verify.replay import replay_line
 
 if TYPE_CHECKING:
     from urdfkin.compiled.breakdown import AccelerationBreakdown
-    from urdfkin.conventions import Conversion
+    from urdfkin.model.conventions import Conversion
     from urdfkin.model.tree import FloatArray
     from urdfkin.robot import Robot
     from urdfkin.verify.singular_values import SingularValues
@@ -108,7 +108,7 @@ def _along(
     """Read the samples of a trajectory; compute v and a by differences only if the command needs them."""
     import numpy as np  # noqa: PLC0415  keeps --help fast
 
-    from urdfkin.motion.trajectory import read_samples, with_rates  # noqa: PLC0415
+    from urdfkin.robot.trajectory import read_samples, with_rates  # noqa: PLC0415
 
     context = click.get_current_context()
     reject_unused_options(context, ("q", "v", "a", "seed"), "along a --trajectory")
@@ -423,8 +423,9 @@ def _numbers(x: Inputs, T: FloatArray, written: str, *, verify: bool) -> FloatAr
 
     from urdfkin.kinematics.rotation import quaternion_of, rpy_of  # noqa: PLC0415
 
-    of: Callable[[Any], FloatArray] = rpy_of if written == "rpy" else quaternion_of
-    orientation = of(R := T[:, :3, :3])
+    of: Mapping[str, Callable[[Any], FloatArray]]
+    of = {"rpy": rpy_of, "quaternion": quaternion_of, "wxyz": quaternion_of}
+    orientation = of[written](R := T[:, :3, :3])
     if verify and x.robot.certificate().verified:
         from urdfkin.verify.orientation import check_orientations  # noqa: PLC0415
 
@@ -476,7 +477,7 @@ def analytical_jacobian_command(representation: str, nearest: float | None, **_:
     The table has one row for each joint velocity. A row lists the derivatives of the frame's position and
     orientation (Euler angles or a quaternion). `urdfkin jacobian` has angular velocities instead.
     """
-    from urdfkin.kinematics.rotation.euler import NEAREST  # noqa: PLC0415  keeps --help fast
+    from urdfkin.kinematics.rotation import NEAREST  # noqa: PLC0415  keeps --help fast
 
     x, nearest = _read(), NEAREST if nearest is None else nearest
     with compiling():
@@ -522,7 +523,7 @@ def imu_command(gravity: str, **_: Any) -> Answer:
     .npz file. With --root-joint floating, the pose of the base is part of --q. For details, run `urdfkin
     explain gravity-in-an-acceleration`.
     """
-    from urdfkin.motion.trajectory import numbers  # noqa: PLC0415  keeps --help fast
+    from urdfkin.robot.trajectory import numbers  # noqa: PLC0415  keeps --help fast
 
     x = _read()
     g = numbers(gravity.split(","), "--gravity", ("x", "y", "z"))

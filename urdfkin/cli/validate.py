@@ -293,7 +293,7 @@ def _cluster(scheduler: str | None) -> Iterator[Engine | None]:
 
 def _load_stdin(source: str, how: dict[str, Any]) -> Robot | str:
     """Load standard input now: it can be read only once, and the accuracy study needs it later."""
-    from urdfkin.loading import load  # noqa: PLC0415  keeps --help fast
+    from urdfkin.robot.loading import load  # noqa: PLC0415  keeps --help fast
 
     return load(source, **how) if source == "-" else source
 

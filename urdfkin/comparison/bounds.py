@@ -35,10 +35,21 @@ from dataclasses import replace
 
 import numpy as np
 
+from urdfkin.compiled.evaluate import jacobians, placements
+from urdfkin.compiled.plan import CompiledTree
 from urdfkin.kinematics.roundings import EPS, FOLLOWER, NOT_ZERO
-from urdfkin.model.configuration import neutral
-from urdfkin.model.mechanisms.alignment import IDENTITY, Alignment, FramePair, Line, Pair, Step, Variables
-from urdfkin.model.mechanisms.mechanism import Screw, apart
+from urdfkin.model.configuration import WIDEST, neutral, with_unit_quaternions
+from urdfkin.model.mechanisms.mechanism import (
+    IDENTITY,
+    Alignment,
+    FramePair,
+    Line,
+    Pair,
+    Screw,
+    Step,
+    Variables,
+    apart,
+)
 from urdfkin.model.mechanisms.upper_bound import (
     COARSE,
     Support,
@@ -49,9 +60,7 @@ from urdfkin.model.mechanisms.upper_bound import (
     passed,
     point,
 )
-from urdfkin.model.pose import inverse, pose
-from urdfkin.model.ranges import WIDEST
-from urdfkin.model.tree import FloatArray
+from urdfkin.model.tree import FloatArray, inverse, pose
 from urdfkin.robot import Robot
 from urdfkin.verify.oracle import QueryBatch
 from urdfkin.verify.sampling import sample
@@ -272,7 +281,13 @@ def _distances(a: FloatArray, b: FloatArray) -> FloatArray:
 
 def own_results(robot: Robot, q: FloatArray, frames: Sequence[str]) -> FloatArray:
     """Return poses (n, frames, 4, 4) computed by urdfkin's forward recursion."""
-    return robot.placement(q, frames, verify=False)
+    return placements(*_flat_inputs(robot, q, frames))
+
+
+def _flat_inputs(robot: Robot, q: FloatArray, frames: Sequence[str]) -> tuple[CompiledTree, FloatArray]:
+    """Return the compiled tree of some frames, and configurations (n, nq) with unit quaternions."""
+    tree = robot.tree
+    return robot.plan([tree.frame_link(frame) for frame in frames]), with_unit_quaternions(tree, q)
 
 
 def pinocchios(robot: Robot, q: FloatArray, frames: Sequence[str]) -> FloatArray:
@@ -432,7 +447,8 @@ class Boxes:
         self, robot: Robot, q: FloatArray, frame: str, tool: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Return the position (n, 3) of a frame's point, and its Jacobian (n, 3, nv)."""
-        T, J = own_results(robot, q, [frame])[:, 0], robot.jacobian(q, frame, verify=False)
+        inputs = _flat_inputs(robot, q, [frame])
+        T, J = placements(*inputs)[:, 0], jacobians(*inputs)[:, 0]
         if not tool.any():
             return T[:, :3, 3], J[:, :3]
         lever = T[:, :3, :3] @ tool

@@ -13,9 +13,17 @@ from urdfkin.comparison.result import REASONS, Confirmation, Difference, Samenes
 from urdfkin.comparison.verdict import CONFIRMED, Comparator
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.model.mechanisms.alignment import Alignment, FramePair, Gauge, Variables, variables_of
 from urdfkin.model.mechanisms.matcher import align
-from urdfkin.model.mechanisms.mechanism import JointTransform, apart, is_pose
+from urdfkin.model.mechanisms.mechanism import (
+    Alignment,
+    FramePair,
+    Gauge,
+    JointTransform,
+    Variables,
+    apart,
+    is_pose,
+    variables_of,
+)
 from urdfkin.model.mechanisms.upper_bound import COARSE, FINE, upper_bounds
 from urdfkin.model.tree import JointKind, Mimic
 from urdfkin.robot import Robot

@@ -12,10 +12,10 @@ from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
 from urdfkin.errors.escape import log_line
 from urdfkin.errors.numbers import parse_float
-from urdfkin.loading import load
 from urdfkin.model.tree import Joint, KinematicTree
 from urdfkin.robot import Robot
-from urdfkin.urdf.plain_xml import plain_xml
+from urdfkin.robot.loading import load
+from urdfkin.system.plain_xml import plain_xml
 from urdfkin.urdf.sources import Source
 from urdfkin.urdf.writer import to_urdf
 

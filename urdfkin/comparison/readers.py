@@ -18,9 +18,9 @@ import numpy as np
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.errors.escape import printable
 from urdfkin.model.tree import FloatArray, Joint, JointKind
+from urdfkin.system.plain_xml import plain_xml
 from urdfkin.system.processes import ask_python, own_python
 from urdfkin.urdf.mjcf import is_mjcf, is_text
-from urdfkin.urdf.plain_xml import plain_xml
 from urdfkin.verify.adapters import LIBRARIES, version
 
 if TYPE_CHECKING:

@@ -16,15 +16,26 @@ from urdfkin.dh.units import units_of
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Displayable, TextDocument
 from urdfkin.errors.escape import log_line
-from urdfkin.kinematics.rotation.euler import rpy_of
+from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.configuration import checked, neutral
-from urdfkin.model.mechanisms.alignment import IDENTITY, Alignment, FramePair, Step, Variables, limits
-from urdfkin.model.mechanisms.mechanism import JointTransform, Mechanism, Tolerance, apart, tolerance_of
-from urdfkin.model.tree import FloatArray, Joint, KinematicTree, Mimic
+from urdfkin.model.mechanisms.mechanism import (
+    IDENTITY,
+    Alignment,
+    FramePair,
+    JointTransform,
+    Mechanism,
+    Step,
+    Tolerance,
+    Variables,
+    apart,
+    limits,
+    tolerance_of,
+)
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Lock, Mimic
 from urdfkin.system.lazy_import import hook
 
 if TYPE_CHECKING:
-    from urdfkin.conventions import Convention
+    from urdfkin.model.conventions import Convention
 
 #: `_TENTH` is the smallest number that is printed with a unit prefix: it is 0.1 after rounding to four
 #: digits. The unit without a prefix is used only for numbers of at least `_NINE` times `_TENTH`, which is
@@ -140,6 +151,9 @@ class Difference:
                 return f"{place} is a mimic joint in A and an independent joint in B: {_rule(a)}"
             case "mimic rule":
                 return f"{place} has another mimic rule: {_rule(a)} in A, {_rule(b)} in B"
+            case "idle":
+                which, values = ("A", a) if isinstance(a, tuple) else ("B", b)
+                return f"{place} never moves in {which}: {_idle_words(values)}"
             case "limits":
                 converted = " (in A's coordinate)" if self.detail else ""
                 return f"{place}: limits {_range(a)} in A, {_range(b)} in B{converted}"
@@ -159,6 +173,12 @@ class Difference:
 
 def _rule(rule: Value) -> str:
     return f"{rule.multiplier!r} {rule.leader} {rule.offset:+.17g}" if isinstance(rule, Mimic) else "free"
+
+
+def _idle_words(values: Value) -> str:
+    kind, value = values if isinstance(values, tuple) else (None, None)
+    unit = "m" if kind == JointKind.PRISMATIC.value else "rad"
+    return f"its mimic rule has the multiplier 0 and fixes it at {_number(value):.12g} {unit}"
 
 
 def _number(x: object, infinity: float = math.inf) -> float:
@@ -406,7 +426,7 @@ class Sameness(Displayable):
         >>> found.convention().joints[:2]
         ('shoulder_pan_joint', 'shoulder_lift_joint')
         """
-        from urdfkin.conventions import Convention, Conversion, JointRule  # noqa: PLC0415  keeps same light
+        from urdfkin.model.conventions import Convention, Conversion, JointRule  # noqa: PLC0415  keeps same light
 
         tree_a, tree_b = self.trees
         of_b = {one.b: one for one in self.joints}
@@ -645,9 +665,14 @@ def _rounded(x: float, rounding: float) -> float:
 
 
 def _is_tool(found: Alignment, frame: FramePair) -> bool:
-    """Return whether a frame is fixed and has no children, in A as well as in B."""
+    """Return whether a frame is fixed and has no children, in A as well as in B.
+
+    The child link of a mimic joint with the multiplier 0 is no tool, because it has a joint.
+    """
     for tree, link in ((found.a.tree, frame.a), (found.b.tree, frame.b)):
-        if link == 0 or tree.joints[link - 1].kind.nv or any(joint.parent == link for joint in tree.joints):
+        if link == 0 or tree.joints[link - 1].kind.nv or idle(tree.joints[link - 1]):
+            return False
+        if any(joint.parent == link for joint in tree.joints):
             return False
     return True
 
@@ -732,13 +757,28 @@ def remarks(found: Alignment, variables: Variables, tolerance: Tolerance) -> tup
     for step in found.steps:
         if not step.unlike:
             some += _of_limits(step, found.a.tree.joints[step.a], found.b.tree.joints[step.b], tolerance)
+    for tree, which in ((found.a.tree, "A"), (found.b.tree, "B")):
+        for lock in filter(None, map(idle, tree.joints)):
+            value = lock.joint.kind.value, lock.value
+            some.append(Difference(f"joint {lock.joint.name}", "idle", *_in_order(which, value)))
     for tree, other, which in ((found.a.tree, found.b.tree, "A"), (found.b.tree, found.a.tree, "B")):
         paired = {tree.links[frame.a if which == "A" else frame.b] for frame in found.frames}
         lacking = [link for link in tree.links if link not in other.links and link not in paired]
         if lacking:
-            names = (tuple(lacking), None) if which == "A" else (None, tuple(lacking))
+            names = _in_order(which, tuple(lacking))
             some.append(Difference(f"links of {which}", f"only in {which}", *names))
     return tuple(some)
+
+
+def _in_order(which: str, value: Value) -> tuple[Value, Value]:
+    """Return the values of a parameter in A and in B, if only the model `which` has it."""
+    return (value, None) if which == "A" else (None, value)
+
+
+def idle(joint: Joint) -> Lock | None:
+    """Return the lock of a mimic joint with the multiplier 0 that is compared as a fixed joint; else None."""
+    lock = joint.lock
+    return lock if lock and lock.joint.mimic and lock.joint.mimic.multiplier == 0.0 else None
 
 
 def _of_limits(step: Step, a: Joint, b: Joint, tolerance: Tolerance) -> Iterator[Difference]:

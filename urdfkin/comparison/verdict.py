@@ -29,22 +29,24 @@ from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.validators import real_number, whole_number
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.loading import load
-from urdfkin.model.mechanisms.alignment import (
+from urdfkin.model.configuration import WIDEST, narrowed_ranges
+from urdfkin.model.mechanisms.matcher import align
+from urdfkin.model.mechanisms.mechanism import (
     AS_WRITTEN,
     IDENTITY,
     Alignment,
     FramePair,
+    Mechanism,
+    Tolerance,
     Variables,
+    apart,
+    tolerance_of,
     variables_of,
 )
-from urdfkin.model.mechanisms.matcher import align
-from urdfkin.model.mechanisms.mechanism import Mechanism, Tolerance, apart, tolerance_of
 from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
-from urdfkin.model.pose import inverse
-from urdfkin.model.ranges import WIDEST, narrowed_ranges
-from urdfkin.model.tree import FloatArray, KinematicTree
+from urdfkin.model.tree import FloatArray, KinematicTree, Lock, inverse
 from urdfkin.robot import Robot
+from urdfkin.robot.loading import load
 from urdfkin.urdf.sources import Source
 from urdfkin.verify.oracles import PINOCCHIO
 from urdfkin.verify.sampling import checked_choice
@@ -112,7 +114,7 @@ def same(
         within = real_number(within, "within")
     for which, robot, names in (("A", robots[0], list(given)), ("B", robots[1], list(given.values()))):
         demand_joint_names(robot.tree, names, which)
-    # The copies have separate ledgers, so results computed here are not counted as the user's results.
+    # The compiled trees of a comparison are many, and the copies own them, not the user's robots.
     return Comparator((copy(robots[0]), copy(robots[1])), given, bounds, boxes, within).judged()
 
 
@@ -157,10 +159,11 @@ class Comparator:
     ) -> None:
         self.robots, self.given, self.bounds, self.boxes = robots, given, bounds, boxes
         self.within = within
-        trees = robots[0].tree, robots[1].tree
+        self.trees = a, b = robots[0].tree, robots[1].tree
+        back = {theirs: ours for ours, theirs in given.items()}
+        trees = _with_idle_joints_fixed(a, b, given), _with_idle_joints_fixed(b, a, back)
         parting = _fixed_here(trees[0], trees[1]), _fixed_here(trees[1], trees[0])
         self.mechanisms = Mechanism(trees[0], parting[0]), Mechanism(trees[1], parting[1])
-        self.trees = trees
         for which, mechanism, robot in zip("AB", self.mechanisms, robots, strict=True):
             if not mechanism.size <= LONGEST:
                 raise InputError(
@@ -440,6 +443,27 @@ def _fixed_here(tree: KinematicTree, other: KinematicTree) -> set[int]:
         for i, joint in enumerate(tree.joints)
         if not joint.kind.nv and (joint.name in moving or tree.links[i + 1] in children)
     }
+
+
+def _with_idle_joints_fixed(
+    tree: KinematicTree, other: KinematicTree, given: Mapping[str, str]
+) -> KinematicTree:
+    """Return a tree in which mimic joints with the multiplier 0 are fixed joints at the rule's offset.
+
+    Such a joint never moves. It remains a mimic joint if the other model has a moving joint with its name,
+    above its child link, or with the name that the map gives: then the two rules are compared.
+    """
+    moving = {joint.name for joint in other.joints if joint.kind.nv}
+    children = {other.links[i + 1] for i, joint in enumerate(other.joints) if joint.kind.nv}
+    joints = tuple(
+        Lock(joint, 0.0).fixed()
+        if joint.mimic is not None
+        and joint.mimic.multiplier == 0.0
+        and not (given.get(joint.name, joint.name) in moving or tree.links[i + 1] in children)
+        else joint
+        for i, joint in enumerate(tree.joints)
+    )
+    return tree if joints == tree.joints else replace(tree, joints=joints)
 
 
 def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:

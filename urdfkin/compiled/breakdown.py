@@ -28,12 +28,11 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, assert_never
 
 import numpy as np
 
-from urdfkin.compiled.batch import in_parts
-from urdfkin.compiled.evaluate import placements, velocities
+from urdfkin.compiled.evaluate import in_parts, placements, velocities
 from urdfkin.compiled.plan import CompiledTree, compile_tree
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.errors.display import Displayable, Table, TextDocument
@@ -234,13 +233,18 @@ def _slide(joint: Joint, q: FloatArray) -> FloatArray:
     The first numbers of q are the displacement.
     """
     slide = np.zeros((len(q), 3))
-    if joint.kind is JointKind.PLANAR:
-        slide[:, :2] = q[:, :2]
-    elif joint.kind is JointKind.FLOATING:
-        slide[:] = q[:, :3]
-    elif joint.kind is JointKind.PRISMATIC:
-        value = joint.mimic.multiplier * q[:, :1] + joint.mimic.offset if joint.mimic else q[:, :1]
-        slide[:] = value * joint.axis
+    match joint.kind:
+        case JointKind.PLANAR:
+            slide[:, :2] = q[:, :2]
+        case JointKind.FLOATING:
+            slide[:] = q[:, :3]
+        case JointKind.PRISMATIC:
+            value = joint.mimic.multiplier * q[:, :1] + joint.mimic.offset if joint.mimic else q[:, :1]
+            slide[:] = value * joint.axis
+        case JointKind.REVOLUTE | JointKind.CONTINUOUS | JointKind.FIXED:
+            pass
+        case _:
+            assert_never(joint.kind)
     return slide
 
 

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from urdfkin.kinematics.rotation.matrix import axis_aligning
+from urdfkin.kinematics.rotation import axis_aligning
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
 IntArray = NDArray[np.int64]

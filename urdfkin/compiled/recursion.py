@@ -22,7 +22,6 @@ module `python_numbers`. The kernels are copies of these functions for Numba's n
 from __future__ import annotations
 
 from urdfkin.compiled.axes import seen, seen_after
-from urdfkin.compiled.kernel_args import KernelArgs
 from urdfkin.compiled.program import (
     ANGLE_ROW,
     ANGLE_WIDTH,
@@ -32,6 +31,7 @@ from urdfkin.compiled.program import (
     WIDTH,
     ZERO_ROW,
     Head,
+    KernelArgs,
     Op,
 )
 from urdfkin.compiled.python_numbers import (
@@ -395,7 +395,7 @@ def forward_recursion(address, axes, orders, follow, keep, column, emit):
     The result is 1 if an input is nan, infinite or too large, else 0.
 
     Args:
-        address: Address of the kernel's arguments (`kernel_args`).
+        address: Address of the kernel's arguments (`KernelArgs`).
         axes: `link_axes` or `world_axes`: the axes in which vectors are expressed.
         orders: Number of inputs that are read: 1 for q, 2 for q and v, 3 for q, v and a.
         follow: Replaces the parts of a state that the output does not need by `nothing()`.

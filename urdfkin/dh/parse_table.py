@@ -34,7 +34,7 @@ from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinErr
 from urdfkin.errors.escape import from_csv_cell
 from urdfkin.errors.numbers import UNITS
 from urdfkin.errors.validators import safe_repr
-from urdfkin.kinematics.rotation.matrix import ROUNDED, polar_factor
+from urdfkin.kinematics.rotation import ROUNDED, polar_factor
 from urdfkin.system.files import exists, read_text
 from urdfkin.system.resources import robots_dir
 

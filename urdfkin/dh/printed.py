@@ -18,7 +18,7 @@ from urdfkin.dh.snapping import SAMPLES, UNKNOWN, travel
 from urdfkin.dh.table import DHRow, DHTable
 from urdfkin.dh.tree_parameters import TreeParameters, TreeRow
 from urdfkin.dh.units import Units, cell_in_si, read_number
-from urdfkin.model.ranges import axis_range, values_within
+from urdfkin.model.configuration import axis_range, values_within
 from urdfkin.model.tree import FloatArray
 
 

@@ -24,15 +24,23 @@ from urdfkin.errors import InputError
 from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.errors.escape import log_line
 from urdfkin.kinematics.inputs import rotation_defect
-from urdfkin.kinematics.rotation import axis_aligning
-from urdfkin.kinematics.rotation.matrix import ROUNDED, polar_factor
+from urdfkin.kinematics.rotation import ROUNDED, axis_aligning, polar_factor
 from urdfkin.kinematics.roundings import EPS, of_rows
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.mimic import Coupling, coupling_of
 from urdfkin.model.path import Motion, Path
-from urdfkin.model.pose import pose
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, build_tree, frozen
+from urdfkin.model.tree import (
+    FloatArray,
+    Joint,
+    JointKind,
+    KinematicTree,
+    Limit,
+    Mimic,
+    build_tree,
+    frozen,
+    pose,
+)
 
 #: Tolerance of handwritten screws. The tolerance applies to the deviation of an axis' length from 1, and to
 #: the deviation of a pitch from 0 (m/rad).

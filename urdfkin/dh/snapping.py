@@ -27,10 +27,10 @@ import numpy as np
 from urdfkin.dh.table import Convention, DHTable, SnapChange, SnapReport, nearest_twelfth, wrapped
 from urdfkin.errors import InputError
 from urdfkin.errors.validators import real_number
-from urdfkin.kinematics.rotation.euler import coordinate_rotation
+from urdfkin.kinematics.rotation import coordinate_rotation
 from urdfkin.kinematics.roundings import ANGLE, EPS, TURN
 from urdfkin.model.chain import FrameChain, chain, steps_between
-from urdfkin.model.ranges import axis_range, values_within
+from urdfkin.model.configuration import axis_range, values_within
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, frozen
 
 #: Largest tolerance (rad): 5 degrees. With a tolerance of more than 7.5 degrees, an angle could be within the

@@ -42,8 +42,8 @@ from urdfkin.dh.screws import ProductOfExponentials
 from urdfkin.dh.table import Convention, DHRow, DHTable
 from urdfkin.errors import InputError
 from urdfkin.model.chain import FrameChain
+from urdfkin.model.configuration import axis_range, values_within
 from urdfkin.model.path import elementary
-from urdfkin.model.ranges import axis_range, values_within
 from urdfkin.model.tree import FloatArray, JointKind
 
 #: A property such as parallel axes is reported if its deviation is at most `NEAR_ANGLE` (rad) and

@@ -41,8 +41,7 @@ from urdfkin.kinematics.roundings import ANGLE, EPS, of_rows
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.mimic import Coupling, coupling_of
 from urdfkin.model.path import Motion, Path
-from urdfkin.model.pose import is_rigid
-from urdfkin.model.tree import FloatArray, JointKind, Limit, Mimic, frozen
+from urdfkin.model.tree import FloatArray, JointKind, Limit, Mimic, frozen, is_rigid
 from urdfkin.system.lazy_import import hook
 
 

@@ -23,13 +23,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from urdfkin.compiled.batch import in_blocks
-from urdfkin.compiled.evaluate import is_staged
+from urdfkin.compiled.evaluate import in_blocks, is_staged
 from urdfkin.compiled.kept import compiling
-from urdfkin.compiled.kernel_args import KernelArgs, lines
 from urdfkin.compiled.plan import CompiledTree
 from urdfkin.compiled.prepared import Fast
-from urdfkin.compiled.program import LANES
+from urdfkin.compiled.program import LANES, KernelArgs, lines
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.export.c import Layout, advance, framed, spare, unit
 from urdfkin.export.code import Code, bare

@@ -96,18 +96,27 @@ class TreeRecursion(Recursion):
 
     def _move(self, i: int, s: State) -> State:
         (kind, at, rate_at), (q, v, a) = self.plan.steps[i].tolist(), self.inputs
+        match motion := Motion(kind):
+            case Motion.PLANAR:
+                return self.planar(s, q[at:], self._about_z(q[at + 2]), v[rate_at:], a[rate_at:])
+            case Motion.FLOATING:
+                quaternion = q[at + 3 : at + 7]
+                length = self.kind.root(sum(c * c for c in quaternion))
+                S = self.eq.rotation_of_quaternion(*(c / length for c in quaternion))
+                return self.floating(s, q[at:], S, v[rate_at:], a[rate_at:])
+            case Motion.TURN:
+                value, *rates = self._own_values(i)
+                return self.revolute(s, _Z, self._about_z(value), *rates)
+            case Motion.SLIDE:
+                return self.prismatic(s, _Z, *self._own_values(i))
+            case _:
+                assert_never(motion)
+
+    def _own_values(self, i: int) -> tuple[Number, Number, Number]:
+        """Return the value, the velocity and the acceleration of a revolute or prismatic joint."""
+        (_, at, rate_at), (q, v, a) = self.plan.steps[i].tolist(), self.inputs
         multiplier, constant = self.plan.geometry[i, Geometry.MULTIPLIER :].tolist()
-        if kind == Motion.PLANAR:
-            return self.planar(s, q[at:], self._about_z(q[at + 2]), v[rate_at:], a[rate_at:])
-        if kind == Motion.FLOATING:
-            quaternion = q[at + 3 : at + 7]
-            length = self.kind.root(sum(c * c for c in quaternion))
-            S = self.eq.rotation_of_quaternion(*(c / length for c in quaternion))
-            return self.floating(s, q[at:], S, v[rate_at:], a[rate_at:])
-        value, rate, rate_2 = multiplier * q[at] + constant, multiplier * v[rate_at], multiplier * a[rate_at]
-        if kind == Motion.TURN:
-            return self.revolute(s, _Z, self._about_z(value), rate, rate_2)
-        return self.prismatic(s, _Z, value, rate, rate_2)
+        return multiplier * q[at] + constant, multiplier * v[rate_at], multiplier * a[rate_at]
 
     @property
     def columns(self) -> list[Column]:

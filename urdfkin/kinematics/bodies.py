@@ -32,8 +32,14 @@ from numpy.typing import ArrayLike
 
 from urdfkin.kinematics.inputs import FloatArray, matrices, rotations, scalars, unit_vectors, vectors
 from urdfkin.kinematics.number_kinds import array_equations as eq
-from urdfkin.kinematics.rotation.euler import NEAREST, euler_of, euler_rate_inverse, euler_rate_matrix
-from urdfkin.kinematics.rotation.quaternion import quaternion_of, quaternion_rate_matrix
+from urdfkin.kinematics.rotation import (
+    NEAREST,
+    euler_of,
+    euler_rate_inverse,
+    euler_rate_matrix,
+    quaternion_of,
+    quaternion_rate_matrix,
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

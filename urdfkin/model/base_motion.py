@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from urdfkin.errors import InputError, Question
-from urdfkin.kinematics.rotation.matrix import nearest_rotation
+from urdfkin.kinematics.rotation import nearest_rotation
 from urdfkin.model.tree import FloatArray, frozen
 
 

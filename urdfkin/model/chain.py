@@ -22,8 +22,17 @@ from urdfkin.kinematics.rotation import axis_aligning
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.mimic import Coupling, coupling_of
 from urdfkin.model.path import Motion, Path
-from urdfkin.model.pose import inverse, pose
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, frozen
+from urdfkin.model.tree import (
+    FloatArray,
+    Joint,
+    JointKind,
+    KinematicTree,
+    Limit,
+    Mimic,
+    frozen,
+    inverse,
+    pose,
+)
 
 #: Smallest size (m) of a robot. A robot whose frames all coincide has this size, which avoids a division by
 #: 0.

@@ -14,8 +14,7 @@ import math
 import numpy as np
 
 from urdfkin.errors import InputError
-from urdfkin.kinematics.rotation import exp_rotation, log_rotation, skew
-from urdfkin.kinematics.rotation.quaternion import quaternion_of, rotation_of
+from urdfkin.kinematics.rotation import exp_rotation, log_rotation, quaternion_of, rotation_of, skew
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
 #: Below this squared angle (rad^2), (|w| - sin|w|)/|w|^3 is computed as a series, to avoid cancellation.

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.kinematics.number_kinds import array_equations as eq
-from urdfkin.kinematics.rotation.euler import coordinate_rotation
+from urdfkin.kinematics.rotation import coordinate_rotation
 from urdfkin.model.tree import FloatArray
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from urdfkin.errors.display import Displayable, Table, TextDocument
-from urdfkin.model.ranges import narrowed_ranges
+from urdfkin.model.configuration import narrowed_ranges
 from urdfkin.model.tree import Joint, KinematicTree
 
 #: Columns of a joint: limits in rad and rad/s, for prismatic joints in m and m/s.

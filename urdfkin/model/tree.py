@@ -1,7 +1,9 @@
 """The robot model: a tree of links and joints, with the joint limits and mimic rules of the URDF.
 
-`KinematicTree` depends neither on XML nor on Pinocchio. The links and joints of the tree are in Pinocchio's
-order (depth first, sibling joints by name), so `q` and `v` have the same order in urdfkin and in Pinocchio.
+`KinematicTree` depends neither on XML nor on Pinocchio. The links and joints of the tree are in
+Pinocchio's order (depth first, sibling joints by name), so `q` and `v` have the same order in urdfkin and in
+Pinocchio. The frame of a link or a joint has
+its name; the prefix `link:` or `joint:` is needed if a link and a joint have equal names.
 """
 
 from __future__ import annotations
@@ -11,17 +13,55 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from enum import Enum
 from functools import cached_property
-from typing import Any, TypeGuard
+from typing import Any, ClassVar, Self, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError, Question, UnknownNameError
 from urdfkin.errors.validators import safe_repr
-from urdfkin.kinematics.inputs import FloatArray, floats
-from urdfkin.kinematics.rotation.axis_angle import rotation_about
-from urdfkin.kinematics.rotation.euler import coordinate_rotation
-from urdfkin.model.frame_names import FrameName, JointFrame, LinkFrame
+from urdfkin.kinematics.inputs import FloatArray, floats, rotation_defect
+from urdfkin.kinematics.rotation import coordinate_rotation, rotation_about
+
+
+class FrameName(str):
+    """`link:NAME` or `joint:NAME`: the link or joint NAME, even if another frame is named `link:NAME`.
+
+    Reports and messages print a `FrameName` like an ordinary name. A plain `str` with the same text has a
+    different meaning: `KinematicTree.frame_link` first looks for a link or joint whose own name is exactly
+    that text.
+
+    >>> LinkFrame.of("hand"), LinkFrame.of("hand").own
+    ('link:hand', 'hand')
+    """
+
+    __slots__ = ()
+    prefix: ClassVar[str]
+
+    @classmethod
+    def of(cls, own: str) -> Self:
+        """Return the frame name, with the prefix, of the link or joint with the name `own`."""
+        return cls(f"{cls.prefix}{own}")
+
+    @property
+    def own(self) -> str:
+        """The link's or joint's own name, without the prefix."""
+        return self[len(self.prefix) :]
+
+
+class LinkFrame(FrameName):
+    """The name `link:NAME` of a link's frame."""
+
+    __slots__ = ()
+    prefix = "link:"
+
+
+class JointFrame(FrameName):
+    """The name `joint:NAME` of a joint's frame, which is the frame of the joint's child link."""
+
+    __slots__ = ()
+    prefix = "joint:"
+
 
 __all__ = [
     "FloatArray",
@@ -541,3 +581,33 @@ def build_tree(name: str, root: str, joints: Sequence[tuple[Joint, str, str]]) -
 
 def _last_name_first(joints: list[tuple[Joint, str]]) -> list[tuple[Joint, str]]:
     return sorted(joints, key=lambda pair: pair[0].name, reverse=True)
+
+
+def pose(R: ArrayLike | None = None, p: ArrayLike | None = None) -> FloatArray:
+    """Return the pose (4, 4) with a rotation (3, 3) and an origin (3,), m.
+
+    By default the rotation is the identity and the origin is zero.
+
+    >>> pose(p=[1.0, 2.0, 3.0])[:3, 3].tolist()
+    [1.0, 2.0, 3.0]
+    """
+    T = np.eye(4)
+    if R is not None:
+        T[:3, :3] = R
+    if p is not None:
+        T[:3, 3] = p
+    return T
+
+
+def is_rigid(T: FloatArray, tolerance: float) -> bool:
+    """Return whether a matrix (4, 4) is a rigid transform.
+
+    The upper left block of the matrix must be a rotation matrix within `tolerance`.
+    """
+    return bool(rotation_defect(T[:3, :3]) <= tolerance) and T[3].tolist() == [0.0, 0.0, 0.0, 1.0]
+
+
+def inverse(T: FloatArray) -> FloatArray:
+    """Return the inverse (4, 4) of a pose."""
+    back = T[:3, :3].T
+    return pose(back, -back @ T[:3, 3])

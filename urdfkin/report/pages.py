@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from urdfkin.dh.units import Units as DisplayUnits
-from urdfkin.model.ranges import range_words
+from urdfkin.model.configuration import range_words
 from urdfkin.model.summary import axis_words
 from urdfkin.report.words import (
     SIDES,

@@ -19,8 +19,7 @@ from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.errors.escape import markdown_text
 from urdfkin.kinematics.roundings import NOT_ZERO
 from urdfkin.model.mechanisms.mechanism import Mechanism
-from urdfkin.model.pose import inverse
-from urdfkin.model.tree import FloatArray
+from urdfkin.model.tree import FloatArray, inverse
 from urdfkin.report.words import counted
 from urdfkin.robot import Robot
 

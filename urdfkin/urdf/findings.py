@@ -1,9 +1,9 @@
 """Findings: problems in a URDF, with a stable code, their position, the found text and a remedy.
 
-The parser and the rules of `urdfkin.lint` add findings to the `Reporter` of a file. The reporter computes the
-position of each finding in the bytes of the file, and applies the comments that silence findings. A finding
-is plain data: it can be printed, compared, converted to JSON or SARIF and sent to another process. A byte
-order mark does not count in positions.
+The parser and the rules of `urdfkin.urdf.lint` add findings to the `Reporter` of a file. The reporter
+computes the position of each finding in the bytes of the file, and applies the comments that silence
+findings. A finding is plain data: it can be printed, compared, converted to JSON or SARIF and sent to another
+process. A byte order mark does not count in positions.
 
 A comment in a URDF names the codes that it silences, and gives a reason.
 

@@ -16,9 +16,8 @@ import numpy as np
 
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.validators import safe_repr
-from urdfkin.kinematics.rotation.euler import rpy_of
-from urdfkin.model.pose import inverse
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree
+from urdfkin.kinematics.rotation import rpy_of
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree, inverse
 from urdfkin.urdf.findings import Finding, Severity
 from urdfkin.urdf.mjcf import UNBOUNDED
 from urdfkin.urdf.parser import QUATERNION

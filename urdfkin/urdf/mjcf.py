@@ -26,10 +26,8 @@ from typing import Any, TypeGuard
 import numpy as np
 
 from urdfkin.errors import InputError
-from urdfkin.kinematics.rotation.axis_angle import rotation_about
-from urdfkin.kinematics.rotation.quaternion import rotation_of
-from urdfkin.model.pose import pose
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, build_tree
+from urdfkin.kinematics.rotation import rotation_about, rotation_of
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, build_tree, pose
 from urdfkin.system.files import at_home, read_start
 from urdfkin.urdf.mujoco import compiled, library
 

@@ -7,7 +7,7 @@ expands an entity.
 
 `read_robot` reads links and joints into records, once and strictly. Numbers are ASCII, finite, and of the
 right count: the grammar is `xs:double` without its special values, as in urdfdom. Nothing is guessed or
-repaired; every problem is a finding. `urdfkin.lint` checks the records further.
+repaired; every problem is a finding. `urdfkin.urdf.lint` checks the records further.
 """
 
 from __future__ import annotations

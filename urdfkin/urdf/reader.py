@@ -1,6 +1,6 @@
 """Build a `KinematicTree` from the records of a URDF.
 
-`urdfkin.urdf.parser` reads the records, and `urdfkin.lint` checks them. This module normalises the axes,
+`urdfkin.urdf.parser` reads the records, and `urdfkin.urdf.lint` checks them. This module normalises the axes,
 resolves chains of mimic joints, and sorts the joints in Pinocchio's order.
 """
 
@@ -12,8 +12,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.kinematics.rotation.euler import coordinate_rotation, rpy_of
-from urdfkin.kinematics.rotation.quaternion import rotation_of
+from urdfkin.kinematics.rotation import coordinate_rotation, rotation_of, rpy_of
 from urdfkin.model.tree import (
     FloatArray,
     Joint,
@@ -31,7 +30,7 @@ def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None =
     """Return the kinematic tree of a URDF.
 
     Args:
-        urdf: The records of the URDF, without errors (see `urdfkin.lint`).
+        urdf: The records of the URDF, without errors (see `urdfkin.urdf.lint`).
         mimic: True: mimic joints follow their mimicked joints, as URDF defines. False: they move freely.
         root_joint: `"floating"` or `"planar"` adds a joint `root_joint` of this kind above the root link.
 

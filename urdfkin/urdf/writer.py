@@ -14,7 +14,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 
 from urdfkin.errors import InputError
-from urdfkin.kinematics.rotation.euler import rpy_of
+from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.tree import Joint, JointKind, KinematicTree, Limit
 from urdfkin.system.files import Edit
 from urdfkin.urdf.records import ATTRIBUTE, START_TAG, Element

@@ -19,8 +19,13 @@ from numpy.typing import NDArray
 
 from urdfkin.errors import InputError
 from urdfkin.kinematics.bodies import QUATERNION, analytical_jacobian
-from urdfkin.kinematics.rotation.euler import NEAREST, SEQUENCES, euler_of, singularity_distance
-from urdfkin.kinematics.rotation.quaternion import quaternion_of
+from urdfkin.kinematics.rotation import (
+    NEAREST,
+    SEQUENCES,
+    euler_of,
+    quaternion_of,
+    singularity_distance,
+)
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.recursion import Number
@@ -38,8 +43,7 @@ from urdfkin.verify.bounds import (
 from urdfkin.verify.call import Call
 from urdfkin.verify.exact.numbers import DIGITS, enough_digits, exact, precision, read_exact
 from urdfkin.verify.exact.recursion import move, on_base
-from urdfkin.verify.oracle import BaseRows
-from urdfkin.verify.pinocchio_inputs import BaseNumbers, davenport
+from urdfkin.verify.oracle import BaseNumbers, BaseRows, davenport
 from urdfkin.verify.quantities import ANALYTICAL_JACOBIAN, JACOBIAN, PLACEMENT, Quantity, validated
 from urdfkin.verify.sampling import Samples, draw
 from urdfkin.verify.verifier import bound_of, oracle_results, own_results

@@ -17,15 +17,14 @@ import zlib
 from dataclasses import dataclass, replace
 from typing import Any
 
-from urdfkin.errors import UrdfkinError
-from urdfkin.lint import UrdfError
+from urdfkin.errors import OracleError, UrdfkinError
 from urdfkin.system.documents import as_data, typed
+from urdfkin.urdf.lint import UrdfError
 from urdfkin.validation.chunk import Chunk, ChunkResult, run_chunk
 from urdfkin.validation.error_stats import Key, Tally
 from urdfkin.validation.outcome import Verdict
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.validation.robot_summary import NO_PORTRAIT, RobotSummary, entries_of
-from urdfkin.verify.pinocchio import OracleError
 
 
 @dataclass(frozen=True, slots=True)

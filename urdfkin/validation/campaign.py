@@ -33,7 +33,7 @@ from urdfkin.validation.store import Store, opened
 from urdfkin.validation.worker_processes import ProcessEngine
 from urdfkin.verify.ahead import load_kernels
 from urdfkin.verify.oracles import PINOCCHIO, OracleName, oracle_library
-from urdfkin.verify.pinocchio_module import pinocchio
+from urdfkin.verify.pinocchio import pinocchio
 
 if TYPE_CHECKING:
     from urdfkin.validation.accuracy import Judgement

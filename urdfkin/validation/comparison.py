@@ -16,9 +16,8 @@ import numpy as np
 
 from urdfkin.compiled.plan import compile_tree
 from urdfkin.model.base_motion import STILL_STATE
-from urdfkin.model.frame_names import JointFrame
 from urdfkin.model.reference import Reference
-from urdfkin.model.tree import FloatArray, KinematicTree, freed
+from urdfkin.model.tree import FloatArray, JointFrame, KinematicTree, freed
 from urdfkin.robot import Robot
 from urdfkin.validation.error_stats import Inputs, Key, Tally, ThreeSides, tally, three_sides
 from urdfkin.validation.timings import Clock

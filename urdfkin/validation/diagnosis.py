@@ -21,7 +21,7 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
 if TYPE_CHECKING:
-    from urdfkin.conventions import Conversion
+    from urdfkin.model.conventions import Conversion
     from urdfkin.robot import Robot
     from urdfkin.verify.quantities import Quantity
 
@@ -305,7 +305,7 @@ class Mistakes:
         mimics = [joint for joint in tree.joints if joint.mimic]
         if not mimics or self.conversion is not None:
             return
-        from urdfkin.loading import load  # noqa: PLC0415  few robots need it
+        from urdfkin.robot.loading import load  # noqa: PLC0415  few robots need it
 
         lock = dict(self.robot.origin.lock)
         free = load(self.robot.urdf, mimic=False, root_joint=self.robot.root_joint, lock=lock, verify=False)
@@ -399,7 +399,7 @@ class Mistakes:
         """Yield the joint orders of other tools, if they are permutations of urdfkin's order."""
         if self.conversion is not None:
             return
-        from urdfkin.conventions import BUILT_IN  # noqa: PLC0415  few functions need it
+        from urdfkin.model.conventions import BUILT_IN  # noqa: PLC0415  few functions need it
 
         seen = {tuple(range(self.robot.nq))}
         for name in BUILT_IN:

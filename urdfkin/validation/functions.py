@@ -19,11 +19,11 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from urdfkin.conventions import Convention
 from urdfkin.errors import DegreesWarning, InputError
 from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.errors.validators import as_bool, real_number, safe_repr, whole_number
 from urdfkin.kinematics.roundings import EPS
+from urdfkin.model.conventions import Convention
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.documents import plain
@@ -36,7 +36,7 @@ from urdfkin.verify.sampling import draw
 from urdfkin.verify.verifier import Verifier, bound_of, oracle_results_with_bound
 
 if TYPE_CHECKING:
-    from urdfkin.conventions import Conversion
+    from urdfkin.model.conventions import Conversion
     from urdfkin.robot import Robot
     from urdfkin.verify.call import Call
 

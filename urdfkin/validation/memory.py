@@ -10,9 +10,9 @@ import resource
 from collections.abc import Iterator
 from pathlib import Path
 
+from urdfkin.errors import OracleError
 from urdfkin.model.tree import KinematicTree
 from urdfkin.validation.comparison import BLOCK_BYTES, frame_bytes
-from urdfkin.verify.pinocchio import OracleError
 
 #: Fraction of the free memory that a validation uses.
 SHARE = 0.5

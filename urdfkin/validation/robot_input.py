@@ -19,15 +19,14 @@ from numpy.typing import ArrayLike
 
 from urdfkin.dh.parse_table import is_table_file
 from urdfkin.dh.table import DHTable
-from urdfkin.errors import InputError, UrdfkinError
-from urdfkin.lint import Finding, UrdfWarning
-from urdfkin.loading import load, robot_of
+from urdfkin.errors import InputError, OracleError, UrdfkinError
 from urdfkin.robot import Robot
+from urdfkin.robot.loading import load, robot_of
 from urdfkin.urdf.catalogue import catalogue
+from urdfkin.urdf.lint import Finding, UrdfWarning
 from urdfkin.urdf.mjcf import is_mjcf
 from urdfkin.urdf.sources import Origin, Source, Text, as_word, is_xacro, read_source
 from urdfkin.verify.oracles import PINOCCHIO
-from urdfkin.verify.pinocchio import OracleError
 
 #: Input of a validation: anything that `load` accepts, or a loaded robot.
 Given = Source | DHTable | Robot

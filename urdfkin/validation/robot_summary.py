@@ -19,11 +19,11 @@ import numpy as np
 from urdfkin.dh import DHRow, DHTable
 from urdfkin.dh.make import dh_table
 from urdfkin.errors import InputError
-from urdfkin.lint import Finding
-from urdfkin.model.ranges import NarrowedRange, narrowed_ranges
+from urdfkin.model.configuration import NarrowedRange, narrowed_ranges
 from urdfkin.robot import Robot
 from urdfkin.system.documents import plain
 from urdfkin.urdf.catalogue import catalogue
+from urdfkin.urdf.lint import Finding
 from urdfkin.validation.document import Chain, Model, Row, SecondReading
 from urdfkin.validation.document import Finding as FindingEntry
 from urdfkin.verify.oracle import Oracle

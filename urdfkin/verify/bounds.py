@@ -187,10 +187,14 @@ def _carry_place(state: list[Length], d: Length) -> list[Length]:
     return [eq.point_position(state[0], None, d), *state[1:]]
 
 
+#: Numbers of the displacements and of the rotations of a joint with several coordinates.
+_FREE_PARTS = {int(Motion.PLANAR): (2, 1), int(Motion.FLOATING): (3, 3)}
+
+
 def _slid(link: _Link, q: Any) -> Length:
     """Return a bound on the displacement of a prismatic, planar or floating joint, m."""
     if link.kind != Motion.SLIDE:
-        return _norm(q[link.q : link.q + (2 if link.kind == Motion.PLANAR else 3)])
+        return _norm(q[link.q : link.q + _FREE_PARTS[link.kind][0]])
     return product(link.multiplier, abs(q[link.q])) + link.constant
 
 
@@ -209,7 +213,7 @@ def _step(link: _Link, state: list[Length], q: Any, v: Any, a: Any) -> list[Leng
             return [p, w, eq.sliding_velocity(vel, _Z, rate), alpha, acc]
         w = eq.angular_velocity(w, _Z, rate)
         return [p, w, vel, eq.angular_acceleration(alpha, w, _Z, rate, rate_2), acc]
-    slides, turns = (2, 1) if kind == Motion.PLANAR else (3, 3)
+    slides, turns = _FREE_PARTS[kind]
     (u, o), (u_rate, o_rate) = (
         (_norm(x[at : at + slides]), _norm(x[at + slides : at + slides + turns])) for x in (v, a)
     )

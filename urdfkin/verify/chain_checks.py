@@ -14,8 +14,7 @@ from urdfkin.dh.screws import ProductOfExponentials
 from urdfkin.dh.structure import Opw
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, of_joints
 from urdfkin.model.chain import FrameChain, chain
-from urdfkin.model.frame_names import JointFrame
-from urdfkin.model.tree import FloatArray
+from urdfkin.model.tree import FloatArray, JointFrame
 from urdfkin.verify.oracle import QueryBatch
 from urdfkin.verify.sampling import sample
 from urdfkin.verify.tables import TableError

@@ -23,8 +23,7 @@ from urdfkin.errors import InputError, OracleError
 from urdfkin.errors.escape import printable
 from urdfkin.kinematics.roundings import EPS, MJCF_RULE
 from urdfkin.model.base_motion import STILL_STATE
-from urdfkin.model.frame_names import LinkFrame
-from urdfkin.model.tree import FloatArray
+from urdfkin.model.tree import FloatArray, LinkFrame
 from urdfkin.system.files import at_home
 from urdfkin.system.processes import ask_python, own_python
 from urdfkin.urdf.mjcf import Listed, is_text, name_of

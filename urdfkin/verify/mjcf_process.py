@@ -31,7 +31,7 @@ from urdfkin.urdf.confinement import MEMORY, limit
 from urdfkin.urdf.mjcf import Mjcf, read_mjcf
 from urdfkin.urdf.mujoco import library
 from urdfkin.urdf.writer import to_urdf
-from urdfkin.verify.pinocchio_module import pinocchio
+from urdfkin.verify.pinocchio import pinocchio
 from urdfkin.verify.sampling import sample
 
 #: Number of coordinates of a free joint.

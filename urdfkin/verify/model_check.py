@@ -10,13 +10,11 @@ from urdfkin.compiled.plan import compile_tree
 from urdfkin.errors import OracleError
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.configuration import neutral
-from urdfkin.model.frame_names import LinkFrame
-from urdfkin.model.tree import FloatArray, JointKind, KinematicTree
+from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, LinkFrame
 from urdfkin.urdf.foreign import Modelled
 from urdfkin.verify.bounds import Bound, magnitudes
 from urdfkin.verify.certificate import compare
-from urdfkin.verify.pinocchio import MOST_RATES
-from urdfkin.verify.pinocchio_module import pinocchio, version
+from urdfkin.verify.pinocchio import MOST_RATES, pinocchio, version
 from urdfkin.verify.quantities import PLACEMENT
 from urdfkin.verify.sampling import sample
 from urdfkin.verify.verifier import Verifier

@@ -30,11 +30,18 @@ import numpy as np
 from urdfkin.errors import OracleError
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree, Mimic
+from urdfkin.system.plain_xml import plain_xml
 from urdfkin.urdf.mujoco import compiled, library
-from urdfkin.urdf.plain_xml import plain_xml
-from urdfkin.verify.oracle import Oracle, QueryBatch, mimic_rules
+from urdfkin.verify.oracle import (
+    WORLD,
+    Frames,
+    Oracle,
+    QueryBatch,
+    locked_by_rules,
+    mimic_rules,
+    nearest_quaternion,
+)
 from urdfkin.verify.pinocchio import depth_of
-from urdfkin.verify.pinocchio_inputs import WORLD, Frames, locked_by_rules, nearest_quaternion
 
 #: Mass (kg) and moments of inertia (kg m^2) that each link has while MuJoCo reads the text.
 _MASS = "1"

@@ -1,12 +1,32 @@
-"""Define the base class of the oracles, and the query, which is the argument of an oracle's methods.
+"""Define the base class of the oracles, the query that its methods take, and the conversion of arguments.
 
-`OracleQuery` converts the arguments of a call to flat batches for the oracle. `urdfkin.verify.call` converts
-the same arguments for the recursion. Apart from the exceptions below, the two modules share no code. A wrong
-broadcast, order or name in one of them therefore leads to a disagreement.
+urdfkin converts the arguments of a call for its own computation. This module converts them a second time for
+the oracle, from the URDF text, the oracle's model and the user's numbers. Apart from the exceptions below,
+the two conversions share no code. A wrong broadcast, order or name in one of them therefore leads to a
+disagreement.
 
-This module looks up names a second time, in the list of joints. The oracle compares the order of this list
-with the order of joints in the oracle's model. The exceptions are the values of named poses and the parser of
-units (`urdfkin.errors.numbers`), which the two modules share.
+| Part | In this module | In urdfkin's own computation |
+|---|---|---|
+| mimic rules | `rules_of_text` | `urdfkin.urdf.lint`, `urdfkin.urdf.reader` |
+| names, batch shapes | `OracleQuery` | `urdfkin.verify.call` |
+| order of q, v and a | `Layout` | `KinematicTree` |
+| frame of a name | `Frames` | `KinematicTree.frame_link` |
+| moving base | `free_flyer` and others | `BaseMotion` |
+
+This module looks up names in the list of joints. The oracle compares the order of this list with the order of
+joints in the oracle's model. The two conversions share the values of named poses and the parser of units
+(`urdfkin.errors.numbers`).
+
+Mimic rules: Pinocchio's model has no mimic joints (`urdfkin.verify.pinocchio`), so this module reads the
+rules. The module parses the text again at the first check.
+
+Layout of q: the joints are in Pinocchio's order. A revolute, continuous or prismatic joint has one number, a
+planar joint three, a floating joint seven, and a mimic joint none.
+
+Moving base: its rotation is the one nearest to the given matrix M (`urdfkin.kinematics.rotation`). urdfkin
+computes it with a Newton step. This module uses Davenport's q-method: among unit quaternions,
+q^T K q = trace(R(q)^T M) is largest for the nearest rotation. So q is the eigenvector of K for the largest
+eigenvalue.
 """
 
 from __future__ import annotations
@@ -14,21 +34,348 @@ from __future__ import annotations
 import math
 import re
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Protocol
 from xml.parsers.expat import ExpatError
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from urdfkin.compiled.plan import IntArray
 from urdfkin.errors import OracleError
 from urdfkin.errors.numbers import parse_float, parse_quantity
 from urdfkin.model.reference import Reference
-from urdfkin.model.tree import FloatArray, KinematicTree, Mimic
-from urdfkin.verify.pinocchio_inputs import BaseNumbers, nearest_quaternion, rules_of_text
+from urdfkin.model.tree import FloatArray, JointFrame, KinematicTree, LinkFrame, Mimic
+from urdfkin.system.plain_xml import plain_xml
+from urdfkin.verify.mimic_columns import Places, coupled
+
+
+def rules_of_text(text: str, joints: Collection[str]) -> dict[str, Mimic]:
+    """Return the rule of each mimic joint relative to an independent joint; chains of rules are resolved.
+
+    Args:
+        text: The URDF text.
+        joints: Names of the moving joints; rules of other joints are ignored.
+
+    Raises:
+        ValueError: a multiplier or offset is not a number.
+        expat.ExpatError: the text is not well-formed XML.
+    """
+    if "mimic" not in text:
+        return {}
+    rules = {
+        name: Mimic(rule.get("joint", ""), float(rule.get("multiplier", "1")), float(rule.get("offset", "0")))
+        for joint in plain_xml(text).iterfind("joint")
+        if (rule := joint.find("mimic")) is not None and (name := joint.get("name", "")) in joints
+    }
+    return resolved_rules(rules)
+
+
+def resolved_rules(rules: dict[str, Mimic]) -> dict[str, Mimic]:
+    """Return mimic rules in which every mimicked joint is independent, not a mimic joint."""
+    known: dict[str, Mimic] = {}
+    return {name: _resolved(name, rules, known) for name in rules}
+
+
+def _resolved(joint: str, rules: dict[str, Mimic], known: dict[str, Mimic]) -> Mimic:
+    """Return the resolved rule q_mimic = m_1 (m_2 (... q_independent ...) + o_2) + o_1.
+
+    The products are computed from the independent joint outwards. The results are stored in `known`, so each
+    rule of a chain is resolved only once.
+    """
+    chain = [joint]
+    while (leader := rules[chain[-1]].leader) in rules and leader not in known and len(chain) <= len(rules):
+        chain.append(leader)
+    for name in reversed(chain):
+        rule = rules[name]
+        end = known.get(rule.leader, Mimic(rule.leader, 1.0, 0.0))
+        offset = rule.multiplier * end.offset + rule.offset
+        known[name] = Mimic(end.leader, rule.multiplier * end.multiplier, offset)
+    return known[joint]
+
+
+def locked_by_rules(lock: Mapping[str, float], rules: Mapping[str, Mimic]) -> dict[str, float]:
+    """Return the value of each locked joint, and the value of each mimic joint that a locked joint moves.
+
+    >>> locked_by_rules({"a": 2.0}, {"b": Mimic("a", 0.5, 0.25), "c": Mimic("d", 1.0, 0.0)})
+    {'a': 2.0, 'b': 1.25}
+    """
+    moved = {
+        name: rule.multiplier * lock[rule.leader] + rule.offset
+        for name, rule in rules.items()
+        if rule.leader in lock
+    }
+    return {**lock, **moved}
+
+
+#: For each pair (nq, nv) of a joint in Pinocchio: the joint's number of coordinates in urdfkin.
+_CONTINUOUS, _PLANAR, _FLOATING = (2, 1), (4, 3), (7, 6)
+_COORDINATES = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
+
+
+class _Place(NamedTuple):
+    """A joint: its (nq, nv) in Pinocchio, its first indices in Pinocchio and urdfkin, and its mimic rule."""
+
+    sizes: tuple[int, int]
+    full_q: int
+    full_v: int
+    q: int
+    v: int
+    multiplier: float
+    offset: float
+
+
+class Layout:
+    """Convert q, v and a to Pinocchio's vectors, and Pinocchio's Jacobian columns to urdfkin's.
+
+    Args:
+        model: Pinocchio's model.
+        joints: Pinocchio's indices of the robot's joints, in order.
+        names: Their names.
+        rules: The resolved rule of each mimic joint.
+
+    Attributes:
+        nq: Length of q.
+        nv: Length of v.
+        rate_columns: Indices of the columns of Pinocchio's Jacobian that belong to moving joints, including
+            mimic joints.
+    """
+
+    def __init__(
+        self, model: Any, joints: Sequence[int], names: Sequence[str], rules: Mapping[str, Mimic]
+    ) -> None:
+        self._model = model
+        sizes = [(int(model.joints[j].nq), int(model.joints[j].nv)) for j in joints]
+        at, self.nq, self.nv = dict[str, tuple[int, int]](), 0, 0
+        for name, own in zip(names, sizes, strict=True):
+            if name not in rules:
+                at[name] = self.nq, self.nv
+                self.nq, self.nv = self.nq + _COORDINATES[own], self.nv + own[1]
+        self._places = list[_Place]()
+        for j, name, own in zip(joints, names, sizes, strict=True):
+            rule = rules.get(name, Mimic(name, 1.0, 0.0))
+            if rule.leader not in at:
+                raise OracleError(
+                    "Pinocchio has no such mimicked joint", where=f"joint {name}", found=repr(rule.leader)
+                )
+            full = int(model.joints[j].idx_q), int(model.joints[j].idx_v)
+            self._places.append(_Place(own, *full, *at[rule.leader], rule.multiplier, rule.offset))
+        self.rate_columns = [place.full_v + c for place in self._places for c in range(place.sizes[1])]
+        self._index, self._factor = self._rates()
+        self._columns = np.array(self.rate_columns, dtype=np.int64)
+        self._free = [place for place in self._places if place.sizes in (_PLANAR, _FLOATING)]
+        self._single, self._angles = (self._of_sizes(sizes) for sizes in ((1, 1), _CONTINUOUS))
+        #: True if Pinocchio's coordinates (or joint velocities) are the same numbers as the robot's.
+        plain = [(p.q, (1, 1), 1.0, 0.0) == (p.full_q, p.sizes, p.multiplier, p.offset) for p in self._places]
+        self._same_q = all(plain) and model.nq == self.nq
+        self._same_v = model.nv == self.nv and bool((self._factor == 1.0).all())
+        self._same_v &= bool((self._index == np.arange(model.nv)).all())
+
+    def _of_sizes(self, sizes: tuple[int, int]) -> tuple[Places, Places, FloatArray, FloatArray]:
+        """Return the indices in Pinocchio's q and urdfkin's q, and the rules, of joints with given sizes."""
+        own = [place for place in self._places if place.sizes == sizes]
+        return (
+            np.array([place.full_q for place in own], dtype=np.int64),
+            np.array([place.q for place in own], dtype=np.int64),
+            np.array([place.multiplier for place in own]),
+            np.array([place.offset for place in own]),
+        )
+
+    def _rates(self) -> tuple[Places, FloatArray]:
+        """Return, for each joint velocity of Pinocchio, its index in v and its factor in G.
+
+        The index and the factor are 0 for the base's velocities.
+        """
+        index, factor = np.zeros(self._model.nv, dtype=np.int64), np.zeros(self._model.nv)
+        for place in self._places:
+            for c in range(place.sizes[1]):
+                index[place.full_v + c] = place.v + c
+                factor[place.full_v + c] = place.multiplier
+        return index, factor
+
+    def configurations(self, q: FloatArray) -> FloatArray:
+        """Return Pinocchio's configurations (n, model.nq) for q (n, nq); quaternions are normalized."""
+        if self._same_q:
+            return np.array(q)
+        full = np.zeros((len(q), self._model.nq))
+        to, of, multiplier, offset = self._single
+        full[:, to] = multiplier * q[:, of] + offset
+        to, of, multiplier, offset = self._angles
+        if len(to):
+            angles = multiplier * q[:, of] + offset
+            full[:, to], full[:, to + 1] = np.cos(angles), np.sin(angles)
+        for sizes, at, _, own, *_ in self._free:
+            if sizes == _FLOATING:
+                full[:, at : at + 7] = q[:, own : own + 7]
+                full[:, at + 3 : at + 7] /= np.linalg.norm(full[:, at + 3 : at + 7], axis=1, keepdims=True)
+            else:
+                full[:, at : at + 2] = q[:, own : own + 2]
+                full[:, at + 2], full[:, at + 3] = np.cos(q[:, own + 2]), np.sin(q[:, own + 2])
+        return full
+
+    def rates(self, v: FloatArray) -> FloatArray:
+        """Return v_full = G v, Pinocchio's joint velocities (n, model.nv) for v (n, nv)."""
+        if self._same_v:
+            return np.array(v)
+        if not self.nv:
+            return np.zeros((len(v), self._model.nv))
+        full: FloatArray = v[:, self._index] * self._factor
+        return full
+
+    def couple(self, full: FloatArray) -> FloatArray:
+        """Return J_full G without the base's columns; mimic joints' columns are added to those they mimic."""
+        if self._same_v:
+            return full
+        return coupled(full, self._columns, self._index, self._factor, self.nv)
+
+
+#: Pinocchio's name of the world, the parent of a root joint.
+WORLD = "universe"
+_PREFIXED = re.compile(r"(link|joint):(.*)", re.DOTALL)
+
+
+class Frames:
+    """An oracle's frames by name.
+
+    Args:
+        oracle: Title of the oracle.
+        robot: Name of the robot, for errors.
+        bodies: Index of the frame of each link.
+        joints: Index of the frame of each joint.
+        carriers: For the frame of each link that a joint carries: the index of the joint's frame. A frame
+            that is missing here is the frame of the link and of the joint.
+    """
+
+    def __init__(
+        self,
+        oracle: str,
+        robot: str,
+        bodies: Mapping[str, int],
+        joints: Mapping[str, int],
+        carriers: Mapping[int, int],
+    ) -> None:
+        self._oracle, self._robot = oracle, robot
+        self._bodies, self._joints, self._carriers = bodies, joints, carriers
+
+    def index(self, name: str) -> int:
+        """Return the index of the frame with a name.
+
+        Raises:
+            OracleError: no frame has this name, or a body and an unrelated joint have this name.
+        """
+        if isinstance(name, LinkFrame):
+            return self._known(self._bodies, name, str(name)[5:])
+        if isinstance(name, JointFrame):
+            return self._known(self._joints, name, str(name)[6:])
+        body, joint = self._bodies.get(name), self._joints.get(name)
+        if body is not None and joint is not None and self._carriers.get(body, body) != joint:
+            raise self._error(f"two of {self._oracle}'s frames have this name", name)
+        if body is not None:
+            return body
+        if joint is not None:
+            return joint
+        if (parts := _PREFIXED.fullmatch(name)) is None:
+            raise self._error(f"{self._oracle} has no such frame", name)
+        return self._known(self._bodies if parts[1] == "link" else self._joints, name, parts[2])
+
+    def _known(self, names: Mapping[str, int], asked: str, own: str) -> int:
+        if (index := names.get(own)) is None:
+            raise self._error(f"{self._oracle} has no such frame", asked)
+        return index
+
+    def _error(self, what: str, name: str) -> OracleError:
+        return OracleError(what, where=self._robot, found=repr(str(name)))
+
+
+def frames_of(model: Any, pin: Any, *, stands_on_world: bool) -> Frames:
+    """Return the frames of a model that Pinocchio's URDF parser returned.
+
+    Args:
+        model: The model.
+        pin: The module of Pinocchio.
+        stands_on_world: Whether the robot has a root joint. If the robot has a root joint, the world counts
+            as a link.
+    """
+    bodies, joints = dict[str, int](), dict[str, int]()
+    for index, frame in enumerate(model.frames):
+        if index:  # the first frame is the world
+            (bodies if frame.type == pin.FrameType.BODY else joints)[frame.name] = index
+    if stands_on_world:
+        bodies[WORLD] = 0
+    parents = {index: int(frame.parentFrame) for index, frame in enumerate(model.frames)}
+    return Frames("Pinocchio", str(model.name), bodies, joints, parents)
+
+
+class BaseNumbers(Protocol):
+    """Motion of the base in the user's numbers. Each array has at most one leading batch axis."""
+
+    @property
+    def placement(self) -> FloatArray:
+        """(..., 4, 4) T_world_base."""
+
+    @property
+    def velocity(self) -> FloatArray:
+        """(..., 6) velocity, [linear; angular] in world axes."""
+
+    @property
+    def acceleration(self) -> FloatArray:
+        """(..., 6) classical acceleration, [linear; angular] in world axes."""
+
+
+def free_flyer(base: BaseNumbers) -> FloatArray:
+    """Return x, y, z, qx, qy, qz, qw of the base, (..., 7)."""
+    T = np.asarray(base.placement)
+    return np.concatenate((T[..., :3, 3], nearest_quaternion(T[..., :3, :3])), axis=-1)
+
+
+def free_flyer_rates(base: BaseNumbers) -> FloatArray:
+    """Return the base's velocity in its own axes, (..., 6)."""
+    return _in_own_axes(free_flyer(base)[..., 3:], np.asarray(base.velocity))
+
+
+def free_flyer_second_rates(base: BaseNumbers) -> FloatArray:
+    """Return the base's spatial acceleration, acc - w x vel, in its own axes, (..., 6)."""
+    vel, acc = np.broadcast_arrays(base.velocity, base.acceleration)
+    linear = acc[..., :3] - np.cross(vel[..., 3:], vel[..., :3])
+    return _in_own_axes(free_flyer(base)[..., 3:], np.concatenate((linear, acc[..., 3:]), axis=-1))
+
+
+def nearest_quaternion(M: FloatArray) -> FloatArray:
+    """Return the unit quaternion (..., 4), scalar last, of the rotation nearest to M (..., 3, 3)."""
+    K = davenport(M)
+    q = np.linalg.eigh(K).eigenvectors[..., -1:]
+    # For a rotation, K + I = 4 q q^T. The product of K + I and q does not contain the parts of the other
+    # eigenvectors.
+    q = (K @ q + q)[..., 0]
+    unit: FloatArray = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    return unit
+
+
+def davenport(M: NDArray[Any]) -> NDArray[Any]:
+    """Return Davenport's matrix K (..., 4, 4) of M (..., 3, 3); for a rotation it is 4 q q^T - I."""
+    K = np.empty((*M.shape[:-2], 4, 4), dtype=M.dtype)
+    K[..., :3, :3] = M + np.swapaxes(M, -1, -2)
+    trace = np.trace(M, axis1=-2, axis2=-1)
+    for i in range(3):
+        K[..., i, i] -= trace
+        K[..., 3, i] = K[..., i, 3] = M[..., i - 1, i - 2] - M[..., i - 2, i - 1]
+    K[..., 3, 3] = trace
+    return K
+
+
+def _in_own_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
+    """Return R^T times the linear half and R^T times the angular half of a six-vector.
+
+    For a quaternion (u, w) and a half x, this is x + 2 w (x x u) + 2 (x x u) x u.
+    """
+    u, w = quaternion[..., np.newaxis, :3], quaternion[..., np.newaxis, 3:]
+    x = six.reshape(*six.shape[:-1], 2, 3)
+    aside = 2.0 * np.cross(x, u)
+    turned: FloatArray = x + w * aside + np.cross(aside, u)
+    return turned.reshape(*turned.shape[:-2], 6)
+
 
 #: Largest number of names that an error lists.
 _NAMED = 5

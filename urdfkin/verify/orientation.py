@@ -14,7 +14,7 @@ import numpy as np
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.certificate import VerificationError
-from urdfkin.verify.pinocchio_module import pinocchio
+from urdfkin.verify.pinocchio import pinocchio
 
 #: Rounding errors of urdfkin and of Pinocchio together, in eps; each is less than 8 eps. In `roundings`,
 #: these errors are counted in the same way as the errors of a joint. For angles, the operations are arctan2,

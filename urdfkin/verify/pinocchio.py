@@ -1,11 +1,15 @@
 """The oracle Pinocchio.
 
-The oracle shares no code with urdfkin's computation. The oracle reads the URDF text with Pinocchio's own
-parser. `urdfkin.verify.pinocchio_inputs` determines three things a second time from Pinocchio's model and the
-user's original numbers: the frame of a name, the joint of each number of q, and the motion of the base.
+No other module but `urdfkin.verify.adapters` imports Pinocchio. On PyPI, Pinocchio has the name `pin`. The
+PyPI project `pinocchio` is a different one: plugins for the test runner nose, in a module that is also called
+`pinocchio`. If both projects are installed, Python finds the module of the plugins first.
+
+The oracle shares no code with urdfkin's computation. The oracle reads the URDF text with
+Pinocchio's own parser. `urdfkin.verify.oracle` determines three things a second time, from Pinocchio's model
+and the user's original numbers: the frame of a name, the joint of each number of q, and the base's motion.
 
 Pinocchio's model is built without mimic joints, because Pinocchio 4.1 with mimic joints refuses four of the
-robots it ships with. `urdfkin.verify.pinocchio_inputs` reads the mimic rules from the text a second time.
+robots it ships with. `urdfkin.verify.oracle` reads the mimic rules from the text a second time.
 The rules define a matrix G and a vector g_0, with q_full = G q + g_0, v_full = G v and J = J_full G. The
 index "full" marks Pinocchio's vectors, in which mimic joints have numbers of their own.
 """
@@ -15,27 +19,95 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import islice, repeat
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from urdfkin.errors import OracleError
+from urdfkin.errors import InstallationError, OracleError, Question
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.system.processes import with_stack
-from urdfkin.verify.oracle import Oracle, QueryBatch, mimic_rules
-from urdfkin.verify.pinocchio_inputs import (
+from urdfkin.verify.oracle import (
     Layout,
+    Oracle,
+    QueryBatch,
     frames_of,
     free_flyer,
     free_flyer_rates,
     free_flyer_second_rates,
     locked_by_rules,
+    mimic_rules,
 )
-from urdfkin.verify.pinocchio_module import pinocchio, version
 
-__all__ = ["MOST_RATES", "OracleError", "PinocchioOracle", "depth_of", "version"]
+#: Supported versions; the definitions of accelerations and J-dot were tested with them.
+_MAJOR = "4"
+_WANTED = "'pin>=4,<5'"
+
+
+def pinocchio() -> Any:
+    """Return the module of Pinocchio.
+
+    Raises:
+        InstallationError: Pinocchio is not installed, has an unsupported version, or is a different project
+            of the same name.
+    """
+    try:
+        import pinocchio as found  # noqa: PLC0415  slow to import, needed for checks only
+    except ImportError as error:
+        if error.name == "pinocchio":
+            raise InstallationError("Pinocchio is not installed", remedy=f"pip install {_WANTED}") from None
+        raise InstallationError(
+            "Pinocchio cannot be imported",
+            found=str(error),
+            remedy=f"pip install --force-reinstall {_WANTED}",
+        ) from error
+    if not hasattr(found, "buildModelFromXML"):
+        raise _impostor(found)
+    if not str(found.__version__).startswith(f"{_MAJOR}."):
+        raise InstallationError(
+            f"urdfkin needs Pinocchio {_MAJOR} for its checks",
+            where=str(found.__file__),
+            found=str(found.__version__),
+            remedy=f"pip install {_WANTED}",
+        )
+    return found
+
+
+def version() -> str:
+    """Return the version of Pinocchio; "not installed" if no supported version is installed."""
+    try:
+        return str(pinocchio().__version__)
+    except InstallationError:
+        return "not installed"
+
+
+def _impostor(found: Any) -> InstallationError:
+    """Return the error for a different project with Pinocchio's name; its message states the remedy."""
+    file = found.__file__ or next(iter(found.__path__), "a folder without modules")
+    owner = _owner(Path(file))
+    cure = f"pip uninstall {owner[0]}" if owner else f"rename or remove {file}"
+    what = f"{owner[0]} {owner[1]}, another project" if owner else "a file of no installed package"
+    return InstallationError(
+        "the module `pinocchio` is not Pinocchio, the library that checks results",
+        where=str(file),
+        found=what,
+        remedy=f"Pinocchio's package is called pin: {cure}; pip install {_WANTED}",
+        question=Question.WRONG_PINOCCHIO,
+    )
+
+
+def _owner(file: Path) -> tuple[str, str] | None:
+    """Return the name and the version of the installed project that contains a file."""
+    from importlib import metadata  # noqa: PLC0415  for an error only
+
+    for project in metadata.distributions():
+        for one in project.files or ():
+            if one.name == file.name and Path(str(project.locate_file(one))) == file:
+                return project.metadata["Name"], project.version
+    return None
+
 
 #: Bytes of stack for each link. Pinocchio processes links recursively; version 4.1.0 needs less than 4 kB for
 #: each.

@@ -12,10 +12,9 @@ import numpy as np
 from urdfkin.compiled.plan import IntArray
 from urdfkin.errors import InputError
 from urdfkin.errors.validators import safe_repr
-from urdfkin.kinematics.rotation.quaternion import rotation_of
+from urdfkin.kinematics.rotation import rotation_of
 from urdfkin.model.base_motion import BaseMotion
-from urdfkin.model.configuration import neutral
-from urdfkin.model.ranges import coordinate_ranges, own_ranges
+from urdfkin.model.configuration import coordinate_ranges, neutral, own_ranges
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
 #: Range of positions of planar and floating joints, +- m.
@@ -55,15 +54,21 @@ def _uniform(
 
 
 def _sample_joint(joint: Joint, n: int, rng: np.random.Generator) -> FloatArray:
-    if joint.kind is JointKind.PLANAR:
-        return np.hstack((rng.uniform(-_RANGE, _RANGE, (n, 2)), rng.uniform(-math.pi, math.pi, (n, 1))))
-    return _sample_floating(n, rng)
+    return _SAMPLED[joint.kind](n, rng)
+
+
+def _sample_planar(n: int, rng: np.random.Generator) -> FloatArray:
+    return np.hstack((rng.uniform(-_RANGE, _RANGE, (n, 2)), rng.uniform(-math.pi, math.pi, (n, 1))))
 
 
 def _sample_floating(n: int, rng: np.random.Generator) -> FloatArray:
     quaternion = rng.standard_normal((n, 4))
     quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
     return np.hstack((rng.uniform(-_RANGE, _RANGE, (n, 3)), quaternion))
+
+
+#: The samples of a joint with several coordinates.
+_SAMPLED = {JointKind.PLANAR: _sample_planar, JointKind.FLOATING: _sample_floating}
 
 
 def special(tree: KinematicTree) -> FloatArray:

@@ -30,8 +30,8 @@ from urdfkin.errors.escape import printable
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import Joint, JointKind, KinematicTree, Mimic
 from urdfkin.system.lazy_import import installed_version
-from urdfkin.urdf.plain_xml import plain_xml
-from urdfkin.verify.pinocchio_inputs import resolved_rules
+from urdfkin.system.plain_xml import plain_xml
+from urdfkin.verify.oracle import resolved_rules
 
 if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf

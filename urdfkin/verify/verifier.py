@@ -14,7 +14,7 @@ import numpy as np
 
 from urdfkin.compiled import preload
 from urdfkin.compiled.plan import CompiledTree, IntArray
-from urdfkin.errors import RangeError, warn_caller
+from urdfkin.errors import OracleError, RangeError, warn_caller
 from urdfkin.kinematics.roundings import EPS, NOT_ZERO, of_joints
 from urdfkin.model.base_motion import STILL_STATE, BaseMotion
 from urdfkin.model.configuration import warn_of_degrees
@@ -29,8 +29,7 @@ from urdfkin.verify.certificate import Certificate, Comparison, Ledger, Verifica
 from urdfkin.verify.comparison import CHECKS, KERNELS
 from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.oracles import PINOCCHIO, OracleLibrary, OracleName, oracle_library
-from urdfkin.verify.pinocchio import OracleError, build_model
-from urdfkin.verify.pinocchio_module import pinocchio, version
+from urdfkin.verify.pinocchio import build_model, pinocchio, version
 from urdfkin.verify.quantities import QUANTITIES, Quantity
 from urdfkin.verify.replay import replay_line
 from urdfkin.verify.sampling import SAMPLE, Verify, checked_choice, draw, parts

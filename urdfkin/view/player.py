@@ -16,9 +16,9 @@ import numpy as np
 
 from urdfkin.errors.escape import markdown_text
 from urdfkin.model.tree import FloatArray
-from urdfkin.motion.frame_motion import frame_motion
-from urdfkin.motion.trajectory import Trajectory
 from urdfkin.robot import Robot
+from urdfkin.robot.frame_motion import frame_motion
+from urdfkin.robot.trajectory import Trajectory
 from urdfkin.view.plot import foot
 
 _SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")

@@ -19,10 +19,10 @@ from urdfkin.kinematics.rotation import log_rotation
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model import configuration
 from urdfkin.model.tree import FloatArray
-from urdfkin.motion.frame_motion import FrameMotion
-from urdfkin.motion.trajectory import Trajectory
 from urdfkin.robot import Robot
-from urdfkin.verify.pinocchio_module import version
+from urdfkin.robot.frame_motion import FrameMotion
+from urdfkin.robot.trajectory import Trajectory
+from urdfkin.verify.pinocchio import version
 from urdfkin.view.figure import BAD, COLOURS, label, new_figure, style
 
 if TYPE_CHECKING:

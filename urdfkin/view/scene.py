@@ -19,12 +19,11 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from urdfkin.kinematics.rotation import rotation_from_rpy
-from urdfkin.model.pose import pose
-from urdfkin.model.tree import FloatArray
+from urdfkin.model.tree import FloatArray, pose
 from urdfkin.robot import Robot
 from urdfkin.system.files import read_bytes
+from urdfkin.system.plain_xml import plain_xml
 from urdfkin.urdf.catalogue import catalogue, find_package, split_uri
-from urdfkin.urdf.plain_xml import plain_xml
 
 #: Largest size of a mesh, material or texture file in bytes; larger files are not shown.
 LARGEST_FILE = 200_000_000

@@ -19,8 +19,8 @@ from urdfkin.dh.table import DHTable
 from urdfkin.errors.escape import printable
 from urdfkin.kinematics.rotation import quaternion_of
 from urdfkin.model.tree import FloatArray, KinematicTree
-from urdfkin.motion.frame_motion import FrameMotion
 from urdfkin.robot import Robot
+from urdfkin.robot.frame_motion import FrameMotion
 from urdfkin.view.scene import GREY, Shape, corners, mesh, shapes
 
 #: The colour of each part of the acceleration and of their sum, as red, green and blue from 0 to 255.

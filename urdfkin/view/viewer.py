@@ -15,18 +15,18 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.conventions import Conversion
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import UrdfkinError
 from urdfkin.errors.escape import markdown_text, printable
 from urdfkin.model.configuration import checked, degrees_lines
 from urdfkin.model.configuration_like import Given
+from urdfkin.model.conventions import Conversion
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, Joint
-from urdfkin.motion.frame_motion import FrameMotion, frame_motion
-from urdfkin.motion.trajectory import Trajectory
 from urdfkin.robot import Robot
-from urdfkin.verify.pinocchio_module import version
+from urdfkin.robot.frame_motion import FrameMotion, frame_motion
+from urdfkin.robot.trajectory import Trajectory
+from urdfkin.verify.pinocchio import version
 from urdfkin.view.player import Player, as_png
 from urdfkin.view.scene import Shape
 from urdfkin.view.stage import (

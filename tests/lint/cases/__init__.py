@@ -3,6 +3,6 @@
 from importlib import import_module
 
 from tests.lint.cases.arm import Case
-from urdfkin.lint.pages import TOPICS
+from urdfkin.urdf.lint.pages import TOPICS
 
 CASES: list[Case] = [case for topic in TOPICS for case in import_module(f"tests.lint.cases.{topic}").CASES]

@@ -12,9 +12,9 @@ import pytest
 import urdfkin
 from urdfkin.cli.plot import PANELS as OFFERED
 from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.motion.frame_motion import FrameMotion, frame_motion
-from urdfkin.motion.trajectory import Trajectory, line
 from urdfkin.robot import Robot
+from urdfkin.robot.frame_motion import FrameMotion, frame_motion
+from urdfkin.robot.trajectory import Trajectory, line
 from urdfkin.view.figure import save
 from urdfkin.view.plot import COORDINATES, PANELS, _look, foot, sheet
 

@@ -32,11 +32,10 @@ from urdfkin.dh.snapping import rotation_angle
 from urdfkin.dh.table import Convention, DHTable
 from urdfkin.errors import InputError
 from urdfkin.model.chain import LEAST_SIZE, FrameChain
-from urdfkin.model.mechanisms.alignment import AS_WRITTEN, variables_of
+from urdfkin.model.configuration import values_within
 from urdfkin.model.mechanisms.matcher import align
-from urdfkin.model.mechanisms.mechanism import Mechanism, tolerance_of
+from urdfkin.model.mechanisms.mechanism import AS_WRITTEN, Mechanism, tolerance_of, variables_of
 from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
-from urdfkin.model.ranges import values_within
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree, is_bounded
 
 #: Default tolerance for the tip's position (metres). The tolerance is 1.5 times the error of a table in which

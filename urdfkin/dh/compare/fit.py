@@ -37,8 +37,7 @@ from urdfkin.kinematics.rotation import exp_rotation, log_rotation
 from urdfkin.kinematics.roundings import EPS, NOT_ZERO, of_a_fit
 from urdfkin.model.chain import LEAST_SIZE, FrameChain
 from urdfkin.model.path import Motion, Path
-from urdfkin.model.pose import pose
-from urdfkin.model.tree import FloatArray
+from urdfkin.model.tree import FloatArray, pose
 
 #: Names of the cells in the order of their transforms in a row. `_ROW` contains these transforms.
 CELLS = ("theta", "d", "a", "alpha", "beta")

@@ -21,11 +21,9 @@ from urdfkin.dh.compare.result import CellDifference, Fitted, Mistake, MistakeKi
 from urdfkin.dh.convert import to_convention
 from urdfkin.dh.snapping import rotation_angle
 from urdfkin.dh.table import Convention, DHRow, DHTable
-from urdfkin.kinematics.rotation import log_rotation
-from urdfkin.kinematics.rotation.matrix import polar_factor
+from urdfkin.kinematics.rotation import log_rotation, polar_factor
 from urdfkin.model.chain import FrameChain
-from urdfkin.model.pose import pose
-from urdfkin.model.tree import FloatArray
+from urdfkin.model.tree import FloatArray, pose
 
 #: Two angles with a smaller difference (rad) count as equal.
 _SAME_ANGLE = 1e-9

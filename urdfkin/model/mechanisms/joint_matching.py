@@ -37,8 +37,7 @@ from urdfkin.model.mechanisms.mechanism import (
     between,
     between_lines,
 )
-from urdfkin.model.pose import inverse
-from urdfkin.model.tree import FloatArray, JointKind
+from urdfkin.model.tree import FloatArray, JointKind, inverse
 
 Pair = tuple[Edge, Edge]
 Via = tuple[Edge | None, Edge | None]
@@ -49,7 +48,17 @@ def family(kind: JointKind) -> str:
 
     Joints of different kinds are never paired.
     """
-    return "turns" if kind.turns else kind.value
+    return _FAMILIES[kind]
+
+
+_FAMILIES = {
+    JointKind.REVOLUTE: "turns",
+    JointKind.CONTINUOUS: "turns",
+    JointKind.PRISMATIC: "prismatic",
+    JointKind.FIXED: "fixed",
+    JointKind.PLANAR: "planar",
+    JointKind.FLOATING: "floating",
+}
 
 
 class Pairing:

@@ -23,7 +23,6 @@ from dataclasses import dataclass, replace
 from itertools import chain, islice
 from typing import TypeVar
 
-from urdfkin.model.mechanisms.alignment import IDENTITY, Alignment, FramePair, Gauge, Step
 from urdfkin.model.mechanisms.joint_matching import (
     Congruence,
     Pair,
@@ -36,10 +35,15 @@ from urdfkin.model.mechanisms.joint_matching import (
     zeros,
 )
 from urdfkin.model.mechanisms.mechanism import (
+    IDENTITY,
+    Alignment,
     Edge,
+    FramePair,
+    Gauge,
     JointTransform,
     Mechanism,
     Screw,
+    Step,
     Tolerance,
     along,
     apart,
@@ -51,8 +55,7 @@ from urdfkin.model.mechanisms.mechanism import (
     turn_about,
     undoing,
 )
-from urdfkin.model.pose import inverse
-from urdfkin.model.tree import FloatArray, Joint
+from urdfkin.model.tree import FloatArray, Joint, inverse
 
 #: Number of further joints that the matcher examines if the next axis does not decide between two choices.
 AHEAD = 6

@@ -35,10 +35,17 @@ from functools import cache
 
 import numpy as np
 
-from urdfkin.kinematics.rotation.axis_angle import rotation_about
-from urdfkin.kinematics.rotation.matrix import axis_aligning
-from urdfkin.model.mechanisms.alignment import IDENTITY, Alignment, FramePair, Pair, Step, Variables
-from urdfkin.model.mechanisms.mechanism import Screw, apart
+from urdfkin.kinematics.rotation import axis_aligning, rotation_about
+from urdfkin.model.mechanisms.mechanism import (
+    IDENTITY,
+    Alignment,
+    FramePair,
+    Pair,
+    Screw,
+    Step,
+    Variables,
+    apart,
+)
 from urdfkin.model.tree import FloatArray
 
 _WHOLE = 2.0 * math.pi

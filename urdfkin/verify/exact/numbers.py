@@ -4,7 +4,7 @@ A ball is an interval: a midpoint with many digits, and a radius. Arb (python-fl
 each sum, product, quotient, root, sine and cosine contains the true value. Vectors are triples of balls.
 
 `read_exact` reads the decimals of a URDF text without rounding them to doubles. Names and order of the joints
-come from the tree. `urdfkin.lint` has already checked the text.
+come from the tree. `urdfkin.urdf.lint` has already checked the text.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from urdfkin.kinematics import equations as eq
 from urdfkin.model.recursion import IDENTITY, ZERO, Matrix, Number, Vector
 from urdfkin.model.tree import Joint, JointKind, KinematicTree, Lock
 from urdfkin.system.locks import lock_over_forks
-from urdfkin.urdf.plain_xml import plain_xml
+from urdfkin.system.plain_xml import plain_xml
 
 #: Number of digits in the accuracy study. A double has 16 digits, so fifty digits are enough to measure an
 #: error in its last digit.

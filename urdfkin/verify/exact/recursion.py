@@ -25,7 +25,7 @@ from urdfkin.verify.exact.numbers import (
     from_quaternion,
     nearest_rotation,
 )
-from urdfkin.verify.pinocchio_inputs import BaseNumbers
+from urdfkin.verify.oracle import BaseNumbers
 
 _RECURSION = Recursion(equations)
 

@@ -30,13 +30,13 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from urdfkin.errors import InputError, SourceError, UnknownNameError
-from urdfkin.lint.pages import find_rules
-from urdfkin.lint.rules.bodies import MESH_MISSING
-from urdfkin.lint.runner import Examined, file_of
 from urdfkin.system.files import exists, is_folder, read_text
 from urdfkin.system.git import Version
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import Finding, Severity
+from urdfkin.urdf.lint.pages import find_rules
+from urdfkin.urdf.lint.rules.bodies import MESH_MISSING
+from urdfkin.urdf.lint.runner import Examined, file_of
 from urdfkin.urdf.sources import Text, as_word, is_xacro
 
 #: Version of the file format; the version changes when a field is removed or changes its meaning.

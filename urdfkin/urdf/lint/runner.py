@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from urdfkin.errors.validators import as_bool, as_str
-from urdfkin.lint.pages import CODES
-from urdfkin.lint.rules.bodies import check_inertials, check_materials, check_meshes, check_shapes
-from urdfkin.lint.rules.dialect import (
+from urdfkin.urdf.findings import Finding, Findings, Reporter
+from urdfkin.urdf.lint.pages import CODES
+from urdfkin.urdf.lint.rules.bodies import check_inertials, check_materials, check_meshes, check_shapes
+from urdfkin.urdf.lint.rules.dialect import (
     check_dialect,
     check_names,
     check_prefixes,
@@ -20,8 +21,13 @@ from urdfkin.lint.rules.dialect import (
     check_vocabulary,
     read_comments,
 )
-from urdfkin.lint.rules.joints import check_axes, check_mimic, check_ranges, check_structure, check_suspicious
-from urdfkin.urdf.findings import Finding, Findings, Reporter
+from urdfkin.urdf.lint.rules.joints import (
+    check_axes,
+    check_mimic,
+    check_ranges,
+    check_structure,
+    check_suspicious,
+)
 from urdfkin.urdf.parser import read_document, read_robot
 from urdfkin.urdf.records import DEFAULT_LIMITS, Limits, RobotRecord
 from urdfkin.urdf.sources import Source, Text, read_source

@@ -18,8 +18,8 @@ from urdfkin.errors.validators import as_str
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.motion.trajectory import Trajectory
 from urdfkin.robot import Robot
+from urdfkin.robot.trajectory import Trajectory
 from urdfkin.verify.bounds import movable, result_k
 from urdfkin.verify.call import Call
 from urdfkin.verify.comparison import worst_of_each

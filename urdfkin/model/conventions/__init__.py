@@ -1,13 +1,11 @@
 """Conventions of other programs: joint order, quaternions, row order, base velocities, units and zeros."""
 
-from urdfkin.conventions.convention import BUILT_IN, Convention, JointRule, as_toml, find_convention
-from urdfkin.conventions.conversion import Conversion, Reordering, reordering
-from urdfkin.conventions.robot import ConventionRobot
+from urdfkin.model.conventions.convention import BUILT_IN, Convention, JointRule, as_toml, find_convention
+from urdfkin.model.conventions.conversion import Conversion, Reordering, reordering
 
 __all__ = [
     "BUILT_IN",
     "Convention",
-    "ConventionRobot",
     "Conversion",
     "JointRule",
     "Reordering",

@@ -498,7 +498,7 @@ class _MimicChecker:
 
     def check_range(self, joint: JointRecord, mimic: MimicRecord, limit: LimitRecord) -> None:
         """Check that the limits of a mimic joint allow the full range of the mimicked joint."""
-        from urdfkin.model.ranges import kept_range, range_words  # noqa: PLC0415  most files need no numpy
+        from urdfkin.model.configuration import kept_range, range_words  # noqa: PLC0415  most files need no numpy
         from urdfkin.model.tree import Limit  # noqa: PLC0415
 
         rule, leader = self.resolved(mimic)

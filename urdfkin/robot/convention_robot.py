@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
-from urdfkin.conventions.conversion import Conversion
 from urdfkin.errors.escape import log_line
+from urdfkin.model.conventions.conversion import Conversion
 from urdfkin.model.tree import FloatArray
 
 if TYPE_CHECKING:

@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.compiled.batch import in_parts
 from urdfkin.compiled.plan import CompiledTree, compile_tree
 from urdfkin.compiled.prepared import PreparedFrame
 from urdfkin.errors import InputError, RangeError, RepresentationSingularityError
@@ -36,16 +35,15 @@ from urdfkin.errors.validators import (
 )
 from urdfkin.export import QUANTITIES as EXPORTED
 from urdfkin.kinematics.inputs import scalars, vectors
-from urdfkin.kinematics.rotation.euler import NEAREST
+from urdfkin.kinematics.rotation import NEAREST
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model import configuration, integration
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.configuration_like import Given, listed
-from urdfkin.model.frame_names import FrameName, LinkFrame
 from urdfkin.model.reference import Reference
 from urdfkin.model.summary import Joints, described
-from urdfkin.model.tree import FloatArray, KinematicTree, with_locks
+from urdfkin.model.tree import FloatArray, FrameName, KinematicTree, LinkFrame, with_locks
 from urdfkin.system.lazy_import import hook
 from urdfkin.system.locks import importing
 from urdfkin.urdf.findings import Finding, Findings
@@ -71,11 +69,12 @@ from urdfkin.verify.verifier import Verifier
 
 if TYPE_CHECKING:
     from urdfkin.compiled.breakdown import AccelerationBreakdown
-    from urdfkin.conventions import Convention, ConventionRobot, Conversion
     from urdfkin.dh.screws import ProductOfExponentials
     from urdfkin.dh.table import DHTable
     from urdfkin.dh.tree_parameters import TreeParameters
     from urdfkin.export.compiled_frame import CompiledFrame
+    from urdfkin.model.conventions import Convention, Conversion
+    from urdfkin.robot.convention_robot import ConventionRobot
     from urdfkin.verify.exact.enclosure import Enclosures
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
@@ -186,7 +185,7 @@ class Robot(Displayable):
 
     def _sheet(self) -> TextDocument:
         with importing:
-            from urdfkin.urdf.plain_xml import order_words  # noqa: PLC0415
+            from urdfkin.system.plain_xml import order_words  # noqa: PLC0415
 
         order = order_words(self.urdf, self.joint_names)
         return described(self.tree, self.base_frame, self.tip_frame, order)
@@ -656,7 +655,7 @@ class Robot(Displayable):
         (12,)
         """
         with importing:
-            from urdfkin.conventions import Conversion, find_convention  # noqa: PLC0415  nothing is paid without one
+            from urdfkin.model.conventions import Conversion, find_convention  # noqa: PLC0415  nothing is paid without one
 
         return Conversion(self.tree, self.urdf, find_convention(name), joints)
 
@@ -673,7 +672,7 @@ class Robot(Displayable):
         [0.0, 0.0, 1.0, 0.0, 0.9, 0.0]
         """
         with importing:
-            from urdfkin.conventions import ConventionRobot  # noqa: PLC0415
+            from urdfkin.robot.convention_robot import ConventionRobot  # noqa: PLC0415
 
         return ConventionRobot(self, self.convention(name, joints))
 
@@ -1125,6 +1124,9 @@ class Robot(Displayable):
                     J[part] = ANALYTICAL_JACOBIAN.compute(representation, Rs[part], Js_v[part], nearest)
             except RepresentationSingularityError as error:
                 near.append((error.distance, part.start + error.sample[0]))
+
+        with importing:
+            from urdfkin.compiled.evaluate import in_parts  # noqa: PLC0415  few calls need this import
 
         in_parts(compute, call.n, threads)
         if near:

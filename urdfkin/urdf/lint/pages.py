@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 
 from urdfkin.errors import Question, UnknownNameError
 from urdfkin.errors.escape import printable
-from urdfkin.lint.rules import bodies, dialect, joints, left_out
 from urdfkin.urdf import parser
 from urdfkin.urdf.findings import Rule
+from urdfkin.urdf.lint.rules import bodies, dialect, joints, left_out
 
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable

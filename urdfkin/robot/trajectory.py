@@ -34,7 +34,7 @@ from urdfkin.errors import InputError, SourceError
 from urdfkin.errors.numbers import UNITS, in_radians, parse_float, parse_quantity, remedy
 from urdfkin.errors.validators import real_number, whole_number
 from urdfkin.kinematics.inputs import FloatArray, scalars
-from urdfkin.kinematics.rotation.quaternion import angular_velocity_from_quaternion_rates, rotation_of
+from urdfkin.kinematics.rotation import angular_velocity_from_quaternion_rates, rotation_of
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.configuration import checked, places
 from urdfkin.model.configuration_like import Given, listed, wrong_count
@@ -43,7 +43,7 @@ from urdfkin.model.tree import Joint, JointKind, KinematicTree, frozen
 from urdfkin.system.files import MOST_DATA, read_bytes, read_text
 
 if TYPE_CHECKING:
-    from urdfkin.conventions import Convention, Conversion
+    from urdfkin.model.conventions import Convention, Conversion
     from urdfkin.robot import Robot
 
 
@@ -439,6 +439,8 @@ def _rates(tree: KinematicTree, q: FloatArray, t: FloatArray) -> FloatArray:
             R = rotation_of(quaternion)
             v[:, to : to + 3] = (R.swapaxes(-1, -2) @ slopes[:, at : at + 3, np.newaxis])[..., 0]
             v[:, to + 3 : to + 6] = angular_velocity_from_quaternion_rates(quaternion, rates, "body")
+        elif joint.nv:
+            raise NotImplementedError(f"the velocity of a {joint.kind} joint from its coordinates")
     return v
 
 

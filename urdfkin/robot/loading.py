@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack, cast
 from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError
-from urdfkin.lint.rules.joints import MIMIC_CONTINUOUS, tilts
-from urdfkin.lint.rules.left_out import left_out
-from urdfkin.lint.runner import read_urdf
 from urdfkin.model.tree import with_poses, with_tilts
 from urdfkin.robot import Robot
 from urdfkin.system.files import at_home, read_bytes
 from urdfkin.urdf.findings import Finding, PinocchioReading, Reporter, Severity, UrdfError, UrdfWarning
+from urdfkin.urdf.lint.rules.joints import MIMIC_CONTINUOUS, tilts
+from urdfkin.urdf.lint.rules.left_out import left_out
+from urdfkin.urdf.lint.runner import read_urdf
 from urdfkin.urdf.parser import NEWER_VERSION
 from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.sources import Origin, Source, Text, as_word, entry_of, is_urdf_path, read_source

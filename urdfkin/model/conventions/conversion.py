@@ -17,14 +17,14 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from urdfkin.conventions.convention import Convention, JointRule, spelled
 from urdfkin.errors import InputError, Question, UnknownNameError
 from urdfkin.kinematics.inputs import scalars
-from urdfkin.kinematics.rotation.quaternion import NORM_TOLERANCE, rotation_of
+from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_of
 from urdfkin.model import configuration
 from urdfkin.model.configuration_like import CoordinateLayout, Given
+from urdfkin.model.conventions.convention import Convention, JointRule, spelled
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
-from urdfkin.urdf.plain_xml import plain_xml
+from urdfkin.system.plain_xml import plain_xml
 
 #: Largest allowed difference (rad or m) between a mimic joint's given value and the value from its mimic
 #: rule.
@@ -232,8 +232,10 @@ class Conversion:
         elif joint.kind is JointKind.PLANAR:
             self._refuse_rule(joint)
             self._add_planar(i, name, q, v)
-        else:
+        elif joint.kind.has_axis:
             self._add_axis(joint, rule, name, q, v)
+        else:
+            raise NotImplementedError(f"a {joint.kind} joint in another convention")
         return name
 
     def _refuse_rule(self, joint: Joint) -> None:
@@ -633,6 +635,7 @@ class Conversion:
             B[..., 1, 0], B[..., 0, 1] = np.sin(angle), -np.sin(angle)
             B[..., 2, 2] = unit
             return B
+        assert block.joint.kind is JointKind.FLOATING
         R = rotation_of(q[..., block.q + 3 : block.q + 7])
         A = R if how.linear == "parent" else np.broadcast_to(np.eye(3), R.shape)
         turn = R if how.angular == "parent" else np.eye(3)
@@ -647,6 +650,7 @@ class Conversion:
             B[..., 0, 0] = B[..., 1, 1] = -np.sin(angle) * w
             B[..., 1, 0], B[..., 0, 1] = np.cos(angle) * w, -np.cos(angle) * w
             return B
+        assert block.joint.kind is JointKind.FLOATING
         R = rotation_of(q[..., block.q + 3 : block.q + 7]) @ _cross(v[..., 3:])
         A = R if how.linear == "parent" else np.zeros_like(R)
         turn = R if how.angular == "parent" else np.zeros_like(R)

@@ -3,8 +3,8 @@
 urdfkin checks every URDF before it uses it.
 """
 
-from urdfkin.lint.runner import check, check_text
 from urdfkin.urdf.findings import Finding, PinocchioReading, Severity, UrdfError, UrdfWarning
+from urdfkin.urdf.lint.runner import check, check_text
 from urdfkin.urdf.records import DEFAULT_LIMITS, Limits
 
 __all__ = [

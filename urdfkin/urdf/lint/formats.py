@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from urdfkin.lint.pages import RULES, page
 from urdfkin.urdf.findings import Finding, Fix, Rule, Severity
+from urdfkin.urdf.lint.pages import RULES, page
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 

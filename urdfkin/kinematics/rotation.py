@@ -1,0 +1,1054 @@
+"""Rotations of rigid bodies, and the time derivatives of rotation matrices, quaternions and Euler angles.
+
+| Functions | Section and equations of the textbook |
+|---|---|
+| `skew`, `unskew`, `rotate_skew` | 7.2: 7.16, 7.31, 7.46; appendix A |
+| `rotation_about`, `axis_angle_of` and others: an axis and an angle | 7.2.1: 7.18 to 7.34 |
+| `rotation_rate`, `angular_velocity_of`, `turning_vector_rate` | 7.2.2: 7.35 to 7.42 |
+| `add_angular_velocities` | 7.2.3: 7.43 to 7.50 |
+| `euler_of`, `euler_rates` and others: Euler angles | 7.2.4: 7.51 to 7.56 |
+| `quaternion_of`, `quaternion_rates` and others: unit quaternions | 7.2.5: 7.57 |
+| `axis_aligning` | 7.4 |
+
+Every function accepts any leading batch shape. `w_0_1` is the angular velocity of frame 1 relative to
+frame 0.
+
+A user's matrix often has only a few digits, so its columns are only approximately orthogonal. Such a matrix
+can be converted to a rotation by a quaternion, by angles or column by column. The results differ in the last
+digit of the given matrix. `nearest_rotation` and `polar_factor` return the rotation that is nearest to the
+matrix in the Frobenius norm. This rotation is unique: it is the orthogonal factor U of the polar
+decomposition M = U H.
+
+The textbook's joint i turns about the axis z_{i-1} of a frame. A URDF joint turns about any axis of its
+frame. `axis_aligning` returns the rotation between the two frames.
+
+A *rotation vector* is the unit axis times the angle.
+
+A quaternion is (qx, qy, qz, qw), with the scalar last as in a configuration; qw is the textbook's q0. A
+quaternion and its negative are the same rotation. For its rates, the angular velocity is expressed in the
+fixed frame 0, as in the textbook (`frame="fixed"`), or in the frame of the turning body (`frame="body"`).
+Quaternion rates have no singularity. `integrate_orientation` integrates the rates of a quaternion and
+normalises the quaternion after each step. It does not integrate the angular velocity itself, because that
+integral is not an orientation (example 7.3).
+
+Euler angles have 24 sequences, with SciPy's names. Capital letters are axes that turn with the body: "ZYZ" is
+the textbook's R = Rz Ry Rz. Small letters are fixed axes: "xyz" is the URDF's rpy (roll, pitch, yaw). Their
+angular velocities are expressed in the fixed frame 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from urdfkin.errors import InputError, RepresentationSingularityError, UnknownNameError
+from urdfkin.errors.validators import as_str
+from urdfkin.kinematics.inputs import FloatArray, matrices, rotations, scalars, unit_vectors, vectors
+
+
+def skew(w: ArrayLike) -> FloatArray:
+    """Return S(w), the skew-symmetric matrix with S(w) p = w x p (7.16).
+
+    Args:
+        w: (..., 3), any unit, any frame.
+
+    Returns:
+        (..., 3, 3), in the unit and frame of `w`.
+
+    Raises:
+        InputError: `w` is not (..., 3) or not finite.
+
+    Example:
+        >>> skew([0.0, 0.0, 1.0]) + 0.0
+        array([[ 0., -1.,  0.],
+               [ 1.,  0.,  0.],
+               [ 0.,  0.,  0.]])
+    """
+    w = vectors(w, "w")
+    S = np.zeros((*w.shape, 3))
+    S[..., 2, 1], S[..., 0, 2], S[..., 1, 0] = w[..., 0], w[..., 1], w[..., 2]
+    S[..., 1, 2], S[..., 2, 0], S[..., 0, 1] = -w[..., 0], -w[..., 1], -w[..., 2]
+    return S
+
+
+def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
+    """Return the vector w of a skew-symmetric matrix S = S(w), the inverse of `skew`.
+
+    A computed S has a small symmetric part, caused by rounding. The function removes this part: each
+    component of w is the mean of two entries, S_ij and -S_ji.
+
+    Args:
+        S: (..., 3, 3).
+        tolerance: Largest allowed entry of the symmetric part, relative to the largest entry of S.
+
+    Returns:
+        (..., 3), in the unit and frame of `S`.
+
+    Raises:
+        InputError: `S` is not (..., 3, 3), not finite, or not skew-symmetric (7.26, 7.37).
+
+    Example:
+        >>> unskew(skew([1.0, 2.0, 3.0]))
+        array([1., 2., 3.])
+    """
+    S = matrices(S, "S")
+    size = np.abs(S).max(axis=(-1, -2), initial=0.0)
+    symmetric = np.abs(S + S.swapaxes(-1, -2)).max(axis=(-1, -2), initial=0.0) / 2.0
+    if (symmetric > tolerance * size).any():
+        raise InputError(
+            "S must be skew-symmetric, S + S^T = 0", found=f"a symmetric part of {symmetric.max():.3g}"
+        )
+    pairs = (S[..., 2, 1] - S[..., 1, 2], S[..., 0, 2] - S[..., 2, 0], S[..., 1, 0] - S[..., 0, 1])
+    return np.stack(pairs, axis=-1) / 2.0
+
+
+def rotate_skew(R_0_1: ArrayLike, S_1: ArrayLike) -> FloatArray:
+    """Return R S(w) R^T = S(R w), a skew-symmetric matrix expressed in another frame (7.46).
+
+    Args:
+        R_0_1: (..., 3, 3) orientation of frame 1 in frame 0.
+        S_1: (..., 3, 3) skew-symmetric matrix of a vector in frame 1.
+
+    Returns:
+        (..., 3, 3) skew-symmetric matrix of the same vector in frame 0.
+
+    Raises:
+        InputError: a wrong shape, or `R_0_1` is not a rotation.
+    """
+    R_0_1 = rotations(R_0_1, "R_0_1")
+    return R_0_1 @ matrices(S_1, "S_1") @ R_0_1.swapaxes(-1, -2)
+
+
+#: If no entry of a matrix differs from that of the nearest rotation by more than this number, the matrix is a
+#: rotation up to rounding and is not changed.
+ROUNDED = 1e-15
+
+
+def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
+    """Return the rotation that is nearest to a matrix M, up to rounding.
+
+    The method is one Newton step (Bjorck and Bowie): M - M (M^T M - I)/2. With M = U (I + E) the result is U
+    (I - 3/2 E^2). Here |E| is 3e-9 at most, so the error of the result is 1.4e-17 at most, an eighth of a
+    rounding error.
+
+    Args:
+        M: (..., 3, 3), a rotation whose entries are rounded to nine decimals.
+        name: Name of the argument, for messages.
+
+    Returns:
+        (..., 3, 3).
+
+    Raises:
+        InputError: a wrong shape, or `M` is not a rotation.
+    """
+    M = rotations(M, name)
+    defect = np.swapaxes(M, -1, -2) @ M - np.eye(3)
+    nearest: FloatArray = M - M @ (0.5 * defect)
+    return nearest
+
+
+def polar_factor(M: FloatArray) -> FloatArray:
+    """Return the rotation nearest to a matrix that has larger errors than `nearest_rotation` allows.
+
+    An example is a matrix that is printed with few digits.
+
+    Args:
+        M: (3, 3) matrix with a positive determinant.
+
+    Example:
+        >>> polar_factor(np.diag([1.0, 1.001, 0.999])).tolist()
+        [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    """
+    U, _, Vt = np.linalg.svd(M)
+    return np.asarray(U @ Vt)
+
+
+def axis_aligning(axis: ArrayLike) -> FloatArray:
+    """Return a rotation with `axis` as its third column.
+
+    If the axis does not point down (its z component is not negative), the result is the shortest rotation
+    from z to the axis. If the axis points down, the result is half a turn about x, followed by the shortest
+    rotation from -z to the axis. The computation therefore has no singularity near any axis (Duff and others,
+    "Building an Orthonormal Basis, Revisited", 2017). For a coordinate axis the entries are exactly 0 and
+    +-1.
+
+    Args:
+        axis: (..., 3) unit axis.
+
+    Returns:
+        (..., 3, 3) rotation; the identity for the axis z.
+
+    Raises:
+        InputError: a wrong shape, or an axis that is not of unit length.
+
+    Example:
+        >>> axis_aligning([1.0, 0.0, 0.0])
+        array([[ 0.,  0.,  1.],
+               [ 0.,  1.,  0.],
+               [-1.,  0.,  0.]])
+    """
+    axis = unit_vectors(axis, "axis")
+    x, y, z = np.moveaxis(axis, -1, 0)
+    sign = np.copysign(1.0, z)
+    scale = -1.0 / (sign + z)
+    first = (1.0 + sign * x * x * scale, sign * x * y * scale, -sign * x)
+    second = (x * y * scale, sign + y * y * scale, -y)
+    columns = [np.stack(column, axis=-1) for column in (first, second)]
+    # Adding zero turns -0 into 0, so that printed matrices are easier to read.
+    return np.stack([*columns, axis], axis=-1) + 0.0
+
+
+def rotation_rate(R_0_1: ArrayLike, w_0_1: ArrayLike) -> FloatArray:
+    """Return the time derivative R-dot = S(w) R of a rotation matrix (7.38, 7.42).
+
+    Args:
+        R_0_1: (..., 3, 3) orientation of frame 1 in frame 0.
+        w_0_1: (..., 3) angular velocity of frame 1, rad/s, expressed in frame 0.
+
+    Returns:
+        (..., 3, 3) time derivative of `R_0_1`, 1/s.
+
+    Raises:
+        InputError: a wrong shape, or `R_0_1` is not a rotation.
+    """
+    return skew(vectors(w_0_1, "w_0_1")) @ rotations(R_0_1, "R_0_1")
+
+
+def angular_velocity_of(R_0_1: ArrayLike, R_rate: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
+    """Return the angular velocity w, for which S(w) = R-dot R^T (7.38).
+
+    Equations 7.35 to 7.37 show that such a w exists.
+
+    Args:
+        R_0_1: (..., 3, 3) orientation of frame 1 in frame 0.
+        R_rate: (..., 3, 3) time derivative of `R_0_1`, 1/s.
+        tolerance: Largest allowed entry of the symmetric part of R-dot R^T, relative to the largest entry of
+            R-dot R^T.
+
+    Returns:
+        (..., 3) angular velocity of frame 1, rad/s, expressed in frame 0.
+
+    Raises:
+        InputError: a wrong shape, `R_0_1` is not a rotation, or `R_rate` is not the rate of a rotation.
+
+    Example:
+        >>> R = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+        >>> angular_velocity_of(R, rotation_rate(R, [1.0, 2.0, 3.0]))
+        array([1., 2., 3.])
+    """
+    R_0_1 = rotations(R_0_1, "R_0_1")
+    return unskew(matrices(R_rate, "R_rate") @ R_0_1.swapaxes(-1, -2), tolerance)
+
+
+def turning_vector_rate(w_0_1: ArrayLike, p_0: ArrayLike) -> FloatArray:
+    """Return the time derivative w x p of a vector p that is fixed in a turning frame (7.39 to 7.41).
+
+    Args:
+        w_0_1: (..., 3) angular velocity of the frame, rad/s, expressed in frame 0.
+        p_0: (..., 3) vector, metres, expressed in frame 0.
+
+    Returns:
+        (..., 3) time derivative of the vector in frame 0, m/s.
+
+    Raises:
+        InputError: a wrong shape, or a value that is not finite.
+    """
+    return np.cross(vectors(w_0_1, "w_0_1"), vectors(p_0, "p_0"))
+
+
+def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
+    """Return the angular velocity w_0n of the last frame (7.43 to 7.50).
+
+    It is the sum of the angular velocities of each frame relative to the previous frame, after each is
+    expressed in frame 0.
+
+    Args:
+        Rs: (..., n, 3, 3); entry i is the orientation of frame i + 1 in frame i.
+        ws: (..., n, 3); entry i is the angular velocity of frame i + 1 relative to frame i, rad/s, expressed
+            in frame i.
+
+    Returns:
+        (..., 3) angular velocity of frame n relative to frame 0, rad/s, expressed in frame 0.
+
+    Raises:
+        InputError: a wrong shape, different numbers n in `Rs` and `ws`, or a matrix that is not a rotation.
+    """
+    Rs, ws = rotations(Rs, "Rs"), vectors(ws, "ws")
+    if Rs.ndim < 3 or ws.ndim < 2 or Rs.shape[-3] != ws.shape[-2]:
+        raise InputError(
+            "Rs (..., n, 3, 3) and ws (..., n, 3) must have the same n",
+            found=f"{Rs.shape} and {ws.shape}",
+        )
+    batch = np.broadcast_shapes(Rs.shape[:-3], ws.shape[:-2])
+    total, R_0_i = np.zeros((*batch, 3)), np.broadcast_to(np.eye(3), (*batch, 3, 3))
+    for i in range(ws.shape[-2]):
+        total = total + (R_0_i @ ws[..., i, :, np.newaxis])[..., 0]
+        R_0_i = R_0_i @ Rs[..., i, :, :]
+    return total
+
+
+#: Largest accepted deviation of a quaternion's norm from 1.
+NORM_TOLERANCE = 1e-6
+
+
+def unit_quaternions(value: ArrayLike, name: str = "quat") -> FloatArray:
+    """Return `value` as quaternions (..., 4) that are normalised to unit length, up to rounding.
+
+    Args:
+        value: (..., 4), scalar last.
+        name: Name of the argument, for messages.
+
+    Returns:
+        (..., 4) of unit length.
+
+    Raises:
+        InputError: a wrong shape, or a norm that differs from 1 by more than 1e-6.
+    """
+    quat = vectors(value, name, 4)
+    norms = np.sqrt((quat * quat).sum(axis=-1, keepdims=True))
+    if (np.abs(norms - 1.0) > NORM_TOLERANCE).any():
+        worst = norms.flat[np.abs(norms - 1.0).argmax()]
+        raise InputError(f"{name} must be a unit quaternion", found=f"norm {worst:.9g}")
+    normalised: FloatArray = quat / norms
+    return normalised
+
+
+def rotation_of(quat: ArrayLike) -> FloatArray:
+    """Return R = (q0^2 - q.q) I + 2 q q^T + 2 q0 S(q), the rotation of a unit quaternion.
+
+    Args:
+        quat: (..., 4), scalar last.
+
+    Returns:
+        (..., 3, 3) rotation.
+
+    Raises:
+        InputError: a wrong shape, or a quaternion that is not of unit length.
+    """
+    x, y, z, w = np.moveaxis(unit_quaternions(quat), -1, 0)
+    rows = (
+        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)),
+        (2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)),
+        (2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)),
+    )
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def quaternion_of(R: ArrayLike) -> FloatArray:
+    """Return the unit quaternion with qw >= 0 of a rotation.
+
+    The function uses Shepperd's method: it divides by the component with the largest absolute value, which
+    avoids cancellation.
+
+    Args:
+        R: (..., 3, 3) rotation.
+
+    Returns:
+        (..., 4), scalar last.
+
+    Raises:
+        InputError: a wrong shape, or `R` is not a rotation.
+    """
+    R = rotations(R, "R")
+    # K = 4 q q^T is linear in R. The row of K with the largest diagonal entry gives q without cancellation.
+    K = np.empty((*R.shape[:-2], 4, 4))
+    trace = R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2]
+    K[..., 3, 3] = 1.0 + trace
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        K[..., i, i] = 1.0 + 2.0 * R[..., i, i] - trace
+        K[..., i, j] = K[..., j, i] = R[..., i, j] + R[..., j, i]
+        K[..., i, 3] = K[..., 3, i] = R[..., k, j] - R[..., j, k]
+    largest = np.diagonal(K, axis1=-2, axis2=-1).argmax(axis=-1)
+    row = np.take_along_axis(K, largest[..., np.newaxis, np.newaxis], axis=-2)[..., 0, :]
+    quat: FloatArray = row / np.sqrt((row * row).sum(axis=-1, keepdims=True))
+    return np.where(quat[..., 3:] < 0.0, -quat, quat)
+
+
+def multiply(left: ArrayLike, right: ArrayLike) -> FloatArray:
+    """Return the product of two quaternions, with R(left right) = R(left) R(right).
+
+    Args:
+        left: (..., 4), scalar last; any length.
+        right: (..., 4), scalar last; any length.
+
+    Returns:
+        (..., 4), scalar last.
+
+    Raises:
+        InputError: a wrong shape.
+    """
+    left, right = vectors(left, "left", 4), vectors(right, "right", 4)
+    p, p0, q, q0 = left[..., :3], left[..., 3:], right[..., :3], right[..., 3:]
+    scalar = p0 * q0 - (p * q).sum(axis=-1, keepdims=True)
+    return np.concatenate((p0 * q + q0 * p + np.cross(p, q), scalar), axis=-1)
+
+
+def conjugate(quat: ArrayLike) -> FloatArray:
+    """Return the conjugate (-q, q0), the inverse rotation of a unit quaternion.
+
+    Args:
+        quat: (..., 4), scalar last.
+
+    Returns:
+        (..., 4), scalar last.
+
+    Raises:
+        InputError: a wrong shape.
+    """
+    conjugated: FloatArray = vectors(quat, "quat", 4) * np.array([-1.0, -1.0, -1.0, 1.0])
+    return conjugated
+
+
+ExpressedIn = Literal["fixed", "body"]
+
+
+def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> FloatArray:
+    """Return the matrix E in (q-dot, q0-dot) = E w (7.57).
+
+    For w in the fixed frame, E = 1/2 [q0 I - S(q); -q^T]. For w in the body's frame, the sign of S(q)
+    changes. The columns of E have length 1/2. They are perpendicular to each other and to the quaternion, so
+    the quaternion's length is constant.
+
+    Args:
+        quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
+        frame: Frame of `w`: "fixed" or "body".
+
+    Returns:
+        (..., 4, 3), dimensionless.
+
+    Raises:
+        InputError: a wrong shape, a quaternion that is not of unit length, or an unknown `frame`.
+    """
+    if frame not in ("fixed", "body"):
+        raise InputError("frame must be 'fixed' or 'body'", found=repr(frame))
+    quat = unit_quaternions(quat)
+    q, q0 = quat[..., :3], quat[..., 3]
+    turn = -skew(q) if frame == "fixed" else skew(q)
+    top = turn + q0[..., np.newaxis, np.newaxis] * np.eye(3)
+    E: FloatArray = 0.5 * np.concatenate((top, -q[..., np.newaxis, :]), axis=-2)
+    return E
+
+
+def quaternion_rates(quat: ArrayLike, w: ArrayLike, frame: ExpressedIn = "fixed") -> FloatArray:
+    """Return the time derivative of a body's quaternion from the body's angular velocity w (7.57).
+
+    Args:
+        quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
+        w: (..., 3) angular velocity of the body, rad/s.
+        frame: Frame of `w`: "fixed" is frame 0, "body" the body's own.
+
+    Returns:
+        (..., 4) rates, 1/s, scalar last.
+
+    Raises:
+        InputError: a wrong shape, a quaternion that is not of unit length, or an unknown `frame`.
+
+    Example:
+        >>> quaternion_rates([0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 2.0]) + 0.0
+        array([0., 0., 1., 0.])
+    """
+    return (quaternion_rate_matrix(quat, frame) @ vectors(w, "w")[..., np.newaxis])[..., 0]
+
+
+def angular_velocity_from_quaternion_rates(
+    quat: ArrayLike, rates: ArrayLike, frame: ExpressedIn = "fixed"
+) -> FloatArray:
+    """Return the angular velocity w = 4 E^T (q-dot, q0-dot), the inverse of 7.57.
+
+    The component of the rates along the quaternion changes only the quaternion's length. No rotation causes
+    this component, so the function ignores it.
+
+    Args:
+        quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
+        rates: (..., 4) rates of `quat`, 1/s, scalar last.
+        frame: Frame of the result: "fixed" is frame 0, "body" the body's own.
+
+    Returns:
+        (..., 3) angular velocity of the body, rad/s.
+
+    Raises:
+        InputError: a wrong shape, a quaternion that is not of unit length, or an unknown `frame`.
+    """
+    E = quaternion_rate_matrix(quat, frame)
+    w: FloatArray = 4.0 * (E.swapaxes(-1, -2) @ vectors(rates, "rates", 4)[..., np.newaxis])[..., 0]
+    return w
+
+
+def integrate_orientation(
+    w: Callable[[float], ArrayLike], quat: ArrayLike, times: ArrayLike, frame: ExpressedIn = "fixed"
+) -> FloatArray:
+    """Integrate 7.57 with an angular velocity w(t), by the fourth-order Runge-Kutta method.
+
+    The results are orientations as quaternions.
+
+    The exact quaternion has constant length. Rounding and truncation errors change the length, so the
+    quaternion is normalised after each step. If the step is halved, the truncation error is divided by about
+    16.
+
+    Args:
+        w: Function of the time in s that returns the angular velocity, (..., 3) rad/s. It must be smooth
+            within a step, so add a time to `times` at each jump. At the two ends of a step, w is evaluated
+            just inside the step.
+        quat: (..., 4) orientation at `times[0]`, unit quaternion, scalar last.
+        times: (n,) increasing times in s; the method makes one step from each time to the next.
+        frame: Frame of w: "fixed" is frame 0, "body" the body's own.
+
+    Returns:
+        (n, ..., 4) unit quaternions, scalar last.
+
+    Raises:
+        InputError: a wrong shape, or times that do not increase.
+    """
+    times = scalars(times, "times")
+    if times.ndim != 1 or (np.diff(times) <= 0.0).any():
+        raise InputError(
+            "times must be a one-dimensional array of increasing numbers", found=str(times.shape)
+        )
+    quats = [unit_quaternions(quat)]
+    for start, end in pairwise(times.tolist()):
+        quats.append(_step(w, quats[-1], start, end, frame))
+    return np.stack(quats)
+
+
+def _step(
+    w: Callable[[float], ArrayLike], quat: FloatArray, start: float, end: float, frame: ExpressedIn
+) -> FloatArray:
+    """Return the normalised quaternion after one Runge-Kutta step."""
+    step = end - start
+    first, middle, last = (
+        vectors(w(t), "w") for t in (np.nextafter(start, end), (start + end) / 2.0, np.nextafter(end, start))
+    )
+    k1 = _rates(quat, first, frame)
+    k2 = _rates(quat + step / 2.0 * k1, middle, frame)
+    k3 = _rates(quat + step / 2.0 * k2, middle, frame)
+    k4 = _rates(quat + step * k3, last, frame)
+    stepped = quat + step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+    normalised: FloatArray = stepped / np.sqrt((stepped * stepped).sum(axis=-1, keepdims=True))
+    return normalised
+
+
+def _rates(quat: FloatArray, w: FloatArray, frame: ExpressedIn) -> FloatArray:
+    """Return the rates of a quaternion of any length.
+
+    Equation 7.57 is linear in the quaternion, so it needs no unit quaternion.
+    """
+    length = np.sqrt((quat * quat).sum(axis=-1, keepdims=True))
+    rates: FloatArray = length * quaternion_rates(quat / length, w, frame)
+    return rates
+
+
+def rotation_about(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
+    """Return R_k(phi) = I cos(phi) + k k^T (1 - cos(phi)) + S(k) sin(phi), Rodrigues' formula (7.28).
+
+    Args:
+        axis: (..., 3) unit axis k.
+        angle: (...) angle phi in radians.
+
+    Returns:
+        (..., 3, 3) rotation.
+
+    Raises:
+        InputError: a wrong shape, a value that is not finite, or an axis that is not a unit vector.
+
+    Example:
+        >>> rotation_about([0.0, 0.0, 1.0], np.pi / 2).round(15) + 0.0
+        array([[ 0., -1.,  0.],
+               [ 1.,  0.,  0.],
+               [ 0.,  0.,  1.]])
+    """
+    axis = unit_vectors(axis, "axis")
+    angle = scalars(angle, "angle")[..., np.newaxis, np.newaxis]
+    # This is 1 - cos(phi), computed without cancellation at small angles.
+    versine = 2.0 * np.sin(angle / 2.0) ** 2
+    outer = axis[..., :, np.newaxis] * axis[..., np.newaxis, :]
+    return np.eye(3) * np.cos(angle) + outer * versine + skew(axis) * np.sin(angle)
+
+
+def rotation_about_derivative(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
+    """Return the derivative dR_k(phi)/dphi = S(k) R_k(phi), per radian (7.33; 7.29 states its terms).
+
+    Args:
+        axis: (..., 3) unit axis k.
+        angle: (...) angle phi in radians.
+
+    Returns:
+        (..., 3, 3), 1/rad.
+
+    Raises:
+        InputError: as for `rotation_about`.
+    """
+    return skew(axis) @ rotation_about(axis, angle)
+
+
+def angular_velocity_about(axis: ArrayLike, rate: ArrayLike) -> FloatArray:
+    """Return the angular velocity w = phi-dot k of a rotation about a fixed axis (7.12, 7.34).
+
+    Args:
+        axis: (..., 3) unit axis k.
+        rate: (...) phi-dot in rad/s.
+
+    Returns:
+        (..., 3) rad/s, in the frame of `axis`.
+
+    Raises:
+        InputError: a wrong shape, or an axis that is not a unit vector.
+    """
+    w: FloatArray = scalars(rate, "rate")[..., np.newaxis] * unit_vectors(axis, "axis")
+    return w
+
+
+def circular_velocity(axis: ArrayLike, rate: ArrayLike, p: ArrayLike) -> FloatArray:
+    """Return phi-dot k x p, the velocity of the tip of a vector p that turns about k (7.21).
+
+    Args:
+        axis: (..., 3) unit axis k.
+        rate: (...) phi-dot in rad/s.
+        p: (..., 3) vector from a point on the axis, in metres.
+
+    Returns:
+        (..., 3) velocity in m/s, in the frame of the arguments.
+
+    Raises:
+        InputError: a wrong shape, or an axis that is not a unit vector.
+    """
+    return np.cross(angular_velocity_about(axis, rate), vectors(p, "p"))
+
+
+def split_along(axis: ArrayLike, p: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Split a vector p = k (k . p) + r into the part along the axis k and the radial part r (7.18).
+
+    Args:
+        axis: (..., 3) unit axis k.
+        p: (..., 3).
+
+    Returns:
+        The part along the axis (..., 3), and r (..., 3), perpendicular to it.
+
+    Raises:
+        InputError: a wrong shape, or an axis that is not a unit vector.
+    """
+    axis, p = unit_vectors(axis, "axis"), vectors(p, "p")
+    along = axis * (axis * p).sum(axis=-1, keepdims=True)
+    return along, p - along
+
+
+def exp_rotation(rotation_vector: ArrayLike) -> FloatArray:
+    """Return the rotation R_k(phi) of the rotation vector phi k, without a division by phi.
+
+    Args:
+        rotation_vector: (..., 3), radians.
+
+    Returns:
+        (..., 3, 3) rotation.
+
+    Raises:
+        InputError: a wrong shape, or a value that is not finite.
+    """
+    vector = vectors(rotation_vector, "rotation_vector")
+    angle = np.sqrt((vector * vector).sum(axis=-1))[..., np.newaxis, np.newaxis]
+    S = skew(vector)
+    # np.sinc(x) is sin(pi x) / (pi x), and 1 at 0.
+    half = np.sinc(angle / (2.0 * np.pi))
+    R: FloatArray = np.eye(3) + np.sinc(angle / np.pi) * S + 0.5 * half**2 * (S @ S)
+    return R
+
+
+def log_rotation(R: ArrayLike) -> FloatArray:
+    """Return the rotation vector phi k of a rotation, with phi in [0, pi].
+
+    The result is accurate for every angle, also near 0 and near pi.
+
+    At phi = pi both k and -k are correct; the function returns either of them.
+
+    Args:
+        R: (..., 3, 3) rotation.
+
+    Returns:
+        (..., 3), radians.
+
+    Raises:
+        InputError: a wrong shape, or `R` is not a rotation.
+    """
+    quat = quaternion_of(R)
+    vector, scalar = quat[..., :3], quat[..., 3:]
+    sine = np.sqrt((vector * vector).sum(axis=-1, keepdims=True))
+    angle = 2.0 * np.arctan2(sine, scalar)
+    small = sine < 1e-150  # for a small angle, phi is twice this sine; the quotient would lose digits
+    log: FloatArray = np.where(small, 2.0 * vector, vector * (angle / np.where(small, 1.0, sine)))
+    return log
+
+
+def axis_angle_of(R: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return the unit axis k and the angle phi in [0, pi] of a rotation, the inverse of `rotation_about`.
+
+    The identity has no unique axis; the z axis is returned for it.
+
+    Args:
+        R: (..., 3, 3) rotation.
+
+    Returns:
+        Axis (..., 3) and angle (...) in radians.
+
+    Raises:
+        InputError: a wrong shape, or `R` is not a rotation.
+    """
+    quat = quaternion_of(R)
+    vector, scalar = quat[..., :3], quat[..., 3]
+    sine = np.sqrt((vector * vector).sum(axis=-1))
+    identity = (sine == 0.0)[..., np.newaxis]
+    axis = np.where(identity, [0.0, 0.0, 1.0], vector / np.where(identity, 1.0, sine[..., np.newaxis]))
+    return axis, 2.0 * np.arctan2(sine, scalar)
+
+
+_AXES = "xyz"
+#: All triples of axes in which neighbouring axes differ.
+_TRIPLES = [a + b + c for a in _AXES for b in _AXES for c in _AXES if a != b != c]
+#: Names of all sequences: twelve with axes that turn with the body, and twelve with fixed axes.
+SEQUENCES = (*(triple.upper() for triple in _TRIPLES), *_TRIPLES)
+
+
+@dataclass(frozen=True, slots=True)
+class Sequence:
+    """The axes of an Euler sequence.
+
+    Attributes:
+        name: SciPy's name.
+        first: Index of the first turning axis: 0 is x, 1 is y, 2 is z.
+        second: Index of the second turning axis.
+        third: Index of the third turning axis; in a proper Euler sequence it is equal to `first`.
+        other: The index that is neither the first nor the second.
+        sign: +1 if (first, second, other) is right-handed, else -1.
+        fixed: Whether the axes are fixed. The angles are then in the reverse order of the turning axes.
+    """
+
+    name: str
+    first: int
+    second: int
+    third: int
+    other: int
+    sign: float
+    fixed: bool
+
+    @property
+    def proper(self) -> bool:
+        """Whether the first and the third axis have the same index, as in ZYZ."""
+        return self.first == self.third
+
+    def turning(self, values: FloatArray) -> FloatArray:
+        """Return angles or their rates in the order of the turning axes.
+
+        A second call with the result returns the original order.
+        """
+        return values[..., ::-1] if self.fixed else values
+
+
+def sequence(name: str) -> Sequence:
+    """Return the Euler sequence with a given name.
+
+    Args:
+        name: Three letters as in SciPy: "ZYZ" for axes that turn with the body, "xyz" for fixed axes.
+
+    Raises:
+        UnknownNameError: the name is not one of the 24.
+    """
+    if as_str(name, "an Euler sequence") not in SEQUENCES:
+        raise UnknownNameError("Euler sequence", name, SEQUENCES)
+    return _sequence(name)
+
+
+@cache
+def _sequence(name: str) -> Sequence:
+    fixed = name.islower()
+    letters = name.lower()[::-1] if fixed else name.lower()
+    first, second, third = (_AXES.index(letter) for letter in letters)
+    other = 3 - first - second
+    sign = 1.0 if (second - first) % 3 == 1 else -1.0
+    return Sequence(name, first, second, third, other, sign, fixed)
+
+
+def coordinate_rotation(axis: int, angle: FloatArray) -> FloatArray:
+    """Return the rotation Rx, Ry or Rz (axis 0, 1 or 2) by `angle` (...), rad.
+
+    The entries that do not depend on the angle are exactly 0 and 1.
+    """
+    angle = np.asarray(angle)
+    R = np.zeros((*angle.shape, 3, 3))
+    j, k = (axis + 1) % 3, (axis + 2) % 3
+    R[..., axis, axis] = 1.0
+    R[..., j, j] = R[..., k, k] = np.cos(angle)
+    R[..., k, j] = np.sin(angle)
+    R[..., j, k] = -R[..., k, j]
+    return R
+
+
+def rotation_from_euler(name: str, angles: ArrayLike) -> FloatArray:
+    """Return the rotation of three angles, for example R = Rz(phi) Ry(theta) Rz(psi) for "ZYZ".
+
+    Args:
+        name: SciPy's name of the sequence.
+        angles: (..., 3) radians, in the order of the name.
+
+    Returns:
+        (..., 3, 3) rotation.
+
+    Raises:
+        UnknownNameError: the sequence does not exist.
+        InputError: a wrong shape, or a value that is not finite.
+    """
+    axes = sequence(name)
+    turns = axes.turning(vectors(angles, "angles"))
+    product: FloatArray = (
+        coordinate_rotation(axes.first, turns[..., 0])
+        @ coordinate_rotation(axes.second, turns[..., 1])
+        @ coordinate_rotation(axes.third, turns[..., 2])
+    )
+    return product
+
+
+def euler_of(name: str, R: ArrayLike) -> FloatArray:
+    """Return the Euler angles of a rotation. Up to rounding, it is the inverse of `rotation_from_euler`.
+
+    The middle angle is in [0, pi] for a proper sequence and in [-pi/2, pi/2] for the others. At the
+    representational singularity, only the sum or the difference of the first and the third angle is
+    determined. The third angle is then computed from the first angle, so that the product of the three
+    rotations is correct there too.
+
+    Args:
+        name: SciPy's name of the sequence.
+        R: (..., 3, 3) rotation.
+
+    Returns:
+        (..., 3) radians, in the order of the name.
+
+    Raises:
+        UnknownNameError: the sequence does not exist.
+        InputError: a wrong shape, or `R` is not a rotation.
+    """
+    axes = sequence(name)
+    R = rotations(R, "R") + 0.0  # adding 0 turns -0 into 0, because arctan2(0, -0) would be pi
+    i, j, m, sign = axes.first, axes.second, axes.other, axes.sign
+    if axes.proper:
+        first = np.arctan2(R[..., j, i], -sign * R[..., m, i] + 0.0)
+        second = np.arctan2(np.hypot(R[..., j, i], R[..., m, i]), R[..., i, i])
+    else:
+        first = np.arctan2(-sign * R[..., j, m], R[..., m, m])
+        second = np.arctan2(sign * R[..., i, m], np.hypot(R[..., j, m], R[..., m, m]))
+    # R_first^T R = R_second R_third. In this product, the row of the second axis depends on the third angle
+    # only.
+    cosine, sine = np.cos(first), np.sin(first)
+    row = cosine[..., np.newaxis] * R[..., j, :] + (sign * sine)[..., np.newaxis] * R[..., m, :]
+    # R_third rotates about the third axis, in the plane of the second axis and a remaining one. In a proper
+    # sequence the remaining axis is `other`, else it is the first axis.
+    rest, sense = (m, sign) if axes.proper else (i, -sign)
+    third = np.arctan2(-sense * row[..., rest], row[..., j])
+    return axes.turning(np.stack((first, second, third), axis=-1)).copy()
+
+
+def rotation_from_rpy(rpy: ArrayLike) -> FloatArray:
+    """Return R = Rz(yaw) Ry(pitch) Rx(roll), the rotation of the URDF's `rpy`.
+
+    Args:
+        rpy: (..., 3) roll, pitch, yaw in radians.
+
+    Returns:
+        (..., 3, 3) rotation; exactly the identity for zero angles.
+
+    Raises:
+        InputError: a wrong shape, or a value that is not finite.
+    """
+    return rotation_from_euler("xyz", rpy)
+
+
+def rpy_of(R: ArrayLike) -> FloatArray:
+    """Return roll, pitch and yaw of a rotation; they are accurate at a pitch of +-pi/2 too (see `euler_of`).
+
+    Args:
+        R: (..., 3, 3) rotation.
+
+    Returns:
+        (..., 3) radians; the yaw is 0 if R[0, 0] = R[1, 0] = 0 exactly.
+
+    Raises:
+        InputError: a wrong shape, or `R` is not a rotation.
+    """
+    return euler_of("xyz", R)
+
+
+#: Least allowed distance from the singularity, radians. At a smaller distance, computed rates of the angles
+#: lose too many digits.
+NEAREST = 1e-9
+
+
+def euler_rate_matrix(name: str, angles: ArrayLike) -> FloatArray:
+    """Return the matrix Omega in w = Omega (phi-dot, theta-dot, psi-dot) (7.51 to 7.55).
+
+    Its columns are the axes of the three rotations.
+
+    Args:
+        name: SciPy's name of the sequence; the textbook's is "ZYZ".
+        angles: (..., 3) radians, in the order of the name.
+
+    Returns:
+        (..., 3, 3), dimensionless, expressed in frame 0.
+
+    Raises:
+        UnknownNameError: the sequence does not exist.
+        InputError: a wrong shape, or a value that is not finite.
+
+    Example:
+        >>> euler_rate_matrix("ZYZ", [0.0, np.pi / 2, 0.3]).round(15) + 0.0
+        array([[0., 0., 1.],
+               [0., 1., 0.],
+               [1., 0., 0.]])
+    """
+    axes = sequence(name)
+    turns = axes.turning(vectors(angles, "angles"))
+    R_0_1 = coordinate_rotation(axes.first, turns[..., 0])
+    R_0_2 = R_0_1 @ coordinate_rotation(axes.second, turns[..., 1])
+    first = np.broadcast_to(np.eye(3)[axes.first], R_0_1.shape[:-1])
+    columns = np.stack((first, R_0_1[..., axes.second], R_0_2[..., axes.third]), axis=-1)
+    return axes.turning(columns).copy()
+
+
+def angular_velocity_from_euler_rates(name: str, angles: ArrayLike, rates: ArrayLike) -> FloatArray:
+    """Return the angular velocity w = Omega (phi-dot, theta-dot, psi-dot) (7.54).
+
+    Args:
+        name: SciPy's name of the sequence.
+        angles: (..., 3) radians, in the order of the name.
+        rates: (..., 3) rates of the angles, rad/s.
+
+    Returns:
+        (..., 3) angular velocity, rad/s, expressed in frame 0.
+
+    Raises:
+        UnknownNameError: the sequence does not exist.
+        InputError: a wrong shape, or a value that is not finite.
+    """
+    product = euler_rate_matrix(name, angles) @ vectors(rates, "rates")[..., np.newaxis]
+    return product[..., 0]
+
+
+def euler_rates(name: str, angles: ArrayLike, w: ArrayLike, nearest: float = NEAREST) -> FloatArray:
+    """Return the rates Omega^-1 w of a body's Euler angles from its angular velocity w (7.56).
+
+    They are computed in closed form.
+
+    Args:
+        name: SciPy's name of the sequence.
+        angles: (..., 3) radians, in the order of the name.
+        w: (..., 3) angular velocity, rad/s, expressed in frame 0.
+        nearest: Least allowed distance from the singularity, radians.
+
+    Returns:
+        (..., 3) rates, rad/s, in the order of the name.
+
+    Raises:
+        RepresentationSingularityError: the distance of a sample from the singularity is `nearest` or less.
+        UnknownNameError: the sequence does not exist.
+        InputError: a wrong shape, or a value that is not finite.
+    """
+    return (euler_rate_inverse(name, angles, nearest) @ vectors(w, "w")[..., np.newaxis])[..., 0]
+
+
+def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -> FloatArray:
+    """Return the matrix Omega^-1, computed from the geometry of the axes and not by elimination (7.56).
+
+    In the frame after the first rotation, the first and the second axis are coordinate axes, and the third
+    axis lies in a coordinate plane. The rates then follow from the components of w one after the other.
+
+    Args:
+        name: SciPy's name of the sequence.
+        angles: (..., 3) radians, in the order of the name.
+        nearest: Least allowed distance from the singularity, radians.
+
+    Returns:
+        (..., 3, 3).
+
+    Raises:
+        RepresentationSingularityError: the distance of a sample from the singularity is `nearest` or less.
+        UnknownNameError: the sequence does not exist.
+        InputError: a wrong shape, or a value that is not finite.
+    """
+    angles = vectors(angles, "angles")
+    _refuse_singular(name, angles, nearest)
+    axes = sequence(name)
+    turns = axes.turning(angles)
+    cosine, sine = np.cos(turns[..., 1]), np.sin(turns[..., 1])
+    # Components of the third axis in the frame after the first rotation: `along` is the component along the
+    # first axis, `across` the component along the axis `other`.
+    if axes.proper:
+        along, across = cosine, -axes.sign * sine
+    else:
+        along, across = axes.sign * sine, cosine
+    inverse = np.zeros((*angles.shape[:-1], 3, 3))
+    inverse[..., 2, axes.other] = 1.0 / across
+    inverse[..., 1, axes.second] = 1.0
+    inverse[..., 0, axes.first] = 1.0
+    inverse[..., 0, axes.other] = -along / across
+    inverse = inverse @ coordinate_rotation(axes.first, turns[..., 0]).swapaxes(-1, -2)
+    return inverse[..., ::-1, :].copy() if axes.fixed else inverse
+
+
+def singularity_distance(name: str, angles: ArrayLike) -> FloatArray:
+    """Return the distance of the middle angle from the representational singularity (gimbal lock).
+
+    A proper Euler sequence such as ZYZ is singular if the middle angle is a multiple of pi (the textbook
+    names only 0). The other sequences are singular if the middle angle is an odd multiple of pi/2.
+
+    Args:
+        name: SciPy's name of the sequence.
+        angles: (..., 3) radians, in the order of the name.
+
+    Returns:
+        (...) radians in [0, pi/2].
+
+    Raises:
+        UnknownNameError: the sequence does not exist.
+        InputError: a wrong shape, or a value that is not finite.
+    """
+    middle = vectors(angles, "angles")[..., 1]
+    sine, cosine = np.abs(np.sin(middle)), np.abs(np.cos(middle))
+    distance: FloatArray = np.arctan2(sine, cosine) if sequence(name).proper else np.arctan2(cosine, sine)
+    return distance
+
+
+def euler_condition(name: str, angles: ArrayLike) -> FloatArray:
+    """Return the condition number of Omega.
+
+    It is the largest factor by which the relative error of the rates exceeds that of the angular velocity w.
+
+    The middle axis is perpendicular to the first and to the third axis. Let d be the angle between the first
+    and the third axis. The singular values of Omega are then 1 and sqrt(1 +- cos d), and its condition number
+    is cot(d / 2).
+
+    Args:
+        name: SciPy's name of the sequence.
+        angles: (..., 3) radians, in the order of the name.
+
+    Returns:
+        (...) condition number; it is 1 if the three axes are perpendicular to each other.
+
+    Raises:
+        RepresentationSingularityError: a sample is at the singularity, where no condition number exists.
+        UnknownNameError: the sequence does not exist.
+        InputError: a wrong shape, or a value that is not finite.
+    """
+    angles = vectors(angles, "angles")
+    _refuse_singular(name, angles, 0.0)
+    condition: FloatArray = 1.0 / np.tan(singularity_distance(name, angles) / 2.0)
+    return condition
+
+
+def _refuse_singular(name: str, angles: FloatArray, nearest: float) -> None:
+    distance = singularity_distance(name, angles)
+    if distance.size and distance.min() <= nearest:
+        sample = np.unravel_index(distance.argmin(), distance.shape)
+        raise RepresentationSingularityError(name, float(distance.min()), tuple(int(i) for i in sample))

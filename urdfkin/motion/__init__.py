@@ -1,1 +1,0 @@
-"""Trajectories of joints, and the motion of a frame along a trajectory."""
