@@ -186,5 +186,5 @@ class PreparedFrame:
             verifier.ledger.account(quantity).counters.append((task, KernelArgs.COUNT))
         setattr(self, f"_{quantity}", compute)
         if (found := compute(q, *others)) is not None and not self.verify:
-            warn_of_degrees(self._robot.tree, q)  # the first configuration only: later calls cost nothing
+            warn_of_degrees(self._robot.tree, q)  # for the first configuration only: later calls skip this
         return found

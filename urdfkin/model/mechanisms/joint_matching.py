@@ -357,8 +357,8 @@ def behind(
 ) -> Iterator[Both[Axis]]:
     """Yield pairs of joint axes, one at a body of A and one at a body of B.
 
-    If a joint's axis is parallel to the line `seen`, the joint does not move that line. The axes after this
-    joint are then yielded too.
+    If a joint's axis is parallel to the line `seen`, the joint does not change the direction of that line.
+    The axes after this joint are then yielded too.
     """
     for e, f in _next_joints(mechanisms, via, bodies):
         axes = _axis(mechanisms[0], e, seen[0]), _axis(mechanisms[1], f, seen[1])
