@@ -295,7 +295,8 @@ def _lines_apart(kind: str, s: Screw, t: Screw) -> tuple[float, float]:
 
 
 _Some = TypeVar("_Some")
-#: A pair of objects of the same type. The first belongs to mechanism A, the second to mechanism B.
+#: A pair of objects of the same type. The first object belongs to mechanism A, the second object to mechanism
+#: B.
 Both = tuple[_Some, _Some]
 
 
