@@ -135,7 +135,7 @@ class PreparedFrame:
         return self._robot.jacobian(q, self.frame, self.reference, out=out, verify=self.verify, threads=1)
 
     def hessian(self, q: Given, out: FloatArray | None = None) -> FloatArray:
-        """Return the Hessian (6, nv, nv), the change of the Jacobian per unit of motion of each joint.
+        """Return the Hessian (6, nv, nv), the derivative of the Jacobian by the motion of each joint.
 
         >>> import urdfkin
         >>> tip = urdfkin.load("planar_two_link").prepare("tip")
