@@ -62,7 +62,7 @@ def peak_over_output(robot: str, frame: str, quantity: str, n: int, *, out: bool
 
 
 def first_uses(robot: str, frame: str, uses: Sequence[str]) -> Iterator[dict[str, Any]]:
-    """Yield the processor time of the first use of each quantity, and of all quantities in one process.
+    """Yield the processor time of each quantity's first use, and of all first uses in one process.
 
     Each time is measured twice: with an empty kernel cache, and in another process with the kernels on disk.
     """

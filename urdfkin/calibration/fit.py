@@ -9,8 +9,8 @@ of the decomposition. You do not have to choose a tolerance.
 The frame of a revolute joint can be shifted along the joint's axis and rotated about it, if the next frame
 compensates this change. The frame of a prismatic joint can be shifted anywhere and rotated about the joint's
 direction. Therefore, 4 of the 6 parameters of each revolute joint are identifiable, 2 of the 6 parameters of
-each prismatic joint, and all 6 parameters of the tip (Everett, Driels and Mooring, 1987). From positions
-alone, 3 parameters fewer are identifiable, because the tool's orientation is not measured.
+each prismatic joint, and all 6 parameters of the tip (Everett, Driels and Mooring, 1987). If only positions
+are measured, 3 fewer parameters are identifiable, because the tool's orientation is unknown.
 
 The parameters that are not fitted are fixed. Orthogonal elimination chooses the fixed parameters joint by
 joint, from base to tip. Each parameter has a column in the Jacobian. The elimination finds the column that
@@ -301,7 +301,7 @@ def best_fit(
         model: The model.
         measured: The measurements.
         kept: Indices of the parameters to fit.
-        noise: The known noise. If it is None, the noise is estimated from the residuals.
+        noise: The known noise; if `noise` is None, the noise is estimated from the residuals.
         at: (p,) start values.
     """
     weights = noise or Noise(1.0, 1.0 / model.way.size)

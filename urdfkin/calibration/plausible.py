@@ -239,7 +239,7 @@ def _out_of_range(model: Model, q: FloatArray) -> tuple[list[str], list[str]]:
 
 
 def _coordinates(model: Model) -> Iterator[tuple[str, bool, float, float]]:
-    """Yield each coordinate of the path: name, whether it is an angle, lower and upper limit."""
+    """Yield each coordinate of the path as its name, whether it is an angle, and its two limits."""
     kinds = dict(zip(model.coupling.joints, model.coupling.kinds, strict=True))
     for name in model.coupling.names:
         lower, upper, kind = -math.inf, math.inf, kinds.get(name)

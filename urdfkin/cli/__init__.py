@@ -23,9 +23,9 @@ from urdfkin.verify.quantities import by_command
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-#: Heading of the help page -> command name -> (module, one-line summary). A module of several commands
-#: defines `NAME_command` for each, others define `command`. The commands of the table of quantities come
-#: first under `_COMPUTE`.
+#: For each heading of the help page, and for each command name below it: the module, and a summary in one
+#: line. A module of several commands defines `NAME_command` for each, others define `command`. The commands
+#: of the table of quantities come first under `_COMPUTE`.
 _COMPUTE = "Compute"
 _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {
@@ -127,8 +127,8 @@ def commands() -> dict[str, tuple[str, str]]:
     return {name: entry for entries in groups().values() for name, entry in entries.items()}
 
 
-#: A word that users may type for a command -> the right command. A value that is not a command's name is a
-#: text to suggest.
+#: For each word that users may type instead of a command: the right command. A value that is not a command's
+#: name is a text to suggest.
 _SYNONYMS = {
     **dict.fromkeys(("fk", "forward", "forward-kinematics", "pose", "transform", "tf"), "placement"),
     **dict.fromkeys(("relative-placement", "relative-pose"), "placement --relative-to FRAME"),
@@ -157,7 +157,7 @@ _SYNONYMS = {
     **dict.fromkeys(("equal", "equivalent"), "same"),
     **dict.fromkeys(("list", "catalogue", "catalog"), "robots"),
 }
-#: A word for a subject that urdfkin does not support -> the commands with the most similar purpose.
+#: For each word about a subject that urdfkin does not support: the commands with the most similar purpose.
 _ABSENT = {
     **dict.fromkeys(
         ("ik", "inverse", "inverse-kinematics", "solve"),

@@ -22,7 +22,7 @@ from urdfkin.urdf.catalogue import catalogue
 if TYPE_CHECKING:
     Items = list[CompletionItem[str]]
 
-#: Pattern of the names that completion offers. They have no quotes, blanks or characters that a shell
+#: Pattern of the names that completion offers. The words have no quotes, blanks or characters that a shell
 #: expands, and no colon, because bash separates words at colons.
 _HARMLESS = re.compile(r"(?=\w)[\w./+-]+")
 #: Largest file that is read for its names, in bytes.

@@ -18,7 +18,7 @@ A box with a bound below the target needs no further work. Every other box is ha
 
 M_ij is computed joint by joint. The derivative of a rotated vector by the angle is the cross product of the
 axis u with the rotated vector. Let y be the position of B's frame, and d the vector from A's frame to B's
-frame. Their derivatives by a joint value are
+frame. The derivatives of y and d by a joint value are
 
     y_i = u' x (Y - o'),    d_i = u x (Y - e(S t) (y - d)) + (u' - u) x (Y - o') + u x (o - o'),
 

@@ -660,7 +660,7 @@ def pose_words(T: FloatArray, rounding: Tolerance) -> str:
 
 
 def _rounded(x: float, rounding: float) -> float:
-    """Return the shortest decimal number within the rounding."""
+    """Return the shortest decimal number that differs from `x` by no more than the rounding."""
     return round(x, math.ceil(-math.log10(rounding))) + 0.0
 
 

@@ -119,7 +119,7 @@ def same(
 
 
 def _parse_given_map(given: Mapping[str, str] | None) -> dict[str, str]:
-    """Return the map as a dict; raise InputError if it is not a mapping of names to names."""
+    """Return the user's map of joints as a dict; raise InputError if it does not map names to names."""
     if given is None:
         return {}
     if not isinstance(given, Mapping) or any(

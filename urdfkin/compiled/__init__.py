@@ -1,4 +1,4 @@
 """The textbook's recursion (sections 7.4 and 7.7), written once.
 
-Python can interpret it or Numba compile it.
+Either Python interprets this recursion, or Numba compiles it.
 """

@@ -108,7 +108,7 @@ def hessians(
 ) -> FloatArray:
     """Return Hessians (n, frames, 6, nv, nv).
 
-    [..., i, j] is the change of column i per unit of motion of joint velocity j.
+    [..., i, j] is the derivative of column i in the direction of the joint velocity j.
     """
     program = program_of(plan, turned=reference.own_axes, columns=True, pairs=True)
     return _compute("hessians", plan, program, [q], reference, (6, plan.nv, plan.nv), **how)

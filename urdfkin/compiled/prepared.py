@@ -135,7 +135,7 @@ class PreparedFrame:
         return self._robot.jacobian(q, self.frame, self.reference, out=out, verify=self.verify, threads=1)
 
     def hessian(self, q: Given, out: FloatArray | None = None) -> FloatArray:
-        """Return the Hessian (6, nv, nv), the change of the Jacobian per unit of motion of each joint.
+        """Return the Hessian (6, nv, nv), the derivative of the Jacobian by the motion of each joint.
 
         >>> import urdfkin
         >>> tip = urdfkin.load("planar_two_link").prepare("tip")
@@ -186,5 +186,5 @@ class PreparedFrame:
             verifier.ledger.account(quantity).counters.append((task, KernelArgs.COUNT))
         setattr(self, f"_{quantity}", compute)
         if (found := compute(q, *others)) is not None and not self.verify:
-            warn_of_degrees(self._robot.tree, q)  # the first configuration only: later calls cost nothing
+            warn_of_degrees(self._robot.tree, q)  # for the first configuration only: later calls skip this
         return found

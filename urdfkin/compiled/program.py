@@ -122,8 +122,8 @@ def program_of(plan: CompiledTree, *, turned: bool, columns: bool = False, pairs
 
     Args:
         plan: The compiled tree.
-        turned: Whether the state is rotated to the axes of each frame. Placements need this, and results in
-            the frame's own axes.
+        turned: Whether the state is rotated to the axes of each frame. Placements need this rotation, and so
+            do results in the frame's own axes.
         columns: Whether Jacobian columns are needed.
         pairs: Whether the column of each joint, also of a mimic joint, is stored separately, to compute
             derivatives from pairs of columns.

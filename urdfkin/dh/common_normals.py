@@ -26,8 +26,8 @@ joint axes. The program that wrote the file may also have rounded each angle to 
 `urdfkin.kinematics.roundings` takes both effects into account. Angles that are written with fourteen or
 fifteen digits are therefore treated as round. For example, 1.5707963267949 and 3.14159265358979 differ by 15
 eps from a multiple of a right angle, where eps is the machine epsilon. An angle that is written with twelve
-digits differs by 900 eps or more and is not treated as round. The option `snap` makes such an angle round and
-reports the effect.
+digits differs by 900 eps or more and is not treated as round. The option `snap` replaces such an angle by the
+nearest multiple of 15 degrees and reports the effect.
 
 If the tilt between two axes is below the noise, the table contains zero instead of the tilt. The two axes
 then count as parallel, so that no foot is far away. `left_out` returns the sum of these tilts. The

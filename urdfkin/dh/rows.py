@@ -74,7 +74,7 @@ def _of_row(row: Mapping[str, Any] | Sequence[Any], units: Units) -> dict[str, f
 
 
 def half_a_digit(value: object, whole_is_rounded: bool = False) -> float:
-    """Return half a unit of the last digit of a number, in the number's own unit; 0 if it is exact.
+    """Return half a unit of a number's last digit, in the unit of the number; 0 if the number is exact.
 
     Example:
         >>> half_a_digit(Literal("0.3111")), half_a_digit("90"), half_a_digit(425, True), half_a_digit("pi")

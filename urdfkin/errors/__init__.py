@@ -31,7 +31,7 @@ _OFFERED = 3
 def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6, work: int = WORK) -> list[str]:
     """Return up to three known names that look like `word`, the most similar first.
 
-    The similarity is that of `difflib.get_close_matches`, but the amount of work is bounded.
+    Similarity is measured as in `difflib.get_close_matches`, but the amount of work is bounded.
 
     Args:
         word: The misspelt name.

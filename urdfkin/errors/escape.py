@@ -21,8 +21,8 @@ FORMULA = ("=", "+", "-", "@")
 COMMAND_ANYWHERE = re.compile(r"##(?:vso|teamcity)?(\[)")
 COMMANDS = (re.compile(r"\A\s*:(:)"), COMMAND_ANYWHERE)
 _NUMBER = re.compile(r"[-+]?[0-9.]+(?:e[-+]?[0-9]+)?")
-#: An invisible character (word joiner). It keeps Markdown from turning text into a link, a mention or an
-#: issue number.
+#: An invisible character (word joiner). The character keeps Markdown from turning text into a link, a mention
+#: or an issue number.
 _JOINER = "&#8288;"
 
 

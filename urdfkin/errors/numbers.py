@@ -18,7 +18,7 @@ _WHOLE = re.compile(r"[+-]?[0-9]+")
 #: Longest accepted number, in characters: Python converts long integers in quadratic time.
 _LONGEST = 2000
 
-#: Pattern of a rejected text -> its remedy; the first match counts.
+#: For each pattern of a rejected text: the remedy. The first pattern that matches counts.
 _REMEDIES = (
     (r"", "the text is empty: write a number"),
     (r"[+-]?(nan|inf|infinity)", "write a finite number"),
@@ -59,7 +59,7 @@ def remedy(text: str) -> str | None:
     return next(found, None)
 
 
-#: Accepted names of units -> the short name.
+#: For each accepted name of a unit: the short name.
 UNITS = {
     **dict.fromkeys(("rad", "radian", "radians"), "rad"),
     **dict.fromkeys(("deg", "degs", "degree", "degrees"), "deg"),

@@ -98,5 +98,5 @@ def safe_repr(value: object) -> str:
     """Return the repr of a value for a message, at most 60 characters; it never raises."""
     try:
         return repr(value)[:60]
-    except Exception:  # a repr may raise any exception: that of an int with 5,000 digits raises ValueError
+    except Exception:  # a repr may raise any exception: for an int with 5,000 digits it raises ValueError
         return f"an object of type {type(value).__name__}"

@@ -11,7 +11,7 @@ from urdfkin.export.seal import seal
 if TYPE_CHECKING:
     from urdfkin.export.code import Code
 
-#: Language -> (module of `write`, suffix of files, one-line summary).
+#: For each language: the module of `write`, the suffix of files, and a summary in one line.
 LANGUAGES: dict[str, tuple[str, str, str]] = {
     "c": ("urdfkin.export.c", ".c", "C99, single or double precision, one configuration or a batch"),
     "cpp": ("urdfkin.export.cpp", ".hpp", "C++11, a header of templates for any number type"),
@@ -23,7 +23,7 @@ LANGUAGES: dict[str, tuple[str, str, str]] = {
     "matlab": ("urdfkin.export.matlab", "_kinematics.m", "MATLAB and Octave"),
     "latex": ("urdfkin.export.latex", ".tex", "LaTeX formulas in the textbook's symbols"),
 }
-#: Form of a chain -> one-line summary.
+#: For each form of a chain: a summary in one line.
 FORMS = {"tree": "the URDF's links", "dh": "its Denavit-Hartenberg table", "screws": "its screws"}
 #: Quantities that are exported by default.
 QUANTITIES = ("placement", "jacobian", "acceleration")

@@ -57,8 +57,8 @@ class NoCompilerError(Exception):
 def library(code: Code) -> ctypes.CDLL:
     """Return the library of the code's only function.
 
-    Its entry point is `task`. It takes an array with the fields of `KernelArgs`, and returns 0, or 1 for an
-    input that is not finite.
+    Its entry point is `task`. The function takes an array with the fields of `KernelArgs`, and returns 0, or
+    1 for an input that is not finite.
 
     Raises:
         NoCompilerError: there is no C compiler, or it fails.
@@ -188,8 +188,8 @@ class _Robot(Protocol):
 class CompiledFrame:
     """One frame of a robot in one reference frame, compiled; the result of `Robot.compiled`.
 
-    Results agree with those of `Robot` within the error bound, but not to the last bit. A batch gives the
-    same bits as its configurations one by one. Inputs are checked: a wrong shape or a number that is not
+    Results agree with the results of `Robot` within the error bound, but not to the last bit. A batch gives
+    the same bits as its configurations one by one. Inputs are checked: a wrong shape or a number that is not
     finite is an error. Pinocchio does not check each call, and the ledger counts the calls as unchecked.
     Pinocchio checks the machine code once, on a hundred configurations, unless the robot is loaded with
     `verify=False`.

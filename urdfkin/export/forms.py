@@ -57,7 +57,8 @@ def code_of_chain(
 ) -> Code:
     """Return the code of a table's tip, or of the tip of screws, with its proof.
 
-    The steps of the code are those of the table or the screws. Results are in the axes of the chain's base.
+    The steps of the code are the rows of the table or the screws. Results are in the axes of the chain's
+    base.
 
     Args:
         chain: A table, or a product of exponentials.

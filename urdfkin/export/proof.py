@@ -1,10 +1,10 @@
 """Make the proof in an exported file: a comparison with Pinocchio, and test vectors at fifty digits.
 
-The expressions are evaluated exactly as they are printed, and the results are compared with Pinocchio's. The
-test vectors then check the file wherever it is used, together with the language, compiler and library there.
-They contain true values at fifty digits, computed from the URDF's decimals. For each number they also contain
-the error bound of a correct computation, in eps of the precision used. The inputs are single-precision
-numbers, so they are equal in both precisions.
+The expressions are evaluated exactly as they are printed, and the results are compared with Pinocchio's.
+Wherever the file is used, the test vectors then check the file together with the language, the compiler and
+the library of that place. The test vectors contain true values at fifty digits, computed from the URDF's
+decimals. For each number they also contain the error bound of a correct computation, in eps of the precision
+used. The inputs are single-precision numbers, so they are equal in single and in double precision.
 """
 
 from __future__ import annotations

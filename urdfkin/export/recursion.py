@@ -180,7 +180,7 @@ def jacobian_rate(plan: CompiledTree, kind: Kind, inputs: Any, reference: Refere
 def hessian(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
     """Return the derivative of each Jacobian entry with respect to each coordinate.
 
-    These are the terms whose sum is 7.126.
+    The terms are those whose sum is equation 7.126.
     """
     path, nv = TreeRecursion(plan, kind, inputs, own=False), plan.nv
     out: list[Number] = [0.0] * (6 * nv**2)

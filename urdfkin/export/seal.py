@@ -1,7 +1,7 @@
 """Write and test the seal of an exported file. The seal is a digest of the whole text, in the file's header.
 
-The seal shows whether numbers, test vectors or statements of the file were changed. It is a digest and not a
-signature, so it does not prove who wrote the file.
+The seal shows whether numbers, test vectors or statements of the file were changed. The seal is a digest and
+not a signature, so it does not prove who wrote the file.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ def bound(
 
     Args:
         made: A decorator that is applied to each copied function, for example the decorator of a compiler.
-        vectors: Basic operations that replace those of `equations`, by name.
+        vectors: Basic operations, by name, that replace the basic operations of `equations`.
 
     >>> lengths = bound(plus=lambda x, y: x + y, cross=lambda x, y: x * y)
     >>> lengths.point_velocity(1.0, 2.0, 3.0)

@@ -81,7 +81,8 @@ def turned(R: FloatArray, p: FloatArray) -> FloatArray:
 def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
     """Return the motion of frame 2 relative to frame 0 (7.60, 7.61).
 
-    It is computed from the motion of frame 1 relative to frame 0 and that of frame 2 relative to frame 1.
+    The motion is computed from the motion of frame 1 relative to frame 0 and the motion of frame 2 relative
+    to frame 1.
 
     The origin O_2 is a point that moves in frame 1. Its motion follows from 7.58, 7.124 and 7.125. The
     angular velocity of frame 2 is w_01 + w_12 (7.49). The time derivative of this sum contains the term w_01
@@ -277,7 +278,7 @@ def interorigin_vector(d: ArrayLike, z: ArrayLike, a: ArrayLike, x: ArrayLike) -
 def joint_angular_velocity(z: ArrayLike, rate: ArrayLike, turns: bool) -> FloatArray:
     """Return a joint's angular velocity w_{i-1,i}.
 
-    It is theta-dot z for a rotary joint (7.62), and zero for a prismatic joint (7.63).
+    The angular velocity is theta-dot z for a rotary joint (7.62), and zero for a prismatic joint (7.63).
 
     Args:
         z: (..., 3) unit axis z_{i-1} in frame 0.
@@ -562,7 +563,7 @@ def analytical_jacobian(
 def velocity_jacobian(representation: str, R: ArrayLike, J: ArrayLike) -> FloatArray:
     """Return the velocity Jacobian J_v = C J from the manipulator Jacobian J (7.121).
 
-    Unlike the inverse conversion, this one works for every orientation.
+    Unlike the inverse conversion, this conversion works for every orientation.
 
     Args:
         representation: SciPy's name of an Euler sequence, or "quaternion".

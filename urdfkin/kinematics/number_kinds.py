@@ -6,8 +6,8 @@ vector, so one call computes a whole batch.
 `length_equations` computes the scale of a result, which is an upper bound on the sum of the absolute values
 of its terms. Each vector is replaced by its length or by an upper bound on its length. A difference becomes a
 sum, a cross product becomes the product of two lengths, and a rotation changes nothing. No term, no partial
-sum and no result of the equation exceeds the scale. Rounding errors are proportional to the scale. They are
-not proportional to the result, because the result is small where large terms cancel.
+sum and no result of the equation exceeds the scale. Rounding errors are proportional to the scale. Rounding
+errors are not proportional to the result, because the result is small where large terms cancel.
 
 A scale that is not zero is at least `SMALLEST`, the smallest normal number, for two reasons. A product
 smaller than `SMALLEST` has an error of half the smallest subnormal number, the same error as a product of the

@@ -125,8 +125,8 @@ def rotate_skew(R_0_1: ArrayLike, S_1: ArrayLike) -> FloatArray:
     return R_0_1 @ matrices(S_1, "S_1") @ R_0_1.swapaxes(-1, -2)
 
 
-#: If no entry of a matrix differs from that of the nearest rotation by more than this number, the matrix is a
-#: rotation up to rounding and is not changed.
+#: If no entry of a matrix differs from the same entry of the nearest rotation by more than this number, the
+#: matrix is a rotation up to rounding and is not changed.
 ROUNDED = 1e-15
 
 
@@ -265,7 +265,7 @@ def turning_vector_rate(w_0_1: ArrayLike, p_0: ArrayLike) -> FloatArray:
 def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
     """Return the angular velocity w_0n of the last frame (7.43 to 7.50).
 
-    It is the sum of the angular velocities of each frame relative to the previous frame, after each is
+    The result is the sum of the angular velocities of each frame relative to the previous frame, all
     expressed in frame 0.
 
     Args:
@@ -413,8 +413,8 @@ def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> Flo
     """Return the matrix E in (q-dot, q0-dot) = E w (7.57).
 
     For w in the fixed frame, E = 1/2 [q0 I - S(q); -q^T]. For w in the body's frame, the sign of S(q)
-    changes. The columns of E have length 1/2. They are perpendicular to each other and to the quaternion, so
-    the quaternion's length is constant.
+    changes. The columns of E have length 1/2. The columns are perpendicular to each other and to the
+    quaternion, so the quaternion's length is constant.
 
     Args:
         quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
@@ -665,7 +665,7 @@ def log_rotation(R: ArrayLike) -> FloatArray:
 
     The result is accurate for every angle, also near 0 and near pi.
 
-    At phi = pi both k and -k are correct; the function returns either of them.
+    At phi = pi, k and -k are both correct, and the function returns either of them.
 
     Args:
         R: (..., 3, 3) rotation.
@@ -818,7 +818,7 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     The middle angle is in [0, pi] for a proper sequence and in [-pi/2, pi/2] for the others. At the
     representational singularity, only the sum or the difference of the first and the third angle is
     determined. The third angle is then computed from the first angle, so that the product of the three
-    rotations is correct there too.
+    rotations is correct at the singularity too.
 
     Args:
         name: SciPy's name of the sequence.
@@ -889,7 +889,7 @@ NEAREST = 1e-9
 def euler_rate_matrix(name: str, angles: ArrayLike) -> FloatArray:
     """Return the matrix Omega in w = Omega (phi-dot, theta-dot, psi-dot) (7.51 to 7.55).
 
-    Its columns are the axes of the three rotations.
+    The columns of the matrix are the axes of the three rotations.
 
     Args:
         name: SciPy's name of the sequence; the textbook's is "ZYZ".

@@ -39,7 +39,7 @@ from urdfkin.model.tree import (
     is_bounded,
 )
 
-#: Largest bound of a range (rad or m); also used when a limit is missing.
+#: Largest bound of a range (rad or m). The same number replaces a missing limit.
 WIDEST = 10.0
 
 

@@ -203,7 +203,7 @@ class Recursion:
     def hessian(
         self, s: State, columns: Sequence[Column], reference: Reference
     ) -> Iterator[tuple[int, int, Number, Six]]:
-        """Yield the change of each Jacobian column per unit of motion of each joint.
+        """Yield the derivative of each Jacobian column in the direction of each joint velocity.
 
         Each item consists of the column's index, the index of the joint velocity in v, a factor and the
         derivative.
@@ -216,7 +216,7 @@ class Recursion:
                 yield of.place, by.place, of.factor * by.factor, self.in_reference(s, reference, *change)
 
     def _change(self, six: Any, by: Any, reference: Reference, *, before: bool) -> tuple[Vector, Vector]:
-        """Return the change of a Jacobian column per unit of motion of a joint.
+        """Return the derivative of a Jacobian column in the direction of a joint velocity.
 
         Args:
             six: The column.

@@ -35,7 +35,7 @@ from urdfkin.system.documents import Header, Layout, plain, says
 from urdfkin.validation.document import Check, Document, Joint, Model, Robot, Units, outcome_of
 from urdfkin.verify.oracles import versions
 
-#: Maximum length of a text; longer ones are truncated.
+#: Maximum length of a text; longer texts are truncated.
 _LONGEST = 200
 #: Precision of a displayed pose. Smaller changes are visible in the displayed distance.
 _PRECISION = Tolerance(1e-9, 1e-9)

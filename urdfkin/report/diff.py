@@ -17,7 +17,7 @@ HEADS = ("element", "what", "old", "new", "alone")
 def headline(found: Changes) -> str:
     """Return one line about all changes.
 
-    It has the number of changes, and the distance by which all changes together move a frame.
+    The text has the number of changes, and the distance by which all changes together move a frame.
     """
     if not found:
         return "nothing changed"

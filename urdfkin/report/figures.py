@@ -1,9 +1,9 @@
 """Histograms of the disagreements, and the data of the 3D view.
 
-The plot has one row for each quantity, with all reference frames together. Its x axis is the disagreement in
-eps * scale, logarithmic. The histogram shows the results, the triangle the worst one, and the bar the bound,
-from the frame with the fewest joints before it to the one with the most. A quantity is verified if its
-histogram lies left of its bar.
+The plot has one row for each quantity, with all reference frames together. The x axis of the histogram is
+logarithmic and shows the disagreement in eps * scale. The histogram shows the results, and the triangle shows
+the worst result. The bar shows the bound, from the frame with the fewest joints before it to the frame with
+the most. A quantity is verified if its histogram lies left of its bar.
 
 The data of the 3D view is compact: links, joints and chains with their tables. Its numbers have seven digits
 for display; the JSON document has the full numbers.

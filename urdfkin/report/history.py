@@ -31,7 +31,8 @@ from urdfkin.verify.oracles import versions
 
 #: Largest number of reports, and of files that a folder may have.
 MOST_RUNS, MOST_FILES = 1000, 20_000
-#: Number of latest runs that a terminal marks for each robot; the same for the charts of the page.
+#: Number of latest runs that a terminal marks for each robot; number of latest runs in the charts of the
+#: page.
 MARKED, CHARTED = 20, 60
 #: Number of latest changes that are shown without --all, and for each robot on the page.
 SHOWN = 20
@@ -187,7 +188,7 @@ def history(paths: Sequence[Path]) -> History:
 
 
 def _rank(found: History, points: Sequence[Point]) -> tuple[bool, int]:
-    """Return the sort key of a robot: those of the latest run first, worse verdicts first."""
+    """Return the sort key of a robot; robots of the latest run come first, and worse verdicts come first."""
     return points[-1]["run"] != len(found.runs) - 1, VERDICTS.index(points[-1]["verdict"])
 
 

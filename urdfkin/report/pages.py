@@ -181,7 +181,7 @@ def _share(check: Check, subject: int) -> float:
     """Return an upper bound on the ratio of a subject's worst disagreement to its bound.
 
     The disagreement is divided by the tightest bound of all results. The ratio is therefore an upper bound.
-    It is limited to the largest ratio of the whole check.
+    The result is limited to the largest ratio of the whole check.
     """
     value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["share_of_bound"]
     if not value:  # a disagreement of 0 lies within every bound

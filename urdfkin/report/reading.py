@@ -1,4 +1,4 @@
-"""Reader of report documents. It checks the layout and the consistency of all entries.
+"""Reader of report documents. This module checks the layout and the consistency of all entries.
 
 A report is evidence, and may have been edited or truncated. Entries that follow from other entries are
 computed again and compared: the outcome, verdicts, sums, ratios and percentiles. The links and joints of a

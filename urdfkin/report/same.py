@@ -1,6 +1,6 @@
 """Report the comparison of two models: on a terminal, as Markdown and as an HTML page.
 
-The page shows the verdict, the intervals and a picture of both models at the worst configuration.
+The page shows the verdict, the intervals and a picture of A and B at the worst configuration.
 """
 
 from __future__ import annotations
@@ -329,7 +329,7 @@ def command_of(robots: tuple[Robot, Robot], question: Question, options: Sequenc
 def pictures(
     found: Sameness, robots: tuple[Robot, Robot], worst: Interval | None, *, written: bool = False
 ) -> list[dict[str, Any]]:
-    """Draw the skeletons of both robots in two views, and the worst frame close up.
+    """Draw the skeletons of the two robots in two views, and an enlarged picture of the worst frame.
 
     Args:
         found: The result of `same`.

@@ -126,8 +126,8 @@ def nearer(line: Judged) -> Literal["urdfkin", "Pinocchio", "equal"]:
 def nearer_counts(lines: Sequence[Judged]) -> str:
     """Return three counts of rows of the accuracy study.
 
-    They are the numbers of rows in which urdfkin's typical error is smaller than Pinocchio's, equal to it,
-    and larger.
+    The counts are the numbers of rows in which urdfkin's typical error is smaller than, equal to and larger
+    than Pinocchio's.
     """
     counts = Counter(nearer(line) for line in lines)
     return (

@@ -1,11 +1,12 @@
 """Make a trajectory from a line between two configurations, or from samples in a CSV or .npz file.
 
-A line is parameterised by s = 10 u^3 - 15 u^4 + 6 u^5 with u = t / duration. It starts and ends at rest, and
-its acceleration is continuous. If a file has no joint velocities, they are computed by central differences of
-the configurations, after the angles are unwrapped. The error of these joint velocities is proportional to the
-square of the time step. Joint accelerations that are computed from configurations have a larger error at both
-ends of the trajectory: it is proportional to the time step. To estimate the errors, the differences are also
-computed from every second sample, and the two results are compared.
+A line is parameterised by s = 10 u^3 - 15 u^4 + 6 u^5 with u = t / duration. The motion starts and ends at
+rest, and the acceleration is continuous. If a file has no joint velocities, they are computed by central
+differences of the configurations, after the angles are unwrapped. The error of these joint velocities is
+proportional to the square of the time step. Joint accelerations that are computed from configurations have a
+larger error at the start and the end of the trajectory: this error is proportional to the time step. To
+estimate the errors, the differences are also computed from every second sample, and the two results are
+compared.
 
 A log often wraps the angle of a wheel to [-pi, pi] or [0, 2 pi]. The jump from one end of this range to the
 other is not a motion. A difference across this jump would, however, give a huge joint velocity. The angle of
@@ -408,7 +409,7 @@ def column_units(robot: Robot, letter: str, conversion: Conversion | None = None
 
 
 def _arrays(path: Path, known: Robot | Conversion) -> dict[str, FloatArray]:
-    """Return the arrays t, q, v and a, and those of the base's motion, that an .npz file contains."""
+    """Return the arrays in an .npz file: t, q, v and a, and the arrays of the base's motion."""
     shapes = {"t": (), "q": (known.nq,), "v": (known.nv,), "a": (known.nv,)}
     base = dict(zip(_BASE, ((4, 4), (6,), (6,)), strict=True))
     data = read_arrays(path, shapes | base, ["q"])
@@ -470,7 +471,8 @@ def read_columns(
     r"""Parse CSV text into columns of finite numbers.
 
     Empty lines and lines that begin with # are skipped. The first line that is not skipped may contain the
-    names of the columns, in any order. Without names, the columns are those in `required`, in this order.
+    names of the columns, in any order. Without names, the columns are the columns in `required`, in this
+    order.
 
     Args:
         text: The content of the file.

@@ -1,12 +1,12 @@
 """The cache on disk: one folder for each state of the sources, with a checksum in each file.
 
-urdfkin later executes or unpickles cached files. It therefore uses a folder only if no other user can have
-written to it. Folders of older versions are deleted after a month without use.
+urdfkin later executes or unpickles cached files. Therefore, this module uses a folder only if no other user
+can have written to it. Folders of older versions are deleted after a month without use.
 
 `put` writes a file with a checksum, and `get` verifies it. A truncated or corrupted file could crash the
 process or compute a wrong result, so it is reported and replaced. The checksum includes the names of the file
-and of its folder, which identify the sources. So `get` detects a renamed file, which could belong to another
-robot.
+and of its folder, which identify the sources. Therefore, `get` detects a renamed file, which could belong to
+another robot.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ import platformdirs
 from urdfkin.errors import SourceError
 from urdfkin.system.files import MOST_DATA, read_bytes, read_if_there
 
-#: Version of the checksum. It is part of the digest in a folder's name, so each version of the checksum uses
-#: folders of its own.
+#: Version of the checksum. The version is part of the digest in a folder's name, so each version of the
+#: checksum uses folders of its own.
 _CHECKSUM_VERSION = "sealed with its name"
 _A_MONTH = 30 * 24 * 3600.0
 _USED = ".used"

@@ -84,7 +84,7 @@ def read_bytes(path: Path, most: int = MOST, *, pipes: bool = False) -> bytes:
 def read_start(path: Path, count: int, *, pipes: bool = False) -> bytes:
     """Return the first `count` bytes of a file, or the whole file if it is shorter.
 
-    Arguments and errors are those of `read_bytes`.
+    The function has the same arguments and errors as `read_bytes`.
     """
     try:
         # Without O_NONBLOCK, opening a pipe blocks until a writer opens it.
@@ -133,7 +133,7 @@ def _check_regular(path: Path, kind: int) -> None:
 def read_if_there(path: Path, most: int = MOST) -> bytes | None:
     """Return the content of a file, or None if the file does not exist.
 
-    All other errors are those of `read_bytes`.
+    All other errors are the same as for `read_bytes`.
     """
     try:
         return read_bytes(path, most)

@@ -32,8 +32,8 @@ class Ground:
     """The files that an expansion may read.
 
     Attributes:
-        roots: Folders and files that may be read, except hidden ones below them. The target of a symbolic
-            link must also lie in one of them.
+        roots: Folders and files that may be read; hidden folders and files below them may not be read. The
+            target of a symbolic link must also lie in one of them.
         installed: Folders whose symbolic links may lead to packages in other folders. An example is the
             install folder of `colcon build --symlink-install`.
     """

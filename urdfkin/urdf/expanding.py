@@ -117,7 +117,7 @@ def _finder(path: Path, search: Mapping[str, str], ground: Ground) -> Callable[[
     def is_package(folder: Path) -> bool:
         """Return whether a folder is a package.
 
-        A folder outside the allowed ones needs a package.xml. So `$(find etc)` does not find /etc.
+        A folder that is outside the allowed folders needs a package.xml. So `$(find etc)` does not find /etc.
         """
         return ground.holds(str(folder)) or (folder / "package.xml").is_file()
 

@@ -185,7 +185,7 @@ class Finding:
         name: The name of the link, joint or material, or None.
         oracle: Pinocchio's behaviour, if Pinocchio refuses the file for this reason or reads it differently;
             otherwise None. If it is set, no result of this robot can be verified with Pinocchio.
-        also: The lines of further findings of the same kind, combined into this one.
+        also: The lines of further findings of the same kind, which are combined into this finding.
         width: Number of marked characters from `column` on; 0: no position in the text.
         fix: The automatic fix, or None.
 
@@ -397,7 +397,7 @@ class Silence:
         comment: The comment.
         codes: The codes.
         reason: The reason.
-        used: Those of the codes that silenced at least one finding.
+        used: The codes in this comment that have silenced at least one finding.
     """
 
     comment: Comment
@@ -406,7 +406,7 @@ class Silence:
     used: set[str] = field(default_factory=set)
 
 
-#: Code -> the first comment that silences it.
+#: For each code: the first comment that silences it.
 Codes = dict[str, Silence]
 
 
@@ -548,7 +548,7 @@ class Reporter:
                 tag of the link or joint that contains `at`.
             severity: Severity of the finding; None: the severity of the rule.
             position: (line, column) of the finding; used if there is no element.
-            weight: If findings of one kind are combined, the one with the greatest weight is reported.
+            weight: If findings of one kind are combined, the finding with the greatest weight is reported.
             fix: A function that makes the automatic fix, called on demand; None: there is no automatic fix.
         """
         severity = rule.severity if severity is None else severity
@@ -592,7 +592,7 @@ class Reporter:
         return self.silences.reason(code, line if at is None else self._place(at, attribute)[0], at)
 
     def silence(self, silences: Silences) -> None:
-        """Apply comments to the findings that are already in the reporter, and to all later ones."""
+        """Apply comments to the findings that are already in the reporter, and to all later findings."""
         self.silences = silences
         for (code, severity), kind in self._kinds.items():
             if severity is not Severity.ERROR:

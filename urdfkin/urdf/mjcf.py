@@ -106,7 +106,7 @@ class Mjcf:
     def placements(self, q: FloatArray) -> FloatArray:
         """Return the placements (n, frames, 4, 4) of `frames` for q (n, nq), by `mj_kinematics`.
 
-        The placements are those of the fused model if there is one. A frame that the fused model does not
+        If there is a fused model, the placements come from this model. A frame that the fused model does not
         contain has its placement in `model`.
         """
         qpos = self.qpos(q)
@@ -127,7 +127,7 @@ class Mjcf:
     def lengths(self, q: FloatArray) -> FloatArray:
         """Return an upper bound (n, frames), in m, of each frame's distance from the world's origin.
 
-        It is the sum of the lengths along the path from the world to the frame. Error bounds use it.
+        The bound is the sum of the lengths along the path from the world to the frame. Error bounds use it.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))
@@ -361,7 +361,7 @@ def _align_note(body: str, *, whole: bool) -> Listed:
 
 
 def name_of(source: str | bytes | os.PathLike[str]) -> str:
-    """Return the name of a source in messages."""
+    """Return the name that messages use for a source."""
     return "<bytes>" if isinstance(source, bytes) else "<text>" if is_text(source) else str(source)
 
 
@@ -408,7 +408,7 @@ def _strip(mujoco: Any, spec: Any) -> None:
     for site in spec.sites:
         site.material = ""
     for joint in spec.joints:
-        # the alignment would use inertias that differ from those of the file
+        # the alignment would use inertias that are not in the file
         joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
     for body in spec.bodies[1:]:
         body.explicitinertial, body.mass, body.ipos = True, 1.0, (0.0, 0.0, 0.0)

@@ -411,7 +411,7 @@ class _Builder:
         )
 
     def syntax_error(self, error: expat.ExpatError) -> None:
-        """Report a syntax error with its position and the text there."""
+        """Report a syntax error with its position and the text at this position."""
         reason = expat.errors.messages[error.code]
         if reason == expat.errors.XML_ERROR_UNDEFINED_ENTITY:
             self.undefined_entity(self._entity_name())
@@ -452,7 +452,7 @@ class _Builder:
 _ENTITY = re.compile(rb"&([A-Za-z_:\x80-\xff][^;\s<>&\"']{0,60});")
 _PREDEFINED = (b"lt", b"gt", b"amp", b"quot", b"apos")
 
-#: expat's message -> a clearer message and a remedy.
+#: For each message of expat: a clearer message and a remedy.
 _REASONS: dict[str, tuple[str, str | None]] = {
     expat.errors.XML_ERROR_SYNTAX: ("text instead of an element", "a URDF begins with <robot ...>"),
     expat.errors.XML_ERROR_INVALID_TOKEN: ("a character that XML does not allow here", None),
@@ -488,7 +488,7 @@ _BLANKS = re.compile(r"[ \t\r\n]+")
 
 @dataclass(slots=True)
 class NumberReader:
-    """Reader of numbers in attributes, which reports invalid ones.
+    """Reader of numbers in attributes, which reports invalid numbers.
 
     Attributes:
         report: The reporter, which receives the findings.
@@ -623,7 +623,7 @@ _PLAIN = ("origin", "axis", "limit")
 #: Leading zeros of a character reference. Python cannot convert a reference with thousands of them.
 _LEADING_ZEROS = re.compile(r"(&#[xX]?)0+")
 
-#: Pattern for an invalid number -> remedy. The remedy of the first matching pattern is used.
+#: For each pattern of an invalid number: the remedy. The remedy of the first matching pattern is used.
 _REMEDIES = (
     (r"[+-]?(nan|inf|infinity)", "write a finite number"),
     (r".*\$[({].*", "expand the xacro first"),
@@ -699,7 +699,7 @@ def read_robot(report: Reporter, root: Element) -> RobotRecord | None:
     return robot
 
 
-#: Root element of another format -> remedy.
+#: For each root element of another format: the remedy.
 _FORMATS = {
     "sdf": "this is an SDF file; convert it to a URDF first",
     "mujoco": "this is an MJCF file; `load` and all other commands read it if its suffix is .xml or .mjcf",

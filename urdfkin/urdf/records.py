@@ -1,7 +1,7 @@
 """Elements, links and joints of a URDF as plain data, and the limits on their size. `urdf.parser` fills them.
 
 In the records of links and joints, None marks a value that could not be read; a finding reports it. A value
-that the file does not write has the default of the specification.
+that the file omits has the default of the specification.
 """
 
 from __future__ import annotations

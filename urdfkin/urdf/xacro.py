@@ -109,7 +109,7 @@ def _included_file(name: str, beside: Path, find: Find) -> Path | None:
     return None if _COMPUTED.search(name) or not name else folder / name
 
 
-#: Time limit of an expansion in seconds. It is needed because a macro may call itself without end.
+#: Time limit of an expansion in seconds. This limit is needed because a macro may call itself without end.
 PATIENCE = 60.0
 
 #: Size limit of the answer in bytes.

@@ -481,7 +481,7 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
 
 
 def quaternion_jacobian_bound(bound: Bound) -> Bound:
-    """Return the bound of analytical Jacobians with quaternions, (n, frames, 7, nv); no singularity.
+    """Return the bound (n, frames, 7, nv) of analytical Jacobians with quaternions, which are never singular.
 
     The position rows have the Jacobian's bound. A row of 4 q q^T is linear in R. The error of this row is
     below 4.6 delta and its length at least 2, so the error of q is below 2.3 delta. Half the product of w and

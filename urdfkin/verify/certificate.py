@@ -102,7 +102,7 @@ class Comparison:
         return cls(0, 0.0, 0.0, ())
 
     def __add__(self, other: Comparison) -> Comparison:
-        """Return the joint comparison of two batches.
+        """Return the combined comparison of two batches.
 
         The `index` of the result belongs to the batch with the larger ratio.
         """

@@ -39,7 +39,7 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
         The line; None if Pinocchio cannot check the robot.
 
     Raises:
-        TableError: the two differ by more than rounding.
+        TableError: the chain and Pinocchio differ by more than rounding.
     """
     if verifier.cannot() is not None:
         return None
@@ -103,7 +103,7 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
         The line; None if Pinocchio cannot check the robot.
 
     Raises:
-        TableError: the two differ by more than rounding.
+        TableError: the product of exponentials and Pinocchio differ by more than rounding.
     """
     if verifier.cannot() is not None:
         return None

@@ -9,7 +9,7 @@ Pinocchio's own parser. `urdfkin.verify.oracle` determines three things a second
 and the user's original numbers: the frame of a name, the joint of each number of q, and the base's motion.
 
 Pinocchio's model is built without mimic joints, because Pinocchio 4.1 with mimic joints refuses four of the
-robots it ships with. `urdfkin.verify.oracle` reads the mimic rules from the text a second time.
+robots in its own examples. `urdfkin.verify.oracle` reads the mimic rules from the text a second time.
 The rules define a matrix G and a vector g_0, with q_full = G q + g_0, v_full = G v and J = J_full G. The
 index "full" marks Pinocchio's vectors, in which mimic joints have numbers of their own.
 """

@@ -97,8 +97,8 @@ def draw(tree: KinematicTree, n: int, rng: np.random.Generator, *, with_special:
 
     The samples cover the full range of each joint, even if a mimic joint then exceeds its own limits. The
     equations are valid beyond the limits too. Joint velocities and accelerations are standard normal. In
-    every eighth sample they are a hundred times larger, so that the quadratic terms of eq. 7.129 and 7.130
-    dominate.
+    every eighth sample these velocities and accelerations are a hundred times larger, so that the quadratic
+    terms of eq. 7.129 and 7.130 dominate.
     """
     q = _uniform(tree, n, rng, own_ranges(tree))
     if with_special:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     Axes = matplotlib.axes.Axes
     Figure = matplotlib.figure.Figure
 
-#: Placeholder colours in a drawing -> colours of the page's style that replace them.
+#: For each placeholder colour in a drawing: the colour of the page's style that replaces it.
 PAGE_COLOURS = {
     "#010101": "var(--plot-text)",
     "#020202": "var(--plot-grid)",

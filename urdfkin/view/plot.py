@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 #: A function that draws a motion over time, in seconds, into axes.
 Panel = Callable[["Axes", FrameMotion, FloatArray], None]
 
-#: Line styles. They distinguish lines for readers who see no colours.
+#: Line styles. The styles distinguish lines for readers who see no colours.
 STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), "-")
 
 
@@ -64,7 +64,7 @@ def position(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
 def orientation(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
     """Draw the frame's rotation since the start, rad.
 
-    It is drawn as the rotation vector, axis times angle, in world axes.
+    The orientation is drawn as the rotation vector, axis times angle, in world axes.
     """
     R = x.placement[:, :3, :3]
     _lines(axes, t, log_rotation(R @ R[0].T), ("x", "y", "z"))

@@ -89,7 +89,7 @@ class Sliders:
         self.handles: list[Any] = []
 
     def build(self, values: FloatArray, *, degrees: bool) -> None:
-        """Create the sliders in the given unit, in place of the previous ones."""
+        """Create sliders in the given unit; they replace the previous sliders."""
         orders = [handle.order for handle in self.handles] or [None] * len(self.rows)
         for handle in self.handles:
             handle.remove()
@@ -156,7 +156,7 @@ class Sliders:
 
 
 def _marks(lower: float, upper: float) -> tuple[tuple[float, str], tuple[float, str]]:
-    """Return the limits as marks at both ends of a slider."""
+    """Return the limits as marks at the two ends of a slider."""
     first, last = (f"{round(x, 1):g}" if abs(x) >= 1.0 else f"{x:.2g}" for x in (lower, upper))
     return (lower, first), (upper, last)
 

@@ -37,8 +37,8 @@ FORMATS: dict[str, tuple[str, str]] = {
 def export(table: DHTable, format: str, units: Units | None = None, *, verify: bool = True) -> str:
     """Return the table in a format.
 
-    Code for numbers computes the placement, the Jacobian and the acceleration of the tip. The code contains
-    its own check, as after `urdfkin export --form dh`.
+    Code for numbers computes the placement, the Jacobian and the acceleration of the tip. The code also
+    contains its proof, like the code that `urdfkin export --form dh` writes.
 
     Args:
         table: Any table.

@@ -817,7 +817,7 @@ class Reordering:
 
 
 def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | None:
-    """Return the formula that computes "q" or "v" of the convention `end` from that of `start`, or None.
+    """Return the formula that computes "q" or "v" of convention `end` from "q" or "v" of `start`, or None.
 
     There is no formula if one of the two conventions stores the cosine and the sine of an angle, or if the
     two conventions express a base velocity in different frames.

@@ -295,7 +295,8 @@ def _lines_apart(kind: str, s: Screw, t: Screw) -> tuple[float, float]:
 
 
 _Some = TypeVar("_Some")
-#: A pair of objects of the same type. The first belongs to mechanism A, the second to mechanism B.
+#: A pair of objects of the same type. The first object belongs to mechanism A, the second object to mechanism
+#: B.
 Both = tuple[_Some, _Some]
 
 
@@ -357,8 +358,8 @@ def behind(
 ) -> Iterator[Both[Axis]]:
     """Yield pairs of joint axes, one at a body of A and one at a body of B.
 
-    If a joint's axis is parallel to the line `seen`, the joint does not move that line. The axes after this
-    joint are then yielded too.
+    If a joint's axis is parallel to the line `seen`, the joint does not change the direction of that line.
+    The axes after this joint are then yielded too.
     """
     for e, f in _next_joints(mechanisms, via, bodies):
         axes = _axis(mechanisms[0], e, seen[0]), _axis(mechanisms[1], f, seen[1])

@@ -625,7 +625,7 @@ def align(a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | N
     Args:
         a: One mechanism.
         b: The other mechanism.
-        given: Joints of A and their names in B.
+        given: Names of joints of A, each with the name of the matched joint in B.
         gauge: Prescribed free choices; None: the choices with which most joints and links agree.
     """
     if gauge is not None:
@@ -657,7 +657,7 @@ def _orders_to_try(
     Args:
         a: One mechanism.
         b: The other mechanism.
-        given: Joints of A and their names in B.
+        given: Names of joints of A, each with the name of the matched joint in B.
         run: Names of the commuting joints of B, from the inner body outwards.
         orders: All other orders of these joints that their axes allow.
     """

@@ -186,7 +186,7 @@ def is_pose(kind: JointKind, T: FloatArray) -> bool:
 
 
 def turn_in_plane(P: FloatArray) -> FloatArray:
-    """Return the angle about z that is nearest to a pose's rotation."""
+    """Return the angle of the rotation about z that is nearest to a pose's rotation."""
     return np.arctan2(P[..., 1, 0] - P[..., 0, 1], P[..., 0, 0] + P[..., 1, 1])
 
 
