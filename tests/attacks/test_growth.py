@@ -11,7 +11,7 @@ from contextlib import contextmanager
 import pytest
 
 import urdfkin
-from scripts.growing.kinds import KINDS
+from scripts.check_growth import KINDS
 from tests.lint.cases.arm import arm
 from tests.reading import tree_of
 from urdfkin.errors import nearest
