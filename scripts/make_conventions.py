@@ -105,7 +105,7 @@ _TABLES = (
     ("urdfkin", "pinocchio", "mujoco", "drake", "idyntree", "rtb", "kdl"),
     ("isaaclab", "isaaclab3", "isaacgym", "newton", "newton-usd", "usd", "ros"),
 )
-#: The distribution of each library that tests/conventions/libraries.py runs.
+#: The distribution of each library that tests/model/conventions/libraries.py runs.
 _DISTRIBUTIONS = {
     "pinocchio": "pin",
     "mujoco": "mujoco",
@@ -492,7 +492,7 @@ def _cells(how: Convention) -> dict[str, str]:
 
 def measure() -> None:
     """Run the installed libraries on the catalogue, and write the results to conventions.toml."""
-    from tests.conventions.libraries import LIBRARIES  # noqa: PLC0415  needs pytest
+    from tests.model.conventions.libraries import LIBRARIES  # noqa: PLC0415  needs pytest
 
     for name, library in LIBRARIES.items():
         try:
@@ -510,7 +510,7 @@ def measure() -> None:
 
 def _measured(name: str, make: Callable[[Any, Path], Any]) -> str:
     """Return the number of robots on which a library agrees with urdfkin, and the largest difference."""
-    from tests.conventions.test_libraries import _conversion, _differences, _loaded  # noqa: PLC0415
+    from tests.model.conventions.test_libraries import _conversion, _differences, _loaded  # noqa: PLC0415
 
     agree, worst, share, robots = 0, 0.0, 0.0, sorted(catalogue())
     for name_of_robot in robots:
