@@ -28,13 +28,13 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout 
 
 import urdfkin
 from scripts.benchmarking.subject import chain_urdf
+from scripts.pages import inserted
 from urdfkin.export import QUANTITIES, write
 from urdfkin.export.code import Code, code_of
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import examples
 
 PAGE = Path(__file__).parents[1] / "docs" / "export.md"
-_SIZES = re.compile(r"(<!-- sizes -->\n).*?(<!-- end -->)", re.DOTALL)
 _STRICT = ("-std=c99", "-O0", "-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Wshadow", "-Werror")
 _SHARE = re.compile(r"worst error (\S+) of the bound")
 
@@ -153,10 +153,7 @@ def sizes() -> str:
 
 def page(text: str) -> str:
     """Return the page with the current table of sizes."""
-    found, count = _SIZES.subn(lambda place: place[1] + sizes() + place[2], text)
-    if count != 1:
-        raise ValueError(f"the page has {count} places for the sizes")
-    return found
+    return inserted(text, sizes=sizes())
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -5,18 +5,227 @@
 
 If the cost grows linearly, all numbers in a row are equal. Each document is checked in its own process. A
 check that takes longer than `--patience` ends its row.
+
+Each kind of content is a function that takes a size in bytes, and returns a URDF of about this size with this
+content many times. A faulty exporter or an attacker could write such files. Most are rejected. The time and
+memory of the rejection must be proportional to the size of the file.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
+import resource
+import subprocess
 import sys
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 
-from scripts.growing.clock import Cost, cost_apart
-from scripts.growing.kinds import KINDS
+from urdfkin.urdf.lint import check_text
+
+Kind = Callable[[int], bytes]
+
+_JOINT = (
+    '<joint name="j{i}" type="{kind}"><parent link="l{p}"/><child link="l{c}"/>'
+    '<axis xyz="0 0 1"/>{more}</joint>'
+)
+
+
+def _robot(inside: str) -> bytes:
+    return f'<robot name="r">{inside}</robot>'.encode()
+
+
+def _filled(size: int, piece: Callable[[int], str]) -> str:
+    """Return the concatenation of `piece(0)`, `piece(1)`, and so on, up to a size in bytes."""
+    count = max(size // len(piece(10**6)), 2)
+    return "".join(map(piece, range(count)))
+
+
+def _in_base(inside: str) -> bytes:
+    return _robot(f'<link name="base">{inside}</link>')
+
+
+def _attribute(written: str) -> bytes:
+    ends = '<parent link="a"/><child link="b"/>'
+    return _robot(
+        f'<link name="a"/><link name="b"/><joint name="j" type="fixed">{ends}<origin {written}/></joint>'
+    )
+
+
+def _tree(size: int, parent: Callable[[int], int], kind: str = "fixed", more: str = "") -> bytes:
+    links = max(size // 130, 2)
+    return _robot(
+        "".join(f'<link name="l{i}"/>\n' for i in range(links))
+        + "".join(
+            _JOINT.format(i=i, kind=kind, p=parent(i), c=i + 1, more=more.format(i - 1) if i else "")
+            for i in range(links - 1)
+        )
+    )
+
+
+KINDS: dict[str, Kind] = {
+    # numbers
+    "one long number": lambda n: _attribute(f'xyz="{"1" * n}e+ 0 0"'),
+    "one long decimal": lambda n: _attribute(f'xyz="0.{"1" * n} 0 0"'),
+    "many numbers in a vector": lambda n: _attribute(f'xyz="{"1 " * (n // 2)}"'),
+    "many blanks in a vector": lambda n: _attribute(f'xyz="1{" " * n}0 0"'),
+    "tabs in a vector": lambda n: _attribute('xyz="' + "\t" * n + '1 0 0"'),
+    "a number by long references": lambda n: _attribute(f'xyz="&#{"0" * n}49; 0 0"'),
+    "bad numbers": lambda n: _robot(
+        _filled(n, lambda i: f'<joint name="j{i}" type="fixed"><origin xyz="a b c"/></joint>')
+    ),
+    "signs and points": lambda n: _attribute(f'xyz="{"+." * (n // 2)} 0 0"'),
+    # comments for urdfkin
+    "comments that silence nothing": lambda n: _robot(
+        '<link name="l"/>' + _filled(n, lambda i: f"<!-- urdfkin: ignore[x{i}] y -->\n")
+    ),
+    "comments behind each other": lambda n: _robot(
+        '<link name="l"/>' + _filled(n, lambda i: f"<!-- urdfkin: ignore[URDF207] y --><x{i}/>")
+    ),
+    "one long comment": lambda n: _robot(f'<!-- urdfkin: ignore[{"207 " * (n // 4)}] y --><link name="l"/>'),
+    # names
+    "one long name": lambda n: _robot(f'<link name="{"a" * n}"/>'),
+    "one long tag": lambda n: _in_base(f"<{'a' * n}/>"),
+    "one long attribute's name": lambda n: _in_base(f'<visual {"a" * n}="1"/>'),
+    "one long type": lambda n: _robot(f'<link name="l"/><joint name="j" type="{"a" * n}"/>'),
+    "one long version": lambda n: f'<robot name="r" version="{"1" * n}.0"><link name="l"/></robot>'.encode(),
+    "one long address": lambda n: _in_base(
+        f'<visual><geometry><mesh filename="package://{"a" * n}"/></geometry></visual>'
+    ),
+    "names that say the same": lambda n: _robot(_filled(n, lambda i: '<link name="a"/>')),
+    "names of combining marks": lambda n: _robot(
+        _filled(n, lambda i: f'<link name="{i}' + "a" + "\u0301\u0323" * 100 + '"/>')
+    ),
+    "names that look alike": lambda n: _robot(
+        _filled(n, lambda i: f'<link name="{"ab" * 40}{i}"/><joint name="{i}" type="x{"ba" * 40}"/>')
+    ),
+    "links by misspelt names": lambda n: _robot(
+        _filled(
+            n,
+            lambda i: (
+                f'<link name="{"ab" * 25}{i}"/>'
+                f'<joint name="j{i}" type="fixed"><parent link="{"ba" * 25}{i}"/><child link="c"/></joint>'
+            ),
+        )
+    ),
+    "unknown links": lambda n: _robot(
+        '<link name="l"/>'
+        + _filled(
+            n,
+            lambda i: f'<joint name="j{i}" type="fixed"><parent link="x{i}"/><child link="y{i}"/></joint>',
+        )
+    ),
+    "unknown leaders": lambda n: _tree(n, lambda i: i, "continuous", '<mimic joint="x{}"/>'),
+    "undeclared prefixes": lambda n: _robot('<link name="l"/>' + _filled(n, lambda i: f"<p{i}:x/>")),
+    "declared prefixes": lambda n: _robot(
+        '<link name="l"/>' + _filled(n, lambda i: f'<gazebo xmlns:p{i}="http://p" p{i}:a="1"/>')
+    ),
+    # attributes
+    "attributes of one link": lambda n: _robot(
+        f'<link name="l" {_filled(n, lambda i: f"a{i}={chr(34)}1{chr(34)} ")}/>'
+    ),
+    "unknown attributes": lambda n: _robot(
+        _filled(n, lambda i: f'<link name="l{i}" ' + "".join(f'a{k}="1" ' for k in range(60)) + "/>")
+    ),
+    "one long value": lambda n: _robot(f'<link name="l"/><material file="{"a" * n}"/>'),
+    "openings of expressions": lambda n: _robot(f'<link name="l"/><material file="{"${" * (n // 2)}"/>'),
+    "references in a value": lambda n: _robot(f'<link name="l"/><material file="{"&amp;" * (n // 5)}"/>'),
+    # content between elements
+    "text": lambda n: _robot('<link name="l"/>' + "words " * (n // 6)),
+    "lines": lambda n: _robot('<link name="l"/>' + "\n" * n),
+    "lines, then a broken tag": lambda n: _robot('<link name="l"/>' + "\n" * n + "<"),
+    "references in text": lambda n: _robot('<link name="l"/>' + "&lt;" * (n // 4)),
+    "text between elements": lambda n: _robot('<link name="l"/>' + "a<gazebo/>" * (n // 10)),
+    "text like attributes": lambda n: _robot('<link name="l"/>="' + "\t" * n),
+    "text like many attributes": lambda n: _robot('<link name="l"/>' + "=\"\t='" * (n // 5)),
+    "one comment": lambda n: _robot(f'<link name="l"/><!--{"a" * n}-->'),
+    "comments": lambda n: _robot('<link name="l"/>' + "<!---->" * (n // 7)),
+    "one instruction": lambda n: f"<?a {'a' * n}?>".encode() + _robot('<link name="l"/>'),
+    "instructions": lambda n: b"<?a b?>" * (n // 7) + _robot('<link name="l"/>'),
+    "instructions inside": lambda n: _robot('<link name="l"/>' + "<?a b?>" * (n // 7)),
+    "one CDATA section": lambda n: _in_base(f"<![CDATA[{'a' * n}]]>"),
+    "CDATA sections": lambda n: _in_base("<![CDATA[a]]>" * (n // 13)),
+    "a declaration that does not end": lambda n: b"<?xml version='1.0' " + b"?" * n,
+    "a long encoding": lambda n: f'<?xml version="1.0" encoding="{"a" * n}"?>'.encode() + _robot(""),
+    "undefined entities": lambda n: _robot(f'<link name="&{"a" * n};"/>'),
+    "a document type": lambda n: f"<!DOCTYPE {'a' * n}>".encode() + _robot('<link name="l"/>'),
+    # structure
+    "links that nothing connects": lambda n: _robot(_filled(n, lambda i: f'<link name="l{i}"/>\n')),
+    "a chain": lambda n: _tree(n, lambda i: i),
+    "a star": lambda n: _tree(n, lambda i: 0),
+    "one place for all joints": lambda n: _tree(n, lambda i: 0, "continuous"),
+    "a chain of mimic joints": lambda n: _tree(n, lambda i: i, "continuous", '<mimic joint="j{}"/>'),
+    "a loop": lambda n: _tree(n, lambda i: i).replace(b'<child link="l1"/>', b'<child link="l0"/>', 1),
+    "several parents": lambda n: _robot(
+        '<link name="a"/><link name="b"/>'
+        + _filled(n, lambda i: f'<joint name="j{i}" type="fixed"><parent link="a"/><child link="b"/></joint>')
+    ),
+    "deep nesting": lambda n: _robot('<link name="l"/>' + "<a>" * (n // 7) + "</a>" * (n // 7)),
+    "misplaced links, deep": lambda n: _robot(
+        '<link name="l"/>' + "<a>" * 400 + '<link name="x"/>' * (n // 16) + "</a>" * 400
+    ),
+    "unknown elements": lambda n: _robot('<link name="l"/>' + _filled(n, lambda i: f"<u{i}/>")),
+    "children of one joint": lambda n: _robot(
+        '<link name="l"/><joint name="j" type="fixed">' + "<origin/>" * (n // 9) + "</joint>"
+    ),
+    "shapes": lambda n: _in_base(
+        '<visual><geometry><box size="1 1 1"/></geometry><material name="m"/></visual>' * (n // 76)
+    ),
+    "materials": lambda n: _robot('<link name="l"/>' + _filled(n, lambda i: f'<material name="m{i % 9}"/>')),
+    "tags that are never closed": lambda n: b'<robot name="r">' + b"<link>" * (n // 6),
+    "a file cut in a tag": lambda n: b'<robot name="r"><link name="' + b"a" * n,
+    # bytes
+    "no XML": lambda n: b"a" * n,
+    "blanks": lambda n: b" " * n,
+    "zero bytes": lambda n: _robot("\0" * n),
+    "a wrong byte at the end": lambda n: _robot("a" * n) + b"\xff",
+    "another encoding": lambda n: ("\ufeff" + "a" * (n // 2)).encode("utf-16-le"),
+    "characters of four bytes": lambda n: _robot('<link name="l"/>' + "\U0001f600" * (n // 4)),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """The cost of a check.
+
+    Attributes:
+        megabytes: Size of the document.
+        seconds: Processor time.
+        memory: Largest growth of the process's memory in megabytes, including the memory of the findings.
+        findings: Number of reported findings.
+    """
+
+    megabytes: float
+    seconds: float
+    memory: float
+    findings: int
+
+
+def cost_of(kind: str, size: int) -> Cost:
+    """Check a document of a kind and about `size` bytes, in this process."""
+    document = KINDS[kind](size)
+    before, start = _peak(), time.process_time()
+    findings = check_text(document, fold=False)
+    seconds = time.process_time() - start
+    return Cost(len(document) / 1e6, seconds, _peak() - before, len(findings))
+
+
+def cost_apart(kind: str, size: int, patience: float) -> Cost | None:
+    """Check a document in a separate process; return None after `patience` seconds."""
+    command = [sys.executable, str(Path(__file__)), "--one", str(size), kind]
+    try:
+        done = subprocess.run(command, capture_output=True, check=True, timeout=patience)
+    except subprocess.TimeoutExpired:
+        return None
+    return Cost(**json.loads(done.stdout))
+
+
+def _peak() -> float:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
 
 
 def main() -> None:
@@ -31,7 +240,11 @@ def main() -> None:
         "--sizes", default="1,4,16,64", help="sizes of the documents in megabytes, separated by commas"
     )
     parser.add_argument("--patience", type=float, default=600.0, help="time limit of one document in seconds")
+    parser.add_argument("--one", type=int, help="check one document of this many bytes in this process")
     options = parser.parse_args()
+    if options.one is not None:
+        print(json.dumps(asdict(cost_of(options.words[0], options.one))))
+        return
     sizes = [float(size) for size in options.sizes.split(",")]
     heads = [f"{size:g} MB" for size in sizes]
     print(f"| seconds and megabytes for each megabyte of | {' | '.join(heads)} |")

@@ -17,6 +17,10 @@ from html import escape
 from pathlib import Path
 from typing import NamedTuple
 
+sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
+
+from scripts.pages import inserted
+
 ROOT = Path(__file__).resolve().parents[1]
 PAGE, PICTURE = ROOT / "docs" / "architecture.md", ROOT / "docs" / "images" / "architecture.svg"
 PLAN = tomllib.loads((ROOT / "docs" / "architecture.toml").read_text(encoding="utf-8"))
@@ -198,10 +202,7 @@ def picture() -> str:
 
 def page() -> str:
     """Return docs/architecture.md with a current table."""
-    text = PAGE.read_text(encoding="utf-8")
-    return re.sub(
-        r"(?s)(<!-- packages -->\n).*?(\n<!-- /packages -->)", lambda m: m[1] + table() + m[2], text
-    )
+    return inserted(PAGE.read_text(encoding="utf-8"), packages=table())
 
 
 if __name__ == "__main__":

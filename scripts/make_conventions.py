@@ -28,6 +28,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 import urdfkin
+from scripts.pages import inserted
 from urdfkin.model.conventions import Convention, find_convention
 from urdfkin.model.conventions.convention import _built_in, spelled
 from urdfkin.model.tree import FloatArray
@@ -98,66 +99,13 @@ FREE_URDF = '<robot name="r"><link name="base"/><link name="l1"/>' + (
     '<joint name="f" type="floating"><parent link="base"/><child link="l1"/></joint></robot>'
 )
 
-_HEAD = """# Conventions
 
-urdfkin, Pinocchio and MuJoCo use the same words with different definitions. This table was measured, not
-copied from manuals. `scripts/make_conventions.py` moves a robot and computes its velocity and acceleration by
-finite differences of placements. It then finds the definition that matches each library's result. A test
-checks that this page is current.
-
-`urdfkin validate --oracle mujoco` compares all three libraries. After conversion to the same conventions
-(`urdfkin/verify/pinocchio.py`, `urdfkin/verify/mujoco.py`) they agree to rounding.
-
-"""
-_FOOT = """
-The libraries differ most in mimic joints, so urdfkin couples them itself before it calls the other two.
-Kinematics needs no mass, so urdfkin gives each link a mass before MuJoCo reads the text. `URDF702` reports an
-impossible mass or inertia.
-"""
-
-_TOOLS = """
-## Conventions of other tools
-
-`urdfkin order ROBOT` shows the joints' order in each tool. With --from or --to it prints the conversion:
-
-```console
-$ urdfkin order a1 --from isaaclab --to mujoco
-q_to = q_from[..., [1, 5, 9, 0, 4, 8, 3, 7, 11, 2, 6, 10]]
-v_to = v_from[..., [1, 5, 9, 0, 4, 8, 3, 7, 11, 2, 6, 10]]
-# mujoco: qpos and qvel; mj_jac with jacp above jacr; mj_objectVelocity and others return [angular; linear]
-```
-
-`robot.convention(NAME)` converts q, v, a, Jacobians and six-vectors to a tool's numbers and back. The methods
-of `robot.with_convention(NAME)` take and return them:
-
-```python
-import urdfkin
-
-robot = urdfkin.load("a1", root_joint="floating")
-mujoco = robot.convention("mujoco")
-q = robot.sample(1)[0]
-qpos, qvel = mujoco.to(q, [1.0] + [0.0] * 17)  # 1 m/s forwards
-q, v = mujoco.from_(qpos, qvel)
-J = robot.with_convention("mujoco").jacobian(qpos, "FL_foot")
-print(qpos.shape, qvel.shape, J.shape)
-```
-
-```text
-(19,) (18,) (6, 18)
-```
-
-Every command that takes joint values has `--convention NAME`. --q, --v, --a, --trajectory and the result are
-the tool's numbers. Three results stay in urdfkin's convention: `imu` prints the accelerometer first, singular
-values are for joint velocities in rad/s and m/s, and the panels of `plot` and the sliders of `view` have the
-URDF's names.
-
-"""
 #: The tools in each table: libraries of kinematics in one table, simulators and formats in the other.
 _TABLES = (
     ("urdfkin", "pinocchio", "mujoco", "drake", "idyntree", "rtb", "kdl"),
     ("isaaclab", "isaaclab3", "isaacgym", "newton", "newton-usd", "usd", "ros"),
 )
-#: The distribution of each library that tests/conventions/libraries.py runs.
+#: The distribution of each library that tests/model/conventions/libraries.py runs.
 _DISTRIBUTIONS = {
     "pinocchio": "pin",
     "mujoco": "mujoco",
@@ -168,63 +116,6 @@ _DISTRIBUTIONS = {
     "newton-usd": "newton",
     "usd": "usd-exchange",
 }
-_OWN = """
-`urdf` (the joints in the order of the file) and `alphabetical` (sorted by name) are urdfkin's convention with
-another order and a coordinate for each mimic joint. A root joint comes first.
-
-*Measured*: `scripts/make_conventions.py --measure` ran the library on the catalogue, with its own forward
-kinematics, Jacobian and base velocity, and compared them with ours after the conversion. The bound is derived
-(`tests/conventions/libraries.py`); Newton and USD compute in single precision. A test does the same on 20
-robots wherever the library is installed (`tests/conventions/test_libraries.py`). OpenUSD has no forward
-kinematics; the test computes it from the frames of the joint prims. The other robots were not compared for
-these reasons:
-
-- Drake and urdf-usd-converter refuse `alex_psyonic_hands`: mimic joints name a leader that the file lacks.
-- Robotics Toolbox fails for `hector` and `iris_simple`, which have no moving joint. It turns an axis that is
-  not parallel to x, y or z, as in both iCubs and two Romeos, so that only their joints' order agrees.
-
-*Sources*: no library runs here. A test compares the convention with what the sources state
-(`tests/conventions/test_statements.py`), and the orders of Isaac Lab and Isaac Gym with published lists
-(`tests/conventions/test_published_orders.py`). The file of the convention,
-`urdfkin/model/conventions/conventions.toml`, says what each source is for, and what is in doubt.
-
-`isaaclab` and `isaaclab3` assume that the importer merges fixed joints. Without that option, a fixed joint
-counts as a level: use `order = "breadth first, with fixed joints"` in a file.
-
-## Your own convention
-
-A TOML file has an order, names, signs, units and motor zeros. The value in the tool is the angle in its unit,
-times `sign`, plus `zero`:
-
-```toml
-like = "urdf"                # the convention to begin with: the default
-joints = ["2", "joint_1"]    # the order, by the tool's names
-
-[joint.joint_1]
-unit = "deg"
-
-[joint.joint_2]
-name = "2"
-sign = -1
-unit = 4096                  # steps of one turn
-zero = 2048                  # the motor's value where the joint is at 0
-```
-
-The other keys are those of `urdfkin/model/conventions/conventions.toml`, such as `quaternion = "wxyz"`, or
-`names = "usd"`, `"identifier"` and `"isaacsim"` for three spellings of names in USD.
-
-`urdfkin same A B --write-map FILE` writes such a file for A, with the joint names, order, senses and zeros of
-B:
-
-```console
-$ urdfkin same ur5 ur5_limited --boxes 0 --write-map map.toml
-...
-$ urdfkin placement ur5 --convention map.toml --q 0,-90deg,90deg,0,0,0
-...
-```
-
-In Python, `urdfkin.same(a, b).convention()` returns it.
-"""
 
 Readings = Mapping[str, FloatArray]
 
@@ -563,11 +454,6 @@ def _free() -> list[Row]:
     ]
 
 
-def _tools() -> str:
-    """Return the tables of the built-in conventions."""
-    return _TOOLS + "\n".join(map(_table, _TABLES)) + _OWN
-
-
 def _table(names: tuple[str, ...]) -> str:
     """Return a table with a column for each convention."""
     columns = [_cells(find_convention(name)) for name in names]
@@ -606,7 +492,7 @@ def _cells(how: Convention) -> dict[str, str]:
 
 def measure() -> None:
     """Run the installed libraries on the catalogue, and write the results to conventions.toml."""
-    from tests.conventions.libraries import LIBRARIES  # noqa: PLC0415  needs pytest
+    from tests.model.conventions.libraries import LIBRARIES  # noqa: PLC0415  needs pytest
 
     for name, library in LIBRARIES.items():
         try:
@@ -624,7 +510,7 @@ def measure() -> None:
 
 def _measured(name: str, make: Callable[[Any, Path], Any]) -> str:
     """Return the number of robots on which a library agrees with urdfkin, and the largest difference."""
-    from tests.conventions.test_libraries import _conversion, _differences, _loaded  # noqa: PLC0415
+    from tests.model.conventions.test_libraries import _conversion, _differences, _loaded  # noqa: PLC0415
 
     agree, worst, share, robots = 0, 0.0, 0.0, sorted(catalogue())
     for name_of_robot in robots:
@@ -658,7 +544,8 @@ def page() -> str:
 
     heads = f"| | urdfkin | Pinocchio {pin.__version__} | MuJoCo {mujoco.__version__} |\n|---|---|---|---|\n"
     table = [f"| {row.question} | {row.urdfkin} | {row.pinocchio} | {row.mujoco} |\n" for row in rows()]
-    return _HEAD + heads + "".join(table) + _FOOT + _tools()
+    tools = "\n".join(map(_table, _TABLES))
+    return inserted(PAGE.read_text("utf-8"), measured=heads + "".join(table), tools=tools)
 
 
 if __name__ == "__main__":

@@ -6,9 +6,13 @@ page with the output of this script.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
+
+from scripts.pages import inserted
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import WRITTEN_OUT, shortened
 from urdfkin.urdf.lint import DEFAULT_LIMITS, Finding, Severity, check
@@ -39,25 +43,7 @@ REMARKS = {
     "URDF708": "Only a colour is missing.",
 }
 
-HEAD = """\
-# Findings
-
-`urdfkin check FILE` and `urdfkin.check(source)` report the problems of a URDF. `urdfkin.load` refuses a file
-with an error, and warns of the other problems. `urdfkin explain CODE` prints the page of a code.
-`scripts/make_findings.py` writes this file.
-
-- An **error** means that the file has no unique meaning. It is refused.
-- A **warning** is legal, but almost certainly a mistake, or read differently by some readers.
-- A **note** is information.
-
-Codes marked *refuses* or *differs* are legal, but Pinocchio refuses the file or reads another robot from it.
-urdfkin computes the robot and reports every result as **not verified**, with the finding as the reason.
-
-[check.md](check.md) describes the command: folders, settings, silencing comments, baselines, automatic fixes.
-
-Time and memory grow linearly with the file (`scripts/check_growth.py` measures this for every kind of
-content). These limits apply to `check` and `load`; an option of `check` raises each:
-
+LIMITS = """\
 | limit | option |
 |---|---|
 | {limits.bytes:,} bytes | `--max-bytes` |
@@ -67,29 +53,20 @@ content). These limits apply to `check` and `load`; an option of `check` raises 
 | {limits.name:,} characters of a name | `--max-name` |
 | {limits.number:,} characters of a number | `--max-number` |
 | {limits.markup:,} bytes of one tag or comment | `--max-markup` |
-
-On a terminal, many warnings of one kind are combined into one that lists the lines. Errors are combined from
-the hundredth of a kind on. `--each` prints each finding. At most {written:,} findings of a kind are complete,
-also in JSON and SARIF; the last of them lists the lines of the others (`also` in JSON).
-
-## Codes
+| {written:,} complete findings of a kind, also in JSON and SARIF | |
 """
 
-ROBOTS = """\
-## Warnings of the robots in the catalogue
-
-No robot has an error (alex_psyonic_hands is loaded with mimic=False, as its catalogue entry states). The
-table lists the warnings. The other robots have none. Notes, such as rounded multiples of pi, are not listed.
-
-| robot | code | where | what | meaning |
-|---|---|---|---|---|
-"""
+ROBOTS = "| robot | code | where | what | meaning |\n|---|---|---|---|---|\n"
 
 
 def page() -> str:
     """Return the page."""
-    head = HEAD.format(limits=DEFAULT_LIMITS, written=WRITTEN_OUT)
-    return head + "".join(_tables()) + "\n" + ROBOTS + "".join(_robots())
+    return inserted(
+        PAGE.read_text("utf-8"),
+        limits=LIMITS.format(limits=DEFAULT_LIMITS, written=WRITTEN_OUT),
+        codes="".join(_tables()),
+        robots=ROBOTS + "".join(_robots()),
+    )
 
 
 def _tables() -> Iterator[str]:

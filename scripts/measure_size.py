@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import importlib.metadata
-import re
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -21,10 +20,13 @@ try:
 except ModuleNotFoundError:  # an environment without extras has only pip's copy
     from pip._vendor.packaging.requirements import Requirement  # type: ignore[assignment,unused-ignore]
 
+sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
+
+from scripts.pages import inserted
+
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "install.md"
 EXTRAS = ("plots", "view", "xacro", "mujoco", "descriptions", "cluster")
-_PLACE = re.compile(r"(<!-- size -->\n).*?(\n<!-- end -->)", re.DOTALL)
 
 
 def closure(name: str, extras: Iterable[str] = (), without: str = "") -> dict[str, int]:
@@ -91,14 +93,6 @@ def sentences(core: dict[str, int], lean: dict[str, int], extras: dict[str, tupl
     return text + "\n".join(rows)
 
 
-def page(text: str, inserted: str) -> str:
-    """Return the page with the text inserted."""
-    found, count = _PLACE.subn(lambda place: place[1] + inserted + place[2], text)
-    if count != 1:
-        raise ValueError(f"the page has {count} places for the size")
-    return found
-
-
 def main() -> None:
     """Print the largest packages, the sums and the extras, and write the page."""
     parser = argparse.ArgumentParser(description="Measure the size of an installation.")
@@ -126,7 +120,7 @@ def main() -> None:
     if len(extras) < len(EXTRAS):
         missing = ", ".join(set(EXTRAS) - extras.keys())
         sys.exit(f"the page is not written: install these extras first: {missing}")
-    PAGE.write_text(page(PAGE.read_text("utf-8"), sentences(core, lean, extras)), "utf-8")
+    PAGE.write_text(inserted(PAGE.read_text("utf-8"), size=sentences(core, lean, extras)), "utf-8")
     print(PAGE)
 
 

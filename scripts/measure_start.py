@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import re
 import resource
 import statistics
 import subprocess
@@ -25,9 +24,10 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
+from scripts.pages import inserted
+
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "performance.md"
-_PLACE = re.compile(r"(<!-- start -->\n).*?(<!-- end -->)", re.DOTALL)
 _COMMAND = "import sys; sys.argv[0] = 'urdfkin'; from urdfkin.cli import main; main()"
 _NOTEBOOK = "import sys, urdfkin; r = urdfkin.load(sys.argv[1]); r.jacobian(r.neutral(), r.tip_frame)"
 BASE = ("-c", "import numpy, pinocchio")
@@ -120,11 +120,6 @@ def table(found: Sequence[Row]) -> str:
     return "\n".join(lines)
 
 
-def page(text: str, figures: str) -> str:
-    """Return the page with the table inserted."""
-    return _PLACE.sub(lambda place: f"{place[1]}{figures}\n{place[2]}", text)
-
-
 def missed(found: Sequence[Row]) -> list[str]:
     """Return the names of the rows that exceed their bar."""
     base = found[0].median
@@ -140,7 +135,7 @@ def main(words: Sequence[str] | None = None) -> int:
         found = measured(given.rounds, Path(folder))
     figures = table(found)
     print(figures)
-    PAGE.write_text(page(PAGE.read_text("utf-8"), figures), "utf-8")
+    PAGE.write_text(inserted(PAGE.read_text("utf-8"), start=figures), "utf-8")
     for what in missed(found):
         print(f"too slow: {what}", file=sys.stderr)
     return int(bool(missed(found)))

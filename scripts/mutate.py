@@ -33,10 +33,8 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
-from scripts.mutating.arguments import argued
-from scripts.mutating.named import Named, named_slips
 from scripts.mutating.operators import function_at, slips
-from scripts.mutating.selection import ROOT, files, module_of, near_tests
+from scripts.mutating.selection import ROOT, Named, argued, files, module_of, named_slips, near_tests
 
 _NO_TESTS = 5  # pytest's exit code if no test was collected
 _QUICK, _SLOW = "not slow and not browser", "slow and not browser"
@@ -110,7 +108,7 @@ def judge_named(slip: Named, *, timeout: float) -> Outcome:
     word, by = _run({"URDFKIN_MUTANT": slip.module, "URDFKIN_MUTANT_TEXTS": texts}, [slip.test], timeout)
     if word == "noticed" and not by.startswith(f"FAILED {slip.test}"):
         word = "not run"  # the test failed for another reason than the mutant
-    file = f"{slip.module.replace('.', '/')}.py"
+    file = slip.file.relative_to(ROOT).as_posix()
     mutant = Mutant(slip.claim, file, 0, f"{slip.before}  ->  {slip.after}", slip.module)
     return Outcome(mutant, word, by, round(time.perf_counter() - begin, 1))
 

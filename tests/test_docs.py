@@ -12,6 +12,7 @@ from types import ModuleType
 import pytest
 
 from scripts import check_exports, measure_size
+from scripts.pages import inserted
 from tests.cli.running import urdfkin as run
 from tests.pages import pages
 from urdfkin.cli import cli
@@ -104,11 +105,11 @@ def test_the_size_of_an_installation_is_written_by_its_script() -> None:
     assert abs(int(checking) - (measure_size.own() + measure_size.closure("click")["click"]) / 1e6) < 1.0
     core = {"example-robot-data": 10**9, "click": 10**6, "trimesh": 10**9}
     written = measure_size.sentences(core, {"click": 10**6}, {"view": (8, 40_000_000)})
-    assert "takes 2.0 GB: 1.00 GB for" in measure_size.page(text, written)
+    assert "takes 2.0 GB: 1.00 GB for" in inserted(text, size=written)
     assert "2 packages (2000 MB) come only" in written
     assert "| `[view]` | 8 | 40 MB |" in written
     with pytest.raises(ValueError, match="0 places"):
-        measure_size.page("", written)
+        inserted("", size=written)
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ from scripts.fuzzing import GOOD, Case, calibrations, mjcf, robots, tables
 from scripts.fuzzing.judge import Outcome
 from scripts.fuzzing.judge import judge as judge_case
 from scripts.fuzzing.mutations import FAMILIES, mutant
-from tests.lint.cases.arm import arm, fixed
+from tests.urdf.lint.cases.arm import arm, fixed
 from urdfkin.compiled.prepared import PreparedFrame
 from urdfkin.kinematics.inputs import FloatArray
 from urdfkin.system.processes import ask_python

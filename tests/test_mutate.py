@@ -10,9 +10,8 @@ from pathlib import Path
 import pytest
 
 from scripts.mutate import Mutant, judge, main, mutants
-from scripts.mutating.arguments import argued
 from scripts.mutating.operators import function_at, mutated, slips
-from scripts.mutating.selection import PACKAGE, ROOT, files, module_of, near_tests
+from scripts.mutating.selection import PACKAGE, ROOT, argued, files, module_of, near_tests
 
 SOURCE = '''
 """A text is left alone: 1 < 2."""

@@ -1,8 +1,14 @@
-"""Select the files to mutate, and the nearest tests of each."""
+"""Select the files to mutate, and the nearest tests of each; read the named and the harmless mutants.
+
+A named mutant was once not detected. It replaces a text of a file and has a test that must fail. A harmless
+mutant is listed in docs/mutation.md: no test detects it, and no test is needed.
+"""
 
 from __future__ import annotations
 
 import re
+import tomllib
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -71,3 +77,45 @@ def _tests_of(*parts: str) -> set[Path]:
 def _texts() -> dict[Path, str]:
     tests = (path for path in TESTS.rglob("test_*.py") if path.stem not in _OF_SLIPS)
     return {path: path.read_text(encoding="utf-8") for path in tests}
+
+
+@dataclass(frozen=True)
+class Named:
+    """One named mutant.
+
+    Attributes:
+        claim: The mistake that must be detected.
+        module: The module, such as `urdfkin.validation.error_stats`.
+        before: A text that occurs exactly once in the module.
+        after: The text that replaces `before`.
+        test: The test that fails with the mutant and passes without it.
+    """
+
+    claim: str
+    module: str
+    before: str
+    after: str
+    test: str
+
+    @property
+    def file(self) -> Path:
+        """Path of the module's file."""
+        path = ROOT / self.module.replace(".", "/")
+        return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+
+
+def named_slips() -> list[Named]:
+    """Return the mutants of tests/attacks/named_slips.toml."""
+    text = (TESTS / "attacks" / "named_slips.toml").read_text(encoding="utf-8")
+    return [Named(**slip) for slip in tomllib.loads(text)["slip"]]
+
+
+#: - `urdfkin.model.tree.build_tree`: `1  ->  2`: the reason.
+_ARGUMENT = re.compile(r"^- `(?P<place>[\w.]+)`: `(?P<what>[^`]+)`: (?P<why>\S.+)$", re.MULTILINE)
+
+
+@cache
+def argued() -> dict[tuple[str, str], str]:
+    """Return the reason of each harmless mutant, by its function and its text."""
+    page = (ROOT / "docs" / "mutation.md").read_text(encoding="utf-8")
+    return {(found["place"], found["what"]): found["why"] for found in _ARGUMENT.finditer(page)}

@@ -11,9 +11,9 @@ from contextlib import contextmanager
 import pytest
 
 import urdfkin
-from scripts.growing.kinds import KINDS
-from tests.lint.cases.arm import arm
+from scripts.check_growth import KINDS
 from tests.reading import tree_of
+from tests.urdf.lint.cases.arm import arm
 from urdfkin.errors import nearest
 from urdfkin.urdf.findings import ERRORS_SHOWN, WRITTEN_OUT, Reporter
 from urdfkin.urdf.lint import Finding, Severity, UrdfError, check_text

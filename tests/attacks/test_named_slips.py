@@ -7,15 +7,14 @@ from pathlib import Path
 import pytest
 
 from scripts.mutate import judge_named
-from scripts.mutating.named import Named, named_slips
 from scripts.mutating.operators import rewritten
-from scripts.mutating.selection import ROOT
+from scripts.mutating.selection import ROOT, Named, named_slips
 
 SLIPS = named_slips()
 
 
 def _source(slip: Named) -> str:
-    return (ROOT / f"{slip.module.replace('.', '/')}.py").read_text(encoding="utf-8")
+    return slip.file.read_text(encoding="utf-8")
 
 
 def test_every_slip_can_still_be_made_and_its_test_is_there() -> None:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import urdfkin
-from tests.lint.cases.arm import arm
+from tests.urdf.lint.cases.arm import arm
 from urdfkin.robot import Robot
 from urdfkin.urdf.lint import Finding, Severity
 from urdfkin.validation.accuracy import judge

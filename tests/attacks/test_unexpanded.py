@@ -5,7 +5,7 @@ import warnings
 import pytest
 
 import urdfkin
-from tests.lint.cases.arm import MESH, arm
+from tests.urdf.lint.cases.arm import MESH, arm
 from urdfkin.urdf.lint import Severity
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from tests.cli.running import Done, urdfkin
-from tests.lint.cases import CASES
+from tests.urdf.lint.cases import CASES
 from urdfkin.urdf.lint import check as lint
 
 LONG = """<robot name="r">

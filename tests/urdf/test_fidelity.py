@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import urdfkin
-from tests.lint.cases.arm import LIMIT, arm, fixed
+from tests.urdf.lint.cases.arm import LIMIT, arm, fixed
 from urdfkin.robot import Robot
 from urdfkin.verify.verifier import NotVerifiedWarning
 

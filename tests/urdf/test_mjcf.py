@@ -17,7 +17,7 @@ import pytest
 
 import urdfkin
 from tests.cli.running import urdfkin as command
-from tests.lint.cases.arm import arm
+from tests.urdf.lint.cases.arm import arm
 from urdfkin.errors import InputError, OracleError
 from urdfkin.model.tree import FloatArray, pose
 from urdfkin.system.processes import ask_python

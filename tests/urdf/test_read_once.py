@@ -5,7 +5,7 @@ from xml.parsers import expat
 import pytest
 
 import urdfkin
-from tests.lint.cases.arm import arm, axis
+from tests.urdf.lint.cases.arm import arm, axis
 
 FOLLOWS = arm(follow='<mimic joint="j1" multiplier="-0.5"/>')
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import urdfkin
-from tests.lint.cases.arm import arm
+from tests.urdf.lint.cases.arm import arm
 from urdfkin.model.tree import FloatArray
 from urdfkin.report.html import as_html
 from urdfkin.report.junit import as_junit

@@ -8,7 +8,7 @@ import pytest
 
 import urdfkin
 from scripts.fuzzing import robots
-from tests.lint.cases.arm import arm, fixed
+from tests.urdf.lint.cases.arm import arm, fixed
 from urdfkin.errors import UnknownNameError
 from urdfkin.model.reference import Reference
 from urdfkin.urdf.catalogue import catalogue

@@ -21,6 +21,7 @@ from urdfkin.errors import InputError, Question, SourceError
 from urdfkin.errors.numbers import parse_float, parse_int, remedy
 from urdfkin.model.reference import Reference
 from urdfkin.system.files import MOST_DATA, read_standard_input, read_text, shortened
+from urdfkin.verify.oracles import ORACLES
 
 if TYPE_CHECKING:
     from urdfkin.model.base_motion import BaseMotion
@@ -263,7 +264,7 @@ verify_option = click.option(
 )
 oracle_option = click.option(
     "--oracle",
-    type=click.Choice(["pinocchio", "mujoco"]),
+    type=click.Choice(tuple(ORACLES)),
     default="pinocchio",
     help="Library that checks the results: Pinocchio (default) or MuJoCo.",
 )

@@ -27,6 +27,7 @@ from urdfkin.cli.reports import FILES, report_options, say_written, write_report
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.urdf.catalogue import examples
+from urdfkin.verify.oracles import ORACLES
 from urdfkin.verify.quantities import compared, not_compared
 
 if TYPE_CHECKING:
@@ -169,7 +170,7 @@ def _with_quantities(command: _T) -> _T:
 @root_joint_option("Add a moving joint between the world and the root link.")
 @click.option(
     "--oracle",
-    type=click.Choice(["pinocchio", "mujoco"]),
+    type=click.Choice(tuple(ORACLES)),
     default="pinocchio",
     help="`mujoco`: also compare with MuJoCo.",
 )

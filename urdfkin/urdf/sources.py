@@ -11,7 +11,7 @@ import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Literal, TypeGuard
+from typing import IO, TypeGuard
 
 from urdfkin.errors import InputError, Question, SourceError, UnknownNameError, nearest
 from urdfkin.errors.validators import as_bool, as_str, safe_repr
@@ -42,7 +42,7 @@ class Origin:
     mimic: bool | None = None
     root_joint: str | None = None
     xacro_args: tuple[tuple[str, str], ...] = ()
-    oracle: Literal["pinocchio", "mujoco"] | None = None
+    oracle: str | None = None
     table: bool = False
     sha256: str = ""
     lock: tuple[tuple[str, float], ...] = ()

@@ -25,7 +25,7 @@ from urdfkin.validation.error_stats import HISTOGRAM_EDGES, Key, Tally, WorstCas
 from urdfkin.validation.outcome import Outcome, Verdict, outcome
 from urdfkin.validation.robot_summary import NO_PORTRAIT, RobotSummary
 from urdfkin.validation.timings import Clock
-from urdfkin.verify.oracles import version, versions
+from urdfkin.verify.oracles import ORACLES, version, versions
 from urdfkin.verify.quantities import QUANTITIES
 from urdfkin.verify.replay import replay_line
 
@@ -36,9 +36,9 @@ if TYPE_CHECKING:
 _PACKAGE = Path(__file__).resolve().parents[1]
 #: Packages of urdfkin that only display results. The code of these packages may change between two runs of a
 #: campaign.
-_SHOWING = ("cli", "motion", "report", "view")
+_SHOWING = ("cli", "report", "view")
 #: Libraries that compute results or read robots.
-LIBRARIES = ("urdfkin", "pin", "numpy", "numba", "llvmlite", "yourdfpy", "mujoco")
+LIBRARIES = ("urdfkin", "numpy", "numba", "llvmlite", "yourdfpy", *(one.package for one in ORACLES.values()))
 
 
 @cache

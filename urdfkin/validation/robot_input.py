@@ -26,7 +26,7 @@ from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.lint import Finding, UrdfWarning
 from urdfkin.urdf.mjcf import is_mjcf
 from urdfkin.urdf.sources import Origin, Source, Text, as_word, is_xacro, read_source
-from urdfkin.verify.oracles import PINOCCHIO
+from urdfkin.verify.oracles import ORACLES, PINOCCHIO
 
 #: Input of a validation: anything that `load` accepts, or a loaded robot.
 Given = Source | DHTable | Robot
@@ -97,7 +97,7 @@ class RobotInput:
                 self.text(),
                 mimic=self.origin.mimic,
                 root_joint=self.origin.root_joint,
-                oracle=self.origin.oracle or PINOCCHIO.name,
+                oracle=ORACLES[self.origin.oracle or PINOCCHIO.name].name,
                 lock=dict(self.origin.lock),
                 listed=self.listed,
                 made=self.made,

@@ -15,8 +15,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import urdfkin
-from tests.lint.cases import CASES
-from tests.lint.cases.arm import Case, arm, axis, limit
+from tests.urdf.lint.cases import CASES
+from tests.urdf.lint.cases.arm import Case, arm, axis, limit
 from urdfkin.system.files import Edit
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import WRITTEN_OUT, Fix

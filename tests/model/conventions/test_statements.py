@@ -15,8 +15,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import urdfkin
-from tests.conventions.libraries import LIBRARIES
-from tests.conventions.test_libraries import MISTAKES
+from tests.model.conventions.libraries import LIBRARIES
+from tests.model.conventions.test_libraries import MISTAKES
 from urdfkin.model.conventions import BUILT_IN, Convention, find_convention
 from urdfkin.robot import Robot
 

@@ -7,7 +7,7 @@ from typing import Any
 import jsonschema
 import pytest
 
-from tests.lint.cases import CASES
+from tests.urdf.lint.cases import CASES
 from urdfkin.urdf.lint import Finding, Severity, check
 from urdfkin.urdf.lint.formats import as_github, as_json, as_sarif, summary
 from urdfkin.urdf.lint.pages import RULES

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pinocchio as pin
 import pytest
 
-from tests.lint.cases.arm import arm
+from tests.urdf.lint.cases.arm import arm
 from urdfkin.urdf.lint import Severity, check
 from urdfkin.urdf.records import FURTHER_LIMITS
 

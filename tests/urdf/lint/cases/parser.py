@@ -1,6 +1,6 @@
 """Bytes, XML, numbers, links and joints."""
 
-from tests.lint.cases.arm import ACCEPT, REJECT, WARN, Case, arm, axis, limit, xyz
+from tests.urdf.lint.cases.arm import ACCEPT, REJECT, WARN, Case, arm, axis, limit, xyz
 
 _PLAIN = arm()
 

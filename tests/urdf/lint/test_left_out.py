@@ -5,7 +5,7 @@ import warnings
 import pytest
 
 import urdfkin
-from tests.lint.cases.left_out import CASES, Mjcf
+from tests.urdf.lint.cases.left_out import CASES, Mjcf
 from urdfkin.urdf.lint.pages import OF_MJCF
 
 pytest.importorskip("mujoco")

@@ -9,7 +9,7 @@ import pytest
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.lint import Severity, check
 
-SCRIPT = Path(__file__).parents[2] / "scripts" / "make_findings.py"
+SCRIPT = Path(__file__).parents[3] / "scripts" / "make_findings.py"
 
 
 @pytest.fixture(scope="module")

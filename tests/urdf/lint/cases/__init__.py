@@ -2,7 +2,9 @@
 
 from importlib import import_module
 
-from tests.lint.cases.arm import Case
+from tests.urdf.lint.cases.arm import Case
 from urdfkin.urdf.lint.pages import TOPICS
 
-CASES: list[Case] = [case for topic in TOPICS for case in import_module(f"tests.lint.cases.{topic}").CASES]
+CASES: list[Case] = [
+    case for topic in TOPICS for case in import_module(f"tests.urdf.lint.cases.{topic}").CASES
+]

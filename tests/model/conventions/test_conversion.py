@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import urdfkin
-from tests.conventions.libraries import LIBRARIES
+from tests.model.conventions.libraries import LIBRARIES
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.model.conventions import BUILT_IN, Convention, find_convention
 from urdfkin.model.conventions import convention as module

@@ -1,6 +1,6 @@
 """The tree, axes, limits, mimic rules and suspicious values."""
 
-from tests.lint.cases.arm import ACCEPT, REJECT, WARN, Case, arm, axis, fixed, limit, xyz
+from tests.urdf.lint.cases.arm import ACCEPT, REJECT, WARN, Case, arm, axis, fixed, limit, xyz
 
 _CHAIN = "".join(f'<link name="c{i}"/>' for i in range(3))
 

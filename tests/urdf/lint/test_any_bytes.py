@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.lint.cases import CASES
+from tests.urdf.lint.cases import CASES
 from urdfkin.urdf.lint import check_text
 
 DOCUMENTS = [case.data for case in CASES if len(case.data) < 5_000]

@@ -1,7 +1,7 @@
 """Each built-in convention that a library defines: the library's results with converted inputs are ours.
 
-The differences are within the bound that `tests/conventions/libraries.py` derives. MuJoCo and Pinocchio run
-everywhere. The others run where they are installed:
+The differences are within the bound that `tests/model/conventions/libraries.py` derives. MuJoCo and Pinocchio
+run everywhere. The others run where they are installed:
 `pip install drake idyntree roboticstoolbox-python newton[importers] urdf-usd-converter`;
 then `pip uninstall usd-core` and `pip install --force-reinstall usd-exchange`, which has the same modules.
 """
@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import urdfkin
-from tests.conventions.libraries import LIBRARIES, Library
+from tests.model.conventions.libraries import LIBRARIES, Library
 from urdfkin.kinematics.roundings import ROUNDINGS
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.conventions import Conversion, find_convention

@@ -7,7 +7,7 @@ import warnings
 import pytest
 
 import urdfkin
-from tests.lint.cases.arm import arm
+from tests.urdf.lint.cases.arm import arm
 from urdfkin.urdf.findings import WRITTEN_OUT
 from urdfkin.urdf.lint import check
 

@@ -1,6 +1,6 @@
 """Inertials, shapes, materials and meshes."""
 
-from tests.lint.cases.arm import ACCEPT, BALL, REJECT, WARN, Case, arm, base_link, inertial, shape
+from tests.urdf.lint.cases.arm import ACCEPT, BALL, REJECT, WARN, Case, arm, base_link, inertial, shape
 
 CASES = [
     # Inertials.

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.lint.cases import CASES
-from tests.lint.cases.arm import Case
+from tests.urdf.lint.cases import CASES
+from tests.urdf.lint.cases.arm import Case
 from urdfkin.urdf.lint import Finding, Severity, check
 
 SNAPSHOT = Path(__file__).with_name("messages.txt")
@@ -60,7 +60,7 @@ def messages() -> str:
 
 def test_the_messages_are_the_ones_that_were_agreed() -> None:
     assert messages() == SNAPSHOT.read_text("utf-8"), (
-        "messages changed: look at them, then run python -m tests.lint.test_cases to keep them"
+        "messages changed: look at them, then run python -m tests.urdf.lint.test_cases to keep them"
     )
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.lint.examples import document
-from tests.lint.others import ask
+from tests.urdf.lint.examples import document
+from tests.urdf.lint.others import ask
 from urdfkin.errors import UnknownNameError
 from urdfkin.urdf.findings import Rule
 from urdfkin.urdf.lint import DEFAULT_LIMITS, Limits, check, rules

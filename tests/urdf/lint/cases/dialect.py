@@ -1,6 +1,6 @@
 """Root element, version, xacro, elements, attributes, prefixes, names and comments."""
 
-from tests.lint.cases.arm import ACCEPT, LIMIT, MESH, REJECT, SPHERE, WARN, Case, arm, axis, fixed
+from tests.urdf.lint.cases.arm import ACCEPT, LIMIT, MESH, REJECT, SPHERE, WARN, Case, arm, axis, fixed
 
 _INCLUDE = '<xi:include xmlns:xi="http://www.w3.org/2001/XInclude" href="/etc/passwd"/>'
 

@@ -1,1 +1,0 @@
-"""Measure the cost of a check as a file grows: documents of many kinds, and their measurement."""
