@@ -177,12 +177,10 @@ def _end(poses: FloatArray, at: FloatArray, scale: float) -> FloatArray:
     The result (6 samples, 6) has a column for each translation and rotation along the axes of the frame.
     """
     arm = poses[:, :3, 3] - at[:, :3, 3]
+    axes = np.swapaxes(at[:, :3, :3], 1, 2)
     out = np.zeros((len(poses), 6, 6))
-    for k in range(3):
-        axis = at[:, :3, k]
-        out[:, :3, k] = axis
-        out[:, :3, 3 + k] = np.cross(axis, arm) / scale
-        out[:, 3:, 3 + k] = axis
+    out[:, :3, :3] = out[:, 3:, 3:] = at[:, :3, :3]
+    out[:, :3, 3:] = np.swapaxes(np.cross(axes, arm[:, np.newaxis]) / scale, 1, 2)
     return out.reshape(-1, 6)
 
 
