@@ -26,6 +26,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -63,7 +64,7 @@ _BETA, _BETA_AGAIN = 0.3, 0.5
 _HIDDEN = 1e-6
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Model:
     """The numbers of a standard table, as arrays for a fit.
 
@@ -81,14 +82,14 @@ class Model:
     base: FloatArray
     tool: FloatArray
 
-    @property
+    @cached_property
     def first(self) -> FloatArray:
         """(4, 4) pose of the first revolute joint's frame relative to frame 0, with all joints at zero."""
         turning = np.flatnonzero(self.turns)
         end = len(CELLS) * int(turning[0]) if turning.size else 0
         return Path((np.eye(4), *self._motions[:end])).poses(self.cells.ravel()[:end])
 
-    @property
+    @cached_property
     def last(self) -> FloatArray:
         """(4, 4) pose of the tip in the last revolute joint's frame, with the later joints at zero."""
         turning = np.flatnonzero(self.turns)
