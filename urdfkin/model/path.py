@@ -93,7 +93,10 @@ class Path:
 
         Each column is the derivative with respect to one amount.
         """
-        frames = self.frames(amounts)
+        return self.columns_at(self.frames(amounts))
+
+    def columns_at(self, frames: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the same as `columns`, for the poses (..., steps, 4, 4) that `frames` returned."""
         T = frames[..., -1, :, :]
         motions = [(i, step) for i, step in enumerate(self.steps) if isinstance(step, Motion)]
         # A motion does not move its own axis, so the frame after the motion also contains the axis.

@@ -149,17 +149,20 @@ class TargetPoses:
         return np.concatenate([self.poses[:, :3, 3] - poses[:, :3, 3], self.scale * turn], axis=-1).ravel()
 
 
-def columns(model: Model, wanted: TargetPoses) -> tuple[FloatArray, FloatArray, FloatArray]:
+def columns(
+    model: Model, wanted: TargetPoses, frames: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the tip's poses, and the twists (6 s, columns) for changes of free parameters and of cells.
 
     A twist is the derivative of the tip's poses with respect to a parameter.
 
     The free parameters are six numbers of the base, six of the tool, and the variable of each row. The cells
-    are in the order of the array (n, 5). Angles are multiplied by the scale.
+    are in the order of the array (n, 5). Angles are multiplied by the scale. `frames` are the poses along the
+    model's path at the samples, if they are known.
     """
     scale = wanted.scale
     path, amounts = model.path_at(wanted.values)
-    poses, twists = path.columns(amounts)
+    poses, twists = path.columns_at(path.frames(amounts) if frames is None else frames)
     # Changes of angles are multiplied by `scale` and are then in metres. The same is true of the angular part
     # of a twist.
     n, turning = len(model.cells), np.tile([motion.turns for motion in _ROW], len(model.cells))
@@ -403,14 +406,29 @@ def _size(model: Model, wanted: TargetPoses) -> float:
 
 
 def _descend(model: Model, wanted: TargetPoses, ends: bool) -> tuple[Model, float]:
+    # Each step computes the error of a model, and the next step its derivatives: the frames serve both.
+    seen: Model | None = None
+    frames = errors = np.empty(0)
+
+    def look(at: Model) -> None:
+        nonlocal seen, frames, errors
+        if at is not seen:
+            path, amounts = at.path_at(wanted.values)
+            seen, frames = at, path.frames(amounts)
+            errors = wanted.errors(frames[..., -1, :, :])
+
     def linearized(model: Model) -> tuple[FloatArray, FloatArray]:
-        poses, freedoms, _ = columns(model, wanted)
-        return wanted.errors(poses), freedoms[:, : 12 if ends else None]
+        look(model)
+        return errors, columns(model, wanted, frames)[1][:, : 12 if ends else None]
+
+    def size(model: Model) -> float:
+        look(model)
+        return float(np.linalg.norm(errors))
 
     return least_squares(
         model,
         linearized,
-        lambda model: _size(model, wanted),
+        size,
         lambda model, free: moved(model, free, wanted.scale),
         longest=LONGEST_STEP * wanted.scale,
         patience=_PATIENCE,
