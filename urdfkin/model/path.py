@@ -68,12 +68,12 @@ class Path:
     def _after_each_step(self, amounts: FloatArray) -> Iterator[FloatArray]:
         """Yield the poses (..., 4, 4) after each step; consecutive poses may be the same array."""
         # An amount of zero changes nothing, and many cells of a table are zero.
-        moving = iter(amounts.any(axis=tuple(range(amounts.ndim - 1))).tolist())
+        moving = np.asarray(amounts.any(axis=tuple(range(amounts.ndim - 1))))
         T: FloatArray = np.broadcast_to(_IDENTITY, (*amounts.shape[:-1], 4, 4))
         k = 0
         for step in self.steps:
             if isinstance(step, Motion):
-                if next(moving):
+                if moving[k]:
                     T = _moved(T, step, amounts[..., k])
                 k += 1
             else:
