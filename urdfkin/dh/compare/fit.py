@@ -406,29 +406,18 @@ def _size(model: Model, wanted: TargetPoses) -> float:
 
 
 def _descend(model: Model, wanted: TargetPoses, ends: bool) -> tuple[Model, float]:
-    # Each step computes the error of a model, and the next step its derivatives: the frames serve both.
-    seen: Model | None = None
-    frames = errors = np.empty(0)
+    def residuals(model: Model) -> tuple[FloatArray, FloatArray]:
+        path, amounts = model.path_at(wanted.values)
+        frames = path.frames(amounts)
+        return wanted.errors(frames[..., -1, :, :]), frames
 
-    def look(at: Model) -> None:
-        nonlocal seen, frames, errors
-        if at is not seen:
-            path, amounts = at.path_at(wanted.values)
-            seen, frames = at, path.frames(amounts)
-            errors = wanted.errors(frames[..., -1, :, :])
-
-    def linearized(model: Model) -> tuple[FloatArray, FloatArray]:
-        look(model)
-        return errors, columns(model, wanted, frames)[1][:, : 12 if ends else None]
-
-    def size(model: Model) -> float:
-        look(model)
-        return float(np.linalg.norm(errors))
+    def derivatives(model: Model, frames: FloatArray) -> FloatArray:
+        return columns(model, wanted, frames)[1][:, : 12 if ends else None]
 
     return least_squares(
         model,
-        linearized,
-        size,
+        residuals,
+        derivatives,
         lambda model, free: moved(model, free, wanted.scale),
         longest=LONGEST_STEP * wanted.scale,
         patience=_PATIENCE,
