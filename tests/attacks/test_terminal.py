@@ -179,14 +179,15 @@ def test_no_name_acts_on_the_terminal(words: list[str], files: dict[str, str]) -
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("fit", ["--no-fit", pytest.param("--fit", marks=pytest.mark.long)])
 @pytest.mark.parametrize("part", range(5))
-def test_no_name_of_a_table_or_of_what_it_is_held_against_acts(part: int, tmp_path: Path) -> None:
+def test_no_name_of_a_table_or_of_what_it_is_held_against_acts(part: int, fit: str, tmp_path: Path) -> None:
     """All names, a few at a time: what a comparison tries grows with the cube of a table's length."""
     names = list(IN_XML.values())[part::5]
     robot, table = tmp_path / f"{FILE}.urdf".replace("/", ""), tmp_path / f"{FILE}.toml".replace("/", "")
     robot.write_text(chain_of_all(names), encoding="utf-8")
     table.write_text(table_of([NAMES["colours"], *names[1:]]), encoding="utf-8")
-    done = urdfkin("dh", str(robot), "--compare", str(table))
+    done = urdfkin("dh", str(robot), "--compare", str(table), fit)
     harmless(done, [])
     assert "DIFFERS" in done.text
 

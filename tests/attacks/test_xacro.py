@@ -330,7 +330,7 @@ def test_even_a_program_in_the_expanding_process_is_refused(deed: str) -> None:
         link("${'x' * 3000000000}"),
         link("${'%3000000000d' % 1}"),
         link("${python.list(python.range(10**10))}"),
-        link("${len('x' * 2000000000 + 'y' * 2000000000)}"),
+        link("${len('x' * 1100000000 + 'y' * 1100000000)}"),
     ],
 )
 def test_memory_has_an_end(expanded: Expand, inside: str) -> None:

@@ -14,7 +14,7 @@ from urdfkin.calibration.parameters import table_model
 from urdfkin.dh.table import Convention
 from urdfkin.model.tree import FloatArray
 
-pytestmark = pytest.mark.slow  # a second each, forty of them
+pytestmark = pytest.mark.slow  # a second each, forty of them; those of panda and z1 are long
 
 ALL = ["base", "tool", "origins"]
 #: Text or name, tip, base.
@@ -25,6 +25,7 @@ ARMS = {
     "branched": (BRANCHED, "hand", "trunk"),
     "through the trunk": (BRANCHED, "hand", "b"),
 }
+NAMES = [pytest.param(name, marks=pytest.mark.long if name in ("panda", "z1") else ()) for name in ARMS]
 
 
 @cache
@@ -65,7 +66,7 @@ def reason(name: str, q: FloatArray, *, complete: bool = True, fit: list[str] | 
 
 @pytest.mark.parametrize("complete", [True, False])
 @pytest.mark.parametrize("fit", [ALL, ["origins"]], ids=["anywhere", "origins"])
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize("name", NAMES)
 def test_joint_angles_in_degrees_are_named(name: str, fit: list[str], complete: bool) -> None:
     true = arm(name)
     slides = [joint == "two" for joint in true.robot.coordinate_names]
@@ -80,7 +81,7 @@ def test_all_values_multiplied_by_57_are_named_where_one_of_them_slides() -> Non
 
 @pytest.mark.parametrize("complete", [True, False])
 @pytest.mark.parametrize("by", [1, -1, 2])
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize("name", NAMES)
 def test_rows_of_q_that_are_shifted_are_named(name: str, by: int, complete: bool) -> None:
     said = reason(name, np.roll(arm(name).q, by, axis=0), complete=complete)
     rows = "one row" if abs(by) == 1 else "2 rows"
@@ -91,7 +92,7 @@ def test_rows_of_q_that_are_shifted_are_named(name: str, by: int, complete: bool
 
 
 @pytest.mark.parametrize("fit", [ALL, ["origins"]], ids=["anywhere", "origins"])
-@pytest.mark.parametrize("name", list(ARMS))
+@pytest.mark.parametrize("name", NAMES)
 def test_the_joint_whose_sign_is_wrong_is_named(name: str, fit: list[str]) -> None:
     true = arm(name)
     for joint, column in zip(
@@ -149,7 +150,7 @@ def test_a_tables_data_are_judged_as_a_robots() -> None:
 
 
 @pytest.mark.parametrize("complete", [True, False])
-@pytest.mark.parametrize("name", list(ARMS))
+@pytest.mark.parametrize("name", NAMES)
 def test_good_data_are_never_refused(name: str, complete: bool) -> None:
     text, tip, base = ARMS[name]
     for error, noise, poses, seed in [

@@ -7,13 +7,14 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from urdfkin.cli import main
+from urdfkin.system.processes import own_python
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,23 @@ def _streams(
         stdout.flush()
         stdout.detach()
         sys.argv, sys.stdin, sys.stdout, sys.stderr = before
+
+
+def imported(lines: Sequence[str], modules: Collection[str]) -> dict[str, list[str]]:
+    """Run commands one after the other in one new process; return those after which modules are imported.
+
+    A module that a command imports stays imported, so the commands after it are returned too.
+    """
+    code = (
+        "import json, shlex\nfrom urdfkin.cli import main\nfound = {}\n"
+        f"for line in {[*lines]!r}:\n sys.argv = ['urdfkin', *shlex.split(line)]\n"
+        " try: main()\n except SystemExit as end:\n"
+        f"  seen = sorted({set(modules)!r} & set(sys.modules)) + [f'exit {{end.code}}'] * bool(end.code)\n"
+        "  if seen: found[line] = seen\n else: found[line] = ['no exit']\nprint('\\n' + json.dumps(found))"
+    )
+    done = subprocess.run(own_python(f"exec({code!r})"), check=True, capture_output=True, text=True)
+    found: dict[str, list[str]] = json.loads(done.stdout.splitlines()[-1])
+    return found
 
 
 def process(*words: str, stdin: bytes = b"", cwd: Path | None = None, **env: str) -> Done:

@@ -16,7 +16,7 @@ import pytest
 
 import urdfkin
 from scripts.check_bits import WAYS, Subject, differing_interpreted, same
-from tests.cli.running import process
+from tests.cli.running import imported, process
 from urdfkin.compiled import preload
 from urdfkin.compiled.preload import only
 from urdfkin.compiled.python_numbers import Number, fma, sine_cosine
@@ -25,7 +25,6 @@ from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.system.processes import own_python
 from urdfkin.urdf.catalogue import catalogue
 
 #: Modules that one result does not need.
@@ -101,24 +100,16 @@ def test_a_certificate_does_not_depend_on_what_computed() -> None:
     assert certificates[0] == certificates[1]
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
+def test_a_command_for_one_configuration_imports_no_compiler_and_no_library_for_meshes() -> None:
+    own = str(Path(urdfkin.__file__).parents[1] / "robots" / "elbow.urdf")
+    lines = [
         "jacobian OWN --q random", "placement OWN", "velocity OWN --q random --v random",
         "jacobian-rate OWN --q random --v random", "hessian OWN --q random",
         "acceleration OWN --q random --v random --a random", "imu OWN --q random --v random --a random",
         "analytical-jacobian OWN --q random", "singular-values OWN --q random", "info OWN", "chain OWN",
         "screws OWN", "dh OWN", "same OWN OWN", "jacobian OWN --format json", "jacobian tiago",
-    ],
-)  # fmt: skip
-def test_a_command_for_one_configuration_imports_no_compiler_and_no_library_for_meshes(words: str) -> None:
-    own = str(Path(urdfkin.__file__).parents[1] / "robots" / "elbow.urdf")
-    code = (
-        f"sys.argv = ['urdfkin', *{words.replace('OWN', own).split()!r}]\nfrom urdfkin.cli import main\n"
-        f"try: main()\nexcept SystemExit as end: print(end.code, sorted({HEAVY!r} & set(sys.modules)))"
-    )
-    done = subprocess.run(own_python(f"exec({code!r})"), check=True, capture_output=True, text=True)
-    assert done.stdout.splitlines()[-1] == "0 []"
+    ]  # fmt: skip
+    assert imported([line.replace("OWN", own) for line in lines], HEAVY) == {}
 
 
 def test_one_result_needs_no_cache(tmp_path: Path) -> None:
@@ -216,7 +207,7 @@ def _ends(pid: int) -> bool:
     return False
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_kernel_from_beside_is_used_as_soon_as_it_is_there(tmp_path: Path) -> None:
     code = """
 import time

@@ -23,7 +23,7 @@ from urdfkin.robot.loading import load
 pytestmark = pytest.mark.slow
 
 #: Tables that are the URDF's as they are written. Kinova's has frames of its own.
-AS_WRITTEN = ("panda", "ur5", "xarm7_standard")
+AS_WRITTEN = ("panda", "ur5", pytest.param("xarm7_standard", marks=pytest.mark.long))
 
 
 def shipped(name: str) -> tuple[FrameChain, DHTable]:
@@ -74,7 +74,7 @@ def test_an_alpha_with_a_right_angle_too_many_is_named_alone(name: str) -> None:
         assert not found.passes
 
 
-@pytest.mark.parametrize("name", ["kinova", "panda", "ur5"])
+@pytest.mark.parametrize("name", [pytest.param("kinova", marks=pytest.mark.long), "panda", "ur5"])
 def test_rows_that_changed_places_are_named(name: str) -> None:
     path, table = shipped(name)
     last = len(table.rows) - 1
@@ -99,6 +99,7 @@ def test_a_right_table_has_no_mistake(name: str) -> None:
     assert ends.passes
 
 
+@pytest.mark.long
 def test_a_wrong_sign_is_named_where_the_table_leaves_out_its_tool() -> None:
     path, table = shipped("panda")
     bare = replace(table, tool=np.eye(4))

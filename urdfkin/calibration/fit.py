@@ -285,7 +285,10 @@ def errors(model: Model, measured: Measured, at: FloatArray) -> FloatArray:
 
     Each row contains the position error and, for poses, then the rotation error, in the base, in m and rad.
     """
-    T = model.way.poses(measured.values, at)
+    return _apart(measured, model.way.poses(measured.values, at))
+
+
+def _apart(measured: Measured, T: FloatArray) -> FloatArray:
     away = measured.p - T[:, :3, 3]
     if measured.R is None:
         return away
@@ -343,21 +346,26 @@ def _estimate_noise(found: Fit, model: Model, measured: Measured) -> Noise:
 
 
 def _whitened(
-    model: Model, measured: Measured, kept: Sequence[int], noise: Noise, at: FloatArray
+    model: Model, measured: Measured, noise: Noise, at: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the residuals (rows,) and the fitted parameters' Jacobian (rows, k), divided by the noise."""
+    """Return the residuals (rows,) divided by the noise, and the poses along the path."""
+    frames = model.way.frames(measured.values, at)
+    return (_apart(measured, frames[:, -1]) / noise.of(measured.complete)).ravel(), frames
+
+
+def _whitened_columns(
+    model: Model, measured: Measured, kept: Sequence[int], noise: Noise, at: FloatArray, frames: FloatArray
+) -> FloatArray:
+    """Return the Jacobian (rows, k) of the fitted parameters, divided by the noise."""
     scale = noise.of(measured.complete)
-    _, columns = model.way.columns(measured.values, at)
+    _, columns = model.way.columns(measured.values, at, frames)
     J = columns[:, : len(scale), list(kept)] / scale[:, np.newaxis]
-    r = (errors(model, measured, at) / scale).ravel()
-    return r, J.reshape(r.size, len(kept))
+    return J.reshape(len(measured) * len(scale), len(kept))
 
 
 def _minimize(
     model: Model, measured: Measured, kept: Sequence[int], noise: Noise, at: FloatArray
 ) -> FloatArray:
-    scale = noise.of(measured.complete)
-
     def moved(at: FloatArray, step: FloatArray) -> FloatArray:
         trial = at.copy()
         trial[list(kept)] += step
@@ -365,14 +373,15 @@ def _minimize(
 
     return least_squares(
         at,
-        lambda at: _whitened(model, measured, kept, noise, at),
-        lambda at: float(np.linalg.norm(errors(model, measured, at) / scale)),
+        lambda at: _whitened(model, measured, noise, at),
+        lambda at, frames: _whitened_columns(model, measured, kept, noise, at, frames),
         moved,
     )[0]
 
 
 def _evaluate(model: Model, measured: Measured, kept: Sequence[int], noise: Noise, at: FloatArray) -> Fit:
-    r, J = _whitened(model, measured, kept, noise, at)
+    r, frames = _whitened(model, measured, noise, at)
+    J = _whitened_columns(model, measured, kept, noise, at, frames)
     k = noise.of(measured.complete).size
     units = np.linalg.norm(J, axis=0)
     units[units == 0.0] = 1.0
@@ -383,7 +392,7 @@ def _evaluate(model: Model, measured: Measured, kept: Sequence[int], noise: Nois
     own = r.reshape(-1, k)
     odd = np.einsum("si,sij,sj->s", own, np.linalg.pinv(judged, rcond=_FOLLOWED, hermitian=True), own)
     left = np.clip(np.einsum("sii->si", judged), 0.0, 1.0)
-    return Fit(at, errors(model, measured, at), noise, half @ half.T, left, odd)
+    return Fit(at, _apart(measured, frames[:, -1]), noise, half @ half.T, left, odd)
 
 
 def odd_poses(

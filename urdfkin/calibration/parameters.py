@@ -110,10 +110,19 @@ class ParametricChain:
         """Return poses (s, 4, 4) of the tip in the base for joint values (s, n) and parameters `at` (p,)."""
         return self.path.poses(self._amounts(values, self.start if at is None else at)[0])
 
-    def columns(self, values: FloatArray, at: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
-        """Return poses (s, 4, 4), and their Jacobian (s, 6, p), [linear; angular], by the parameters."""
+    def frames(self, values: FloatArray, at: FloatArray) -> FloatArray:
+        """Return the poses (s, steps, 4, 4) after each step of the path; the last one is the tip's pose."""
+        return self.path.frames(self._amounts(values, at)[0])
+
+    def columns(
+        self, values: FloatArray, at: FloatArray | None = None, frames: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return poses (s, 4, 4), and their Jacobian (s, 6, p), [linear; angular], by the parameters.
+
+        `frames` are the poses that `frames` returned for the same arguments, if they are known.
+        """
         amounts, factors = self._amounts(values, self.start if at is None else at)
-        T, twists = self.path.columns(amounts)
+        T, twists = self.path.columns_at(self.path.frames(amounts) if frames is None else frames)
         columns = np.zeros((len(values), 6, len(self.parameters)))
         for k, drive in enumerate(self._drives):
             if drive.parameter is not None:

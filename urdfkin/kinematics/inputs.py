@@ -120,5 +120,6 @@ def rotation_defect(R: FloatArray) -> FloatArray:
 
 def determinant(matrix: FloatArray) -> FloatArray:
     """Return the determinant of matrices (..., 3, 3), computed as the triple product of the rows."""
-    triple: FloatArray = (np.cross(matrix[..., 0, :], matrix[..., 1, :]) * matrix[..., 2, :]).sum(axis=-1)
+    (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(matrix, (-2, -1), (0, 1))  # np.cross takes thrice as long
+    triple: FloatArray = (b * f - c * e) * g + (c * d - a * f) * h + (a * e - b * d) * i
     return triple

@@ -11,6 +11,7 @@ import numpy as np
 from urdfkin.kinematics.roundings import EPS, FloatArray
 
 State = TypeVar("State")
+Seen = TypeVar("Seen")
 
 _ROUNDS = 100
 #: The initial, the smallest and the largest damping, relative to the largest singular value.
@@ -27,8 +28,8 @@ _ROUNDED = 4.0
 
 def least_squares(
     start: State,
-    linearized: Callable[[State], tuple[FloatArray, FloatArray]],
-    size: Callable[[State], float],
+    residuals: Callable[[State], tuple[FloatArray, Seen]],
+    derivatives: Callable[[State, Seen], FloatArray],
     moved: Callable[[State, FloatArray], State],
     *,
     longest: float = math.inf,
@@ -38,16 +39,18 @@ def least_squares(
 
     Args:
         start: The state from which the iteration starts.
-        linearized: Returns the residuals (rows,) of a state and the negative derivatives (rows, parameters)
-            of the residuals by the parameters.
-        size: Returns the norm of a state's residuals.
+        residuals: Returns the residuals (rows,) of a state, and what `derivatives` uses of their computation.
+        derivatives: Returns the negative derivatives (rows, parameters) of a state's residuals by the
+            parameters.
         moved: Returns the new state for a state and a step (parameters,).
         longest: Largest component of a step.
         patience: The iteration ends after this many slow steps; 0 means no limit.
     """
-    state, now, damping, slow = start, size(start), _DAMPING, 0
+    state, damping, slow = start, _DAMPING, 0
+    r, seen = residuals(start)
+    now = float(np.linalg.norm(r))
     for _ in range(_ROUNDS):
-        r, J = linearized(state)
+        J = derivatives(state, seen)
         units = np.linalg.norm(J, axis=0)
         units[units == 0.0] = 1.0
         U, S, Vt = np.linalg.svd(J / units, full_matrices=False)
@@ -58,8 +61,9 @@ def least_squares(
             step = Vt.T @ (S / (S**2 + (damping * S[0]) ** 2) * along) / units
             if np.abs(step).max() <= longest:
                 trial = moved(state, step)
-                if (after := size(trial)) < now:
-                    state, now = trial, after
+                left, seen_there = residuals(trial)
+                if (after := float(np.linalg.norm(left))) < now:
+                    state, now, r, seen = trial, after, left, seen_there
                     break
             damping *= _HARDER
         slow = slow + 1 if now > _SLOW * before else 0

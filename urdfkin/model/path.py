@@ -14,6 +14,7 @@ This twist is a column of the Jacobian in equation 7.85.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,8 @@ from numpy.typing import ArrayLike
 from urdfkin.kinematics.number_kinds import array_equations as eq
 from urdfkin.kinematics.rotation import coordinate_rotation
 from urdfkin.model.tree import FloatArray
+
+_IDENTITY = np.eye(4)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,37 +61,54 @@ class Path:
         """Return the poses (..., steps, 4, 4) after each step, for amounts (..., motions) in rad or m."""
         amounts = np.asarray(amounts, np.float64)
         frames = np.empty((*amounts.shape[:-1], len(self.steps), 4, 4))
-        T: FloatArray = np.broadcast_to(np.eye(4), (*amounts.shape[:-1], 4, 4))
-        k = 0
-        for i, step in enumerate(self.steps):
-            if isinstance(step, Motion):
-                T = _moved(T, step, amounts[..., k])
-                k += 1
-            else:
-                T = T @ step
+        for i, T in enumerate(self._after_each_step(amounts)):
             frames[..., i, :, :] = T
         return frames
 
+    def _after_each_step(self, amounts: FloatArray) -> Iterator[FloatArray]:
+        """Yield the poses (..., 4, 4) after each step; consecutive poses may be the same array."""
+        # An amount of zero changes nothing, and many cells of a table are zero.
+        moving = np.asarray(amounts.any(axis=tuple(range(amounts.ndim - 1))))
+        T: FloatArray = np.broadcast_to(_IDENTITY, (*amounts.shape[:-1], 4, 4))
+        k = 0
+        for step in self.steps:
+            if isinstance(step, Motion):
+                if moving[k]:
+                    T = _moved(T, step, amounts[..., k])
+                k += 1
+            else:
+                T = T @ step
+            yield T
+
     def poses(self, amounts: ArrayLike) -> FloatArray:
         """Return the pose (..., 4, 4) at the end of the path for amounts (..., motions)."""
-        return np.ascontiguousarray(self.frames(amounts)[..., -1, :, :])
+        amounts = np.asarray(amounts, np.float64)
+        T: FloatArray = np.broadcast_to(_IDENTITY, (*amounts.shape[:-1], 4, 4))
+        for T in self._after_each_step(amounts):  # noqa: B007  the last one is the result
+            pass
+        return np.array(T)
 
     def columns(self, amounts: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return the pose at the path's end, and its Jacobian (..., 6, motions), [linear; angular].
 
         Each column is the derivative with respect to one amount.
         """
-        frames = self.frames(amounts)
+        return self.columns_at(self.frames(amounts))
+
+    def columns_at(self, frames: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the same as `columns`, for the poses (..., steps, 4, 4) that `frames` returned."""
         T = frames[..., -1, :, :]
         motions = [(i, step) for i, step in enumerate(self.steps) if isinstance(step, Motion)]
         # A motion does not move its own axis, so the frame after the motion also contains the axis.
+        at = [i for i, _ in motions]
+        axes = frames[..., at, :3, [step.axis for _, step in motions]]
         columns = np.zeros((*T.shape[:-2], 6, len(motions)))
-        for k, (i, step) in enumerate(motions):
-            axis = frames[..., i, :3, step.axis]
-            linear = axis
-            if step.turns:
-                linear, columns[..., 3:, k] = eq.turning_column(axis, T[..., :3, 3] - frames[..., i, :3, 3])
-            columns[..., :3, k] = linear
+        columns[..., :3, :] = np.moveaxis(axes, 0, -1)
+        turning = [k for k, (_, step) in enumerate(motions) if step.turns]
+        arms = T[..., :3, 3] - frames[..., [at[k] for k in turning], :3, 3]
+        linear, angular = eq.turning_column(axes[turning], arms)
+        columns[..., :3, turning] = np.moveaxis(linear, 0, -1)
+        columns[..., 3:, turning] = np.moveaxis(angular, 0, -1)
         return T, columns
 
 
@@ -98,13 +118,12 @@ def elementary(axis: int, turns: bool, amount: ArrayLike) -> FloatArray:
     The amounts (...) are angles in rad or distances in m.
     """
     amount = np.asarray(amount, np.float64)
-    return _moved(np.tile(np.eye(4), (*amount.shape, 1, 1)), Motion(axis, turns), amount)
+    T = np.tile(_IDENTITY, (*amount.shape, 1, 1))
+    return _moved(T, Motion(axis, turns), amount) if amount.any() else T
 
 
 def _moved(T: FloatArray, motion: Motion, amount: FloatArray) -> FloatArray:
     """Return poses (..., 4, 4) multiplied by the elementary motion with amounts (...)."""
-    if not amount.any():  # an amount of zero changes nothing, and many cells of a table are zero
-        return T
     moved = np.array(T)
     if motion.turns:
         moved[..., :3, :3] = T[..., :3, :3] @ coordinate_rotation(motion.axis, amount)

@@ -26,6 +26,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -63,7 +64,7 @@ _BETA, _BETA_AGAIN = 0.3, 0.5
 _HIDDEN = 1e-6
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Model:
     """The numbers of a standard table, as arrays for a fit.
 
@@ -81,14 +82,14 @@ class Model:
     base: FloatArray
     tool: FloatArray
 
-    @property
+    @cached_property
     def first(self) -> FloatArray:
         """(4, 4) pose of the first revolute joint's frame relative to frame 0, with all joints at zero."""
         turning = np.flatnonzero(self.turns)
         end = len(CELLS) * int(turning[0]) if turning.size else 0
         return Path((np.eye(4), *self._motions[:end])).poses(self.cells.ravel()[:end])
 
-    @property
+    @cached_property
     def last(self) -> FloatArray:
         """(4, 4) pose of the tip in the last revolute joint's frame, with the later joints at zero."""
         turning = np.flatnonzero(self.turns)
@@ -148,17 +149,20 @@ class TargetPoses:
         return np.concatenate([self.poses[:, :3, 3] - poses[:, :3, 3], self.scale * turn], axis=-1).ravel()
 
 
-def columns(model: Model, wanted: TargetPoses) -> tuple[FloatArray, FloatArray, FloatArray]:
+def columns(
+    model: Model, wanted: TargetPoses, frames: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the tip's poses, and the twists (6 s, columns) for changes of free parameters and of cells.
 
     A twist is the derivative of the tip's poses with respect to a parameter.
 
     The free parameters are six numbers of the base, six of the tool, and the variable of each row. The cells
-    are in the order of the array (n, 5). Angles are multiplied by the scale.
+    are in the order of the array (n, 5). Angles are multiplied by the scale. `frames` are the poses along the
+    model's path at the samples, if they are known.
     """
     scale = wanted.scale
     path, amounts = model.path_at(wanted.values)
-    poses, twists = path.columns(amounts)
+    poses, twists = path.columns_at(path.frames(amounts) if frames is None else frames)
     # Changes of angles are multiplied by `scale` and are then in metres. The same is true of the angular part
     # of a twist.
     n, turning = len(model.cells), np.tile([motion.turns for motion in _ROW], len(model.cells))
@@ -177,12 +181,10 @@ def _end(poses: FloatArray, at: FloatArray, scale: float) -> FloatArray:
     The result (6 samples, 6) has a column for each translation and rotation along the axes of the frame.
     """
     arm = poses[:, :3, 3] - at[:, :3, 3]
+    axes = np.swapaxes(at[:, :3, :3], 1, 2)
     out = np.zeros((len(poses), 6, 6))
-    for k in range(3):
-        axis = at[:, :3, k]
-        out[:, :3, k] = axis
-        out[:, :3, 3 + k] = np.cross(axis, arm) / scale
-        out[:, 3:, 3 + k] = axis
+    out[:, :3, :3] = out[:, 3:, 3:] = at[:, :3, :3]
+    out[:, :3, 3:] = np.swapaxes(np.cross(axes, arm[:, np.newaxis]) / scale, 1, 2)
     return out.reshape(-1, 6)
 
 
@@ -404,14 +406,18 @@ def _size(model: Model, wanted: TargetPoses) -> float:
 
 
 def _descend(model: Model, wanted: TargetPoses, ends: bool) -> tuple[Model, float]:
-    def linearized(model: Model) -> tuple[FloatArray, FloatArray]:
-        poses, freedoms, _ = columns(model, wanted)
-        return wanted.errors(poses), freedoms[:, : 12 if ends else None]
+    def residuals(model: Model) -> tuple[FloatArray, FloatArray]:
+        path, amounts = model.path_at(wanted.values)
+        frames = path.frames(amounts)
+        return wanted.errors(frames[..., -1, :, :]), frames
+
+    def derivatives(model: Model, frames: FloatArray) -> FloatArray:
+        return columns(model, wanted, frames)[1][:, : 12 if ends else None]
 
     return least_squares(
         model,
-        linearized,
-        lambda model: _size(model, wanted),
+        residuals,
+        derivatives,
         lambda model, free: moved(model, free, wanted.scale),
         longest=LONGEST_STEP * wanted.scale,
         patience=_PATIENCE,
