@@ -58,6 +58,8 @@ LICENCE = "CC0-1.0"
 SAMPLES = 3
 #: Range of joint velocities and accelerations, and of positions of planar and floating joints, +-.
 _RANGE = 2.0
+#: Inputs are multiples of 1 / _GRID where limits allow it, so that their few decimals are exactly doubles.
+_GRID = 1024.0
 #: Digits of a tolerance, and those before it is rounded up.
 _DIGITS, _SAME = 3, 12
 
@@ -212,6 +214,10 @@ def _fraction(*words: object) -> float:
     return int.from_bytes(digest[:6], "big") / 2.0**48
 
 
+def _on_grid(x: float) -> float:
+    return round(x * _GRID) / _GRID
+
+
 def configuration(tree: KinematicTree, name: str, sample: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return q, v and a of a sample, which depend on the robot's name and the limits alone."""
     q, ranges = neutral(tree), coordinate_ranges(tree)
@@ -219,15 +225,16 @@ def configuration(tree: KinematicTree, name: str, sample: int) -> tuple[FloatArr
         unit = [_fraction(name, sample, joint.name, k) for k in range(joint.nq)]
         if joint.nq == 1:
             lower, upper = ranges[joint.name]
-            q[at] = lower + (upper - lower) * unit[0] if sample else min(max(0.0, lower), upper)
+            wanted = _on_grid(lower + (upper - lower) * unit[0]) if sample else 0.0
+            q[at] = min(max(wanted, lower), upper)
         elif joint.kind is JointKind.FLOATING and sample:
             quaternion = [2.0 * x - 1.0 for x in unit[3:]]
             length = math.sqrt(math.fsum(x * x for x in quaternion))
             q[at + 3 : at + 7] = [x / length for x in quaternion]
         if joint.nq > 1 and sample:
-            q[at : at + 3] = [round(_RANGE * (2.0 * x - 1.0), 3) for x in unit[:3]]
+            q[at : at + 3] = [_on_grid(_RANGE * (2.0 * x - 1.0)) for x in unit[:3]]
     v, a = (
-        np.array([round(_RANGE * (2.0 * _fraction(name, sample, of, k) - 1.0), 3) for k in range(tree.nv)])
+        np.array([_on_grid(_RANGE * (2.0 * _fraction(name, sample, of, k) - 1.0)) for k in range(tree.nv)])
         for of in "va"
     )
     return q, v, a
@@ -383,7 +390,7 @@ def _write(place: Path, robot: Robot, head: _Head, frames: Sequence[str], sample
     tree = robot.tree
     found = [_sample(robot, head.robot, frames, sample) for sample in range(samples)]
     rows = [
-        f"# {VECTORS.name} version {VERSION}, {head.license or 'licence of the robot'}: {log_line(head.robot)}",
+        f"# {VECTORS.name} version {VERSION}, {head.license or 'no licence'}: {log_line(head.robot)}",
         f"# file {log_line(head.file)}, sha256 {head.sha256}",
         "# sample, frame, reference, quantity, values, tolerances",
     ]
