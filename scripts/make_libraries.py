@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import re
 import subprocess
 import sys
 import tomllib
@@ -251,8 +250,8 @@ def _reasons(cells: Mapping[str, Any]) -> Iterator[str]:
                 quoted = one["verdict"] == "refused"
                 clean = reason.replace("|", r"\|").replace("`", "'")
                 reasons.setdefault(f"`{clean}`" if quoted else clean, []).append(feature)
-        for reason, features in reasons.items():
-            yield f"| {LIBRARIES[library].title} | {'; '.join(features)} | {reason} |\n"
+        for reason, names in reasons.items():
+            yield f"| {LIBRARIES[library].title} | {'; '.join(names)} | {reason} |\n"
 
 
 def _joined(lines: list[str]) -> str:

@@ -1,4 +1,4 @@
-"""Kinematics of URDF, written from the standard alone (https://wiki.ros.org/urdf/XML) and textbook definitions.
+"""Kinematics of URDF, written from the standard (https://wiki.ros.org/urdf/XML) and textbook definitions.
 
 It shares no code with urdfkin. The standard library parses the XML. Numbers have 90 digits (mpmath). Poses
 are products of homogeneous matrices, velocities and accelerations are differences of poses along a motion,
@@ -66,6 +66,7 @@ class _Joint:
         self.child = _of(element.find("child"), "link", "")
         p = _vector(_numbers(_of(origin, "xyz", "0 0 0")))
         quaternion = _of(origin, "quat_xyzw", "") if version == "1.1" else ""
+        self.angles = None if quaternion else [float(x) for x in _of(origin, "rpy", "0 0 0").split()]
         if quaternion:
             R = _quaternion(*_numbers(quaternion))
         else:
@@ -161,7 +162,9 @@ class Robot:
             R, p = value
             planar = self.joints[name].kind == "planar"
             (slide, turn), (slide_rate, turn_rate) = (
-                (_vector((x[0], x[1], 0)), _vector((0, 0, x[2]))) if planar else (_vector(x[:3]), _vector(x[3:]))
+                (_vector((x[0], x[1], 0)), _vector((0, 0, x[2])))
+                if planar
+                else (_vector(x[:3]), _vector(x[3:]))
                 for x in (u, u_rate)
             )
             rotation = turn * t + turn_rate * (t * t / 2)
@@ -174,7 +177,10 @@ class Robot:
     def jacobian(
         self, link: str, values: Mapping[str, Value], columns: Mapping[str, int], reference: str
     ) -> dict[int, list[Any]]:
-        """Return the columns of the Jacobian that are not 0, by their index; `columns` has each joint's first."""
+        """Return the columns of the Jacobian that may differ from 0, by their index.
+
+        `columns` has the index of each joint's first column.
+        """
         end = self.pose(link, values)
         point = mp.zeros(3, 1) if reference == "world" else end[:3, 3]
         found: dict[int, list[Any]] = {}
@@ -258,7 +264,10 @@ class Robot:
                         unit = still | {name: [mp.mpf(int(i == k)) for i in range(len(zeros))]}
                         by[columns[name] + k] = self._change(link, values, unit, columns, reference)
             found["hessian", reference] = [
-                by[d][c][i] if d in by and c in J else 0 for i in range(6) for c in range(nv) for d in range(nv)
+                by[d][c][i] if d in by and c in J else 0
+                for i in range(6)
+                for c in range(nv)
+                for d in range(nv)
             ]
         return found
 
@@ -275,9 +284,7 @@ class Robot:
         after, before = (
             self.jacobian(link, self.later(values, v, still, t), columns, reference) for t in (_STEP, -_STEP)
         )
-        return {
-            c: [(x - y) / (2 * _STEP) for x, y in zip(after[c], before[c], strict=True)] for c in after
-        }
+        return {c: [(x - y) / (2 * _STEP) for x, y in zip(after[c], before[c], strict=True)] for c in after}
 
 
 def poses(text: str, values: Mapping[str, Any]) -> dict[str, np.ndarray]:
