@@ -18,7 +18,7 @@ from urdfkin.errors.escape import csv_value
 if TYPE_CHECKING:
     from urdfkin.validation.vectors import Written
 
-EXAMPLE = "urdfkin vectors write my_tests/vectors --no-catalogue"
+EXAMPLE = "urdfkin vectors write vectors ur5 panda"
 
 
 @click.group("vectors", epilog=f"Example: {EXAMPLE}")

@@ -8,7 +8,6 @@ depend on nothing but these texts: configurations are made from digests, not by 
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 import re
 import tomllib
@@ -22,7 +21,7 @@ from typing import Annotated, Any, Literal, TypedDict
 
 import numpy as np
 
-from urdfkin.errors.escape import log_line
+from urdfkin.errors.escape import json_text, log_line
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
 from urdfkin.lint import UrdfWarning
 from urdfkin.loading import load
@@ -173,7 +172,7 @@ def features() -> Mapping[str, Feature]:
     >>> features()["axis of length 2"].rule
     'The axis is a direction: its length has no effect on an angle.'
     """
-    data = tomllib.loads((robots_dir() / "features.toml").read_text("utf-8"))
+    data = tomllib.loads((robots_dir() / "features.toml").readjson_text("utf-8"))
     return {row["name"]: _feature(row, data["parts"]) for row in data["feature"]}
 
 
@@ -413,7 +412,7 @@ def _write(place: Path, robot: Robot, head: _Head, frames: Sequence[str], sample
     entries = {"schema": VECTORS.name, "version": VERSION, "license": head.license, "robot": head.robot}
     entries |= {"file": head.file, "sha256": head.sha256, "rule": head.rule, "note": head.note}
     top = "".join(
-        f" {_text(name)}: {_text(entry)},\n" for name, entry in {**entries, "joints": joints}.items()
+        f" {json_text(name)}: {json_text(entry)},\n" for name, entry in {**entries, "joints": joints}.items()
     )
     body = ",\n".join(parts)
     files = place.with_name(f"{place.name}.json"), place.with_name(f"{place.name}.tsv")
@@ -422,15 +421,11 @@ def _write(place: Path, robot: Robot, head: _Head, frames: Sequence[str], sample
     return Written(head.robot, files, sum(len(one["value"]) for _, results in found for one in results))
 
 
-def _text(entry: object) -> str:
-    return json.dumps(entry, ensure_ascii=False)
-
-
 def _result(one: Mapping[str, Any]) -> str:
     """Return a result as JSON, with its decimals as they are."""
     lists = {name: f"[{', '.join(one[name])}]" for name in ("value", "tolerance")}
-    texts = {name: _text(x) if name not in lists else lists[name] for name, x in one.items()}
-    return f"{{{', '.join(f'{_text(name)}: {text}' for name, text in texts.items())}}}"
+    texts = {name: json_text(x) if name not in lists else lists[name] for name, x in one.items()}
+    return f"{{{', '.join(f'{json_text(name)}: {text}' for name, text in texts.items())}}}"
 
 
 def _sample(
