@@ -32,7 +32,7 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.system.documents import Count, Layout, Sha256, Size, of_length, says
-from urdfkin.system.files import read_bytes, write_file
+from urdfkin.system.files import MOST_DATA, read_bytes, read_text, write_file
 from urdfkin.system.lazy_import import lazy_import
 from urdfkin.system.resources import robots_dir
 from urdfkin.urdf.catalogue import catalogue
@@ -172,13 +172,13 @@ def features() -> Mapping[str, Feature]:
     >>> features()["axis of length 2"].rule
     'The axis is a direction: its length has no effect on an angle.'
     """
-    data = tomllib.loads((robots_dir() / "features.toml").readjson_text("utf-8"))
+    data = tomllib.loads(read_text(robots_dir() / "features.toml"))
     return {row["name"]: _feature(row, data["parts"]) for row in data["feature"]}
 
 
 def _feature(row: Mapping[str, Any], parts: Mapping[str, str]) -> Feature:
     written = row.get("file") or _robot(row)
-    for name, part in (*reversed(parts.items()), ("inertial", _INERTIAL)):
+    for name, part in (*parts.items(), ("inertial", _INERTIAL)):
         written = written.replace(f"{{{name}}}", part)
     data = (row.get("head", "") + written).encode(row.get("encoding", "utf-8"))
     return Feature(
@@ -376,7 +376,7 @@ def name_of(robot: Robot) -> str:
 def write_sums(folder: Path, written: Sequence[Written]) -> Path:
     """Write SHA256SUMS, which `sha256sum --check` reads, for all files."""
     lines = [
-        f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n"
+        f"{hashlib.sha256(read_bytes(path, MOST_DATA)).hexdigest()}  {path.name}\n"
         for one in written
         for path in one.files
     ]
