@@ -101,5 +101,6 @@ def write_command(
 
 def _document(folder: Path, written: Sequence[Written]) -> TextDocument:
     rows = [(one.robot, one.files[0].name, f"{one.numbers:,}") for one in written]
-    total = f"{sum(one.numbers for one in written):,} numbers of {len(written)} robots in {folder}"
+    robots = "1 robot" if len(written) == 1 else f"{len(written)} robots"
+    total = f"{sum(one.numbers for one in written):,} numbers of {robots} in {folder}"
     return TextDocument("", [Table(("robot", "file", "numbers"), rows, left=2, names=(0, 1)), total])
