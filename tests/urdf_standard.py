@@ -27,34 +27,48 @@ def _numbers(text: str) -> list[Any]:
 
 
 def _vector(x: Sequence[Any]) -> Any:
-    return mp.matrix([[each] for each in x])
+    return np.array(x, dtype=object)
+
+
+_UNIT = np.array([[mp.mpf(int(i == j)) for j in range(4)] for i in range(4)], dtype=object)
+
+
+def _length(x: Any) -> Any:
+    return mp.sqrt((x * x).sum())
 
 
 def _skew(x: Any) -> Any:
-    return mp.matrix([[0, -x[2], x[1]], [x[2], 0, -x[0]], [-x[1], x[0], 0]])
+    zero = mp.mpf(0)
+    return np.array([[zero, -x[2], x[1]], [x[2], zero, -x[0]], [-x[1], x[0], zero]], dtype=object)
 
 
 def _turn(axis: Any, angle: Any) -> Any:
     """Return the rotation about a unit axis by Rodrigues' formula."""
     S = _skew(axis)
-    return mp.eye(3) + mp.sin(angle) * S + (1 - mp.cos(angle)) * S * S
+    return _UNIT[:3, :3] + mp.sin(angle) * S + (1 - mp.cos(angle)) * (S @ S)
 
 
 def _pose(R: Any, p: Any) -> Any:
-    T = mp.eye(4)
+    T = _UNIT.copy()
     T[:3, :3], T[:3, 3] = R, p
     return T
 
 
 def _quaternion(x: Any, y: Any, z: Any, w: Any) -> Any:
     """Return the rotation of a quaternion of any length, from q v q*."""
-    v = _vector((x, y, z))
-    s = x * x + y * y + z * z + w * w
-    return ((2 * w * w - s) * mp.eye(3) + 2 * v * v.T + 2 * w * _skew(v)) / s
+    v, s = _vector((x, y, z)), x * x + y * y + z * z + w * w
+    return ((2 * w * w - s) * _UNIT[:3, :3] + 2 * np.outer(v, v) + 2 * w * _skew(v)) / s
 
 
 def _of(element: ET.Element | None, name: str, default: str) -> str:
     return default if element is None else element.get(name, default)
+
+
+#: Axis of the child link, and whether it is a rotation, for each velocity of a planar or floating joint.
+_FREE = {
+    "planar": ((0, False), (1, False), (2, True)),
+    "floating": tuple((i, turns) for turns in (False, True) for i in range(3)),
+}
 
 
 class _Joint:
@@ -70,14 +84,14 @@ class _Joint:
         if quaternion:
             R = _quaternion(*_numbers(quaternion))
         else:
-            x, y, z = (_vector(one) for one in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
+            x, y, z = _UNIT[:3, :3]
             roll, pitch, yaw = _numbers(_of(origin, "rpy", "0 0 0"))
-            R = _turn(z, yaw) * _turn(y, pitch) * _turn(x, roll)
+            R = _turn(z, yaw) @ _turn(y, pitch) @ _turn(x, roll)
         self.origin = _pose(R, p)
         axis = _vector(_numbers(_of(element.find("axis"), "xyz", "1 0 0")))
-        self.axis = axis / mp.norm(axis) if self.kind in ("revolute", "continuous", "prismatic") else axis
+        self.axis = axis / _length(axis) if self.kind in ("revolute", "continuous", "prismatic") else axis
         if self.kind == "planar":
-            assert list(axis) == [0, 0, 1], "x and y of another plane are no part of the standard"
+            assert axis.tolist() == [0, 0, 1], "x and y of another plane are no part of the standard"
         rule = element.find("mimic") if self.kind != "fixed" else None
         self.leader = _of(rule, "joint", "")
         self.multiplier = mp.mpf(_of(rule, "multiplier", "1"))
@@ -86,11 +100,11 @@ class _Joint:
     def motion(self, value: Value) -> Any:
         """Return the pose of the child link in the joint's frame."""
         if self.kind == "fixed":
-            return mp.eye(4)
+            return _UNIT
         if self.kind in ("revolute", "continuous"):
-            return _pose(_turn(self.axis, value), mp.zeros(3, 1))
+            return _pose(_turn(self.axis, value), _UNIT[:3, 3])
         if self.kind == "prismatic":
-            return _pose(mp.eye(3), self.axis * value)
+            return _pose(_UNIT[:3, :3], self.axis * value)
         R, p = value
         return _pose(R, p)
 
@@ -116,7 +130,7 @@ class Robot:
         """Return the value of a joint from its numbers in q."""
         kind, x = self.joints[name].kind, [mp.mpf(one) for one in numbers]
         if kind == "planar":
-            return _turn(_vector((0, 0, 1)), x[2]), _vector((x[0], x[1], 0))
+            return _turn(_UNIT[2, :3], x[2]), _vector((x[0], x[1], mp.mpf(0)))
         return (_quaternion(*x[3:]), _vector(x[:3])) if kind == "floating" else x[0]
 
     def path(self, link: str) -> list[str]:
@@ -143,9 +157,9 @@ class Robot:
 
     def pose(self, link: str, values: Mapping[str, Value]) -> Any:
         """Return the pose (4, 4) of a link in the root."""
-        T = mp.eye(4)
+        T = _UNIT
         for name in self.path(link):
-            T = T * self.joints[name].origin * self.joints[name].motion(self.own(name, values))
+            T = T @ self.joints[name].origin @ self.joints[name].motion(self.own(name, values))
         return T
 
     def later(self, values: Mapping[str, Value], v: Mapping[str, Any], a: Mapping[str, Any], t: Any) -> Any:
@@ -162,51 +176,46 @@ class Robot:
             R, p = value
             planar = self.joints[name].kind == "planar"
             (slide, turn), (slide_rate, turn_rate) = (
-                (_vector((x[0], x[1], 0)), _vector((0, 0, x[2])))
+                (_vector((x[0], x[1], mp.mpf(0))), x[2] * _UNIT[2, :3])
                 if planar
                 else (_vector(x[:3]), _vector(x[3:]))
                 for x in (u, u_rate)
             )
             rotation = turn * t + turn_rate * (t * t / 2)
-            angle = mp.norm(rotation)
+            angle = _length(rotation)
             axis = rotation / angle if angle else rotation
-            moved = slide * t + (slide_rate + _skew(turn) * slide) * (t * t / 2)
-            found[name] = R * _turn(axis, angle), p + R * moved
+            moved = slide * t + (slide_rate + _skew(turn) @ slide) * (t * t / 2)
+            found[name] = R @ _turn(axis, angle), p + R @ moved
         return found
 
-    def jacobian(
-        self, link: str, values: Mapping[str, Value], columns: Mapping[str, int], reference: str
-    ) -> dict[int, list[Any]]:
-        """Return the columns of the Jacobian that may differ from 0, by their index.
+    def jacobians(
+        self, link: str, values: Mapping[str, Value], columns: Mapping[str, int]
+    ) -> dict[tuple[str, int], Any]:
+        """Return the columns of the Jacobians that may differ from 0, by reference frame and index.
 
         `columns` has the index of each joint's first column.
         """
-        end = self.pose(link, values)
-        point = mp.zeros(3, 1) if reference == "world" else end[:3, 3]
-        found: dict[int, list[Any]] = {}
-        T = mp.eye(4)
+        axes: list[tuple[int, Any, Any, bool, Any]] = []  # index, multiplier, axis, whether it turns, point
+        T = _UNIT
         for name in self.path(link):
             joint = self.joints[name]
-            T = T * joint.origin
-            before = T
-            T = T * joint.motion(self.own(name, values))
+            before = T @ joint.origin
+            T = before @ joint.motion(self.own(name, values))
             leader, multiplier, _ = self.rule(name)
-            unit = [_vector((1, 0, 0)), _vector((0, 1, 0)), _vector((0, 0, 1))]
-            axes: list[tuple[Any, bool, Any]] = []
             if joint.kind in ("revolute", "continuous", "prismatic"):
-                axes = [(before[:3, :3] * joint.axis, joint.kind != "prismatic", before)]
-            elif joint.kind == "planar":
-                axes = [(T[:3, :3] * unit[k], k == 2, T) for k in range(3)]
-            elif joint.kind == "floating":
-                axes = [(T[:3, :3] * unit[k % 3], k > 2, T) for k in range(6)]
-            for k, (z, turns, at) in enumerate(axes):
-                linear = _skew(z) * (point - at[:3, 3]) if turns else z
-                angular = z if turns else mp.zeros(3, 1)
+                z = before[:3, :3] @ joint.axis
+                axes.append((columns[leader], multiplier, z, joint.kind != "prismatic", before[:3, 3]))
+            for k, (i, turns) in enumerate(_FREE.get(joint.kind, ())):
+                axes.append((columns[leader] + k, multiplier, T[:3, i], turns, T[:3, 3]))
+        points = {"local": T[:3, 3], "local_world_aligned": T[:3, 3], "world": _UNIT[:3, 3]}
+        found: dict[tuple[str, int], Any] = {}
+        for reference, point in points.items():
+            for index, multiplier, z, turns, at in axes:
+                linear, angular = (_skew(z) @ (point - at), z) if turns else (z, _UNIT[:3, 3])
                 if reference == "local":
-                    linear, angular = end[:3, :3].T * linear, end[:3, :3].T * angular
-                six = [*linear, *angular]
-                column = found.setdefault(columns[leader] + k, [mp.mpf(0)] * 6)
-                found[columns[leader] + k] = [x + multiplier * y for x, y in zip(column, six, strict=True)]
+                    linear, angular = T[:3, :3].T @ linear, T[:3, :3].T @ angular
+                six = multiplier * np.concatenate((linear, angular))
+                found[reference, index] = found.get((reference, index), 0) + six
         return found
 
     def quantities(
@@ -233,38 +242,42 @@ class Robot:
         T, after, before = self.pose(link, values), at(_STEP), at(-_STEP)
         T_1, T_2 = (after - before) / (2 * _STEP), (after - 2 * T + before) / _STEP**2
         R, p, R_1, p_1, p_2 = T[:3, :3], T[:3, 3], T_1[:3, :3], T_1[:3, 3], T_2[:3, 3]
-        turning, turning_2 = R_1 * R.T, T_2[:3, :3] * R.T
+        turning, turning_2 = R_1 @ R.T, T_2[:3, :3] @ R.T
         w = _vector((turning[2, 1], turning[0, 2], turning[1, 0]))
         odd = (turning_2 - turning_2.T) / 2
         alpha = _vector((odd[2, 1], odd[0, 2], odd[1, 0]))
-        found: dict[tuple[str, str | None], list[Any]] = {("placement", None): list(T)}
+        found: dict[tuple[str, str | None], list[Any]] = {("placement", None): T.ravel().tolist()}
+        J, rate = self.jacobians(link, values, columns), self._change(link, values, v, columns)
+        by = {}
+        for name, zeros in still.items():
+            for k in range(len(zeros)):
+                if ("world", columns[name] + k) in J:
+                    unit = still | {name: [mp.mpf(int(i == k)) for i in range(len(zeros))]}
+                    by[columns[name] + k] = self._change(link, values, unit, columns)
         for reference in ("local", "world", "local_world_aligned"):
             at_origin = reference == "world"
-            back = R.T if reference == "local" else mp.eye(3)
-            velocity = p_1 - _skew(w) * p if at_origin else p_1
-            classical = p_2 - (_skew(alpha) + _skew(w) * _skew(w)) * p if at_origin else p_2
+            back = R.T if reference == "local" else _UNIT[:3, :3]
+            velocity = p_1 - _skew(w) @ p if at_origin else p_1
+            classical = p_2 - (_skew(alpha) + _skew(w) @ _skew(w)) @ p if at_origin else p_2
             # the time derivative of the numbers of the velocity in WORLD; in LOCAL, those of R^T p'
-            spatial = p_2 - _skew(alpha) * p - _skew(w) * p_1 if at_origin else R * (R_1.T * p_1 + R.T * p_2)
+            spatial = R @ (R_1.T @ p_1 + R.T @ p_2)
+            if at_origin:
+                spatial = p_2 - _skew(alpha) @ p - _skew(w) @ p_1
             for name, linear, angular in (
                 ("velocity", velocity, w),
                 ("acceleration", classical, alpha),
                 ("spatial acceleration", spatial, alpha),
             ):
-                found[name, reference] = [*(back * linear), *(back * angular)]
-            J = self.jacobian(link, values, columns, reference)
-            found["jacobian", reference] = [J[c][i] if c in J else 0 for i in range(6) for c in range(nv)]
-            rate = self._change(link, values, v, columns, reference)
-            found["jacobian rate", reference] = [
-                rate[c][i] if c in rate else 0 for i in range(6) for c in range(nv)
+                found[name, reference] = [*(back @ linear), *(back @ angular)]
+            zero = [0] * 6
+            found["jacobian", reference] = [
+                J.get((reference, c), zero)[i] for i in range(6) for c in range(nv)
             ]
-            by = {}
-            for name, zeros in still.items():
-                for k in range(len(zeros)):
-                    if columns[name] + k in J:
-                        unit = still | {name: [mp.mpf(int(i == k)) for i in range(len(zeros))]}
-                        by[columns[name] + k] = self._change(link, values, unit, columns, reference)
+            found["jacobian rate", reference] = [
+                rate.get((reference, c), zero)[i] for i in range(6) for c in range(nv)
+            ]
             found["hessian", reference] = [
-                by[d][c][i] if d in by and c in J else 0
+                by[d].get((reference, c), zero)[i] if d in by else 0
                 for i in range(6)
                 for c in range(nv)
                 for d in range(nv)
@@ -277,18 +290,17 @@ class Robot:
         values: Mapping[str, Value],
         v: Mapping[str, Sequence[Any]],
         columns: Mapping[str, int],
-        reference: str,
-    ) -> dict[int, list[Any]]:
-        """Return the time derivative of the Jacobian's columns."""
+    ) -> dict[tuple[str, int], Any]:
+        """Return the time derivatives of the columns of the Jacobians."""
         still = {name: [mp.mpf(0)] * len(x) for name, x in v.items()}
         after, before = (
-            self.jacobian(link, self.later(values, v, still, t), columns, reference) for t in (_STEP, -_STEP)
+            self.jacobians(link, self.later(values, v, still, t), columns) for t in (_STEP, -_STEP)
         )
-        return {c: [(x - y) / (2 * _STEP) for x, y in zip(after[c], before[c], strict=True)] for c in after}
+        return {place: (after[place] - before[place]) / (2 * _STEP) for place in after}
 
 
 def poses(text: str, values: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """Return the pose (4, 4) of each link in the root, from the values of the joints that do not mimic."""
     robot = Robot(text)
     own = {name: robot.value(name, np.atleast_1d(x).tolist()) for name, x in values.items()}
-    return {link: np.array(robot.pose(link, own).tolist(), dtype=np.float64) for link in robot.links}
+    return {link: robot.pose(link, own).astype(np.float64) for link in robot.links}

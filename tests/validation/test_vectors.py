@@ -95,13 +95,14 @@ def agree(path: Path) -> int:
                     one["tolerance"],
                     strict=True,
                 ):
+                    count += 1
+                    if x == 0 and text == "0":
+                        continue
                     size = mp.mpf(tolerance) / unit or 1
                     # half a unit of the 17th digit, and the error of the differences
                     most = mp.mpf("0.5001e-16") * abs(mp.mpf(text)) + size * mp.mpf("1e-24")
                     assert abs(x - mp.mpf(text)) <= most, (path.stem, one["quantity"], one["reference"], text)
-                    count += 1
-            if sum(one["frame"] == link for one in sample["results"]) == 19:
-                assert not expected
+            assert not expected
     return count
 
 
@@ -185,7 +186,7 @@ class Sizes:
                 sample[key][slice(*at[leader]["q" if key == "q" else "v"])] if leader in at else []
                 for key in "qva"
             )
-            L = float(mp.norm(joint.origin[:3, 3]))
+            L = float(np.linalg.norm(joint.origin[:3, 3].astype(float)))
             if joint.kind == "prismatic":
                 L += abs(float(m) * q[0]) + abs(float(robot.rule(name)[2]))
             elif joint.kind in ("planar", "floating"):
