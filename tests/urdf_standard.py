@@ -205,7 +205,7 @@ class Robot:
             if joint.kind in ("revolute", "continuous", "prismatic"):
                 z = before[:3, :3] @ joint.axis
                 axes.append((columns[leader], multiplier, z, joint.kind != "prismatic", before[:3, 3]))
-            for k, (i, turns) in enumerate(_FREE.get(joint.kind, ())):
+            for k, (i, turns) in enumerate(_FREE.get(str(joint.kind), ())):
                 axes.append((columns[leader] + k, multiplier, T[:3, i], turns, T[:3, 3]))
         points = {"local": T[:3, 3], "local_world_aligned": T[:3, 3], "world": _UNIT[:3, 3]}
         found: dict[tuple[str, int], Any] = {}
