@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 EXAMPLE = "urdfkin vectors write vectors ur5 panda"
 
 
-@click.group("vectors", epilog=f"Example: {EXAMPLE}")
+@click.group("vectors", no_args_is_help=False, epilog=f"Example: {EXAMPLE}")
 def vectors_command() -> None:
     """Write test vectors for other programs.
 
@@ -29,7 +29,9 @@ def vectors_command() -> None:
     """
 
 
-@vectors_command.command("write", epilog=f"Example: {EXAMPLE}")
+@vectors_command.command(
+    "write", short_help="Write test vectors into a folder.", epilog=f"Example: {EXAMPLE}"
+)
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path), required=False)
 @click.argument("robots", metavar="[ROBOT]...", nargs=-1, shell_complete=complete_robot)
 @click.option(
@@ -56,7 +58,7 @@ def write_command(
     numbers as lines between tabs. SHA256SUMS has the digests of all files.
 
     The results are placement, velocity, Jacobian, its time derivative, Hessian, classical and spatial
-    acceleration in LOCAL, WORLD and LOCAL_WORLD_ALIGNED. The files are the same on every machine.
+    acceleration in LOCAL, WORLD and LOCAL_WORLD_ALIGNED. The files depend on the robots and --samples alone.
     """
     from urdfkin.validation import vectors  # noqa: PLC0415  keeps --help fast
 
