@@ -23,20 +23,19 @@ import numpy as np
 
 from urdfkin.errors.escape import json_text, log_line
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
-from urdfkin.lint import UrdfWarning
-from urdfkin.loading import load
 from urdfkin.model.base_motion import STILL_STATE
-from urdfkin.model.configuration import neutral
-from urdfkin.model.ranges import coordinate_ranges
+from urdfkin.model.configuration import coordinate_ranges, neutral
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree
 from urdfkin.robot import Robot
+from urdfkin.robot.loading import load
 from urdfkin.system.documents import Count, Layout, Sha256, Size, of_length, says
 from urdfkin.system.files import MOST_DATA, read_bytes, read_text, write_file
 from urdfkin.system.lazy_import import lazy_import
+from urdfkin.system.plain_xml import plain_xml
 from urdfkin.system.resources import robots_dir
 from urdfkin.urdf.catalogue import catalogue
-from urdfkin.urdf.plain_xml import plain_xml
+from urdfkin.urdf.findings import UrdfWarning
 from urdfkin.verify.bounds import against_true_values, magnitudes
 from urdfkin.verify.exact.numbers import DIGITS, decimal, enough_digits, precision, read_exact
 from urdfkin.verify.exact.recursion import move
