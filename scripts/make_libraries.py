@@ -4,16 +4,15 @@
     python scripts/make_libraries.py --page  # write the page from the JSON file
 
 Each library gets its own environment outside the repository; docs/libraries.toml states its version. In this
-environment, the library's adapter (urdfkin/verify/adapters.py) reads the features of docs/libraries.toml. The
-expected poses are urdfkin's, which Pinocchio checks; tests/test_libraries.py compares them with a reader that
-was written from the URDF standard.
+environment, the library's adapter (urdfkin/verify/adapters.py) reads the features of robots/features.toml
+that docs/libraries.toml lists. The expected poses are urdfkin's, which Pinocchio checks;
+tests/test_libraries.py compares them with a reader that was written from the URDF standard.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import re
 import subprocess
 import sys
 import tomllib
@@ -30,12 +29,15 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout 
 
 import urdfkin
 from urdfkin.comparison.readers import values_of
+from urdfkin.validation.vectors import Feature, features
 from urdfkin.verify import adapters
 from urdfkin.verify.adapters import LIBRARIES
 
 DOCS = Path(__file__).parents[1] / "docs"
-PAGE, FIGURES, FEATURES = (DOCS / f"libraries.{suffix}" for suffix in ("md", "json", "toml"))
-DATA: dict[str, Any] = tomllib.loads(FEATURES.read_text("utf-8"))
+PAGE, FIGURES, LISTED = (DOCS / f"libraries.{suffix}" for suffix in ("md", "json", "toml"))
+DATA: dict[str, Any] = tomllib.loads(LISTED.read_text("utf-8"))
+#: The features of the table, by name.
+FEATURES = {name: features()[name] for name in DATA["features"]}
 #: Number of random configurations of each feature.
 CONFIGURATIONS = 3
 #: Largest difference (m, and entries of a rotation matrix) of a pose that counts as right. Libraries that
@@ -45,12 +47,11 @@ RIGHT = 1e-9
 #: Longest time (seconds) that a library may take for all features that are left.
 _SECONDS = 60
 _QUOTED = 160
-_INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
 
 _HEAD = """# How libraries read URDF
 
 Each row is a feature of the [URDF standard](https://wiki.ros.org/urdf/XML), as a robot of two or three
-joints (`docs/libraries.toml`). Each cell compares the poses of all links with the expected ones, at
+joints (`robots/features.toml`). Each cell compares the poses of all links with the expected ones, at
 {configurations} random configurations. The expected poses are urdfkin's, checked by Pinocchio. A test
 compares them with a second reader, which was written from the standard alone (`tests/urdf_standard.py`).
 
@@ -86,15 +87,6 @@ In Python, `urdfkin.comparison.readers.compare_readers(robot)` returns the same 
 """
 
 
-def text_of(feature: Mapping[str, Any]) -> str:
-    """Return the URDF of a feature."""
-    joints = feature["joints"]
-    links = dict.fromkeys(["base", *re.findall(r'child link="(\w+)"', joints)])
-    version = f' version="{feature["version"]}"' if "version" in feature else ""
-    written = "".join(f'<link name="{link}">{_INERTIAL}</link>\n' for link in links)
-    return f'<robot name="r"{version}>\n{written}{joints}</robot>\n'
-
-
 def configurations(robot: urdfkin.Robot) -> list[dict[str, Any]]:
     """Return random values within limits, by the names of the independent joints."""
     return [values_of(robot, q) for q in robot.sample(CONFIGURATIONS, seed=0)]
@@ -108,9 +100,7 @@ def expected(robot: urdfkin.Robot) -> list[dict[str, Any]]:
     return [dict(zip(links, one, strict=True)) for one in T]
 
 
-def cell(
-    feature: Mapping[str, Any], robot: urdfkin.Robot, library: str, answer: Mapping[str, Any]
-) -> dict[str, Any]:
+def cell(feature: Feature, robot: urdfkin.Robot, library: str, answer: Mapping[str, Any]) -> dict[str, Any]:
     """Return the cell of a feature and a library: a verdict, and the largest difference or a message."""
     if "error" in answer:
         return {"verdict": "refused", "message": answer["error"][:_QUOTED]}
@@ -131,7 +121,7 @@ def cell(
     if notes:
         found["note"] = "; ".join(notes)
     if any(
-        feature["name"] in one["features"] and one["library"] == library for one in DATA.get("documented", ())
+        feature.name in one["features"] and one["library"] == library for one in DATA.get("documented", ())
     ):
         found["verdict"] = "documented"
     return found
@@ -173,10 +163,10 @@ def answers(python: Path, library: str, cases: list[dict[str, Any]]) -> Iterator
 
 def measure(folder: Path, libraries: list[str], before: Mapping[str, Any]) -> dict[str, Any]:
     """Return the versions and cells of the given libraries; all other libraries keep their earlier values."""
-    robots = {feature["name"]: urdfkin.load(text_of(feature)) for feature in DATA["feature"]}
+    robots = {name: urdfkin.load(feature.text) for name, feature in FEATURES.items()}
     cases = [
-        {"name": f["name"], "text": text_of(f), "configurations": configurations(robots[f["name"]])}
-        for f in DATA["feature"]
+        {"name": name, "text": feature.text, "configurations": configurations(robots[name])}
+        for name, feature in FEATURES.items()
     ]
     versions, cells = dict(before.get("versions", {})), dict(before.get("cells", {}))
     for library in libraries:
@@ -185,7 +175,7 @@ def measure(folder: Path, libraries: list[str], before: Mapping[str, Any]) -> di
         found = {answer["name"]: answer for answer in answers(python, library, cases)}
         versions[library] = DATA["versions"][library]
         cells[library] = {
-            f["name"]: cell(f, robots[f["name"]], library, found[f["name"]]) for f in DATA["feature"]
+            name: cell(feature, robots[name], library, found[name]) for name, feature in FEATURES.items()
         }
     order = [name for name in LIBRARIES if name in cells]
     return {
@@ -213,7 +203,7 @@ def page(figures: Mapping[str, Any]) -> str:
         return number
 
     titles = [f"{LIBRARIES[name].title} {versions[name]}" for name in cells]
-    names = [feature["name"] for feature in DATA["feature"]]
+    names = list(FEATURES)
     lines = [f"| | {' | '.join(titles)} |", "|---" * (1 + len(titles)) + "|"]
     lines += [f"| {name} | {' | '.join(words(library, name) for library in cells)} |" for name in names]
     verdicts = {name: Counter(one["verdict"] for one in cells[name].values()) for name in cells}
@@ -234,7 +224,7 @@ def page(figures: Mapping[str, Any]) -> str:
         for n in notes
     ]
     parts += ["\n## The features\n\n| Feature | Rule of the standard |\n|---|---|\n"]
-    parts += [f"| {feature['name']} | {feature['rule']} |\n" for feature in DATA["feature"]]
+    parts += [f"| {name} | {feature.rule} |\n" for name, feature in FEATURES.items()]
     parts += ["\n## Why a cell differs\n\n", *_reasons(cells)]
     return "".join(parts) + _FOOT
 
@@ -260,8 +250,8 @@ def _reasons(cells: Mapping[str, Any]) -> Iterator[str]:
                 quoted = one["verdict"] == "refused"
                 clean = reason.replace("|", r"\|").replace("`", "'")
                 reasons.setdefault(f"`{clean}`" if quoted else clean, []).append(feature)
-        for reason, features in reasons.items():
-            yield f"| {LIBRARIES[library].title} | {'; '.join(features)} | {reason} |\n"
+        for reason, names in reasons.items():
+            yield f"| {LIBRARIES[library].title} | {'; '.join(names)} | {reason} |\n"
 
 
 def _joined(lines: list[str]) -> str:

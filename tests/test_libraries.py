@@ -16,12 +16,12 @@ from urdfkin.verify.adapters import LIBRARIES, answer, version
 
 pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 FIGURES = json.loads(maker.FIGURES.read_text("utf-8"))
-FEATURES = {feature["name"]: feature for feature in maker.DATA["feature"]}
+FEATURES = maker.FEATURES
 
 
 @pytest.mark.parametrize("name", FEATURES)
 def test_the_expected_poses_are_those_of_a_reader_written_from_the_standard(name: str) -> None:
-    text = maker.text_of(FEATURES[name])
+    text = FEATURES[name].text
     robot = urdfkin.load(text)
     for values, found in zip(maker.configurations(robot), maker.expected(robot), strict=True):
         other = poses(text, values)
@@ -50,9 +50,9 @@ def test_a_documented_difference_is_one_of_a_cell() -> None:
 def test_the_cells_of_an_installed_library_can_be_measured_again(library: str) -> None:
     if version(library) != FIGURES["versions"][library]:
         pytest.skip(f"{library} is not installed in the version of the table")
-    robots = {name: urdfkin.load(maker.text_of(feature)) for name, feature in FEATURES.items()}
+    robots = {name: urdfkin.load(feature.text) for name, feature in FEATURES.items()}
     for name, feature in FEATURES.items():
-        case = {"text": maker.text_of(feature), "configurations": maker.configurations(robots[name])}
+        case = {"text": feature.text, "configurations": maker.configurations(robots[name])}
         found = maker.cell(feature, robots[name], library, answer(library, case))
         assert found["verdict"] == FIGURES["cells"][library][name]["verdict"], name
 

@@ -93,6 +93,12 @@ OTHERS: dict[str, list[list[str]]] = {
         [f"{FILE}.py:{FILE}", "ROBOT"],
         ["echo '\x1b[31m::error::forged'", "ROBOT", "--program", "--samples", "0"],
     ],
+    "vectors": [
+        ["write", "FOLDER", "ROBOT"],
+        ["write", "FOLDER", "ROBOT", "--format", "json"],
+        ["write", "FOLDER", "ROBOT", "--format", "csv"],
+        ["write", FILE, FILE],
+    ],
     "view": [[FILE]],
     "warm": [[], [FILE]],
     "completion": [["bash"], ["zsh"], ["fish"], [FILE]],
@@ -142,7 +148,7 @@ def _toml(name: str) -> str:
     return '"' + "".join(f"\\U{ord(c):08x}" for c in name) + '"'
 
 
-ENDINGS = {"ROBOT": ".urdf", "REPORT": ".json", "PICTURE": ".svg"}
+ENDINGS = {"ROBOT": ".urdf", "REPORT": ".json", "PICTURE": ".svg", "FOLDER": ""}
 
 
 def acts(text: str, *, commands: bool = False) -> list[str]:
@@ -322,6 +328,7 @@ def test_what_is_printed_goes_through_the_door() -> None:
         "check.py": ("click.echo(as_json(", "click.echo(as_sarif("),
         "reports.py": ("click.echo(VALIDATION.schema_text()", "click.echo(HISTORY.schema_text()"),
         "models.py": ("click.echo(SAME.schema_text()",),
+        "vectors.py": ("click.echo(vectors.VECTORS.schema_text()",),
         "__init__.py": ('click.echo(f"urdfkin {own_version()}, Pinocchio {version()',),
         "exit.py": ('click.echo("urdfkin: interrupted', 'click.echo("".join(traceback.', "click.echo("),
     }  # fmt: skip

@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 
 import urdfkin
-from scripts.make_libraries import DATA, text_of
+from scripts.make_libraries import FEATURES
 from tests.cli.running import urdfkin as run
 from urdfkin.comparison import readers
 from urdfkin.comparison.readers import compare_readers
 
 pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 pytest.importorskip("mujoco")
-TEXTS = {feature["name"]: text_of(feature) for feature in DATA["feature"]}
+TEXTS = {name: feature.text for name, feature in FEATURES.items()}
 
 
 @pytest.mark.parametrize(

@@ -98,6 +98,10 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
             "urdfkin.cli.readers",
             "Compare how MuJoCo, yourdfpy and other installed libraries read a robot file.",
         ),
+        "vectors": (
+            "urdfkin.cli.vectors",
+            "Write test vectors for other programs: robots and results at 50 digits.",
+        ),
         "report": ("urdfkin.cli.reports", "Show, convert, compare or merge the results of validations."),
     },
     "Check files": {

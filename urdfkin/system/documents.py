@@ -104,7 +104,8 @@ class Layout(Generic[_T]):
                 part["additionalProperties"] = False
         whole: dict[str, Any] = parts.pop(self.type.__name__)
         whole["properties"]["schema"]["const"] = self.name
-        whole["properties"]["verdict"]["enum"] = list(self.verdicts)
+        if self.verdicts:
+            whole["properties"]["verdict"]["enum"] = list(self.verdicts)
         head = {
             "$schema": "https://json-schema.org/draft/2020-12/schema",
             "$id": f"urn:{self.name.replace('-', ':').replace('/', ':')}",

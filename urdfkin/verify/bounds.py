@@ -39,7 +39,7 @@ the link after the joint.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -281,6 +281,30 @@ def about_the_root(size: Magnitudes) -> Magnitudes:
         acc=eq.point_acceleration(size.acc + shared, size.alpha, size.w, p),
         roundings=2.0 * (MUJOCO / ROUNDINGS) * size.roundings,
     )
+
+
+def against_true_values(size: Magnitudes, angles: float, rules: int) -> Magnitudes:
+    """Return the magnitudes for a comparison of one program with true values, rounded to 17 digits.
+
+    The true values belong to the decimals of the URDF and to the doubles q, v and a. Of `ROUNDINGS` = 24 for
+    each joint, one program has 16.8 at most (`urdfkin.kinematics.roundings`). The other 7.2 cover the
+    conversions to doubles: half an eps each for an offset, an axis and the true value itself. An axis rotates
+    twice, so it counts twice. Two kinds of numbers need roundings of their own:
+
+    - Roll, pitch and yaw have an error of half an eps of their size, so all vectors after the joint turn by
+      at most (|roll| + |pitch| + |yaw|) / 2 eps.
+    - A mimic joint's value is m x + c. Reading m, the product and the sum round (3 |m x| + |c|) / 2 eps,
+      reading c rounds |c| / 2 eps, and the error of x is multiplied by |m|. A revolute joint turns all
+      vectors after it by that. Relative to the terms, a displacement or a rate has 3/2 eps for each rule.
+
+    An error of 1 eps rad changes each factor by at most 1 eps of its length.
+
+    Args:
+        size: Magnitudes for two programs.
+        angles: Sum over the path of these errors of angles, in eps.
+        rules: Number of mimic rules on the path, with those of each chain.
+    """
+    return replace(size, roundings=size.roundings + angles + 1.5 * rules)
 
 
 def placement_scale(plan: CompiledTree, size: Magnitudes) -> FloatArray:

@@ -1,6 +1,7 @@
 """A ball holds the true value; fractions of whole numbers, and mpmath, check it."""
 
 import math
+from decimal import Decimal, localcontext
 from fractions import Fraction
 from typing import Any
 
@@ -15,7 +16,7 @@ from tests.high_precision import orthogonal_factor
 from tests.strategies import rotations
 from urdfkin.model.recursion import Matrix
 from urdfkin.model.tree import FloatArray
-from urdfkin.verify.exact.numbers import ends, exact, nearest_rotation, precision
+from urdfkin.verify.exact.numbers import decimal, ends, exact, nearest_rotation, precision
 
 DIGITS = (15, 50)
 #: Eight units in the last place of 53 and of 169 bits.
@@ -161,3 +162,29 @@ def test_doubles_around_an_interval_lie_outside_it_and_next_to_it(man: int, expo
 
 def test_a_whole_number_has_itself_for_ends() -> None:
     assert ends(1) == (1.0, 1.0)
+
+
+moderate = st.floats(-1e6, 1e6).filter(lambda x: x == 0.0 or abs(x) > 1e-6)
+
+
+@given(moderate, moderate.filter(bool), moderate)
+def test_a_decimal_is_the_true_value_rounded_to_seventeen_digits(x: float, y: float, z: float) -> None:
+    true = Fraction(x) / Fraction(y) + Fraction(z)
+    with precision(50):
+        found = decimal(exact(x) / y + z, 1e-15)
+    with localcontext(prec=17):
+        expected = Decimal(true.numerator) / Decimal(true.denominator)
+    if found is None:  # x / y and z cancel, but for less than thirty digits
+        assert abs(true) < Fraction(1, 10**25) * abs(Fraction(z))
+    elif found == "0":
+        assert abs(true) < Fraction(1, 10**25)
+    else:
+        assert Decimal(found) == expected
+        assert float(found) == float(expected)
+
+
+def test_a_ball_that_is_too_large_has_no_decimal() -> None:
+    with precision(50):
+        assert decimal(arb(1.0, 1e-19), 1.0) is None
+        assert decimal(arb(0.0, 1e-19), 1e-12) is None
+        assert decimal(arb(0.0, 1e-19), 1e-3) == "0"

@@ -13,6 +13,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from decimal import ROUND_HALF_EVEN, Decimal, localcontext
 from functools import lru_cache
 from xml.etree.ElementTree import Element
 
@@ -33,6 +34,8 @@ _TWO_DOUBLES = 30
 #: Bits for each decimal digit, and additional bits. Fifteen digits get 55 bits, two more than a double has,
 #: because a ball with 53 bits is up to four times as wide as an interval whose ends have 53 bits.
 _BITS, _MORE_BITS = math.log2(10.0), 5
+#: Significant digits of a decimal: every double is determined by so many. Digits while it is computed.
+_SIGNIFICANT, _ALL_DIGITS = 17, 200
 #: Additional bits of precision during iterations.
 _SPARE = 30
 
@@ -76,6 +79,32 @@ def _outward(end: arb, towards: float) -> float:
     found = float(end)
     inside = arb(found) > end if towards < 0.0 else arb(found) < end
     return math.nextafter(found, towards) if inside else found
+
+
+def decimal(x: Number, negligible: float) -> str | None:
+    """Return a ball as a decimal of 17 significant digits; None if the ball is too large for that.
+
+    The radius is below 1e-20 of the number, so the decimal differs from the true value by at most half a unit
+    of its last digit, and a thousandth of that. A ball that contains 0 is 0 if its radius is below 1e-10 of
+    `negligible`.
+
+    >>> with precision(50):
+    ...     decimal(exact(1) / 3, 1e-15), decimal(exact(2), 1e-15), decimal(arb(0.0, 1e-40), 1e-15)
+    ('0.33333333333333333', '2', '0')
+    """
+    if isinstance(x, int):
+        return str(x)
+    middle, radius = x.mid(), x.rad()
+    if x.contains(0):
+        return "0" if radius <= 1e-10 * negligible else None
+    if not radius <= abs(middle) * 1e-20:
+        return None
+    digits, power = middle.man_exp()
+    with localcontext(prec=_ALL_DIGITS):
+        number = int(digits) * Decimal(2) ** int(power)
+    with localcontext(prec=_SIGNIFICANT, rounding=ROUND_HALF_EVEN):
+        rounded = (+number).normalize()
+    return f"{rounded:f}" if -7 < rounded.adjusted() < _SIGNIFICANT else str(rounded)
 
 
 def unit(x: Vector) -> Vector:

@@ -145,6 +145,19 @@ def acceleration_values(motion: Motion, link: int, reference: Reference) -> NDAr
     return _array(_RECURSION.in_reference(s, reference, *_RECURSION.acceleration(s, reference)))
 
 
+def spatial_acceleration_values(motion: Motion, link: int, reference: Reference) -> NDArray[np.object_]:
+    """Return the spatial acceleration (6,) of a link, [linear; angular].
+
+    At the frame's origin, its linear part is the classical one minus w x vel. In WORLD, it is that of the
+    point of the body at the world origin: minus alpha x p.
+    """
+    s = motion.states[link]
+    linear = equations.minus(s.acc, equations.cross(s.w, s.vel))
+    if reference.at_world:
+        linear = equations.point_velocity(linear, s.alpha, equations.minus((0, 0, 0), s.p))
+    return _array(_RECURSION.in_reference(s, reference, linear, s.alpha))
+
+
 def jacobian_values(motion: Motion, link: int, reference: Reference) -> NDArray[np.object_]:
     """Return the Jacobian (6, nv) of a link."""
     found = _RECURSION.jacobian(motion.states[link], motion.columns[link], motion.nv, reference)

@@ -1,0 +1,37 @@
+"""Compare your results with test vectors. It needs Python only, no library.
+
+from compare import wrong
+
+for line in wrong("vectors/mimic.json", answer):
+    print(line)
+
+`answer(quantity, frame, reference, q, v, a)` is yours. It returns nested lists or an array, or None for a
+quantity that you do not compute.
+"""
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+
+def flat(x: Any) -> list[float]:
+    """Return the numbers of nested lists or of an array; the last index varies fastest."""
+    return [number for row in x for number in flat(row)] if hasattr(x, "__len__") else [float(x)]
+
+
+def wrong(path: str | Path, answer: Callable[..., Any]) -> Iterator[str]:
+    """Yield a line for each number that is not within its tolerance."""
+    vectors = json.loads(Path(path).read_text("utf-8"))
+    for k, sample in enumerate(vectors["samples"]):
+        for one in sample["results"]:
+            what = one["quantity"], one["frame"], one["reference"]
+            given = answer(*what, sample["q"], sample["v"], sample["a"])
+            if given is None:
+                continue
+            if len(found := flat(given)) != len(one["value"]):
+                yield f"sample {k}, {what}: {len(found)} numbers, expected {len(one['value'])}"
+                continue
+            for i, (x, y, most) in enumerate(zip(found, one["value"], one["tolerance"], strict=True)):
+                if not abs(x - y) <= most:
+                    yield f"sample {k}, {what}, number {i}: {x!r}, expected {y!r} within {most}"

@@ -1,0 +1,494 @@
+"""Test vectors: their values, tolerances, files and readers.
+
+The values are computed a second time by `tests/urdf_standard.py`, and the tolerances from the formulas of
+docs/vectors.md. Both share no code with urdfkin.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.cli.running import urdfkin as run
+from tests.urdf_standard import Robot, mp
+from urdfkin.system.resources import example_robots_dir, robots_dir
+from urdfkin.urdf.catalogue import catalogue
+from urdfkin.validation.vectors import VECTORS, features, stem, write_features, write_sums
+
+pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")]
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = ROOT / "examples" / "vectors"
+EPS = 2.0**-52
+FACTORS = {"placement": 1, "velocity": 2, "jacobian": 2}
+#: Features whose values the quick test computes a second time: each kind of joint, rule and number.
+SOME = (
+    "skew axis of any length", "order of rpy", "quat_xyzw of length 2 (URDF 1.1)", "planar", "floating",
+    "mimic chain of three", "mimic joint nearer the base", "two joints follow one", "mimic with multiplier 0",
+    "large and small origins", "UTF-16", "no moving joint",
+)  # fmt: skip
+
+
+def _reader() -> Callable[..., Iterator[str]]:
+    spec = importlib.util.spec_from_file_location("compare", EXAMPLES / "compare.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    found: Callable[..., Iterator[str]] = module.wrong
+    return found
+
+
+wrong = _reader()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The vectors of all features."""
+    made = tmp_path_factory.mktemp("vectors")
+    write_sums(made, list(write_features(made)))
+    return made
+
+
+def document(path: Path, **how: Any) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(path.read_text("utf-8"), **how)
+    return found
+
+
+def urdf_of(path: Path, written: Mapping[str, Any]) -> bytes:
+    folders = path.parent, example_robots_dir(), robots_dir()
+    return next(file.read_bytes() for one in folders if (file := one / str(written["file"])).is_file())
+
+
+# -- values: a second implementation --------------------------------------------------------------------
+
+
+def agree(path: Path) -> int:
+    """Compare all values of a file with the second implementation, and return their number."""
+    data, count = document(path, parse_float=str, parse_int=str), 0
+    joints = [one | {name: list(map(int, one[name])) for name in "qv"} for one in data["joints"]]
+    second = Robot(urdf_of(path, data))
+    for sample in data["samples"]:
+        inputs = {name: list(map(float, sample[name])) for name in "qva"}
+        for link in {one["frame"] for one in sample["results"]}:
+            expected = second.quantities(link, inputs, joints)
+            for one in sample["results"]:
+                if one["frame"] != link:
+                    continue
+                unit = mp.mpf(one["k"]) * EPS
+                for x, text, tolerance in zip(
+                    expected.pop((one["quantity"], one["reference"])),
+                    one["value"],
+                    one["tolerance"],
+                    strict=True,
+                ):
+                    count += 1
+                    if x == 0 and text == "0":
+                        continue
+                    size = mp.mpf(tolerance) / unit or 1
+                    # half a unit of the 17th digit, and the error of the differences
+                    most = mp.mpf("0.5001e-16") * abs(mp.mpf(text)) + size * mp.mpf("1e-24")
+                    assert abs(x - mp.mpf(text)) <= most, (path.stem, one["quantity"], one["reference"], text)
+            assert not expected
+    return count
+
+
+@pytest.mark.parametrize("name", SOME)
+def test_an_implementation_written_from_the_standard_agrees(name: str, folder: Path) -> None:
+    assert agree(folder / f"{stem(name)}.json") >= 3 * 19
+
+
+@pytest.mark.long
+def test_an_implementation_written_from_the_standard_agrees_with_all_features(folder: Path) -> None:
+    assert sum(agree(path) for path in folder.glob("*.json")) > 50_000
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", catalogue())
+def test_an_implementation_written_from_the_standard_agrees_for_the_catalogue(
+    name: str, tmp_path: Path
+) -> None:
+    assert run("vectors", "write", str(tmp_path), name, "--samples", "2").code == 0
+    assert agree(tmp_path / f"{name}.json") > 0
+
+
+def own(robot: urdfkin.Robot) -> Callable[..., Any]:
+    """Return the answers of urdfkin in doubles."""
+
+    def answer(quantity: str, frame: str, reference: str, q: Any, v: Any, a: Any) -> Any:
+        if quantity == "placement":
+            return robot.placement(q, frame)
+        if quantity != "spatial acceleration":
+            inputs = {"velocity": (q, v), "jacobian rate": (q, v), "acceleration": (q, v, a)}.get(
+                quantity, (q,)
+            )
+            return robot.compute(quantity, inputs, frame, reference)
+        R, p = robot.placement(q, frame)[:3, :3], robot.placement(q, frame)[:3, 3]
+        velocity, found = robot.velocity(q, v, frame), robot.acceleration(q, v, a, frame)
+        linear, angular = found[:3] - np.cross(velocity[3:], velocity[:3]), found[3:]
+        if reference == "world":
+            linear = linear - np.cross(angular, p)
+        back = R.T if reference == "local" else np.eye(3)
+        return np.concatenate((back @ linear, back @ angular))
+
+    return answer
+
+
+def test_the_results_of_urdfkin_in_doubles_take_a_small_part_of_the_tolerances(folder: Path) -> None:
+    for name, feature in features().items():
+        path = folder / f"{stem(name)}.json"
+        answer = own(urdfkin.load(feature.text, verify=False))
+        data = document(path)
+        for sample in data["samples"]:
+            for one in sample["results"]:
+                one["tolerance"] = [0.05 * x for x in one["tolerance"]]
+        (narrow := folder.parent / "narrow.txt").write_text(json.dumps(data), "utf-8")
+        assert not list(wrong(narrow, answer)), name
+
+
+# -- tolerances: the formulas of the page ---------------------------------------------------------------
+
+
+class Sizes:
+    """The sizes and the roundings of a link in a sample, from the formulas of docs/vectors.md."""
+
+    def __init__(self, robot: Robot, link: str, sample: Mapping[str, Any], joints: Sequence[Any]) -> None:
+        self.robot, self.path = robot, robot.path(link)
+        at = {one["name"]: one for one in joints}
+        self.columns: list[
+            tuple[int, float, bool, int]
+        ] = []  # place, |m|, turns, place of the joint on the path
+        self.p = self.w = self.u = self.d = self.c = e = 0.0
+        rules = 0
+        for order, name in enumerate(self.path):
+            joint = robot.joints[name]
+            if joint.angles is not None:
+                e += sum(map(abs, joint.angles)) / 2
+            leader, m, _ = robot.rule(name)
+            _, error, count = self._mimic(name, at, sample)
+            rules += count
+            turns = joint.kind in ("revolute", "continuous")
+            e += error if turns else 0.0
+            q, v, a = (
+                sample[key][slice(*at[leader]["q" if key == "q" else "v"])] if leader in at else []
+                for key in "qva"
+            )
+            L = float(np.linalg.norm(joint.origin[:3, 3].astype(float)))
+            if joint.kind == "prismatic":
+                L += abs(float(m) * q[0]) + abs(float(robot.rule(name)[2]))
+            elif joint.kind in ("planar", "floating"):
+                L += float(np.linalg.norm(q[: 2 if joint.kind == "planar" else 3]))
+            self.c += (self.d + self.w**2) * L
+            self.u += self.w * L
+            self.p += L
+            if turns or joint.kind == "prismatic":
+                s, s_2 = abs(float(m) * v[0]), abs(float(m) * a[0])
+                self.columns.append((at[leader]["v"][0], abs(float(m)), turns, order))
+            if turns:
+                self.w += s
+                self.d += self.w * s + s_2
+            elif joint.kind == "prismatic":
+                self.c += 2 * self.w * s + s_2
+                self.u += s
+            elif joint.kind in ("planar", "floating"):
+                k = 2 if joint.kind == "planar" else 3
+                slide, turn, slide_2, turn_2 = (
+                    float(np.linalg.norm(x)) for x in (v[:k], v[k:], a[:k], a[k:])
+                )
+                self.c += (2 * self.w + turn) * slide + slide_2
+                self.w += turn
+                self.u += slide
+                self.d += self.w * turn + turn_2
+                first = at[leader]["v"][0]
+                self.columns += [(first + i, 1.0, i >= k, order) for i in range(len(v))]
+        self.nv = len(sample["v"])
+        self.roundings = 24 * (len(self.path) + 1) + e + 1.5 * rules
+
+    def _mimic(self, name: str, at: Mapping[str, Any], sample: Mapping[str, Any]) -> tuple[float, float, int]:
+        joint = self.robot.joints[name]
+        if not joint.leader:
+            q = sample["q"][slice(*at[name]["q"])] if name in at else [0.0]
+            return abs(q[0]), 0.0, 0
+        x, error, count = self._mimic(joint.leader, at, sample)
+        m, c = abs(float(joint.multiplier)), abs(float(joint.offset))
+        return m * x + c, m * error + 1.5 * m * x + c, count + 1
+
+    def k(self, quantity: str, reference: str | None) -> float:
+        return (FACTORS.get(quantity, 3) + (reference in ("local", "world"))) * self.roundings
+
+    def of(self, quantity: str, reference: str | None) -> np.ndarray:
+        """The sizes of all numbers."""
+        p, w, u, d, c, nv = self.p, self.w, self.u, self.d, self.c, self.nv
+        world, local = reference == "world", reference == "local"
+        if quantity == "placement":
+            return np.array([[1, 1, 1, p]] * 3 + [[0] * 4]).ravel()
+        if quantity == "velocity":
+            return np.repeat([u + w * p if world else u, w], 3)
+        if quantity.endswith("acceleration"):
+            return np.repeat([c + w * u + (w * u + (d + w**2) * p if world else 0.0), d], 3)
+        if quantity == "hessian":
+            return self.hessian(local, world)
+        T, S = np.zeros(nv), np.zeros(nv)
+        for at, m, turns, _ in self.columns:
+            (T if turns else S)[at] += m
+        if quantity == "jacobian":
+            return np.repeat([T * p + S, T], 3, axis=0).ravel()
+        linear, angular = T * (w * p + u) + w * S, w * T
+        if local:
+            linear, angular = linear + w * (T * p + S), 2 * angular
+        return np.repeat([linear, angular], 3, axis=0).ravel()
+
+    def hessian(self, local: bool, world: bool) -> np.ndarray:
+        sizes = np.zeros((2, self.nv, self.nv))
+        near, far = ((0, 0), (3, 1)) if local else ((2, 1), (0, 0)) if world else ((5, 2), (2, 1))
+        for of, m_i, turns_i, i in self.columns:
+            for by, m_j, turns_j, j in self.columns:
+                before = j <= i
+                f, g = near if before else far
+                size = m_i * m_j
+                sizes[0, of, by] += size * (
+                    f * self.p if turns_i and turns_j else g if turns_i != turns_j else 0
+                )
+                sizes[1, of, by] += size * (turns_i and turns_j and before != local)
+        return np.repeat(sizes, 3, axis=0).ravel()
+
+
+@pytest.mark.parametrize("name", features())
+def test_every_tolerance_is_that_of_the_formulas_on_the_page(name: str, folder: Path) -> None:
+    path = folder / f"{stem(name)}.json"
+    data = document(path)
+    second = Robot(urdf_of(path, data))
+    for sample in data["samples"]:
+        for one in sample["results"]:
+            sizes = Sizes(second, one["frame"], sample, data["joints"])
+            k = sizes.k(one["quantity"], one["reference"])
+            assert one["k"] == pytest.approx(k, rel=1e-12, abs=1e-6)
+            expected = k * EPS * sizes.of(one["quantity"], one["reference"])
+            given = np.array(one["tolerance"])
+            where = name, one["quantity"], one["reference"]
+            assert np.all(given >= expected * (1 - 1e-9)), where
+            assert np.all(given <= expected * 1.0101), where
+
+
+# -- the readers ----------------------------------------------------------------------------------------
+
+
+def changed(data: Mapping[str, Any], which: int) -> Iterator[tuple[dict[str, Any], list[float]]]:
+    """Yield each result with one number changed by 1e-9 of its size."""
+    for sample in data["samples"]:
+        for one in sample["results"]:
+            values = list(one["value"])
+            if values:
+                i = which % len(values)
+                values[i] += 1e-9 * (one["tolerance"][i] / (one["k"] * EPS) or 1.0)
+            yield one, values
+
+
+def in_turn(rows: Sequence[Sequence[float]]) -> Callable[..., Any]:
+    """Return the answers of a library that are known: one row for each call."""
+    found = iter(rows)
+    return lambda *_: next(found)
+
+
+@pytest.mark.parametrize("which", [0, 3, 7, 16, 41])
+def test_the_reader_in_python_finds_every_number_changed_by_a_billionth_of_its_size(
+    which: int, folder: Path
+) -> None:
+    kinds = set()
+    for path in folder.glob("*.json"):
+        data = document(path)
+        answers = [values for _, values in changed(data, which)]
+        count = sum(bool(values) for values in answers)
+        kinds |= {(one["quantity"], one["reference"]) for one, values in changed(data, which) if values}
+        right = [one["value"] for sample in data["samples"] for one in sample["results"]]
+        assert not list(wrong(path, in_turn(right)))
+        assert len(list(wrong(path, in_turn(answers)))) == count, path
+    assert len(kinds) == 19
+
+
+def test_the_reader_reports_nan_and_a_wrong_shape_and_skips_what_is_not_computed(folder: Path) -> None:
+    path = folder / "mimic.json"
+    assert len(list(wrong(path, lambda *_: np.full(16, np.nan)))) == 3 * 16 + 3 * 18
+    assert "1 numbers, expected 16" in next(wrong(path, lambda *_: 1.0))
+    assert not list(wrong(path, lambda *_: None))
+
+
+@pytest.fixture(scope="module")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The reader in C++."""
+    if shutil.which("g++") is None:
+        pytest.skip("no C++ compiler")
+    made = tmp_path_factory.mktemp("reader") / "compare"
+    command = "g++", "-std=c++17", "-Wall", "-Wextra", "-Werror", EXAMPLES / "compare.cpp", "-o", made
+    subprocess.run(command, check=True)
+    return made
+
+
+def compared(program: Path, *files: Path) -> tuple[int, str]:
+    done = subprocess.run([program, *files], capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize(
+    "name", ["mimic of a mimic", "floating", "origin of a nanometre", "names beyond ASCII"]
+)
+def test_the_reader_in_cpp_finds_every_number_changed_by_a_billionth_of_its_size(
+    name: str, program: Path, folder: Path, tmp_path: Path
+) -> None:
+    vectors, answers = folder / f"{stem(name)}.tsv", tmp_path / "answers.tsv"
+    lines = [line.split("\t") for line in vectors.read_text("utf-8").splitlines() if line[0] != "#"]
+    results = [fields for fields in lines if fields[1] != "-"]
+    data = document(folder / f"{stem(name)}.json")
+
+    def write(rows: Sequence[Sequence[float]]) -> None:
+        given = zip(results, rows, strict=True)
+        words = ["\t".join((*fields[:4], " ".join(map(repr, row)))) for fields, row in given]
+        answers.write_text("".join(f"{line}\n" for line in words), "utf-8")
+
+    right = [one["value"] for sample in data["samples"] for one in sample["results"]]
+    write(right)
+    assert compared(program, vectors, answers) == (
+        0, f"{sum(map(len, right))} numbers compared, 0 wrong, 0 lines without an answer\n",
+    )  # fmt: skip
+    for which in (0, 4):
+        write([values for _, values in changed(data, which)])
+        code, words = compared(program, vectors, answers)
+        assert code == 1
+        assert f", {len(right)} wrong" in words
+    write([[float("nan")] * len(row) for row in right])
+    assert f", {sum(map(len, right))} wrong" in compared(program, vectors, answers)[1]
+    answers.write_text("0\ttip\t-\tplacement\t1 2 3\n")
+    assert "3 numbers, expected 16" in compared(program, vectors, answers)[1]
+    answers.write_text("")
+    assert compared(program, vectors, answers)[0] == 2
+    assert compared(program, vectors, tmp_path / "missing")[0] == 2
+
+
+def test_the_page_prints_the_reader() -> None:
+    assert (EXAMPLES / "compare.py").read_text("utf-8") in (ROOT / "docs" / "vectors.md").read_text("utf-8")
+
+
+# -- the files ------------------------------------------------------------------------------------------
+
+
+def test_both_forms_have_the_same_numbers_and_conform_to_the_schema(folder: Path) -> None:
+    schema = VECTORS.schema()
+    for path in folder.glob("*.json"):
+        data = document(path)
+        jsonschema.validate(data, schema)
+        VECTORS.read(path)
+        feature = features()[data["robot"]]
+        assert data["sha256"] == hashlib.sha256((folder / data["file"]).read_bytes()).hexdigest()
+        assert (data["rule"], data["note"], data["license"]) == (feature.rule, feature.note, "CC0-1.0")
+        rows = [line.split("\t") for line in path.with_suffix(".tsv").read_text("utf-8").splitlines()[3:]]
+        results = [one for sample in data["samples"] for one in sample["results"]]
+        lines = [row for row in rows if row[1] != "-"]
+        for row, one in zip(lines, results, strict=True):
+            assert [float(x) for x in row[4].split()] == one["value"]
+            assert [float(x) for x in row[5].split()] == one["tolerance"]
+            assert row[1:4] == [one["frame"], one["reference"] or "-", one["quantity"]]
+            assert np.prod(one["shape"]) == len(one["value"]) == len(one["tolerance"])
+        inputs = [sample[name] for sample in data["samples"] for name in "qva"]
+        assert [[float(x) for x in row[4].split()] for row in rows if row[1] == "-"] == inputs
+
+
+def test_the_files_are_the_same_in_another_process_with_another_hash_seed(
+    folder: Path, tmp_path: Path
+) -> None:
+    command = "from urdfkin.cli import main; main()"
+    subprocess.run(
+        [sys.executable, "-c", command, "vectors", "write", str(tmp_path), "--no-catalogue"],
+        env={**os.environ, "PYTHONHASHSEED": "4711", "LC_ALL": "C"}, stdout=subprocess.DEVNULL, check=True,
+    )  # fmt: skip
+    assert (tmp_path / "SHA256SUMS").read_bytes() == (folder / "SHA256SUMS").read_bytes()
+    assert len(list(tmp_path.iterdir())) == 3 * len(features()) + 1
+    subprocess.run(["sha256sum", "--quiet", "--check", "SHA256SUMS"], cwd=tmp_path, check=True)
+
+
+@pytest.mark.long
+def test_all_files_with_the_catalogue_are_written_twice_the_same(tmp_path: Path) -> None:
+    first, second = tmp_path / "a", tmp_path / "b"
+    for made in (first, second):
+        assert run("vectors", "write", str(made)).code == 0
+    assert (first / "SHA256SUMS").read_bytes() == (second / "SHA256SUMS").read_bytes()
+    found = [document(path) for path in first.glob("*.json")]
+    assert len(found) == len(features()) + len(catalogue())
+    for data in found:
+        for one in data["samples"][1]["results"]:
+            assert one["k"] * EPS < 1e-10
+
+
+def test_the_features_are_many_and_have_names_and_files_of_their_own() -> None:
+    assert len(features()) >= 60
+    names = [stem(name).casefold() for name in (*features(), *catalogue())]
+    assert len(set(names)) == len(names)
+    assert len({feature.data for feature in features().values()}) == len(features())
+
+
+def test_the_note_of_a_feature_names_each_library_that_the_table_shows_to_differ() -> None:
+    from urdfkin.verify.adapters import LIBRARIES  # noqa: PLC0415
+
+    table = document(ROOT / "docs" / "libraries.json")["cells"]
+    for library, column in table.items():
+        for name, cell in column.items():
+            named = LIBRARIES[library].title in (features()[name].note or "")
+            assert named == (cell["verdict"] != "right"), (library, name)
+
+
+def test_the_files_that_urdfkin_refuses_have_a_note_that_states_it() -> None:
+    for feature in features().values():
+        try:
+            urdfkin.load(feature.data, verify=False)
+        except urdfkin.UrdfError:
+            assert "urdfkin refuses the file" in (feature.note or ""), feature.name
+        else:
+            assert "urdfkin" not in (feature.note or "")
+
+
+# -- the command ----------------------------------------------------------------------------------------
+
+
+def test_a_robot_of_the_catalogue_is_written_by_reference_and_another_one_with_its_file(
+    tmp_path: Path,
+) -> None:
+    text = urdfkin.load("planar_two_link").urdf
+    (tmp_path / "mine.urdf").write_text(text.replace('"planar_two_link"', '"my arm"'))
+    done = run(
+        *("vectors", "write", str(tmp_path / "out"), "ur5", str(tmp_path / "mine.urdf")),
+        *("--samples", "2", "--format", "json"),
+    )
+    assert done.code == 0, done.err
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        "ur5.json", "ur5.tsv", "my_arm.json", "my_arm.tsv", "my_arm.urdf", "SHA256SUMS",
+    }  # fmt: skip
+    assert [one["robot"] for one in done.data["robots"]] == ["ur5", "my arm"]
+    ur5, mine = (document(tmp_path / "out" / name) for name in ("ur5.json", "my_arm.json"))
+    assert (ur5["license"], mine["license"]) == ("CC0-1.0", None)
+    assert len(ur5["samples"]) == 2
+    assert hashlib.sha256((example_robots_dir() / ur5["file"]).read_bytes()).hexdigest() == ur5["sha256"]
+    assert agree(tmp_path / "out" / "my_arm.json") > 0
+
+
+def test_bad_arguments_are_explained(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    done = run("vectors", "write", str(tmp_path / "file"), "ur5")
+    assert done.code == 2
+    assert "cannot be written" in done.err
+    assert "name the folder" in run("vectors", "write").err
+    done = run("vectors", "write", str(tmp_path), "ur5", "ur5")
+    assert done.code == 2
+    assert "two robots have the same name" in done.err
+    assert json.loads(run("vectors", "write", "--schema").text)["title"] == VECTORS.name

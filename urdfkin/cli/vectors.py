@@ -1,0 +1,108 @@
+"""The command `urdfkin vectors`: write test vectors for other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from urdfkin.cli.completion import complete_robot
+from urdfkin.cli.options import Whole, load_robot
+from urdfkin.cli.output import Answer, answering
+from urdfkin.errors import InputError, SourceError
+from urdfkin.errors.display import Table, TextDocument
+from urdfkin.errors.escape import csv_value
+
+if TYPE_CHECKING:
+    from urdfkin.validation.vectors import Written
+
+EXAMPLE = "urdfkin vectors write vectors ur5 panda"
+
+
+@click.group("vectors", no_args_is_help=False, epilog=f"Example: {EXAMPLE}")
+def vectors_command() -> None:
+    """Write test vectors for other programs.
+
+    A library of any language compares its own results with them. docs/vectors.md explains how.
+    """
+
+
+@vectors_command.command(
+    "write", short_help="Write test vectors into a folder.", epilog=f"Example: {EXAMPLE}"
+)
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path), required=False)
+@click.argument("robots", metavar="[ROBOT]...", nargs=-1, shell_complete=complete_robot)
+@click.option(
+    "--catalogue/--no-catalogue",
+    default=True,
+    help="Write the robots of the catalogue too (default), which refer to the files of example-robot-data.",
+)
+@click.option(
+    "--samples",
+    type=Whole(1, 1000),
+    default=3,
+    show_default=True,
+    help="Configurations of each robot. The first is the zero configuration.",
+)
+@click.option("--schema", is_flag=True, help="Print the JSON Schema of a file and exit.")
+@answering()
+def write_command(
+    folder: Path | None, robots: tuple[str, ...], catalogue: bool, samples: int, schema: bool
+) -> Answer:
+    """Write test vectors into the folder DIR: results at 50 digits, with a tolerance for every number.
+
+    Without ROBOT, the robots are some 70 small ones with one feature of URDF each, and those of the
+    catalogue. With ROBOT, only these are written. Each robot has a JSON file, and a file with the same
+    numbers as lines between tabs. SHA256SUMS has the digests of all files.
+
+    The results are placement, velocity, Jacobian, its time derivative, Hessian, classical and spatial
+    acceleration in LOCAL, WORLD and LOCAL_WORLD_ALIGNED. The files depend on the robots and --samples alone.
+    """
+    from urdfkin.validation import vectors  # noqa: PLC0415  keeps --help fast
+
+    if schema:
+        click.echo(vectors.VECTORS.schema_text(), nl=False)
+        click.get_current_context().exit()
+    if folder is None:
+        raise click.UsageError("name the folder for the files: urdfkin vectors write DIR")
+    loaded = [load_robot(robot, verify=False) for robot in robots]
+    names = [vectors.name_of(robot) for robot in loaded]
+    if len({vectors.stem(name).casefold() for name in names}) < len(names):
+        raise InputError(
+            "two robots have the same name, so they need the same file",
+            found=", ".join(names),
+            remedy="write them into two folders",
+        )
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        found = error.strerror or str(error)
+        raise SourceError("cannot be written", where=str(folder), found=found) from error
+    written = [vectors.write_robot(folder, robot, samples) for robot in loaded]
+    if not robots:
+        written = list(vectors.write_features(folder, samples))
+        written += vectors.write_catalogue(folder, samples) if catalogue else []
+    vectors.write_sums(folder, written)
+
+    def rows() -> Iterator[tuple[object, ...]]:
+        yield "robot", "file", "numbers"
+        for one in written:
+            yield csv_value(one.robot), csv_value(one.files[0].name), one.numbers
+
+    data = {
+        "folder": str(folder),
+        "robots": [
+            {"robot": one.robot, "files": [path.name for path in one.files], "numbers": one.numbers}
+            for one in written
+        ],
+    }
+    return Answer(lambda: _document(folder, written), {"json": lambda: data, "csv": rows})
+
+
+def _document(folder: Path, written: Sequence[Written]) -> TextDocument:
+    rows = [(one.robot, one.files[0].name, f"{one.numbers:,}") for one in written]
+    robots = "1 robot" if len(written) == 1 else f"{len(written)} robots"
+    total = f"{sum(one.numbers for one in written):,} numbers of {robots} in {folder}"
+    return TextDocument("", [Table(("robot", "file", "numbers"), rows, left=2, names=(0, 1)), total])

@@ -1,0 +1,476 @@
+"""Test vectors: robots, configurations, and results at 50 digits with a tolerance for every number.
+
+The robots are those of `robots/features.toml`, with one feature of URDF each, and those of the catalogue by
+reference. The reader of `urdfkin.verify.exact` computes all values from the decimals of the URDF. The files
+depend on nothing but these texts: configurations are made from digests, not by a random generator.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import re
+import tomllib
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from decimal import ROUND_CEILING, Decimal, localcontext
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypedDict
+
+import numpy as np
+
+from urdfkin.errors.escape import json_text, log_line
+from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
+from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.configuration import coordinate_ranges, neutral
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray, JointKind, KinematicTree
+from urdfkin.robot import Robot
+from urdfkin.robot.loading import load
+from urdfkin.system.documents import Count, Layout, Sha256, Size, of_length, says
+from urdfkin.system.files import MOST_DATA, read_bytes, read_text, write_file
+from urdfkin.system.lazy_import import lazy_import
+from urdfkin.system.plain_xml import plain_xml
+from urdfkin.system.resources import robots_dir
+from urdfkin.urdf.catalogue import catalogue
+from urdfkin.urdf.findings import UrdfWarning
+from urdfkin.verify.bounds import against_true_values, magnitudes
+from urdfkin.verify.exact.numbers import DIGITS, decimal, enough_digits, precision, read_exact
+from urdfkin.verify.exact.recursion import move
+from urdfkin.verify.quantities import (
+    ACCELERATION,
+    HESSIAN,
+    JACOBIAN,
+    JACOBIAN_RATE,
+    PLACEMENT,
+    VELOCITY,
+    Quantity,
+)
+
+#: Version of the vectors. Another first number: other files do not fit programs that read these.
+VERSION = "1.0"
+LICENCE = "CC0-1.0"
+#: Number of configurations of each robot; the first is the zero configuration, as far as limits allow it.
+SAMPLES = 3
+#: Range of joint velocities and accelerations, and of positions of planar and floating joints, +-.
+_RANGE = 2.0
+#: Inputs are multiples of 1 / _GRID where limits allow it, so that their few decimals are exactly doubles.
+_GRID = 1024.0
+#: Digits of a tolerance, and those before it is rounded up.
+_DIGITS, _SAME = 3, 12
+
+SPATIAL_ACCELERATION = replace(
+    ACCELERATION,
+    name="spatial acceleration",
+    exact=lazy_import("urdfkin.verify.exact.recursion:spatial_acceleration_values"),
+)
+#: The quantities of the vectors. The scale of an acceleration includes w x vel, the difference of the two.
+QUANTITIES = (
+    PLACEMENT, VELOCITY, JACOBIAN, JACOBIAN_RATE, HESSIAN, ACCELERATION, SPATIAL_ACCELERATION,
+)  # fmt: skip
+
+
+class JointEntry(TypedDict):
+    """A joint with coordinates of its own, and their places in q, v and a."""
+
+    name: Annotated[str, says("Name of the joint.")]
+    type: Annotated[str, says("Type of the joint in the URDF.")]
+    q: Annotated[list[Count], of_length(2), says("First index in q, and the index after the last.")]
+    v: Annotated[list[Count], of_length(2), says("The same in v and a.")]
+
+
+class Result(TypedDict):
+    """A quantity of a frame; metres, radians, seconds."""
+
+    quantity: Literal[
+        "placement",
+        "velocity",
+        "jacobian",
+        "jacobian rate",
+        "hessian",
+        "acceleration",
+        "spatial acceleration",
+    ]
+    frame: Annotated[str, says("Name of a link.")]
+    reference: Annotated[
+        Literal["local", "world", "local_world_aligned"] | None,
+        says("Reference frame; null for a placement."),
+    ]
+    shape: Annotated[list[Count], says("Shape of the result. The last index varies fastest in the lists.")]
+    k: Annotated[Size, says("The tolerance in multiples of 2^-52 times the size of the terms.")]
+    value: Annotated[list[float], says("The true values, rounded to 17 significant digits.")]
+    tolerance: Annotated[list[float], says("Largest difference of a right result; 0: equal.")]
+
+
+class Sample(TypedDict):
+    """A configuration with joint velocities and accelerations, and its results."""
+
+    q: Annotated[list[float], says("Coordinates: rad, m, quaternion x y z w.")]
+    v: Annotated[list[float], says("Joint velocities. Those of a planar or floating joint: child's axes.")]
+    a: Annotated[list[float], says("Joint accelerations: the time derivatives of v.")]
+    results: list[Result]
+
+
+class Vectors(TypedDict):
+    """Test vectors of one robot."""
+
+    schema: Annotated[str, says("Name and version of the layout of this document.")]
+    version: Annotated[str, says("Version of the vectors.")]
+    license: Annotated[str | None, says("SPDX identifier; null: that of the robot's file.")]
+    robot: Annotated[str, says("Name of the feature or robot.")]
+    file: Annotated[str, says("Path of the URDF, in this folder or in example-robot-data.")]
+    sha256: Annotated[Sha256, says("SHA-256 of that file.")]
+    rule: Annotated[str | None, says("The rule of the standard, if the robot shows one.")]
+    note: Annotated[str | None, says("How libraries differ, or how the file was read.")]
+    joints: list[JointEntry]
+    samples: list[Sample]
+
+
+VECTORS = Layout("urdfkin-vectors/1", Vectors, (), "urdfkin vectors write DIR")
+
+
+# -- the robots -----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Feature:
+    """A small robot with one feature of URDF.
+
+    Attributes:
+        name: Name of the feature.
+        rule: The standard's rule.
+        note: How libraries differ; None if no difference is known.
+        text: The URDF.
+        data: The file: the text with its declaration, in its encoding.
+        frames: Links of the test vectors.
+    """
+
+    name: str
+    rule: str
+    note: str | None
+    text: str
+    data: bytes
+    frames: tuple[str, ...]
+
+
+def stem(name: str) -> str:
+    """Return the name of a robot's files without a suffix.
+
+    >>> stem("rpy at pitch -pi/2")
+    'rpy_at_pitch_minus_pi_2'
+    """
+    return re.sub(r"[^\w.]+", "_", name.replace(" -", " minus ")).strip("_.") or "robot"
+
+
+@cache
+def features() -> Mapping[str, Feature]:
+    """Return the features of `robots/features.toml` by name.
+
+    >>> features()["axis of length 2"].rule
+    'The axis is a direction: its length has no effect on an angle.'
+    """
+    data = tomllib.loads(read_text(robots_dir() / "features.toml"))
+    return {row["name"]: _feature(row, data["parts"]) for row in data["feature"]}
+
+
+def _feature(row: Mapping[str, Any], parts: Mapping[str, str]) -> Feature:
+    written = row.get("file") or _robot(row)
+    for name, part in (*parts.items(), ("inertial", _INERTIAL)):
+        written = written.replace(f"{{{name}}}", part)
+    data = (row.get("head", "") + written).encode(row.get("encoding", "utf-8"))
+    return Feature(
+        row["name"], row["rule"], row.get("note"), written, data, tuple(row.get("frames", ("tip",)))
+    )
+
+
+_INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
+
+
+def _robot(row: Mapping[str, Any]) -> str:
+    joints = row.get("joints")
+    if joints is None:
+        joints = (
+            f'{{j1}}<joint name="j2" type="{row.get("type", "revolute")}">\n'
+            f'  <parent link="a"/><child link="tip"/>\n  {row["j2"]}\n</joint>\n'
+        )
+    children = re.findall(r'child link="([^"]+)"', joints.replace("{j1}", 'child link="a"'))
+    links = "".join(
+        f'<link name="{link}">{{inertial}}</link>\n' for link in dict.fromkeys(["base", *children])
+    )
+    version = f' version="{row["version"]}"' if "version" in row else ""
+    return f'<robot name="r"{version}>\n{links}{joints}</robot>\n'
+
+
+# -- configurations -------------------------------------------------------------------------------------
+
+
+def _fraction(*words: object) -> float:
+    """Return a number of [0, 1) that depends on the words alone."""
+    digest = hashlib.sha256("\n".join(map(str, words)).encode()).digest()
+    return int.from_bytes(digest[:6], "big") / 2.0**48
+
+
+def _on_grid(x: float) -> float:
+    return round(x * _GRID) / _GRID
+
+
+def configuration(tree: KinematicTree, name: str, sample: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return q, v and a of a sample, which depend on the robot's name and the limits alone."""
+    q, ranges = neutral(tree), coordinate_ranges(tree)
+    for joint, at in zip(tree.joints, tree.q_index, strict=True):
+        unit = [_fraction(name, sample, joint.name, k) for k in range(joint.nq)]
+        if joint.nq == 1:
+            lower, upper = ranges[joint.name]
+            wanted = _on_grid(lower + (upper - lower) * unit[0]) if sample else 0.0
+            q[at] = min(max(wanted, lower), upper)
+        elif joint.kind is JointKind.FLOATING and sample:
+            quaternion = [2.0 * x - 1.0 for x in unit[3:]]
+            length = math.sqrt(math.fsum(x * x for x in quaternion))
+            q[at + 3 : at + 7] = [x / length for x in quaternion]
+        if joint.nq > 1 and sample:
+            q[at : at + 3] = [_on_grid(_RANGE * (2.0 * x - 1.0)) for x in unit[:3]]
+    v, a = (
+        np.array([_on_grid(_RANGE * (2.0 * _fraction(name, sample, of, k) - 1.0)) for k in range(tree.nv)])
+        for of in "va"
+    )
+    return q, v, a
+
+
+# -- tolerances -----------------------------------------------------------------------------------------
+
+
+class _Decimals:
+    """The angles and mimic rules of a URDF, for the errors that their conversion to doubles causes."""
+
+    def __init__(self, text: str) -> None:
+        self.elements = {str(joint.get("name")): joint for joint in plain_xml(text).findall("joint")}
+
+    def of(self, tree: KinematicTree, path: Sequence[int], q: FloatArray) -> tuple[float, int]:
+        """Return the errors of angles on a path, in eps rad, and the number of mimic rules."""
+        at = {joint.name: q[i] for joint, i in zip(tree.joints, tree.q_index, strict=True) if joint.nq == 1}
+        angles, rules = 0.0, 0
+        for i in path:
+            joint = tree.joints[i]
+            if (element := self.elements.get(joint.name)) is None:
+                continue
+            if (origin := element.find("origin")) is not None and "quat_xyzw" not in origin.attrib:
+                angles += math.fsum(abs(float(x)) for x in origin.get("rpy", "0").split()) / 2.0
+            if joint.mimic is not None:
+                _, error, count = self._value(joint.name, at)
+                angles, rules = angles + (error if joint.kind.turns else 0.0), rules + count
+        return angles, rules
+
+    def _value(self, name: str, at: Mapping[str, float]) -> tuple[float, float, int]:
+        """Return the size of a joint's value, its error in eps, and the number of rules of its chain."""
+        rule = self.elements[name].find("mimic")
+        if rule is None or name in at:
+            return abs(at[name]), 0.0, 0
+        m, c = abs(float(rule.get("multiplier", "1"))), abs(float(rule.get("offset", "0")))
+        x, error, count = self._value(str(rule.get("joint")), at)
+        return m * x + c, m * error + 1.5 * m * x + c, count + 1
+
+
+def _tolerance(k: float, scale: float) -> str:
+    """Return k eps scale as a decimal, rounded up; 0 if the scale is 0."""
+    if scale == 0.0:
+        return "0"
+    with localcontext(prec=_SAME):  # without the last digits, in which processors may differ
+        number = +Decimal(k * max(EPS * scale, LEAST_UNIT))
+    with localcontext(prec=_DIGITS, rounding=ROUND_CEILING):
+        return str((+number).normalize())
+
+
+# -- files ----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """The files of one robot.
+
+    Attributes:
+        robot: Name of the feature or robot.
+        files: Paths of the files: the vectors as JSON and as lines, and the URDF if it is written.
+        numbers: Number of values.
+    """
+
+    robot: str
+    files: tuple[Path, ...]
+    numbers: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Head:
+    """The entries of a document that do not depend on configurations."""
+
+    robot: str
+    file: str
+    sha256: str
+    rule: str | None = None
+    note: str | None = None
+    license: str | None = LICENCE
+
+
+def write_features(folder: Path, samples: int = SAMPLES) -> Iterator[Written]:
+    """Write the vectors of all features, each with its URDF, and yield what was written.
+
+    Raises:
+        SourceError: a file cannot be written.
+    """
+    for feature in features().values():
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UrdfWarning)
+            robot = load(feature.text, verify=False)
+        place = folder / stem(feature.name)
+        file = place.with_name(f"{place.name}.urdf")
+        write_file(file, feature.data)
+        sha256 = hashlib.sha256(feature.data).hexdigest()
+        head = _Head(feature.name, file.name, sha256, feature.rule, feature.note)
+        found = _write(place, robot, head, feature.frames, samples)
+        yield replace(found, files=(*found.files, file))
+
+
+def write_robot(folder: Path, robot: Robot, samples: int = SAMPLES) -> Written:
+    """Write the vectors of a robot: of the catalogue by reference, any other robot with its URDF.
+
+    Args:
+        folder: An existing folder.
+        robot: The robot. The frame is its default tip.
+        samples: Number of configurations.
+
+    Raises:
+        SourceError: a file cannot be written.
+    """
+    frames, name = (robot.tip_frame,), name_of(robot)
+    if (entry := catalogue().get(robot.source)) is not None:
+        sha256 = hashlib.sha256(read_bytes(entry.path)).hexdigest()
+        head = _Head(name, entry.relative_path.as_posix(), sha256, note=entry.reason)
+        return _write(folder / stem(name), robot, head, frames, samples)
+    data, file = robot.urdf.encode(), f"{stem(name)}.urdf"
+    write_file(folder / file, data)
+    head = _Head(name, file, hashlib.sha256(data).hexdigest(), license=None)
+    found = _write(folder / stem(name), robot, head, frames, samples)
+    return replace(found, files=(*found.files, folder / file))
+
+
+def write_catalogue(folder: Path, samples: int = SAMPLES) -> Iterator[Written]:
+    """Write the vectors of all robots of the catalogue, and yield what was written.
+
+    Raises:
+        SourceError: a file cannot be written.
+    """
+    for name in catalogue():
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UrdfWarning)
+            robot = load(name, verify=False)
+        yield write_robot(folder, robot, samples)
+
+
+def name_of(robot: Robot) -> str:
+    """Return the name of a robot in its vectors: that in the catalogue, or that in its URDF."""
+    return robot.source if robot.source in catalogue() else robot.name
+
+
+def write_sums(folder: Path, written: Sequence[Written]) -> Path:
+    """Write SHA256SUMS, which `sha256sum --check` reads, for all files."""
+    lines = [
+        f"{hashlib.sha256(read_bytes(path, MOST_DATA)).hexdigest()}  {path.name}\n"
+        for one in written
+        for path in one.files
+    ]
+    write_file(folder / "SHA256SUMS", "".join(sorted(lines, key=lambda line: line[66:])).encode())
+    return folder / "SHA256SUMS"
+
+
+def _write(place: Path, robot: Robot, head: _Head, frames: Sequence[str], samples: int) -> Written:
+    """Write the JSON file, and the same numbers as lines of fields between tabs."""
+    tree = robot.tree
+    found = [_sample(robot, head.robot, frames, sample) for sample in range(samples)]
+    rows = [
+        f"# {VECTORS.name} version {VERSION}, {head.license or 'no licence'}: {log_line(head.robot)}",
+        f"# file {log_line(head.file)}, sha256 {head.sha256}",
+        "# sample, frame, reference, quantity, values, tolerances",
+    ]
+    parts = []
+    for index, (inputs, results) in enumerate(found):
+        rows += [f"{index}\t-\t-\t{name}\t{' '.join(x)}\t" for name, x in inputs.items()]
+        rows += [
+            f"{index}\t{log_line(one['frame'])}\t{one['reference'] or '-'}\t{one['quantity']}"
+            f"\t{' '.join(one['value'])}\t{' '.join(one['tolerance'])}"
+            for one in results
+        ]
+        lists = ",\n".join(f'   "{name}": [{", ".join(x)}]' for name, x in inputs.items())
+        texts = ",\n".join(f"    {_result(one)}" for one in results)
+        parts.append(f'  {{\n{lists},\n   "results": [\n{texts}\n   ]\n  }}')
+    joints = [
+        {"name": joint.name, "type": joint.kind.value, "q": [i, i + joint.nq], "v": [j, j + joint.nv]}
+        for joint, i, j in zip(tree.joints, tree.q_index, tree.v_index, strict=True)
+        if joint.nq
+    ]
+    entries = {"schema": VECTORS.name, "version": VERSION, "license": head.license, "robot": head.robot}
+    entries |= {"file": head.file, "sha256": head.sha256, "rule": head.rule, "note": head.note}
+    top = "".join(
+        f" {json_text(name)}: {json_text(entry)},\n" for name, entry in {**entries, "joints": joints}.items()
+    )
+    body = ",\n".join(parts)
+    files = place.with_name(f"{place.name}.json"), place.with_name(f"{place.name}.tsv")
+    write_file(files[0], f'{{\n{top} "samples": [\n{body}\n ]\n}}\n'.encode())
+    write_file(files[1], "".join(f"{row}\n" for row in rows).encode())
+    return Written(head.robot, files, sum(len(one["value"]) for _, results in found for one in results))
+
+
+def _result(one: Mapping[str, Any]) -> str:
+    """Return a result as JSON, with its decimals as they are."""
+    lists = {name: f"[{', '.join(one[name])}]" for name in ("value", "tolerance")}
+    texts = {name: json_text(x) if name not in lists else lists[name] for name, x in one.items()}
+    return f"{{{', '.join(f'{json_text(name)}: {text}' for name, text in texts.items())}}}"
+
+
+def _sample(
+    robot: Robot, name: str, frames: Sequence[str], sample: int
+) -> tuple[dict[str, list[str]], list[dict[str, Any]]]:
+    """Return the inputs and the results of a sample, with all numbers as decimals."""
+    q, v, a = configuration(robot.tree, name, sample)
+    inputs = {name: [repr(float(x)) for x in array] for name, array in zip("qva", (q, v, a), strict=True)}
+    digits = max(DIGITS, enough_digits(len(robot.tree.joints)))
+    while True:
+        results = list(_results(robot, frames, (q, v, a), digits))
+        if all(None not in one["value"] for one in results):
+            return inputs, results
+        digits *= 2
+
+
+def _results(
+    robot: Robot, frames: Sequence[str], inputs: tuple[FloatArray, ...], digits: int
+) -> Iterator[dict[str, Any]]:
+    """Yield the results of a sample; a value that is not proven to 17 digits is None."""
+    tree, (q, v, a) = robot.tree, inputs
+    decimals = _Decimals(robot.urdf)
+    for frame in frames:
+        link = tree.frame_link(frame)
+        plan, path = robot.plan((link,)), tree.path(link)
+        size = magnitudes(plan, q[np.newaxis], v[np.newaxis], a[np.newaxis], STILL_STATE)
+        size = against_true_values(size, *decimals.of(tree, path, q))
+        with precision(digits):
+            motion = move(tree, read_exact(robot.urdf, tree, path), q, v, a)
+            for row in QUANTITIES:
+                for reference in row.references:
+                    yield _entry(row, motion, link, reference, frame, row.bound(plan, size, reference))
+
+
+def _entry(
+    row: Quantity, motion: Any, link: int, reference: Reference | None, frame: str, bound: Any
+) -> dict[str, Any]:
+    values = row.truth(motion, link, reference)
+    k = float(bound.k.reshape(-1)[0])
+    scale = np.broadcast_to(bound.scale[0, 0], values.shape).reshape(-1).tolist()
+    return {
+        "quantity": row.name,
+        "frame": frame,
+        "reference": None if reference is None else reference.name.lower(),
+        "shape": list(values.shape),
+        "k": round(k, 6),
+        "value": [decimal(x, k * EPS * s) for x, s in zip(values.reshape(-1).tolist(), scale, strict=True)],
+        "tolerance": [_tolerance(k, s) for s in scale],
+    }
