@@ -19,7 +19,7 @@ def programs() -> dict[str, int]:
     parts = re.split(r"^##+ ", PAGE.read_text("utf-8"), flags=re.M)[1:]
     titles, at = {}, -1
     for part in parts:
-        for code in re.findall(r"```python\n(.*?)```", part, flags=re.S):
+        for code in re.findall(r"```py(?:thon)?\n(.*?)```", part, flags=re.S):
             at += 1
             if "expected" in code and "def poses" not in code:
                 titles[part.partition("\n")[0]] = at
@@ -33,7 +33,7 @@ _run: list[int] = []
 
 def outcome(at: int) -> tuple[np.ndarray, np.ndarray]:
     """Run the programs of the page up to one; return what the library found and what was expected."""
-    codes = [code for kind, code in blocks("upstream.md") if kind == "python"]
+    codes = [code for kind, code in blocks("upstream.md") if kind in ("python", "py")]
     for k in range(len(_run), at + 1):
         exec(codes[k], _names)
         _run.append(k)
