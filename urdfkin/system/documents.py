@@ -222,7 +222,10 @@ def read_json(path: Path) -> object:
 
 
 def parse_json(content: bytes, where: str) -> object:
-    """Parse the content of a file. Raise InputError if it is not JSON, or has a number beyond a double."""
+    """Parse the content of a file.
+
+    Raise InputError if the text is not JSON, or contains a number beyond the range of doubles.
+    """
     try:
         return json.loads(content, parse_constant=_number, parse_float=_number)
     except (ValueError, RecursionError) as error:
