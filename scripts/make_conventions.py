@@ -4,8 +4,8 @@ For each row, the script compares a library's result with several candidate defi
 motion. It writes the definition that matches. A test checks that the page is current.
 
 The tables of other tools come from urdfkin/model/conventions/conventions.toml. With --measure, the script
-first runs each installed library on all robots of the catalogue, in the library's convention. It writes the
-results to the same file.
+first runs each installed library on all robots of the catalogue, in the library's convention. The script
+writes the results to the same file.
 
     python scripts/make_conventions.py
     python scripts/make_conventions.py --measure

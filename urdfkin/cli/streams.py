@@ -4,8 +4,9 @@ A shell can close a stream, connect it to a full disk or to a reader that exits,
 lacks a name's letters. With this module, none of these failures causes a traceback.
 
 `guard` wraps standard output and standard error in a `SafeStream`, which escapes control characters and
-commands of CI services. All output passes through it, also that of click and Python. Line feeds pass,
-because the stream cannot detect a line feed inside a name. `say` and the console escape these as well.
+commands of CI services. All output passes through this stream, also the output of click and Python. Line
+feeds pass, because the stream cannot detect a line feed inside a name. `say` and the console escape these as
+well.
 """
 
 from __future__ import annotations

@@ -252,7 +252,7 @@ class Sameness(Displayable):
 
     Attributes:
         names: The robots' names.
-        sources: The two sources, as given.
+        sources: The sources of A and B, as the user gave them.
         digests: SHA-256 of the two texts.
         verdict: `Verdict.SAME`, `SAME_AFTER` the changes in `after`, or `DIFFERS`.
         after: The changes that bring B closest to A, with one line of text for each change. The changes are

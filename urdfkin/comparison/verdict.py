@@ -450,8 +450,8 @@ def _with_idle_joints_fixed(
 ) -> KinematicTree:
     """Return a tree in which mimic joints with the multiplier 0 are fixed joints at the rule's offset.
 
-    Such a joint never moves. It remains a mimic joint if the other model has a moving joint with its name,
-    above its child link, or with the name that the map gives: then the two rules are compared.
+    Such a joint never moves. A mimic joint remains a mimic joint if the other model has a moving joint with
+    its name, above its child link, or with the name that the map gives: then the two rules are compared.
     """
     moving = {joint.name for joint in other.joints if joint.kind.nv}
     children = {other.links[i + 1] for i, joint in enumerate(other.joints) if joint.kind.nv}

@@ -5,7 +5,8 @@ coordinate axis and for a rotation about a coordinate axis. These instructions t
 general instructions. A translation by zero needs no instruction. The state of a link stays in registers until
 the next link is computed. At a branch of the tree, the state is saved to memory and read again later.
 
-`KernelArgs` names the arguments of a kernel. They are one row of integers: addresses, sizes and options.
+`KernelArgs` names the arguments of a kernel. The arguments of a kernel are one row of integers: addresses,
+sizes and options.
 """
 
 from __future__ import annotations

@@ -146,5 +146,5 @@ def csv_value(text: str) -> str:
 
 
 def from_csv_cell(cell: str) -> str:
-    """Return the name that `csv_cell` wrote. It is exact if `csv_cell` escaped no character."""
+    """Return the name that `csv_cell` wrote. The result is exact if `csv_cell` escaped no character."""
     return cell[1:] if cell.startswith("'") and cell.lstrip("' ").startswith(FORMULA) else cell

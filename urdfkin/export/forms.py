@@ -1,7 +1,7 @@
 """The code of a chain in one of its forms: the URDF's joints, a Denavit-Hartenberg table, or screws.
 
-A table or a product of exponentials becomes a robot, as by `urdfkin.load`. Its joints are the rows or the
-screws, and the code is made of this robot.
+A table or a product of exponentials becomes a robot, as by `urdfkin.load`. The joints of this robot are the
+rows or the screws, and the code is made of this robot.
 """
 
 from __future__ import annotations

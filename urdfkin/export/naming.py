@@ -45,7 +45,7 @@ def all_safe(names: Iterable[str]) -> list[str]:
 
 
 def title(robot: str, frame: str) -> str:
-    """Return the name of the exported code for a frame. It begins with a letter; callers add a suffix.
+    """Return the name of the exported code for a frame. The name begins with a letter; callers add a suffix.
 
     >>> title("panda", "panda_hand"), title("ur5", "tool0"), title("2", "x"), title("", "my arm")
     ('panda_hand', 'ur5_tool0', 'robot_2_x', 'my_arm')

@@ -28,8 +28,8 @@ A quaternion is (qx, qy, qz, qw), with the scalar last as in a configuration; qw
 quaternion and its negative are the same rotation. For its rates, the angular velocity is expressed in the
 fixed frame 0, as in the textbook (`frame="fixed"`), or in the frame of the turning body (`frame="body"`).
 Quaternion rates have no singularity. `integrate_orientation` integrates the rates of a quaternion and
-normalises the quaternion after each step. It does not integrate the angular velocity itself, because that
-integral is not an orientation (example 7.3).
+normalises the quaternion after each step. The module does not integrate the angular velocity itself, because
+that integral is not an orientation (example 7.3).
 
 Euler angles have 24 sequences, with SciPy's names. Capital letters are axes that turn with the body: "ZYZ" is
 the textbook's R = Rz Ry Rz. Small letters are fixed axes: "xyz" is the URDF's rpy (roll, pitch, yaw). Their
@@ -493,9 +493,9 @@ def integrate_orientation(
     16.
 
     Args:
-        w: Function of the time in s that returns the angular velocity, (..., 3) rad/s. It must be smooth
-            within a step, so add a time to `times` at each jump. At the two ends of a step, w is evaluated
-            just inside the step.
+        w: Function of the time in s that returns the angular velocity, (..., 3) rad/s. This function must be
+            smooth within a step, so add a time to `times` at each jump. At the two ends of a step, w is
+            evaluated just inside the step.
         quat: (..., 4) orientation at `times[0]`, unit quaternion, scalar last.
         times: (n,) increasing times in s; the method makes one step from each time to the next.
         frame: Frame of w: "fixed" is frame 0, "body" the body's own.
@@ -1023,7 +1023,8 @@ def singularity_distance(name: str, angles: ArrayLike) -> FloatArray:
 def euler_condition(name: str, angles: ArrayLike) -> FloatArray:
     """Return the condition number of Omega.
 
-    It is the largest factor by which the relative error of the rates exceeds that of the angular velocity w.
+    The condition number is the largest factor by which the relative error of the rates exceeds the relative
+    error of the angular velocity w.
 
     The middle axis is perpendicular to the first and to the third axis. Let d be the angle between the first
     and the third axis. The singular values of Omega are then 1 and sqrt(1 +- cos d), and its condition number

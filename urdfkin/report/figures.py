@@ -5,8 +5,8 @@ logarithmic and shows the disagreement in eps * scale. The histogram shows the r
 the worst result. The bar shows the bound, from the frame with the fewest joints before it to the frame with
 the most. A quantity is verified if its histogram lies left of its bar.
 
-The data of the 3D view is compact: links, joints and chains with their tables. Its numbers have seven digits
-for display; the JSON document has the full numbers.
+The data of the 3D view is compact: links, joints and chains with their tables. The numbers of the 3D view
+have seven digits for display; the JSON document has the full numbers.
 """
 
 from __future__ import annotations

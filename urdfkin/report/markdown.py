@@ -63,7 +63,7 @@ def as_markdown(document: Document) -> str:
 def _three_sides(robots: list[Robot]) -> list[str]:
     """Return the table of a comparison with a second oracle.
 
-    It has one row for each quantity, over all robots.
+    The table has one row for each quantity, over all robots.
     """
     if (title := second_oracle_title(robots)) is None:
         return []

@@ -259,8 +259,8 @@ def markdown_of(found: Sameness, question: Question = EQUIVALENT) -> str:
 #: Half the side length of a picture in units of the SVG, and the fraction of the picture that the robots
 #: fill.
 HALF, FILLED = 150.0, 0.9
-#: Largest length of the scale bar, and its distance from the lower edge. The unit of both numbers is the side
-#: length of the picture.
+#: Largest length of the scale bar, and its distance from the lower edge. The unit of the two numbers is the
+#: side length of the picture.
 SCALE, FOOT = 0.3, 6.0
 #: Length of a frame's axes in the close view, as a share of the distance shown.
 AXIS = 0.35
@@ -381,7 +381,7 @@ def _draw(
 ) -> dict[str, Any]:
     """Return one view.
 
-    Its lines are projected along the direction of view and scaled to the size of the picture.
+    The lines of the view are projected along the direction of view and scaled to the size of the picture.
     """
     c, s, up, down = np.cos(turn), np.sin(turn), np.cos(tip), np.sin(tip)
     # The rows are the vectors in space that point right and down on the page.

@@ -49,8 +49,8 @@ Sha256 = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 class Header(TypedDict):
     """The first entries of every certificate and report.
 
-    They state the layout of the document, its verdict, and the versions and texts that the verdict depends
-    on.
+    These entries state the layout of the document, its verdict, and the versions and texts on which the
+    verdict depends.
     """
 
     schema: Annotated[str, says("Name and version of the layout of this document.")]
@@ -133,7 +133,7 @@ class Layout(Generic[_T]):
             where: The file.
 
         Raises:
-            InputError: The data has another layout or version, or does not conform to this one.
+            InputError: The data has another layout or version, or does not conform to this layout.
         """
         self._demand_name(data, where)
         try:
@@ -148,7 +148,7 @@ class Layout(Generic[_T]):
         return document
 
     def _demand_name(self, data: object, where: str) -> None:
-        """Raise InputError if data has another layout, or another version of this one."""
+        """Raise InputError if data has another layout, or another version of this layout."""
         found = data.get("schema") if isinstance(data, dict) else None
         if found == self.name:
             return
@@ -223,7 +223,10 @@ def read_json(path: Path) -> object:
 
 
 def parse_json(content: bytes, where: str) -> object:
-    """Parse the content of a file. Raise InputError if it is not JSON, or has a number beyond a double."""
+    """Parse the content of a file.
+
+    Raise InputError if the text is not JSON, or contains a number beyond the range of doubles.
+    """
     try:
         return json.loads(content, parse_constant=_number, parse_float=_number)
     except (ValueError, RecursionError) as error:

@@ -22,7 +22,7 @@ class Version:
 
     Attributes:
         root: The repository's root folder; names are relative to it.
-        files: Name -> digest of the file's content in this version.
+        files: For each file name: the digest of the file's content in this version.
         digests: The digests of all files of this version.
         gone: Base names of the files that no longer exist in the working tree.
     """

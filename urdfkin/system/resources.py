@@ -15,7 +15,7 @@ from urdfkin.errors import SourceError
 def robots_dir() -> Path:
     """Return the folder `robots`.
 
-    It is inside the installed package; in a checkout it is beside the package.
+    The folder is inside the installed package; in a checkout, the folder is beside the package.
     """
     here = Path(__file__).resolve().parents[1]
     for folder in (here / "robots", here.parent / "robots"):
@@ -25,7 +25,10 @@ def robots_dir() -> Path:
 
 
 def questions_page() -> Path:
-    """Return the path of questions.md. It is inside the installed package; in a checkout it is in `docs`."""
+    """Return the path of questions.md.
+
+    The file is inside the installed package; in a checkout, the file is in `docs`.
+    """
     here = Path(__file__).resolve().parents[1]
     for file in (here / "questions.md", here.parent / "docs" / "questions.md"):
         if file.is_file():

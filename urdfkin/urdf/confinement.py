@@ -3,8 +3,8 @@
 The kernel limits the memory and time of the process, forbids it to write files, and forbids it to start
 processes. Python raises an audit event for each opened file, new process, socket and import. An audit hook
 refuses every event that is not allowed. The process can remove neither the limits nor the hook. This
-confinement is a second defence. The first one is `expressions`, which does not let Python run the expressions
-of a file. A program with full control of the interpreter may evade the hook, but not the limits.
+confinement is a second defence. The first defence is `expressions`, which does not let Python run the
+expressions of a file. A program with full control of the interpreter may evade the hook, but not the limits.
 """
 
 from __future__ import annotations

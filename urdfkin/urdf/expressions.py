@@ -1,9 +1,9 @@
 """Evaluate the expressions `${...}` of a xacro file without Python's `eval`.
 
-xacro itself passes expressions to `eval`. It searches for forbidden names only in the outermost code object.
-A lambda, a comprehension or a chain of attributes can therefore run any program. This module interprets the
-syntax tree and compiles nothing. It allows values, operators, the functions of xacro and the methods listed
-below, and refuses everything else.
+xacro itself passes expressions to `eval`. xacro searches for forbidden names only in the outermost code
+object. A lambda, a comprehension or a chain of attributes can therefore run any program. This module
+interprets the syntax tree and compiles nothing. It allows values, operators, the functions of xacro and the
+methods listed below, and refuses everything else.
 """
 
 from __future__ import annotations

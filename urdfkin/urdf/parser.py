@@ -492,8 +492,8 @@ class NumberReader:
 
     Attributes:
         report: The reporter, which receives the findings.
-        bad_number: The rule for an invalid number. It is a different rule for numbers that kinematics does
-            not use.
+        bad_number: The rule for an invalid number. Numbers that kinematics does not use have a different
+            rule.
         bad_vector: The rule for an attribute with too few or too many numbers.
     """
 

@@ -256,7 +256,7 @@ class ValidationReport(Displayable):
 
     @property
     def passed(self) -> bool:
-        """Whether every requested robot was verified, and there was at least one."""
+        """Whether at least one robot was requested, and every requested robot was verified."""
         return self.outcome.passed
 
     @property

@@ -24,7 +24,8 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
     """Return, for each result, the largest value of `bounds.disagreement` over the result's numbers.
 
     Args:
-        ours: urdfkin's results. The first `axes` axes count results, the others belong to one result.
+        ours: urdfkin's results. The first `axes` axes number the results; the other axes belong to a single
+            result.
         theirs: The oracle's results, of the same shape.
         scale: Scale of the bound; it broadcasts against the results.
         axes: Number of leading axes that count results.

@@ -23,10 +23,10 @@ rules. The module parses the text again at the first check.
 Layout of q: the joints are in Pinocchio's order. A revolute, continuous or prismatic joint has one number, a
 planar joint three, a floating joint seven, and a mimic joint none.
 
-Moving base: its rotation is the one nearest to the given matrix M (`urdfkin.kinematics.rotation`). urdfkin
-computes it with a Newton step. This module uses Davenport's q-method: among unit quaternions,
-q^T K q = trace(R(q)^T M) is largest for the nearest rotation. So q is the eigenvector of K for the largest
-eigenvalue.
+Moving base: the base's rotation is the rotation nearest to the given matrix M. urdfkin computes this rotation
+with a Newton step (`urdfkin.kinematics.rotation`). This module uses Davenport's q-method: among unit
+quaternions, q^T K q = trace(R(q)^T M) is largest for the nearest rotation. The quaternion q is therefore the
+eigenvector of K for the largest eigenvalue.
 """
 
 from __future__ import annotations

@@ -176,8 +176,8 @@ LOOPBACK = "127.0.0.1"
 #: The only message type that the server itself accepts from a page: a control has changed. Messages about the
 #: camera are handled by each connection.
 _ACCEPTED = ("GuiUpdateMessage",)
-#: Replacements in the text of viser's page. They add the nonce to the first script, and to the script that
-#: the first script creates.
+#: Replacements in the text of viser's page. These replacements add the nonce to the first script, and to the
+#: script that the first script creates.
 _SCRIPTS = (
     ("<script data-p=", '<script nonce="{nonce}" data-p='),
     ('e.type="module";', 'e.type="module";e.nonce="{nonce}";'),

@@ -416,7 +416,7 @@ class Stage:
 def _segments(table: DHTable, q: FloatArray, frames: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return three points for each row of the table, as three arrays (rows, 3).
 
-    They are the start of the row's two segments, the corner between them, and their end.
+    The points are the start of the row's two segments, the corner between them, and their end.
     """
     starts, ends = frames[:-1, :3, 3], frames[1:, :3, 3]
     if str(table.convention) == "standard":
