@@ -43,7 +43,7 @@ from urdfkin.comparison.result import Question
 from urdfkin.comparison.verdict import same
 from urdfkin.report.history import as_html as history_page
 from urdfkin.report.history import history
-from urdfkin.report.html import as_html
+from urdfkin.report.html import as_files, as_html
 from urdfkin.report.reading import read_document
 from urdfkin.report.same import as_html as same_page
 from urdfkin.validation.campaign import validate
@@ -53,7 +53,10 @@ from urdfkin.verify.pinocchio import PinocchioOracle
 ROOT = Path(__file__).parents[1]
 #: Folder of npm's packages axe-core and vnu-jar.
 TOOLS = Path.home() / ".cache" / "urdfkin-audit" / "node_modules"
-WIDTHS = (390, 768, 1000, 1280)
+#: Widths in pixels, and whether the theme is dark.
+SCREENS = tuple(product((390, 768, 1000, 1280), (False, True)))
+#: Longest time for axe on a page in seconds. A page of 100,000 elements takes half a minute.
+_AXE_SECONDS = 600
 #: Severities of violations that fail the audit; violations of other severities are only printed.
 IMPACTS = ("serious", "critical")
 #: Code that unfolds everything on a page.
@@ -102,7 +105,8 @@ class Page:
     own: tuple[str, ...] = ("file:", "data:", "blob:", "chrome")
     ready: str = ""
     printed: bool = True
-    large: bool = False  # axe takes a minute on such a page, so it runs only on two screens
+    screens: tuple[tuple[int, bool], ...] = SCREENS
+    whole: bool = True  # also the keyboard, the HTML checker and paper
 
 
 @dataclass
@@ -144,7 +148,7 @@ def disagreement() -> Document:
         return validate(["panda", "ur5"], samples=6).as_dict()
 
 
-def reports(folder: Path, fleet: Path | None) -> Iterator[tuple[str, Callable[[], str]]]:
+def reports(folder: Path) -> Iterator[tuple[str, Callable[[], str]]]:
     """Yield the name of each page of a report or comparison, and the function that makes it."""
     bad = folder / "broken.urdf"
     bad.write_text('<robot name="broken"><link name="a"/><link name="a"/><joint name="j"/></robot>')
@@ -152,10 +156,6 @@ def reports(folder: Path, fleet: Path | None) -> Iterator[tuple[str, Callable[[]
     yield "one", lambda: as_html(validate("panda", samples=20).as_dict())
     yield "unreadable", lambda: as_html(validate([str(bad), "ur5"], samples=6).as_dict())
     yield "disagreement", lambda: as_html(disagreement())
-    yield (
-        "fleet",
-        lambda: as_html(read_document(fleet) if fleet else validate(_all_robots(), samples=1).as_dict()),
-    )
     yield "history", lambda: _history(folder)
     for name, b, within in (
         ("same", "ur5", None),
@@ -174,8 +174,25 @@ def _history(folder: Path) -> str:
     return history_page(history([runs]))
 
 
-def _all_robots() -> list[str]:
-    return [name for name in urdfkin.robots() if name != "ur3"]
+def fleet_pages(folder: Path, document: Document) -> Iterator[Page]:
+    """Yield the pages of a report of many robots: as the command writes it, each robot, and all in one text.
+
+    The command writes a file for each robot beside the page. `to_html` returns one text.
+    """
+    (folder / "fleet-robots").mkdir()
+    for place, text in as_files(document, "fleet.html"):
+        (folder / place).write_text(text, encoding="utf-8")
+    yield (page := Page("fleet", (folder / "fleet.html").as_uri()))
+    (folder / "fleet-text.html").write_text(as_html(document), encoding="utf-8")
+    yield Page("fleet-text", (folder / "fleet-text.html").as_uri())
+    for i, robot in enumerate(document["robots"]):
+        yield Page(
+            f"fleet-{robot['source']}",
+            f"{page.url}#robot-{i}",
+            ready=f"return !!document.querySelector('#robot-{i} :is(.checks, .reason)')",
+            screens=((390, False), (1280, True)),
+            whole=False,
+        )
 
 
 def comparison(b: str, within: float | None) -> str:
@@ -186,14 +203,19 @@ def comparison(b: str, within: float | None) -> str:
 
 def made(folder: Path, only: list[str], fleet: Path | None = None) -> Iterator[Page]:
     """Write the pages of reports and comparisons, and yield them."""
-    for name, make in reports(folder, fleet):
+    for name, make in reports(folder):
         if only and not any(name.startswith(word) for word in only):
             continue
         path = folder / f"{name}.html"
         path.write_text(make(), encoding="utf-8")
-        yield Page(name, path.as_uri(), large=name == "fleet")
+        yield Page(name, path.as_uri())
         if name in ("good", "disagreement"):
             yield Page(f"{name}-unfolded", path.as_uri(), UNFOLD)
+    if not only or any(word.startswith("fleet") for word in only):
+        document = read_document(fleet) if fleet else validate(urdfkin.robots(), samples=1).as_dict()
+        for page in fleet_pages(folder, document):
+            if not only or any(page.name.startswith(word) for word in only):
+                yield page
 
 
 def site(folder: Path) -> Iterator[Page]:
@@ -243,6 +265,7 @@ def viewer() -> Iterator[Page]:
 
 def load(browser: Browser, page: Page) -> None:
     """Open a page and wait until it is drawn."""
+    browser.chrome.get("about:blank")  # another fragment of the same page loads nothing
     browser.chrome.get(page.url)
     if page.ready:
         browser.wait(page.ready)
@@ -278,6 +301,7 @@ def look(
         faults.add(where, f"console: {line}")
     if axe is not None:
         browser.js(axe)
+        browser.chrome.set_script_timeout(_AXE_SECONDS)
         for impact, rule, count, nodes in browser.chrome.execute_async_script(_AXE):
             (faults.add if impact in IMPACTS else _note)(
                 where, f"{impact} {rule}, {count} times: {'; '.join(nodes)}"
@@ -371,9 +395,10 @@ def as_pdf(browser: Browser, page: Page) -> bytes:
 def audit(browser: Browser, page: Page, output: Path | None, axe: str | None, jar: Path | None) -> list[str]:
     """Return all faults of a page."""
     lines = list[str]()
-    for width, dark in product(WIDTHS, (False, True)):
-        tried = axe if not page.large or (width, dark) in ((WIDTHS[0], False), (WIDTHS[-1], True)) else None
-        lines += look(browser, page, width, dark, tried, output)
+    for width, dark in page.screens:
+        lines += look(browser, page, width, dark, axe, output)
+    if not page.whole:
+        return lines
     lines += walk(browser, page)
     if jar is not None and page.url.startswith("file:") and not page.prepare:
         lines += html_errors(page, jar)

@@ -27,7 +27,11 @@ NAMES = ("arms", "failing", "hostile", "history", "same")
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Page]:
     folder = tmp_path_factory.mktemp("pages")
-    texts = {"arms": as_html(arms()), "failing": as_html(failing()), "hostile": as_html(hostile())}
+    document = arms()
+    model = document["robots"][0]["model"]
+    assert model is not None
+    model["path"] = "/home/somebody" + 12 * "/a_long_name_of_a_folder" + "/arm.urdf"
+    texts = {"arms": as_html(document), "failing": as_html(failing()), "hostile": as_html(hostile())}
     (folder / "runs").mkdir()
     for i, report in enumerate([*months_runs(), hostile()]):
         (folder / "runs" / f"{i}.json").write_text(json.dumps(report))

@@ -271,7 +271,7 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
             kind = robot["source"] == dangerous["source"]
             if kind not in made:
                 made[kind] = right(robot, index, whole)
-            return made[kind]
+            return made[kind] | {"index": index}
 
         patch.setattr(html, "_robot", once)
         for place, text in html.as_files(document, "fleet.html"):
@@ -310,6 +310,16 @@ def test_a_robots_details_come_from_its_file_when_it_is_unfolded(desk: Browser, 
     desk.js("document.querySelectorAll('#robot-1234 .checks thead button')[4].click()")
     assert sorted(before) == sorted(desk.js(f"return {heads}"))
     assert before != desk.js(f"return {heads}")
+
+
+def test_a_link_to_findings_loads_the_robots_file_and_shows_them(desk: Browser, fleet: Path) -> None:
+    desk.open(fleet)
+    desk.js("location.hash = '#robot-1500-findings'")
+    desk.wait("return !!document.querySelector('#robot-1500-findings')")
+    desk.wait(
+        "const part = document.querySelector('#robot-1500-findings');"
+        "const top = part.getBoundingClientRect().top; return part.open && top >= -1 && top < innerHeight"
+    )
 
 
 def test_a_hostile_name_in_a_file_beside_the_page_does_nothing(desk: Browser, fleet: Path) -> None:

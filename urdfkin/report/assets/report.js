@@ -74,16 +74,28 @@
   $("#unfold")?.addEventListener("click", () => setAll(true));
   $("#fold")?.addEventListener("click", () => setAll(false));
   const goTo = () => {
-    const target = location.hash.length > 1 && document.getElementById(location.hash.slice(1));
-    if (target && target.matches("details.robot")) {
+    const part = location.hash.slice(1), robot = document.getElementById(part.replace(/-findings$/, ""));
+    if (!robot?.matches("details.robot")) return;
+    const show = () => {
+      const target = document.getElementById(part) ?? robot;
       target.open = true;
       target.scrollIntoView();
-    }
+    };
+    robot.open = true;
+    show();
+    if (document.getElementById(part)) return;
+    // The details lie in a file: the page scrolls to them when they are loaded.
+    const loaded = (event) => {
+      if (event.detail !== robot) return;
+      document.removeEventListener("robotloaded", loaded);
+      show();
+    };
+    document.addEventListener("robotloaded", loaded);
   };
   addEventListener("hashchange", goTo);
   document.addEventListener("click", (event) => {
     // The same link pressed twice changes no hash.
-    if (event.target.closest?.("#overview a")) setTimeout(goTo);
+    if (event.target.closest?.("#overview a, .verdict a")) setTimeout(goTo);
   });
   goTo();
 
