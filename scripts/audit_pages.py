@@ -310,7 +310,7 @@ def look(
         faults.add(where, f"table {name}: {inner} pixels wide in {room}")
     if output is not None:
         scroll_through(browser)
-        _photograph(browser, output / f"{page.name}-{where.replace(' ', '-')}.png", width)
+        _photograph(browser, output / f"{page.name}-{where.replace(' ', '-')}.png", width, dark)
     return faults.lines
 
 
@@ -318,17 +318,11 @@ def _note(where: str, what: str) -> None:
     print(f"  note {where}: {what[:300]}", flush=True)
 
 
-def _photograph(browser: Browser, path: Path, width: int, most: int = 6000) -> None:
-    """Save a picture of the page, at most `most` pixels high."""
-    height = min(most, browser.js("return document.documentElement.scrollHeight"))
-    shot = browser.chrome.execute_cdp_cmd(
-        "Page.captureScreenshot",
-        {
-            "captureBeyondViewport": True,
-            "clip": {"x": 0, "y": 0, "width": width, "height": height, "scale": 1},
-        },
-    )
-    path.write_bytes(base64.b64decode(shot["data"]))
+def _photograph(browser: Browser, path: Path, width: int, dark: bool, most: int = 6000) -> None:
+    """Save a picture of the page on a screen as high as the page, at most `most` pixels."""
+    browser.become(width, min(most, browser.js("return document.documentElement.scrollHeight")), dark=dark)
+    browser.settle()
+    browser.chrome.save_screenshot(str(path))
 
 
 def walk(browser: Browser, page: Page) -> list[str]:

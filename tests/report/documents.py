@@ -75,7 +75,7 @@ def failing() -> Document:
     document["robots"].append(broken)
     document["sha256"].append(None)
     document |= {"asked": 3, "verdict": "disagrees"}
-    document["reason"] = "1 of 3 robots disagrees, 1 of 3 robots bad input"
+    document["reason"] = "1 of 3 robots disagrees, 1 of 3 robots has bad input"
     return document
 
 

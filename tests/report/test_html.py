@@ -106,7 +106,7 @@ def test_it_says_what_was_checked_by_which_versions_and_how_to_repeat_it() -> No
 def test_what_failed_is_said_in_words_and_not_by_colour_alone() -> None:
     text = page("failing").text
     assert "Not verified against Pinocchio" in text
-    assert "1 of 3 robots disagrees, 1 of 3 robots bad input." in text
+    assert "1 of 3 robots disagrees, 1 of 3 robots has bad input." in text
     assert "1 robot verified." in text
     assert "✗ 3" in text
     assert "URDF502" in text
@@ -259,6 +259,17 @@ def test_a_file_that_cannot_be_read_is_no_right_model_and_its_reason_comes_first
     computation, model = banner(failing())
     assert "1 of 3 files unusable" in model
     assert computation.index("bad input") < computation.index("results lie outside")
+
+
+def test_each_error_of_a_file_is_on_the_page_once(tmp_path: Path) -> None:
+    bad = tmp_path / "bad.urdf"
+    bad.write_text('<robot name="r"><link name="a"/><link name="a"/><joint name="j"/></robot>')
+    document = validate([str(bad)], samples=1).as_dict()
+    text = as_html(document)
+    assert "the URDF has 4 errors" in text
+    assert text.count("another link has this name") == 1
+    document["robots"][0]["findings"] = []
+    assert as_html(document).count("another link has this name") == 1
 
 
 def test_a_failure_comes_first_with_the_line_that_computes_it_again() -> None:

@@ -232,6 +232,7 @@ def _robot(robot: Robot, index: int, document: Document) -> dict[str, Any]:
         "index": index,
         "moving": sum(joint["kind"] != "fixed" for joint in model["joints"]) if model else 0,
         "data": robot,
+        "reason": pages.reason(robot),
         "scene": scene(model, robot["chains"]) if model else None,
         "joints": pages.joint_rows(model) if model else [],
         "chains": [

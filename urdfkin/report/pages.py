@@ -69,6 +69,14 @@ def overview(robot: Robot, quantities_of: Sequence[Sequence[str]]) -> dict[str, 
     }
 
 
+def reason(robot: Robot) -> str:
+    """Return the reason of a verdict, without the lines of errors that are among the findings below it."""
+    first, *lines = (robot["reason"] or "").split("\n")
+    found = [(one["code"], one["message"]) for one in robot["findings"] if one["severity"] == "error"]
+    others = [line for line in lines if not any(code in line and words in line for code, words in found)]
+    return "\n".join([first, *others])
+
+
 def _findings(robot: Robot, severity: str) -> int:
     return sum(finding["severity"] == severity for finding in robot["findings"])
 

@@ -26,6 +26,12 @@ class Verdict(StrEnum):
 DISAGREEMENT, INPUT, UNCHECKED = 1, 2, 3
 #: Exit code of an interrupted run: 128 + SIGINT, as in shells.
 INTERRUPTED = 130
+#: Each verdict that fails a run, with its words for one robot and for several.
+_WORDS = {
+    Verdict.DISAGREES: ("disagrees", "disagree"),
+    Verdict.NOT_VERIFIED: ("is not verified", "are not verified"),
+    Verdict.BAD_INPUT: ("has bad input", "have bad input"),
+}
 #: For each exit code: the verdict on a run that ends with this code.
 OUTCOMES = {
     0: Verdict.VERIFIED.value,
@@ -70,13 +76,15 @@ def outcome(verdicts: Iterable[str], asked: int, interrupted: bool) -> Outcome:
 
     >>> outcome(["verified", "disagrees"], asked=3, interrupted=False)
     Outcome(exit_code=1, reason='1 of 3 robots disagrees, 1 of 3 robots without a report')
+    >>> outcome(["bad input", "bad input"], asked=3, interrupted=False).reason
+    '2 of 3 robots have bad input, 1 of 3 robots without a report'
     """
     counts = Counter(map(str, verdicts))
     unknown = sum(counts.values()) != asked
     reasons = ["the validation was interrupted before everything was compared"] if interrupted else []
     reasons += [
-        f"{counts[verdict]} of {_robots(asked)} {verdict.value}"
-        for verdict in (Verdict.DISAGREES, Verdict.NOT_VERIFIED, Verdict.BAD_INPUT)
+        f"{counts[verdict]} of {_robots(asked)} {words[counts[verdict] > 1]}"
+        for verdict, words in _WORDS.items()
         if counts[verdict]
     ]
     if unknown:
