@@ -41,6 +41,7 @@ from tests.report.browser import Browser, opened
 from tests.report.documents import months_runs
 from urdfkin.comparison.result import Question
 from urdfkin.comparison.verdict import same
+from urdfkin.motion.trajectory import line
 from urdfkin.report.history import as_html as history_page
 from urdfkin.report.history import history
 from urdfkin.report.html import as_files, as_html
@@ -243,22 +244,23 @@ def site(folder: Path) -> Iterator[Page]:
 
 
 @contextmanager
-def viewer() -> Iterator[Page]:
-    """Serve the viewer with a robot without meshes."""
+def viewer(plays: bool = False) -> Iterator[Page]:
+    """Serve the viewer with a robot without meshes, with a trajectory to play if `plays`."""
     from urdfkin.view.server import new_server  # noqa: PLC0415  of the extra `view`
     from urdfkin.view.viewer import Viewer  # noqa: PLC0415
 
     server = new_server(port=8097)
     try:
-        robot = urdfkin.load("planar_two_link")
-        Viewer(server, robot, np.array([0.4, 0.8]))
+        robot, q = urdfkin.load("planar_two_link"), np.array([0.4, 0.8])
+        Viewer(server, robot, q, line(robot, q, -q, 2.0, 20) if plays else None)
         host = f"127.0.0.1:{server.get_port()}"
         own = (f"http://{host}", f"ws://{host}", "data:", "blob:", "chrome")
         ready = (  # on the screen of a telephone, the controls are folded
             "return !!document.querySelector('canvas')"
             " && (!!document.getElementById('fold') || document.body.innerText.includes('verified'))"
         )
-        yield Page("viewer", server.address, own=own, ready=ready, printed=False)
+        name = "viewer-trajectory" if plays else "viewer"
+        yield Page(name, server.address, own=own, ready=ready, printed=False)
     finally:
         server.stop()
 
@@ -444,11 +446,11 @@ def main() -> None:
             for page in site(Path(folder)):
                 if not only or any(page.name.startswith(word) for word in only):
                     visit(browser, page)
-    if not only or "viewer" in only:
+    for plays in (False, True) if not only or "viewer" in only else ():
         with (
             tempfile.TemporaryDirectory() as folder,
             opened(Path(folder) / "profile", flags=(_MOUSE,), draws=False) as browser,
-            viewer() as page,
+            viewer(plays) as page,
         ):
             visit(browser, page)
     print(f"{len(faults)} faults")

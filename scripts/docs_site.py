@@ -89,6 +89,10 @@ LIBRARY: dict[str, tuple[str, str, str]] = {
 }
 _FORMULA = re.compile(r"(?:<p>)?\$<code>(.*?)</code>\$(?:</p>)?", re.DOTALL)
 _DISPLAYED = re.compile(r"^```math\n(.*?)\n```$", re.DOTALL | re.MULTILINE)
+#: A picture for each theme of the system: GitHub's form.
+_PICTURE = re.compile(
+    r'<picture><source media="[^"]*dark[^"]*" srcset="([^"]+)"><img src="([^"]+)"(.*?)></picture>'
+)
 #: A LaTeX command before an argument without braces.
 _NAME_OF_FUNCTION = re.compile(r"(<mi>(?:cos|sin)</mi>)(?=<m(?:i|sub)>)")
 _FENCE = re.compile(r"^```(\w+)\n(.*?)^```\n?", re.DOTALL | re.MULTILINE)
@@ -121,8 +125,12 @@ def on_files(files: Any, config: Any) -> Any:
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Put displayed formulas on separate lines, and add the link to a lesson's notebook."""
+    """Put displayed formulas on separate lines, and add the link to a lesson's notebook.
+
+    A picture follows the theme that the reader chooses on the site, not only the system's.
+    """
     markdown = _DISPLAYED.sub(r"\n$`\1`$\n", markdown)
+    markdown = _PICTURE.sub(r'<img src="\2#only-light"\3><img src="\1#only-dark"\3>', markdown)
     if not page.file.src_uri.startswith(LESSONS):
         return markdown
     name = Path(page.file.src_uri).with_suffix(".ipynb").name

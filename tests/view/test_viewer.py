@@ -341,6 +341,34 @@ def _contrast(*colours: list[float]) -> float:
     return max(light) / min(light)
 
 
+@pytest.mark.long
+@pytest.mark.browser
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+def test_every_control_has_a_focus_that_stands_out(dark: bool, viewer: Viewer, tmp_path: Path) -> None:
+    require_chromium()
+    with opened(tmp_path, width=900, height=700, dark=dark, draws=False) as browser:
+        browser.chrome.get(viewer.server.address)
+        assert _until(lambda: browser.js("return document.querySelectorAll('input').length > 5"))
+        kinds = set()
+        for _ in range(14):
+            browser.chrome.switch_to.active_element.send_keys("\ue004")
+            kind, width, ring, behind = browser.js(_RING)
+            kinds.add(kind)
+            assert width >= 2.0, kind
+            assert _contrast(ring, behind) >= 3.0, (kind, ring, behind)
+        assert kinds >= {"INPUT", "BUTTON"}
+
+
+#: The element with the focus: its kind, the width and colour of its outline, and the colour behind it.
+_RING = """const e = document.activeElement, style = getComputedStyle(e);
+  const colour = (x) => getComputedStyle(x).backgroundColor;
+  let behind = e.parentElement;
+  while (behind.parentElement && colour(behind) === "rgba(0, 0, 0, 0)") behind = behind.parentElement;
+  const numbers = (c) => c.match(/[0-9.]+/g).map(Number);
+  return [e.tagName, style.outlineStyle === "none" ? 0 : parseFloat(style.outlineWidth),
+    numbers(style.outlineColor), numbers(colour(behind))];"""
+
+
 @pytest.mark.slow
 @pytest.mark.browser
 def test_folders_open_by_the_keyboard(viewer: Viewer, tmp_path: Path) -> None:
