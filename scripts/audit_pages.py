@@ -299,8 +299,8 @@ def look(
     for url in browser.requests():
         if not url.startswith(page.own):
             faults.add(where, f"asks for {url}")
-    for line in browser.errors():
-        faults.add(where, f"console: {line}")
+    for error in browser.errors():
+        faults.add(where, f"console: {error}")
     if axe is not None:
         browser.js(axe)
         browser.chrome.set_script_timeout(_AXE_SECONDS)

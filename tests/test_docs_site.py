@@ -49,6 +49,20 @@ def test_every_page_is_built_and_in_the_menu(site: Path) -> None:
 
 
 @pytest.mark.long
+@pytest.mark.browser
+def test_a_picture_follows_the_theme_that_the_reader_chooses(site: Path, tmp_path: Path) -> None:
+    shown = (
+        "return [...document.querySelectorAll('article img')].filter((one) => one.checkVisibility())"
+        ".map((one) => one.currentSrc.split('/').pop().split('#')[0])"
+    )
+    with opened(tmp_path, width=1280, height=900, dark=False) as browser:
+        browser.chrome.get((site / "viewer.html").as_uri())
+        assert browser.js(shown) == ["viewer.png", "viewer-phone.png"]
+        browser.js("document.querySelector('label[for=__palette_1]').click()")
+        assert browser.js(shown) == ["viewer-dark.png", "viewer-phone-dark.png"]
+
+
+@pytest.mark.long
 def test_every_equation_is_mathematics_and_no_formula_is_left_in_the_words_of_latex(site: Path) -> None:
     page = (site / "equations.html").read_text("utf-8")
     assert page.count("<math") == len(equations())
