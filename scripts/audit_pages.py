@@ -276,6 +276,13 @@ def load(browser: Browser, page: Page) -> None:
     browser.settle()
 
 
+def forget(browser: Browser) -> None:
+    """Let each page start without a stored theme: the site keeps the theme of the first visit."""
+    browser.chrome.execute_cdp_cmd(
+        "Page.addScriptToEvaluateOnNewDocument", {"source": "try { localStorage.clear(); } catch {}"}
+    )
+
+
 def scroll_through(browser: Browser) -> None:
     """Bring each view into sight, so that it is drawn, and return to the top."""
     for k in range(browser.js("return document.querySelectorAll('canvas').length")):
@@ -440,6 +447,7 @@ def main() -> None:
         tempfile.TemporaryDirectory() as folder,
         opened(Path(folder) / "profile", flags=(_MOUSE,)) as browser,
     ):
+        forget(browser)
         for page in made(Path(folder), only, given.fleet):
             visit(browser, page)
         if not only or any(word.startswith("site") for word in only):
@@ -452,6 +460,7 @@ def main() -> None:
             opened(Path(folder) / "profile", flags=(_MOUSE,), draws=False) as browser,
             viewer(plays) as page,
         ):
+            forget(browser)
             visit(browser, page)
     print(f"{len(faults)} faults")
     sys.exit(bool(faults))
