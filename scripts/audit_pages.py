@@ -41,12 +41,12 @@ from tests.report.browser import Browser, opened
 from tests.report.documents import months_runs
 from urdfkin.comparison.result import Question
 from urdfkin.comparison.verdict import same
-from urdfkin.motion.trajectory import line
 from urdfkin.report.history import as_html as history_page
 from urdfkin.report.history import history
 from urdfkin.report.html import as_files, as_html
 from urdfkin.report.reading import read_document
 from urdfkin.report.same import as_html as same_page
+from urdfkin.robot.trajectory import line
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.document import Document
 from urdfkin.verify.pinocchio import PinocchioOracle
