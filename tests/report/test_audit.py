@@ -124,6 +124,23 @@ def test_on_paper_the_reason_is_not_the_smallest_text(pages: dict[str, Page], de
     assert min(sizes) >= 7.0
 
 
+def test_paper_leaves_out_folded_robots_and_shows_unfolded_ones(
+    pages: dict[str, Page], desk: Browser
+) -> None:
+    desk.become()
+    desk.open(Path(pages["arms"].url.removeprefix("file://")))
+    shown = "return [...document.querySelectorAll('.robot')].map((one) => one.checkVisibility())"
+    desk.js("document.querySelectorAll('.robot').forEach((one, i) => { one.open = i === 1; })")
+    on_screen = desk.js(shown)
+    desk.chrome.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    try:
+        visible = desk.js(shown)
+        note = desk.js("return document.querySelector('main > .paper').checkVisibility()")
+    finally:
+        desk.chrome.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
+    assert (on_screen, visible, note) == ([True, True], [False, True], True)
+
+
 @pytest.mark.skipif(shutil.which("pdftotext") is None, reason="poppler-utils are not installed")
 def test_printed_command_lines_take_at_most_half_a_page(
     pages: dict[str, Page], desk: Browser, tmp_path: Path

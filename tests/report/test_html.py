@@ -261,6 +261,11 @@ def test_a_file_that_cannot_be_read_is_no_right_model_and_its_reason_comes_first
     assert computation.index("bad input") < computation.index("results lie outside")
 
 
+def test_one_sample_is_one_configuration() -> None:
+    text = as_html(arms() | {"samples": 1})
+    assert "1 random configuration for each robot" in text
+
+
 def test_each_error_of_a_file_is_on_the_page_once(tmp_path: Path) -> None:
     bad = tmp_path / "bad.urdf"
     bad.write_text('<robot name="r"><link name="a"/><link name="a"/><joint name="j"/></robot>')
