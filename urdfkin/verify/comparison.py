@@ -45,8 +45,9 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
         worst = _worst(one, other, size if len(size) == n else size[np.arange(n) % len(size)])
         preload.spend("worst", time.thread_time() - begin)
     else:
-        worst = np.empty(n)
-        kernel(one, other, size, worst)
+        worst, units, whole = np.empty(n), np.zeros(numbers), np.int64
+        unit = np.empty(size.size if len(size) < n else 0)
+        kernel(one, other, size, worst, worst.view(whole), unit, units, units.view(whole))
     return worst.reshape(leading)
 
 
