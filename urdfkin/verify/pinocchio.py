@@ -270,12 +270,13 @@ class PinocchioOracle(Oracle):
 
         Velocities and spatial accelerations of the free-flyer of a moving base are in the base's own axes.
         """
-        full = [self._layout.configurations(x.q), *map(self._layout.rates, x.inputs[1:count])]
+        q, *rates = x.inputs[:count]
+        full = [self._layout.configurations(q), *map(self._layout.rates, rates)]
         if self.moving_base:
             full[0][:, :7] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0) if x.base is None else free_flyer(x.base)
         if self.moving_base and x.base is not None:
-            for rates, of in zip(full[1:], (free_flyer_rates, free_flyer_second_rates), strict=False):
-                rates[:, :6] = of(x.base)
+            for own, of in zip(full[1:], (free_flyer_rates, free_flyer_second_rates), strict=False):
+                own[:, :6] = of(x.base)
         return tuple(full)
 
     # -- quantities ----------------------------------------------------------------------------------
@@ -316,23 +317,20 @@ class PinocchioOracle(Oracle):
         computed by `getFrameJacobian`, and Jacobians of joints by `getJointJacobian`.
         """
         pin = self._pin
-        if self._is_alone(x):
-            shape = len(x.q), 1, 6, self._model.nv
+        if len(x.frames) == 1 and not (x.joints or x.divided):
+            shape = len(x.inputs[0]), 1, 6, self._model.nv
             return self._layout.couple(_stacked(self._frame_jacobians(x), *shape))
         get = pin.getJointJacobian if x.joints else pin.getFrameJacobian
         return self._columns(x, 1, pin.computeJointJacobians, get)
 
     def jacobian_blocks(self, x: QueryBatch) -> Iterator[FloatArray]:
         """Yield the same as `jacobians` returns, of one frame in blocks that fit into the cache."""
-        if not self._is_alone(x) or not self._model.nv:
+        if len(x.frames) > 1 or x.joints or x.divided or not self._model.nv:
             yield self.jacobians(x)
             return
         memory = np.empty((min(len(x.q), _block(6, self._model.nv)), 1, 6, self._model.nv))
         for block in _blocks(self._frame_jacobians(x), len(x.q), memory):
             yield self._layout.couple(block)
-
-    def _is_alone(self, x: QueryBatch) -> bool:
-        return len(x.frames) == 1 and not (x.joints or x.divided)
 
     def _frame_jacobians(self, x: QueryBatch) -> _Next:
         """Return a function that returns the Jacobians of the only frame for the next configurations."""
@@ -421,7 +419,7 @@ class PinocchioOracle(Oracle):
 def _stacked(compute: _Next, *shape: int) -> FloatArray:
     """Return results as one array of a shape (n, frames, ...)."""
     out = np.empty(shape)
-    for _ in _blocks(compute, len(out), out):
+    for _ in _blocks(compute, shape[0], out):
         pass
     return out
 
@@ -444,15 +442,15 @@ def _blocks(compute: _Next, n: int, memory: FloatArray) -> Iterator[FloatArray]:
     step, of_one = _block(*memory.shape[1:]), memory.shape[1] * memory.shape[2]
     rows = memory.reshape(-1, *(size for size in memory.shape[3:] if size > 1))
     for first in range(0, n, step):
-        at = first % len(memory)
-        end = at + min(step, n - first)
+        at = first % memory.shape[0]
+        end = at + (step if first + step < n else n - first)
         np.concatenate(compute(end - at), out=rows[at * of_one : end * of_one])
         yield memory[at:end]
 
 
 def _block(*shape: int) -> int:
     """Return the number of configurations whose results of a shape are collected before they are copied."""
-    return max(_AT_A_TIME // max(1, math.prod(shape)), 1)
+    return _AT_A_TIME // (math.prod(shape) or 1) or 1
 
 
 def depth_of(tree: KinematicTree) -> int:
