@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from urdfkin.errors import InputError
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.verify import sampling, verifier
+from urdfkin.verify import pinocchio, sampling, verifier
 from urdfkin.verify.certificate import Certificate
 from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.quantities import PLACEMENT, Quantity
@@ -80,7 +81,12 @@ def lies(monkeypatch: pytest.MonkeyPatch) -> None:
         rows *= 1.0 + size.reshape(-1, *[1] * (theirs.ndim - 1))
         return theirs
 
+    def wrong_in_blocks(*asked: Any) -> Iterator[FloatArray]:
+        theirs = wrong(*asked)
+        return (theirs[i : i + 5] for i in range(0, len(theirs), 5))
+
     monkeypatch.setattr(verifier, "oracle_results", wrong)
+    monkeypatch.setattr(verifier, "oracle_blocks", wrong_in_blocks)
 
 
 BATCHES = [
@@ -144,6 +150,32 @@ def test_the_certificate_does_not_depend_on_the_parts(
     assert counts == {quantity: n * (3 if quantity in several else 1) for quantity in counts}
     assert len(counts) == 6
     assert found[0].verified
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("mimic", [True, False])
+@pytest.mark.parametrize("frames", [FRAMES[:1], FRAMES])
+def test_pinocchios_jacobians_in_blocks_have_the_bits_of_those_at_once(
+    monkeypatch: pytest.MonkeyPatch, size: int, mimic: bool, frames: tuple[str, ...]
+) -> None:
+    robot = urdfkin.load("panda", mimic=mimic)
+    oracle: Oracle = robot.verifier.oracle()
+    for n in (0, 1, 23):
+        query = QueryBatch(frames, (robot.sample(n, 1),), "world")
+        at_once = oracle.jacobians(query)
+        with monkeypatch.context() as patch:
+            patch.setattr(pinocchio, "_AT_A_TIME", size)
+            blocks = [block.copy() for block in oracle.jacobian_blocks(query)]
+        assert np.concatenate(blocks).tobytes() == at_once.tobytes()
+        assert len(blocks) == 1 or all(block.size <= max(size, at_once[0].size) for block in blocks)
+
+
+def test_a_robot_without_moving_joints_has_jacobians_without_columns_in_blocks_too() -> None:
+    robot = urdfkin.load('<robot name="r"><link name="a"/></robot>')
+    (block,) = robot.verifier.oracle().jacobian_blocks(QueryBatch(("a",), (np.zeros((40_000, 0)),)))
+    assert block.shape == (40_000, 1, 6, 0)
+    robot.jacobian(np.zeros((40_000, 0)), "a")
+    assert [line.checked for line in robot.certificate().lines] == [40_000]
 
 
 @pytest.mark.slow

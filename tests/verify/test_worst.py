@@ -74,6 +74,20 @@ def test_it_is_the_definition_for_results_as_they_come(seed: int) -> None:
     np.testing.assert_array_equal(worst_of_each(ours, theirs, scale, 2), definition(ours, theirs, scale, 2))
 
 
+@pytest.mark.parametrize("frames", [1, 3])
+def test_a_scale_that_rows_share_in_threes_gives_the_definition(frames: int) -> None:
+    generator = np.random.default_rng(2)
+    ours = generator.standard_normal((40, frames, 6, 8))
+    theirs = ours + EPS * generator.standard_normal(ours.shape)
+    scale = np.repeat(generator.uniform(0.1, 9.0, (1, frames, 2, 8)), 3, axis=2)
+    scale[..., 5:] = ours[..., 5:] = theirs[..., 5:] = 0.0
+    ours[3, 0, 1, 6], ours[5, -1, 2, 0], theirs[7, 0, 4, 1] = 5e-324, np.nan, np.inf
+    ours[9, 0, 5, 2], theirs[11, 0, 0, 7] = -np.inf, -np.nan
+    found = worst_of_each(ours, theirs, scale, 2)
+    np.testing.assert_array_equal(found, definition(ours, theirs, scale, 2))
+    assert np.argwhere(np.isinf(found)).tolist() == [[3, 0], [5, frames - 1], [7, 0], [9, 0], [11, 0]]
+
+
 @pytest.mark.parametrize("place", range(16))
 @pytest.mark.parametrize("bad", NEVER)
 def test_what_is_not_finite_disagrees_wherever_it_stands(place: int, bad: float) -> None:

@@ -39,21 +39,31 @@ the link after the joint.
 
 from __future__ import annotations
 
+import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from urdfkin.compiled import preload
 from urdfkin.compiled.plan import Column, CompiledTree, Geometry, Motion, Step
+from urdfkin.kinematics import lengths as steps
+from urdfkin.kinematics.lengths import State
 from urdfkin.kinematics.number_kinds import Length, counted, norm, product
 from urdfkin.kinematics.number_kinds import length_equations as eq
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, MUJOCO, ROUNDINGS, of_joints
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
+from urdfkin.verify.comparison import KERNELS
 
 _UNTURNED = np.eye(3).ravel()
-_Z = 1.0  #: Length of a joint's axis.
+#: Indices of the position, the velocities and the accelerations in the state of a moving base.
+_OF_BASE = 9, 12, 15, 18, 21
+#: Number of configurations that the kernel of the recursion on lengths computes at a time. Their states fit
+#: into the nearest cache.
+_BLOCK = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,32 +102,63 @@ def magnitudes(
         a: (n, nv) or None.
         base: (1 or n, 24) state of the moving base.
     """
-    n = len(q)
+    n, lengths = len(q), _lengths(plan)
+    out = np.empty((6, n, len(lengths.ends)))
     if v is not None and a is None:
         a = np.zeros((1, plan.nv))
-    # The values of each coordinate: an array for several configurations, a Python number for one.
-    rows, rates, rates_2, still = (None if x is None else _columns(x, n) for x in (q, v, a, base))
-    assert rows is not None
-    assert still is not None
-    states = [[_norm(still[at : at + 3]) for at in (9, 12, 15, 18, 21)]]
-    lengths = _lengths(plan)
-    for link in lengths.links:
-        state = states[link.parent + 1]
-        moved = (
-            _place(link, state, rows)
-            if rates is None or rates_2 is None
-            else _step(link, state, rows, rates, rates_2)
-        )
-        states.append(moved)
-    carry = _carry if v is not None else _carry_place
-    out = np.empty((6, n, len(lengths.ends)))
-    for end in lengths.ends:
-        carried = carry(states[end.step + 1], end.length)
-        for row, values in zip(out, carried, strict=False):
-            row[:, end.place] = values  # a value equal for all configurations is a scalar
+    inputs = (q, base) if v is None or a is None else (q, base, v, a)
+    kernel = preload.kernel("lengths", home=KERNELS) if n > 1 and len(inputs) > 2 else None
+    if kernel is None:
+        begin = time.thread_time()
+        _by_steps(lengths, inputs, out)
+        if n > 1:
+            preload.spend("lengths", time.thread_time() - begin)
+    else:
+        _by_kernel(kernel, lengths, inputs, out)
     turned = (base[:, :9] != _UNTURNED).any(axis=1)  # a rotated base has the rounding error of a joint
     out[5] = of_joints(plan.depth + 1 + turned[:, np.newaxis], plan.tilts)
     return Magnitudes(*out)
+
+
+def _by_steps(lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
+    """Write the magnitudes of the frames, by NumPy or, for one configuration, with Python's numbers."""
+    q, base, *rates = (_columns(x, out.shape[1]) for x in inputs)
+    states = [tuple(_norm(base[at : at + 3]) for at in _OF_BASE)]
+    for link in lengths.links:
+        states.append((_step if rates else _place)(link, states[link.parent + 1], q, *rates))
+    for end in lengths.ends:
+        carried = (steps.carried if rates else _carried_place)(states[end.step + 1], end.length)
+        for row, values in zip(out, carried, strict=False):
+            row[:, end.place] = values  # a value equal for all configurations is a scalar
+
+
+def _by_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
+    """Write the magnitudes of the frames by a kernel, with the bits of `_by_steps`."""
+    links = lengths.links
+    # An input that is the same for all configurations has one row.
+    q, base, v, a = (x if x.strides[0] else x[:1] for x in inputs)
+    free = [
+        x
+        for link in links
+        if link.kind >= Motion.PLANAR
+        for x in _free_lengths(link, *(x.T for x in (q, v, a)))
+    ]
+    kernel(
+        *lengths.tables,
+        *map(np.ascontiguousarray, (q, v, a)),
+        _rows(free),
+        norm(base[:, _OF_BASE[0] :].reshape(-1, len(_OF_BASE), 3)),
+        np.zeros((len(links) + 2, len(_OF_BASE), _BLOCK)),
+        out[:5].reshape(-1),
+    )
+
+
+def _rows(columns: Sequence[FloatArray]) -> FloatArray:
+    """Return columns as the rows of an array; a column of one number is repeated."""
+    rows = np.empty((max(map(len, columns), default=1), len(columns)))
+    for row, column in zip(rows.T, columns, strict=True):
+        row[:] = column
+    return rows
 
 
 class _Link(NamedTuple):
@@ -141,8 +182,11 @@ class _End(NamedTuple):
 
 
 class _Lengths(NamedTuple):
+    """The steps and frames of a plan, as Python's numbers and as the tables of the kernel."""
+
     links: list[_Link]
     ends: list[_End]
+    tables: tuple[NDArray[Any], ...]
 
 
 def _lengths(plan: CompiledTree) -> _Lengths:
@@ -158,7 +202,13 @@ def _lengths(plan: CompiledTree) -> _Lengths:
         ]
         frames = zip(plan.frames.tolist(), lengths[count:], strict=True)
         ends = [_End(step, place, length) for (step, place), length in frames]
-        found = plan.made["lengths"] = _Lengths(links, ends)
+        tables = (
+            np.array([link[:4] for link in links], dtype=np.int64).reshape(-1, 4),
+            np.array([link[4:] for link in links]).reshape(-1, 3),
+            np.array([end[:2] for end in ends], dtype=np.int64).reshape(-1, 2),
+            np.array([end.length for end in ends]),
+        )
+        found = plan.made["lengths"] = _Lengths(links, ends, tables)
     return found
 
 
@@ -172,54 +222,44 @@ def _norm(x: Any) -> Length:
     return norm(x.T) if isinstance(x, np.ndarray) else float(norm(np.array(x))) if any(x) else 0.0
 
 
-def _carry(state: list[Length], d: Length) -> list[Length]:
-    p, w, vel, alpha, acc = state
-    return [
-        eq.point_position(p, None, d),
-        w,
-        eq.point_velocity(vel, w, d),
-        alpha,
-        eq.point_acceleration(acc, alpha, w, d),
-    ]
-
-
-def _carry_place(state: list[Length], d: Length) -> list[Length]:
-    return [eq.point_position(state[0], None, d), *state[1:]]
+def _carried_place(state: State, d: Length) -> State:
+    return eq.point_position(state[0], None, d), *state[1:]
 
 
 #: Numbers of the displacements and of the rotations of a joint with several coordinates.
 _FREE_PARTS = {int(Motion.PLANAR): (2, 1), int(Motion.FLOATING): (3, 3)}
 
 
-def _slid(link: _Link, q: Any) -> Length:
+def _displacement(link: _Link, q: Any) -> Length:
     """Return a bound on the displacement of a prismatic, planar or floating joint, m."""
     if link.kind != Motion.SLIDE:
         return _norm(q[link.q : link.q + _FREE_PARTS[link.kind][0]])
     return product(link.multiplier, abs(q[link.q])) + link.constant
 
 
-def _place(link: _Link, state: list[Length], q: Any) -> list[Length]:
-    return _carry_place(state, link.length if link.kind == Motion.TURN else link.length + _slid(link, q))
+def _place(link: _Link, state: State, q: Any) -> State:
+    turns = link.kind == Motion.TURN
+    return _carried_place(state, link.length if turns else link.length + _displacement(link, q))
 
 
-def _step(link: _Link, state: list[Length], q: Any, v: Any, a: Any) -> list[Length]:
-    kind, at = link.kind, link.v
-    d = link.length if kind == Motion.TURN else link.length + _slid(link, q)
-    p, w, vel, alpha, acc = _carry(state, d)
-    if kind in (Motion.TURN, Motion.SLIDE):
-        rate, rate_2 = product(link.multiplier, abs(v[at])), product(link.multiplier, abs(a[at]))
-        if kind == Motion.SLIDE:
-            acc = eq.sliding_acceleration(acc, w, _Z, rate, rate_2)
-            return [p, w, eq.sliding_velocity(vel, _Z, rate), alpha, acc]
-        w = eq.angular_velocity(w, _Z, rate)
-        return [p, w, vel, eq.angular_acceleration(alpha, w, _Z, rate, rate_2), acc]
-    slides, turns = _FREE_PARTS[kind]
+def _free_lengths(link: _Link, q: Any, v: Any, a: Any) -> tuple[Length, ...]:
+    """Return the displacement of a planar or floating joint, its velocities and its accelerations."""
+    at, (slides, turns) = link.v, _FREE_PARTS[link.kind]
     (u, o), (u_rate, o_rate) = (
         (_norm(x[at : at + slides]), _norm(x[at + slides : at + slides + turns])) for x in (v, a)
     )
-    alpha = eq.free_angular_acceleration(alpha, eq.plus(w, o), o, o_rate)
-    acc = eq.free_acceleration(acc, w, o, u, u_rate)
-    return [p, eq.plus(w, o), eq.plus(vel, u), alpha, acc]
+    return _displacement(link, q), o, u, o_rate, u_rate
+
+
+def _step(link: _Link, state: State, q: Any, v: Any, a: Any) -> State:
+    kind, d, at = link.kind, link.length, link.v
+    if kind >= Motion.PLANAR:
+        slid, *rates = _free_lengths(link, q, v, a)
+        return steps.freed(state, d + slid, *rates)
+    rate, rate_2 = product(link.multiplier, abs(v[at])), product(link.multiplier, abs(a[at]))
+    if kind == Motion.SLIDE:
+        return steps.slid(state, d + _displacement(link, q), rate, rate_2)
+    return steps.turned(state, d, rate, rate_2)
 
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED

@@ -130,7 +130,11 @@ def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> Co
         bound: Bound on the difference. The arrays `scale` and `k` of the bound broadcast against the results.
         axes: Number of leading axes that count results.
     """
-    units = worst_of_each(ours, theirs, bound.scale, axes)
+    return comparison_of(worst_of_each(ours, theirs, bound.scale, axes), bound)
+
+
+def comparison_of(units: FloatArray, bound: Bound) -> Comparison:
+    """Return the comparison of results with the differences `units`, in multiples of eps * scale."""
     if not units.size:
         return Comparison.of_nothing()
     share = units / result_k(bound, units.shape)

@@ -18,6 +18,7 @@ from urdfkin.model.tree import FloatArray
 #: The module with the compiled kernels of checks, and the kernels of this module that are used here.
 KERNELS = "urdfkin.verify.kernels"
 CHECKS = "worst", "coupling"
+_NO_BITS = np.empty(0, dtype=np.int64)
 
 
 def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes: int) -> FloatArray:
@@ -45,8 +46,12 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
         worst = _worst(one, other, size if len(size) == n else size[np.arange(n) % len(size)])
         preload.spend("worst", time.thread_time() - begin)
     else:
-        worst = np.empty(n)
-        kernel(one, other, size, worst)
+        worst = units = unit = np.empty(n)
+        bits = out_bits = _NO_BITS
+        if len(size) < n:  # results that share a scale need the scratch memory
+            unit, units, out_bits = np.empty(size.size), np.zeros(numbers), worst.view(np.int64)
+            bits = units.view(np.int64)
+        kernel(one, other, size, worst, out_bits, unit, units, bits)
     return worst.reshape(leading)
 
 

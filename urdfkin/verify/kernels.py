@@ -1,11 +1,33 @@
-"""Kernels of checks: the largest difference of each result, and the columns of mimic joints."""
+"""Kernels of checks: the largest difference of each result, lengths, and the columns of mimic joints."""
 
 from __future__ import annotations
 
 import math
+from types import ModuleType
+from typing import Any
 
-from urdfkin.compiled.machine.compiling import NUMBERS, PLACES, ROWS, SCRATCH, helper, kernel
-from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
+from urdfkin.compiled.machine.compiling import (
+    NUMBERS,
+    PLACES,
+    ROWS,
+    SCRATCH,
+    STATES,
+    TABLE,
+    WHOLE,
+    helper,
+    kernel,
+)
+from urdfkin.compiled.machine.memory import fetch, numbers_at
+from urdfkin.compiled.plan import Motion
+from urdfkin.kinematics import lengths as steps
+from urdfkin.kinematics.arithmetic import bound, rebound
+from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST
+
+#: The bits of inf, as a whole number.
+_INFINITE = 0x7FF0000000000000
+_WITHOUT_SIGN = 0x7FFFFFFFFFFFFFFF
+#: Number of rows that are loaded into the cache in advance.
+_AHEAD = 4
 
 
 @helper(fastmath={"reassoc"})
@@ -59,38 +81,70 @@ def _is_in_threes(scale, k):
     return equal
 
 
-@helper(fastmath={"nnan", "nsz"})
-def _largest_of_threes(ours, theirs, scale, i, k):
-    """Return `_largest` of six rows.
+@helper()
+def _divide_threes(ours, theirs, unit, width, units):
+    """Write the largest difference of each three numbers that share a scale; NaN or inf if not finite."""
+    for j in range(width):
+        x = abs(ours[j] - theirs[j])
+        y = abs(ours[j + width] - theirs[j + width])
+        z = abs(ours[j + 2 * width] - theirs[j + 2 * width])
+        largest = x if x > y else y
+        largest = z if z > largest else largest
+        share = largest / unit[j]
+        units[j] = (share if largest != 0.0 else 0.0) + (0.0 * x + 0.0 * y + 0.0 * z)
 
-    Three rows have the same scale, so only the largest of three numbers is divided by it.
+
+@helper()
+def _most(x, count):
+    """Return the bits of the largest of several numbers >= 0, inf or NaN, which have the order of their bits.
+
+    Processors set the sign of NaN, so the sign is removed.
     """
-    largest, width = 0.0, ours.shape[1] // 6
-    for half in range(2):
-        for j in range(3 * half * width, (3 * half + 1) * width):
-            x = abs(ours[i, j] - theirs[i, j])
-            y = abs(ours[i, j + width] - theirs[i, j + width])
-            z = abs(ours[i, j + 2 * width] - theirs[i, j + 2 * width])
-            largest = max(largest, _units(max(x, y, z), scale[k, j]))
-    return largest
+    most = 0
+    for j in range(count):
+        most = max(most, x[j] & _WITHOUT_SIGN)
+    return most
 
 
-@kernel(ROWS, ROWS, ROWS, SCRATCH)
-def worst(ours, theirs, scale, out):
-    """Write the largest difference of each row to `out`; inf for a row with a number that is not finite.
+@kernel(ROWS, ROWS, ROWS, SCRATCH, WHOLE, SCRATCH, SCRATCH, WHOLE)
+def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
+    """Write the largest difference in each row; inf for a row that is not finite.
 
-    If the scale has fewer rows than the results, its rows are repeated.
+    If the scale has fewer rows, they are repeated. The arrays `out_bits` and `bits` are `out` and `units` as
+    whole numbers. The compiler finds the largest of several whole numbers at once.
+
+    Args:
+        ours: urdfkin's results.
+        theirs: The oracle's results.
+        scale: Scale of the bound.
+        out: The largest difference in each row.
+        out_bits: The same memory.
+        unit: Scratch memory of the size of `scale`, if that has fewer rows.
+        units: Scratch memory of a row.
+        bits: The same memory.
     """
     known = in_threes = len(scale) < len(out)
     for k in range(len(scale)):
         known = known and _finite(scale, k)
         in_threes = in_threes and _is_in_threes(scale, k)
+    in_threes = in_threes and known
+    width, address = ours.shape[1] // 6, numbers_at(ours.ctypes.data)
+    numbers = 6 * width
+    if in_threes:
+        for k in range(len(scale)):
+            for j in range(numbers):
+                size = scale[k, j]
+                unit[k * numbers + j] = max(EPS * size, LEAST_UNIT) if size > 0.0 else 0.0
     for i in range(len(out)):
         k = i % len(scale)
-        if not (_finite_difference(ours, theirs, i) and (known or _finite(scale, k))):
+        if in_threes:
+            fetch(address, min(i + _AHEAD, len(out) - 1) * numbers, numbers)
+            for first in (0, 3 * width):
+                own, of_scale = slice(first, first + 3 * width), unit[k * numbers + first :]
+                _divide_threes(ours[i, own], theirs[i, own], of_scale, width, units[first // 3 :])
+            out_bits[i] = min(_most(bits, 2 * width), _INFINITE)
+        elif not (_finite_difference(ours, theirs, i) and (known or _finite(scale, k))):
             out[i] = math.inf
-        elif in_threes:
-            out[i] = _largest_of_threes(ours, theirs, scale, i, k)
         else:
             out[i] = _largest(ours, theirs, scale, i, k)
     return 0
@@ -103,4 +157,132 @@ def coupling(full, columns, index, factor, out):
     for i in range(len(full)):
         for column in columns:
             out[i * nv + index[column]] += full[i, column] * factor[column]
+    return 0
+
+
+# -- the recursion on lengths --------------------------------------------------------------------------------
+
+_TURN, _SLIDE = int(Motion.TURN), int(Motion.SLIDE)
+#: Numbers of a state, and lengths of a planar or floating joint.
+_STATE = _FREE = 5
+
+
+@helper()
+def _sum(x, y):
+    return x + y
+
+
+@helper()
+def _product(x, y):
+    """Return `urdfkin.kinematics.number_kinds.product`."""
+    return SMALLEST if x * y < SMALLEST and x != 0.0 and y != 0.0 else x * y
+
+
+@helper()
+def _unturned(R, x):
+    return x
+
+
+_LENGTHS = {
+    "plus": _sum,
+    "minus": _sum,
+    "rotate": _unturned,
+    **dict.fromkeys(("times", "dot", "cross"), _product),
+}
+_EQUATIONS: Any = ModuleType("length_equations")  # Numba finds the functions of a module
+vars(_EQUATIONS).update(vars(bound(made=helper(), **_LENGTHS)))
+_STEPS = rebound(steps, made=helper(), others={"eq": _EQUATIONS})
+_carried, _turned, _slid, _freed = (_STEPS[name] for name in ("carried", "turned", "slid", "freed"))
+
+
+@helper()
+def _state(x, i):
+    return x[0, i], x[1, i], x[2, i], x[3, i], x[4, i]
+
+
+@helper()
+def _put(x, i, state):
+    x[0, i], x[1, i], x[2, i], x[3, i], x[4, i] = state
+
+
+@helper()
+def _of_row(x, row, at):
+    return x[row, at], x[row, at + 1], x[row, at + 2], x[row, at + 3], x[row, at + 4]
+
+
+@helper()
+def _read(x, first, m, at, factor, to):
+    """Write the products of a factor and the lengths of a column; a single row is that of all."""
+    step = 1 if len(x) > 1 else 0
+    for i in range(m):
+        to[i] = _product(factor, abs(x[(first + i) * step, at]))
+
+
+@helper()
+def _over_turn(before, after, m, d, rates):
+    for i in range(m):
+        _put(after, i, _turned(_state(before, i), d, rates[0, i], rates[1, i]))
+
+
+@helper()
+def _over_slide(before, after, m, d, constant, rates):
+    for i in range(m):
+        way = d + (rates[2, i] + constant)
+        _put(after, i, _slid(_state(before, i), way, rates[0, i], rates[1, i]))
+
+
+@helper()
+def _over_free(before, after, first, m, d, free, at):
+    step = 1 if len(free) > 1 else 0
+    for i in range(m):
+        way, o, u, o_rate, u_rate = _of_row(free, (first + i) * step, at)
+        _put(after, i, _freed(_state(before, i), d + way, o, u, o_rate, u_rate))
+
+
+@kernel(TABLE, ROWS, TABLE, NUMBERS, ROWS, ROWS, ROWS, ROWS, ROWS, STATES, SCRATCH)
+def lengths(links, sizes, ends, tips, q, v, a, free, base, s, out):
+    """Write the five magnitudes of each configuration and frame, by the recursion on lengths.
+
+    Args:
+        links: Kind, q, v and parent of each step.
+        sizes: Length, multiplier and constant of each step.
+        ends: Step and index in the output of each frame.
+        tips: Length from the step to the frame.
+        q: Coordinates; an array of one row counts for all configurations, as also in v, a, free and base.
+        v: Joint velocities.
+        a: Joint accelerations.
+        free: Displacement, velocities and accelerations of each planar and floating joint.
+        base: State of the base.
+        s: Scratch memory of two states more than steps, for a block of configurations.
+        out: p, w, vel, alpha, acc.
+    """
+    frames, block, rates = len(ends), s.shape[2], s[len(links) + 1]
+    n = len(out) // max(1, _STATE * frames)
+    for first in range(0, n, block):
+        m, found = min(block, n - first), 0
+        start, step = s[0], 1 if len(base) > 1 else 0
+        for i in range(m):
+            _put(start, i, _of_row(base, (first + i) * step, 0))
+        for k in range(len(links)):
+            kind, at, parent = links[k, 0], links[k, 2], links[k, 3]
+            d, multiplier = sizes[k, 0], sizes[k, 1]
+            before, after = s[parent + 1], s[k + 1]
+            if kind > _SLIDE:
+                _over_free(before, after, first, m, d, free, found)
+                found += _FREE
+            else:
+                _read(v, first, m, at, multiplier, rates[0])
+                _read(a, first, m, at, multiplier, rates[1])
+                if kind == _TURN:
+                    _over_turn(before, after, m, d, rates)
+                else:
+                    _read(q, first, m, links[k, 1], multiplier, rates[2])
+                    _over_slide(before, after, m, d, sizes[k, 2], rates)
+        for f in range(frames):
+            before = s[ends[f, 0] + 1]
+            for i in range(m):
+                at = (first + i) * frames + ends[f, 1]
+                state = _carried(_state(before, i), tips[f])
+                for j in range(_STATE):
+                    out[j * n * frames + at] = state[j]
     return 0

@@ -34,7 +34,7 @@ from __future__ import annotations
 import math
 import re
 import threading
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple, Protocol
@@ -198,7 +198,7 @@ class Layout:
     def configurations(self, q: FloatArray) -> FloatArray:
         """Return Pinocchio's configurations (n, model.nq) for q (n, nq); quaternions are normalized."""
         if self._same_q:
-            return np.array(q)
+            return np.ascontiguousarray(q)
         full = np.zeros((len(q), self._model.nq))
         to, of, multiplier, offset = self._single
         full[:, to] = multiplier * q[:, of] + offset
@@ -218,7 +218,7 @@ class Layout:
     def rates(self, v: FloatArray) -> FloatArray:
         """Return v_full = G v, Pinocchio's joint velocities (n, model.nv) for v (n, nv)."""
         if self._same_v:
-            return np.array(v)
+            return np.ascontiguousarray(v)
         if not self.nv:
             return np.zeros((len(v), self._model.nv))
         full: FloatArray = v[:, self._index] * self._factor
@@ -683,6 +683,13 @@ class Oracle:
     def jacobians(self, x: QueryBatch) -> FloatArray:
         """Return Jacobians (n, frames, 6, nv)."""
         raise NotImplementedError
+
+    def jacobian_blocks(self, x: QueryBatch) -> Iterator[FloatArray]:
+        """Yield the same as `jacobians` returns, in blocks of configurations that fit into the cache.
+
+        A block is valid until the next one is requested, which may overwrite it.
+        """
+        yield self.jacobians(x)
 
     def jacobian_rates(self, x: QueryBatch) -> FloatArray:
         """Return J-dot (n, frames, 6, nv)."""

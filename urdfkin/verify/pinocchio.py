@@ -121,6 +121,8 @@ MOST_RATES = 315
 #: Number of Pinocchio's result values that are collected and then copied together. The processor's cache is
 #: large enough for so many values.
 _AT_A_TIME = 16384
+#: Function that returns the results for the next configurations; the argument is their number.
+_Next = Callable[[int], list[FloatArray]]
 #: Name of the free-flyer of a moving base.
 _BASE = "base"
 
@@ -268,12 +270,13 @@ class PinocchioOracle(Oracle):
 
         Velocities and spatial accelerations of the free-flyer of a moving base are in the base's own axes.
         """
-        full = [self._layout.configurations(x.q), *map(self._layout.rates, x.inputs[1:count])]
+        q, *rates = x.inputs[:count]
+        full = [self._layout.configurations(q), *map(self._layout.rates, rates)]
         if self.moving_base:
             full[0][:, :7] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0) if x.base is None else free_flyer(x.base)
         if self.moving_base and x.base is not None:
-            for rates, of in zip(full[1:], (free_flyer_rates, free_flyer_second_rates), strict=False):
-                rates[:, :6] = of(x.base)
+            for own, of in zip(full[1:], (free_flyer_rates, free_flyer_second_rates), strict=False):
+                own[:, :6] = of(x.base)
         return tuple(full)
 
     # -- quantities ----------------------------------------------------------------------------------
@@ -315,12 +318,25 @@ class PinocchioOracle(Oracle):
         """
         pin = self._pin
         if len(x.frames) == 1 and not (x.joints or x.divided):
-            (one,), wanted = self._ids(x), self._reference(x.reference)
-            found = self._each(pin.computeFrameJacobian, self._inputs(x, 1), one, wanted)
-            J = _stacked(lambda n: list(islice(found, n)), len(x.q), 1, 6, self._model.nv)
-            return self._layout.couple(J)
+            shape = len(x.inputs[0]), 1, 6, self._model.nv
+            return self._layout.couple(_stacked(self._frame_jacobians(x), *shape))
         get = pin.getJointJacobian if x.joints else pin.getFrameJacobian
         return self._columns(x, 1, pin.computeJointJacobians, get)
+
+    def jacobian_blocks(self, x: QueryBatch) -> Iterator[FloatArray]:
+        """Yield the same as `jacobians` returns, of one frame in blocks that fit into the cache."""
+        if len(x.frames) > 1 or x.joints or x.divided or not self._model.nv:
+            yield self.jacobians(x)
+            return
+        memory = np.empty((min(len(x.q), _block(6, self._model.nv)), 1, 6, self._model.nv))
+        for block in _blocks(self._frame_jacobians(x), len(x.q), memory):
+            yield self._layout.couple(block)
+
+    def _frame_jacobians(self, x: QueryBatch) -> _Next:
+        """Return a function that returns the Jacobians of the only frame for the next configurations."""
+        (one,), wanted = self._ids(x), self._reference(x.reference)
+        found = self._each(self._pin.computeFrameJacobian, self._inputs(x, 1), one, wanted)
+        return lambda n: list(islice(found, n))
 
     def jacobian_rates(self, x: QueryBatch) -> FloatArray:
         """Return J-dot (n, frames, 6, nv) by `getFrameJacobianTimeVariation`.
@@ -400,27 +416,41 @@ class PinocchioOracle(Oracle):
         )
 
 
-def _stacked(compute: Callable[[int], list[FloatArray]], *shape: int) -> FloatArray:
-    """Return results as one array (n, frames, ...).
+def _stacked(compute: _Next, *shape: int) -> FloatArray:
+    """Return results as one array of a shape (n, frames, ...)."""
+    out = np.empty(shape)
+    for _ in _blocks(compute, shape[0], out):
+        pass
+    return out
 
-    An array without numbers is returned without a computation.
 
-    Pinocchio 4.1 crashes the process for a Jacobian without columns, and returns a vector for one column.
+def _blocks(compute: _Next, n: int, memory: FloatArray) -> Iterator[FloatArray]:
+    """Write the results of n configurations to an array, and yield each written part of it.
+
+    Without numbers none is computed. Pinocchio 4.1 crashes the process for a Jacobian without columns, and
+    returns a vector for one column.
 
     Args:
-        compute: Function that returns the results of all frames for the next configurations. The argument of
-            the function is the largest number of these configurations.
-        shape: Shape of all results.
+        compute: Returns the results of all frames for the next configurations.
+        n: Number of configurations.
+        memory: (n or one block, frames, ...) array that is written. With n rows, the blocks follow each
+            other. With fewer rows, each overwrites the block before it.
     """
-    out = np.empty(shape)
-    if 0 in shape:
-        return out
-    rows = out.reshape(-1, *(size for size in shape[3:] if size > 1))
-    n = max(_AT_A_TIME // math.prod(shape[1:]), 1)
-    step = n * shape[1] * shape[2]
-    for at in range(0, len(rows), step):
-        np.concatenate(compute(n), out=rows[at : at + step])
-    return out
+    if 0 in memory.shape:
+        yield memory
+        return
+    step, of_one = _block(*memory.shape[1:]), memory.shape[1] * memory.shape[2]
+    rows = memory.reshape(-1, *(size for size in memory.shape[3:] if size > 1))
+    for first in range(0, n, step):
+        at = first % memory.shape[0]
+        end = at + (step if first + step < n else n - first)
+        np.concatenate(compute(end - at), out=rows[at * of_one : end * of_one])
+        yield memory[at:end]
+
+
+def _block(*shape: int) -> int:
+    """Return the number of configurations whose results of a shape are collected before they are copied."""
+    return _AT_A_TIME // (math.prod(shape) or 1) or 1
 
 
 def depth_of(tree: KinematicTree) -> int:

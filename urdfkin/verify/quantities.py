@@ -18,7 +18,7 @@ acceleration qva (6,)
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
@@ -41,7 +41,7 @@ SIX = ("vx", "vy", "vz", "wx", "wy", "wz")
 Against = Callable[..., "tuple[FloatArray, Bound]"]
 
 
-def oracle_method(name: str) -> Callable[[Oracle, QueryBatch], FloatArray]:
+def oracle_method(name: str) -> Callable[[Oracle, QueryBatch], Any]:
     """Return a function that calls the method `name` of an oracle with a query."""
 
     def ask(oracle: Any, x: QueryBatch) -> Any:
@@ -66,6 +66,7 @@ class Quantity:
         compute: Function (plan, *inputs, reference, base=, out=, threads=) that returns (n, frames, ...). If
             `recursive` is False, a method of `Robot` calls it in another way.
         ask: Function (oracle, query) that returns the oracle's (n, frames, ...).
+        blocks: Function (oracle, query) that yields the same in blocks of configurations, for large results.
         scale: Function (plan, magnitudes, reference) that returns the size of the terms of the quantity
             (`urdfkin.verify.bounds`).
         factors: Number of rotated vectors in each term of [linear; angular], in LOCAL_WORLD_ALIGNED.
@@ -98,6 +99,7 @@ class Quantity:
     ask: Callable[[Oracle, QueryBatch], FloatArray]
     scale: Callable[..., Any]
     factors: int
+    blocks: Callable[[Oracle, QueryBatch], Iterator[FloatArray]] | None = None
     against: Against | None = None
     exact: Callable[..., Any] | None = None
     recursive: bool = True
@@ -213,6 +215,7 @@ JACOBIAN = Quantity(
     equations=("7.85",),
     compute=lazy_import("urdfkin.compiled.evaluate:jacobians"),
     ask=oracle_method("jacobians"),
+    blocks=oracle_method("jacobian_blocks"),
     scale=lazy_import("urdfkin.verify.bounds:jacobian_scale"),
     exact=lazy_import("urdfkin.verify.exact.recursion:jacobian_values"),
     factors=2,
@@ -285,6 +288,7 @@ ANALYTICAL_JACOBIAN = replace(
     JACOBIAN,
     name="analytical jacobian",
     title="analytical Jacobian",
+    blocks=None,
     equations=("7.118", "7.122"),
     compute=lazy_import("urdfkin.kinematics.bodies:analytical_jacobian"),
     against=partial(lazy_import("urdfkin.verify.derived:check_analytical_jacobian"), JACOBIAN.bound),
@@ -324,6 +328,7 @@ SCREWS = replace(
     title="data.J",
     shape=(6,),
     ask=oracle_method("screws"),
+    blocks=None,
     of="columns",
     head="data.J",
 )

@@ -6,7 +6,7 @@ returns.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -25,8 +25,15 @@ from urdfkin.urdf.sources import Origin
 from urdfkin.verify import bounds
 from urdfkin.verify.bounds import Bound, magnitudes
 from urdfkin.verify.call import Call, Part
-from urdfkin.verify.certificate import Certificate, Comparison, Ledger, VerificationError, compare
-from urdfkin.verify.comparison import CHECKS, KERNELS
+from urdfkin.verify.certificate import (
+    Certificate,
+    Comparison,
+    Ledger,
+    VerificationError,
+    compare,
+    comparison_of,
+)
+from urdfkin.verify.comparison import CHECKS, KERNELS, worst_of_each
 from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.oracles import PINOCCHIO, OracleLibrary, OracleName, oracle_library
 from urdfkin.verify.pinocchio import build_model, pinocchio, version
@@ -279,12 +286,11 @@ class Verifier:
         The error for the worst result is also returned, if this result exceeds its bound.
         """
         x = call.part(part)
-        theirs, bound = oracle_results_with_bound(
-            quantity, self.oracle(call.base, self.library), x, ours, self.library
-        )
-        comparison = compare(ours, theirs, bound, 2)
+        compared = quantity, self.oracle(call.base, self.library), x, ours, self.library
+        comparison = comparison_with_oracle(*compared)
         if comparison.agrees:
             return comparison, None
+        theirs, bound = oracle_results_with_bound(*compared)
         i, f = comparison.index
         k = part.start + i if isinstance(part, slice) else int(part[i])
         bound = Bound(*(np.broadcast_to(x, ours.shape)[i, f] for x in (bound.scale, bound.k)))
@@ -390,6 +396,25 @@ class Verifier:
         return line
 
 
+def comparison_with_oracle(
+    quantity: Quantity, oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary
+) -> Comparison:
+    """Compare urdfkin's results (n, frames, ...) for some configurations with an oracle's.
+
+    Large results are compared in blocks, while the oracle's are still in the cache.
+    """
+    if quantity.blocks is None:
+        theirs, bound = oracle_results_with_bound(quantity, oracle, x, ours, by)
+        return compare(ours, theirs, bound, 2)
+    bound, units, first = bound_of(quantity, x, by), np.empty(ours.shape[:2]), 0
+    with _not_finite_is_known():
+        for theirs in oracle_blocks(quantity, oracle, x.query):
+            part = slice(first, first + len(theirs))
+            scale = bound.scale if len(bound.scale) == 1 else bound.scale[part]
+            units[part], first = worst_of_each(ours[part], theirs, scale, 2), part.stop
+    return comparison_of(units[:first], bound)
+
+
 def oracle_results_with_bound(
     quantity: Quantity, oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary = PINOCCHIO
 ) -> tuple[FloatArray, Bound]:
@@ -424,12 +449,21 @@ def own_results(quantity: Quantity, x: Part) -> FloatArray:
     return quantity.ours(x.plan, (x.q, *x.rates), x.reference, base=x.state)
 
 
-@np.errstate(
-    over="ignore", under="ignore", invalid="ignore"
-)  # a value that is not finite counts as a disagreement
+def _not_finite_is_known() -> np.errstate:
+    """Silence NumPy's warnings: a value that is not finite counts as a disagreement."""
+    return np.errstate(over="ignore", under="ignore", invalid="ignore")
+
+
+@_not_finite_is_known()
 def oracle_results(quantity: Quantity, oracle: Oracle, query: QueryBatch) -> FloatArray:
     """Return an oracle's results (n, frames, ...) for the user's arguments."""
     return quantity.ask(oracle, query)
+
+
+def oracle_blocks(quantity: Quantity, oracle: Oracle, query: QueryBatch) -> Iterator[FloatArray]:
+    """Yield the same in blocks of configurations; the next block may overwrite a block."""
+    assert quantity.blocks is not None
+    return quantity.blocks(oracle, query)
 
 
 def _warn(reason: str) -> None:

@@ -213,7 +213,10 @@ compiled = jitted(**_PART)
 NUMBERS = types.Array(types.float64, 1, "C", readonly=True)
 ROWS = types.Array(types.float64, 2, "C", readonly=True)
 PLACES = types.Array(types.int64, 1, "C", readonly=True)
+TABLE = types.Array(types.int64, 2, "C", readonly=True)
 SCRATCH = types.Array(types.float64, 1, "C")
+WHOLE = types.Array(types.int64, 1, "C")
+STATES = types.Array(types.float64, 3, "C")
 
 
 class Kernel:

@@ -23,15 +23,22 @@
 #endif
 
 /* Check count * LANES numbers: 0 x is 0, or NaN if x is not finite. The four sums are independent, so they run in
-   parallel. The check also loads the inputs of the next block into the cache. */
+   parallel. The check also loads the inputs of this block into the cache, and requests the bytes that are AHEAD of
+   them. A processor that waits for the memory at each block takes up to half as long again for a robot with many
+   joints off the path. */
 #define SUMS 4
+#define AHEAD 4096
+#define LINE 64
 typedef double numbers __attribute__((vector_size(PIECE * sizeof(double)), aligned(sizeof(double)), may_alias));
 INLINE void look(size_t count, const double *x, numbers *bad)
 {
     const numbers *at = (const numbers *)x;
     count *= LANES / PIECE;
-    for (size_t i = 0; i < count / SUMS; ++i, at += SUMS)
+    for (size_t i = 0; i < count / SUMS; ++i, at += SUMS) {
+        for (size_t to = 0; to < SUMS * sizeof *at; to += LINE)
+            __builtin_prefetch((const void *)((uintptr_t)at + AHEAD + to));
         for (int k = 0; k < SUMS; ++k) bad[k] += 0.0 * at[k];
+    }
     for (size_t k = 0; k < count % SUMS; ++k) bad[k] += 0.0 * at[k];
 }
 

@@ -1,0 +1,46 @@
+"""The steps of the recursion on lengths: upper bounds on the state of a link, from those of its parent.
+
+A state is (p, w, vel, alpha, acc): upper bounds on the terms of a point's position, angular velocity,
+velocity, angular acceleration and acceleration. `urdfkin.verify.bounds` runs the steps on NumPy's arrays and
+on Python's numbers, and `urdfkin.verify.kernels` compiles them. All of them compute the same bits.
+"""
+
+from urdfkin.kinematics.number_kinds import Length
+from urdfkin.kinematics.number_kinds import length_equations as eq
+
+#: Upper bounds on p, w, vel, alpha and acc.
+State = tuple[Length, ...]
+_Z = 1.0  #: Length of a joint's axis.
+
+
+def carried(state: State, d: Length) -> State:
+    """Return the state of the link's point at the distance d (7.58, 7.128, 7.130)."""
+    p, w, vel, alpha, acc = state
+    return (
+        eq.point_position(p, None, d),
+        w,
+        eq.point_velocity(vel, w, d),
+        alpha,
+        eq.point_acceleration(acc, alpha, w, d),
+    )
+
+
+def turned(state: State, d: Length, o: Length, o_rate: Length) -> State:
+    """Return the state after a revolute joint at the distance d, with joint velocity o (7.127, 7.129)."""
+    p, w, vel, alpha, acc = carried(state, d)
+    w = eq.angular_velocity(w, _Z, o)
+    return p, w, vel, eq.angular_acceleration(alpha, w, _Z, o, o_rate), acc
+
+
+def slid(state: State, d: Length, u: Length, u_rate: Length) -> State:
+    """Return the state after a prismatic joint; d includes its displacement (7.128, 7.130)."""
+    p, w, vel, alpha, acc = carried(state, d)
+    return p, w, eq.sliding_velocity(vel, _Z, u), alpha, eq.sliding_acceleration(acc, w, _Z, u, u_rate)
+
+
+def freed(state: State, d: Length, o: Length, u: Length, o_rate: Length, u_rate: Length) -> State:
+    """Return the state after a planar or floating joint; d includes its displacement."""
+    p, w, vel, alpha, acc = carried(state, d)
+    alpha = eq.free_angular_acceleration(alpha, eq.plus(w, o), o, o_rate)
+    acc = eq.free_acceleration(acc, w, o, u, u_rate)
+    return p, eq.plus(w, o), eq.plus(vel, u), alpha, acc
