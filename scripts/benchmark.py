@@ -167,7 +167,7 @@ def main(words: Sequence[str] | None = None) -> int:
 
 if __name__ == "__main__":
     status = main()
-    if "roboticstoolbox" in sys.modules:  # the bindings print a hundred lines about leaks at exit
+    if "roboticstoolbox" in sys.modules:  # at exit, this library prints a hundred lines about memory leaks
         sys.stdout.flush()
         os._exit(status)
     sys.exit(status)

@@ -230,7 +230,7 @@ settings_options = together(
         help="File with a table [tool.urdfkin] of settings.  [default: nearest pyproject.toml]",
     ),
 )  # fmt: skip
-#: Field of `Limits` -> help of its option.
+#: For each field of `Limits`: the help text of its option.
 _MOST = {
     "bytes": "Largest size of a file in bytes.",
     "depth": "Largest nesting depth of elements.",

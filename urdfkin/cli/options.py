@@ -295,7 +295,7 @@ convention_option = click.option(
     help="Convention of --q, --v, --a, --trajectory and of the result: the name of a tool (`urdfkin order`"
     " lists them), or a TOML file.",
 )
-#: The same for a command whose result is in urdfkin's convention.
+#: The option --convention of a command that prints its result in urdfkin's own convention.
 convention_of_input_option = click.option(
     "--convention",
     metavar="NAME|FILE",

@@ -260,7 +260,8 @@ def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[ob
         yield from ([t, *map(repr, row)] for t, row in samples)
 
 
-#: Heading of the first column of CSV, without times and with them.
+#: Headings of the first CSV column: the first is for results without times, the second for results with
+#: times.
 _TIME = ("sample", "t")
 
 
@@ -353,7 +354,7 @@ def _parts(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
 # -- commands with options of their own --------------------------------------------------------------
 
 _POSITION = ("x", "y", "z")
-#: Forms of a pose besides the matrix.
+#: Forms in which a pose can be printed, besides the matrix.
 _FORMS = {
     "rpy": replace(
         PLACEMENT,

@@ -121,7 +121,8 @@ def _warn(
 
 #: Escape sequences of rich: colours, and cursor movements of a progress bar.
 _STYLE = re.compile(r"(\x1b\[[0-9;?]*[A-Za-z]|\r)")
-#: Number of characters of a line that are stored to check the next piece written to it.
+#: Number of stored characters of an unfinished line.
+#: They are checked again together with the next piece of text.
 _STORED = 64
 
 

@@ -65,11 +65,11 @@ from urdfkin.robot import Robot
 from urdfkin.verify.oracle import QueryBatch
 from urdfkin.verify.sampling import sample
 
-#: Number of random configurations at the start of a search, and number of configurations with each variable
-#: at an end of its range.
+#: Number of random configurations at the start of a search.
+#: Number of further configurations, in which each variable is at an end of its range.
 SAMPLES, CORNERS = 512, 128
-#: Number of configurations from which the search starts, which are the worst random configurations; number of
-#: values that are tried along a coordinate.
+#: The search starts from the `STARTS` worst random configurations.
+#: Along each coordinate, it tries `ALONG` values.
 STARTS, ALONG = 4, 13
 #: Frames that are searched in one batch.
 SEARCHED_TOGETHER = 24
@@ -391,7 +391,8 @@ def _as_free_vectors(step: Step) -> Step:
     return replace(step, axis=axis, other=other, before=before)
 
 
-#: Largest number of boxes at a time. With this number, a frame takes one or two seconds of processor time.
+#: Largest number of boxes that exist at a time; a box is a range for each variable.
+#: With this number, a frame takes one or two seconds of processor time.
 MOST = 2**17
 #: Number of boxes computed in one batch. The Jacobians of more boxes would take gigabytes of memory.
 TOGETHER = 2**16
@@ -482,7 +483,7 @@ def tightened(search: Search, frame: FramePair, target: float, upper: float, mos
     c, h, proven = ends.mean(axis=1)[np.newaxis], (ends[:, 1] - ends[:, 0]) / 2.0, np.array([upper])
     if not np.isfinite(M).all() or 2 ** _halvings(h, M, upper) > most:
         return upper
-    if not names:  # no joint of the path changes the frame's distance
+    if not names:  # no variable changes the distance between the frame's poses in A and B
         return min(upper, float(boxes.bounds(c, h)[0]))
     while len(c) and 2 * len(c) <= most:
         i = _longest(h, M)

@@ -253,8 +253,9 @@ def travel(limit: Limit | None) -> float:
     return 1.0 if limit is None else max(abs(limit.lower), abs(limit.upper))
 
 
-#: Largest difference between a cell that looks rounded and the nearest round value. Angles differ from a
-#: multiple of 15 degrees, in radians. Lengths differ from 0, in metres per metre of span.
+#: A cell nearly equals a round value if it differs from this value by at most this number.
+#: For an angle, the round values are the multiples of 15 degrees, and the difference is in radians.
+#: For a length, the round value is 0, and the difference is divided by the table's span.
 LARGEST = 1e-4
 #: Tolerances for snapping that the hint tries, in radians, in ascending order.
 TOLERANCES = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)

@@ -166,7 +166,7 @@ class Robot(Displayable):
         self._tip_frame = tip_frame
         self._has_one_tip = tip_frame is not None or len(list(tree.leaves())) == 1
         self._plans: dict[tuple[int, ...], CompiledTree] = {}
-        #: The evaluators of unchecked and of checked calls, by frame.
+        #: For each frame: the evaluator of unchecked calls, and the evaluator of checked calls.
         self._prepared: dict[object, PreparedFrame] = {}
         self._checked: dict[object, PreparedFrame] = {}
         self._compiled: dict[object, CompiledFrame] = {}
@@ -514,7 +514,7 @@ class Robot(Displayable):
         >>> urdfkin.load("planar_two_link").limit_violations([[4.0, 0.0], [0.0, 0.0]])
         ['joint joint_1: 4 is outside [-3, 3]']
         """
-        found = configuration.checked(self.tree, q, "q", look=False)  # the lines themselves ask about degrees
+        found = configuration.checked(self.tree, q, "q", look=False)  # limit_violations asks about degrees
         return configuration.limit_violations(self.tree, found)
 
     def integrate(self, q: Given, v: Given) -> FloatArray:
@@ -805,7 +805,8 @@ class Robot(Displayable):
             from urdfkin.kinematics.bodies import seen_from  # noqa: PLC0415  few calls need these imports
 
         name = as_str(relative_to, "relative_to")
-        name = name if isinstance(name, FrameName) else str(name)  # a replay line prints plain strings
+        # the line that repeats a failed call contains plain strings
+        name = name if isinstance(name, FrameName) else str(name)
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (q,), also=(name,), relative_to=name)
         to = call.flat(out, (4, 4))
         self.verifier.ready(verify)

@@ -49,16 +49,19 @@ from urdfkin.verify.quantities import (
     Quantity,
 )
 
-#: Version of the vectors. Another first number: other files do not fit programs that read these.
+#: Version of the file format of the test vectors.
+#: If its first number changes, programs for the old format cannot read the new files.
 VERSION = "1.0"
 LICENCE = "CC0-1.0"
 #: Number of configurations of each robot; the first is the zero configuration, as far as limits allow it.
 SAMPLES = 3
-#: Range of joint velocities and accelerations, and of positions of planar and floating joints, +-.
+#: Joint velocities, accelerations, and positions of planar and floating joints lie between -_RANGE and
+#: _RANGE.
 _RANGE = 2.0
 #: Inputs are multiples of 1 / _GRID where limits allow it, so that their few decimals are exactly doubles.
 _GRID = 1024.0
-#: Digits of a tolerance, and those before it is rounded up.
+#: Number of digits of a written tolerance, which is rounded up.
+#: Before that, the tolerance is rounded to `_SAME` digits.
 _DIGITS, _SAME = 3, 12
 
 SPATIAL_ACCELERATION = replace(
@@ -66,7 +69,8 @@ SPATIAL_ACCELERATION = replace(
     name="spatial acceleration",
     exact=lazy_import("urdfkin.verify.exact.recursion:spatial_acceleration_values"),
 )
-#: The quantities of the vectors. The scale of an acceleration includes w x vel, the difference of the two.
+#: The quantities of the test vectors.
+#: The scale of a classical and of a spatial acceleration includes w x vel, which is their difference.
 QUANTITIES = (
     PLACEMENT, VELOCITY, JACOBIAN, JACOBIAN_RATE, HESSIAN, ACCELERATION, SPATIAL_ACCELERATION,
 )  # fmt: skip
@@ -276,7 +280,7 @@ def _tolerance(k: float, scale: float) -> str:
     """Return k eps scale as a decimal, rounded up; 0 if the scale is 0."""
     if scale == 0.0:
         return "0"
-    with localcontext(prec=_SAME):  # without the last digits, in which processors may differ
+    with localcontext(prec=_SAME):  # drop the last digits, in which processors may differ
         number = +Decimal(k * max(EPS * scale, LEAST_UNIT))
     with localcontext(prec=_DIGITS, rounding=ROUND_CEILING):
         return str((+number).normalize())

@@ -168,7 +168,7 @@ PANELS: dict[str, Panel] = {
     "disagreement": disagreement,
 }
 
-#: Suffix of the unit of a coordinate in the panels of q, v and a.
+#: Text that follows the unit of a joint coordinate: nothing for q, "/s" for v, "/s²" for a.
 _PER = {"q": "", "v": "/s", "a": "/s²"}
 #: Names of the panels of coordinates. Each panel has one plot for each unit.
 COORDINATES = tuple(_PER)

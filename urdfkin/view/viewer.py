@@ -351,7 +351,7 @@ class Viewer:
     def _build(self, trajectory: Trajectory | None) -> None:
         gui, robot = self.server.gui, self.robot
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
-        gui.main_panel.dock_right()  # beside the picture, not over it
+        gui.main_panel.dock_right()  # show the controls beside the picture, not over it
         gui.set_panel_label(printable(robot.name))
         if self.stage.missing:
             gui.add_markdown(missing_words(self.stage.missing))

@@ -215,7 +215,7 @@ def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]
 
 #: The two grids: a coarse grid for every frame, and a fine grid for the frame with the largest bound.
 COARSE, FINE = Grid(8, 24), Grid(16, 48)
-#: Largest number of values of a variable that are treated one by one.
+#: If the range of a variable needs more grid values than this number, they are not examined one by one.
 MOST_VALUES = 1024
 
 
@@ -305,7 +305,8 @@ def passed(
     step: Step, pair: Pair | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
     """Return the support functions of d and y in front of a step, from those behind the step."""
-    # a planar or floating joint has no limits, so it may rotate to the direction with the largest value
+    # A planar or floating joint has no limits, so it may rotate d into any direction.
+    # The largest value of d's support function therefore holds for all directions.
     if pair is None:
         d = Support(d.grid, d.largest() * d.grid.lengths)
         y = Support(d.grid, np.full(len(d.grid.points), math.inf))
