@@ -49,7 +49,7 @@ SECTIONS = ("batch", "single", "checked", "verified", "where", "first", "joints"
 
 @dataclass(frozen=True)
 class Plan:
-    """The amount of measurements.
+    """Numbers of configurations, rounds, joints and frames that the benchmark measures.
 
     Attributes:
         configurations: Number of configurations of a batch.

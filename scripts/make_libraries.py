@@ -241,7 +241,7 @@ def _documented(figures: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _reasons(cells: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the lines with messages and notes; each library and reason has a line."""
+    """Yield the lines of a table with a line for each message or note of each library."""
     yield "| Library | Features | Message, or the joints |\n|---|---|---|\n"
     for library, column in cells.items():
         reasons: dict[str, list[str]] = {}

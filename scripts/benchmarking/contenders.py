@@ -140,7 +140,7 @@ def _urdfkin_lines(
 
 
 def pinocchio_calls(urdf: str, frame: str, quantity: str) -> Calls:
-    """Return the cheapest calls.
+    """Return Pinocchio's cheapest calls for a quantity.
 
     The calls are `computeFrameJacobian`, or a recursion and `getFrameClassicalAcceleration`.
     """

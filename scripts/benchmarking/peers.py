@@ -1,4 +1,4 @@
-"""Write the calls of other libraries as users of these libraries do; a library is imported when it is needed.
+"""Call other libraries as their users call them; a library is imported only when it is needed.
 
 If a library has another order of rows or coordinates, inputs and results are reordered outside the measured
 time.

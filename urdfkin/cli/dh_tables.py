@@ -1,4 +1,4 @@
-"""Compute the tables of `urdfkin dh`, once its options are read."""
+"""Compute the tables of `urdfkin dh` after its options have been read."""
 
 from __future__ import annotations
 

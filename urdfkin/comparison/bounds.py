@@ -350,7 +350,7 @@ def _second_derivatives(
 def _pass_to_front(
     vectors: _Vectors, steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables
 ) -> float:
-    """Return the largest length of d in front of all steps, from the vectors behind the last step's L."""
+    """Return the largest length of d in front of all steps, from the vectors after the last step's L."""
     vectors = before_it(steps[-1], *vectors)
     for step, pair in zip(reversed(steps[:-1]), reversed(pairs[: len(steps) - 1]), strict=True):
         slides = step.kind != "turns"
@@ -359,7 +359,7 @@ def _pass_to_front(
 
 
 def _derivatives(step: Step, pair: Pair, variables: Variables, d: Support, y: Support) -> _Vectors:
-    """Return the derivatives of d and y by a joint's value, behind the rigid motion L of the joint."""
+    """Return the derivatives of d and y by a joint's value, after the rigid motion L of the joint."""
     if step.kind != "turns":
         u, other = step.axis.direction, step.other.direction
         return point(d.grid, other - u), point(d.grid, other)
@@ -505,7 +505,7 @@ def moved_together(
     """Return the steps to a frame that can change the frame's distance.
 
     A joint before the first difference of the models rotates D and does not change its length. However, the
-    variable of this joint may also move a mimic joint behind the difference. Then D depends on both motions,
+    variable of this joint may also move a mimic joint after the difference. Then D depends on both motions,
     and the step is included. The result begins with the first step that differs, or that shares a variable
     with a differing step.
     """

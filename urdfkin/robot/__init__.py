@@ -328,7 +328,7 @@ class Robot(Displayable):
 
     @property
     def link_frames(self) -> tuple[LinkFrame, ...]:
-        """All links as frames `link:NAME`, a list for `placement` and others; each name is unique.
+        """Names `link:NAME` of the frames of all links, each unique; `placement` and others accept this list.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -371,7 +371,7 @@ class Robot(Displayable):
 
     @property
     def all_frames(self) -> tuple[str, ...]:
-        """All links and all joints as frames `link:NAME` and `joint:NAME`, each once.
+        """Names `link:NAME` and `joint:NAME` of the frames of all links and joints, each once.
 
         Each is a `FrameName`, so it is never ambiguous: it means the link or joint NAME, even if another link
         or joint has the literal name `link:NAME`.
