@@ -137,8 +137,9 @@ def nearer_counts(lines: Sequence[Judged]) -> str:
 
 
 def judged_on(judgement: Judgement) -> str:
-    """Return a text about the result of the accuracy study. The text states the number of samples, whether
-    the base moved, and the counts of `nearer_counts`.
+    """Return a text about the result of the accuracy study.
+
+    The text states the number of samples, whether the base moved, and the counts of `nearer_counts`.
     """
     moving = " on a moving base" if judgement.get("moving_base") else ""
     return f"{counted(judgement['samples'], 'sample')}{moving}; {nearer_counts(judgement['lines'])}"

@@ -343,7 +343,7 @@ class Viewer:
 
     @property
     def file_name(self) -> str:
-        """The name of a saved file: the robot's name in letters that every system allows, without a suffix."""
+        """The robot's name in letters that every system allows in a file name, without a suffix."""
         return re.sub(r"[^A-Za-z0-9_-]+", "-", self.robot.name).strip("-") or "robot"
 
     # -- controls ------------------------------------------------------------------------------------
