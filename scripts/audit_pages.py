@@ -60,9 +60,9 @@ SCREENS = tuple(product((390, 768, 1000, 1280), (False, True)))
 _AXE_SECONDS = 600
 #: Severities of violations that fail the audit; violations of other severities are only printed.
 IMPACTS = ("serious", "critical")
-#: Code that unfolds everything on a page.
+#: JavaScript that unfolds everything on a page.
 UNFOLD = "document.querySelectorAll('details').forEach((part) => { part.open = true; })"
-#: Number of presses of the Tab key on a page, and number of printed pages that are drawn.
+#: The script presses the Tab key `_PRESSES` times on a page, and draws `_PAGES` of the printed pages.
 _PRESSES, _PAGES = 60, 12
 #: Errors of the HTML checker that the site's theme causes.
 FOREIGN = ("Attribute “autocomplete” is only allowed when the input type is",)
@@ -79,12 +79,12 @@ axe.run({ resultTypes: ["violations"] })
     v.nodes.slice(0, 3).map((n) => n.target.join(" ") + " " + n.html.slice(0, 160)),
   ])), (error) => done([["critical", "axe failed: " + error, 1, []]]));
 """
-#: Tables that are wider than the screen: name, width, and width of the box around the table.
+#: JavaScript: return name, width and available width of each table that is wider than its box on the page.
 _CUT = """const own = "body:not(:has(#robots, #history)) section > .scroll > table";  // the page of `same`
 return [...document.querySelectorAll(`#overview, .checks, #history, ${own}`)]
   .filter((t) => t.checkVisibility() && t.scrollWidth > t.parentElement.clientWidth)
   .map((t) => [t.id || t.className, t.scrollWidth, t.parentElement.clientWidth]);"""
-#: Describe the element with the focus, and whether an outline, border or shadow shows the focus.
+#: JavaScript: describe the element with the focus, and state whether an outline, border or shadow marks it.
 _FOCUS = """
 let e = document.activeElement;
 if (!e || e === document.body) return null;
@@ -107,7 +107,7 @@ class Page:
     ready: str = ""
     printed: bool = True
     screens: tuple[tuple[int, bool], ...] = SCREENS
-    whole: bool = True  # also the keyboard, the HTML checker and paper
+    whole: bool = True  # whether to test the keyboard, the HTML and the printed page too
 
 
 @dataclass
@@ -255,7 +255,7 @@ def viewer(plays: bool = False) -> Iterator[Page]:
         Viewer(server, robot, q, line(robot, q, -q, 2.0, 20) if plays else None)
         host = f"127.0.0.1:{server.get_port()}"
         own = (f"http://{host}", f"ws://{host}", "data:", "blob:", "chrome")
-        ready = (  # on the screen of a telephone, the controls are folded
+        ready = (  # on the screen of a telephone, the controls are hidden
             "return !!document.querySelector('canvas')"
             " && (!!document.getElementById('fold') || document.body.innerText.includes('verified'))"
         )
@@ -342,7 +342,7 @@ def walk(browser: Browser, page: Page) -> list[str]:
     for _ in range(_PRESSES):
         ActionChains(browser.chrome).send_keys(Keys.TAB).perform()
         stop = browser.js(_FOCUS)
-        if stop is None:  # the end of the page
+        if stop is None:  # the Tab key has left the page
             break
         what, shown, sized, named = stop
         seen.append(what)

@@ -49,7 +49,7 @@ SECTIONS = ("batch", "single", "checked", "verified", "where", "first", "joints"
 
 @dataclass(frozen=True)
 class Plan:
-    """The amount of measurements.
+    """Numbers of configurations, rounds, joints and frames that the benchmark measures.
 
     Attributes:
         configurations: Number of configurations of a batch.
@@ -167,7 +167,7 @@ def main(words: Sequence[str] | None = None) -> int:
 
 if __name__ == "__main__":
     status = main()
-    if "roboticstoolbox" in sys.modules:  # the bindings print a hundred lines about leaks at exit
+    if "roboticstoolbox" in sys.modules:  # at exit, this library prints a hundred lines about memory leaks
         sys.stdout.flush()
         os._exit(status)
     sys.exit(status)

@@ -42,14 +42,15 @@ from urdfkin.verify.quantities import Quantity, recursive_quantities
 from urdfkin.verify.sampling import draw_base
 from urdfkin.verify.verifier import bound_of
 
-#: Sizes of batches: less than a block of eight, one block, a little more, and many blocks with a remainder.
+#: Numbers of configurations of the tested batches.
+#: They are less than a block of eight, one block, a little more, and many blocks with a remainder.
 LENGTHS = (1, 2, 7, 8, 9, 100)
 #: Numbers of threads of a batch; None: urdfkin's default.
 THREADS = (None, 1, 2, 3)
-#: Number of stored configurations, and of stored frames.
+#: Number of configurations, and number of frames, whose results the script stores.
 KEPT, FRAMES = 9, 6
-#: Index of the configuration that is computed with Python numbers, and the names of the two ways to compute
-#: it.
+#: Index of the configuration that is computed with Python numbers.
+#: Names of the two ways to compute it.
 INTERPRETED = 3
 WAYS: tuple[Way, ...] = ("interpreted", "compiled")
 
@@ -69,7 +70,7 @@ class Subject:
     def of(cls, name: str, stored: Arrays | None = None) -> Subject:
         """Make a subject with the inputs and frames from a file, or with new inputs and frames."""
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # this script does not use warnings about the file
+            warnings.simplefilter("ignore")  # hide warnings about the robot's file
             robot = urdfkin.load(name, mimic=catalogue()[name].mimic, verify=False)
         if stored is not None:
             inputs = tuple(stored[f"{name}/{x}"] for x in "qva")
@@ -228,7 +229,7 @@ def compared(name: str, now: Arrays, stored: Arrays) -> tuple[str, float]:
 # -- enclosures ------------------------------------------------------------------------------------------
 
 
-#: Numbers of digits of enclosures: 15, the digits of a double, and the default number.
+#: Numbers of decimal digits of enclosures. The first is 15, as in a double; None is the default number.
 _DIGITS = (15, None)
 
 

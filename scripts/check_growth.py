@@ -68,7 +68,7 @@ def _tree(size: int, parent: Callable[[int], int], kind: str = "fixed", more: st
 
 
 KINDS: dict[str, Kind] = {
-    # numbers
+    # inputs with long or many numbers
     "one long number": lambda n: _attribute(f'xyz="{"1" * n}e+ 0 0"'),
     "one long decimal": lambda n: _attribute(f'xyz="0.{"1" * n} 0 0"'),
     "many numbers in a vector": lambda n: _attribute(f'xyz="{"1 " * (n // 2)}"'),
@@ -79,7 +79,7 @@ KINDS: dict[str, Kind] = {
         _filled(n, lambda i: f'<joint name="j{i}" type="fixed"><origin xyz="a b c"/></joint>')
     ),
     "signs and points": lambda n: _attribute(f'xyz="{"+." * (n // 2)} 0 0"'),
-    # comments for urdfkin
+    # inputs with many comments that address urdfkin
     "comments that silence nothing": lambda n: _robot(
         '<link name="l"/>' + _filled(n, lambda i: f"<!-- urdfkin: ignore[x{i}] y -->\n")
     ),
@@ -87,7 +87,7 @@ KINDS: dict[str, Kind] = {
         '<link name="l"/>' + _filled(n, lambda i: f"<!-- urdfkin: ignore[URDF207] y --><x{i}/>")
     ),
     "one long comment": lambda n: _robot(f'<!-- urdfkin: ignore[{"207 " * (n // 4)}] y --><link name="l"/>'),
-    # names
+    # inputs with long or many names
     "one long name": lambda n: _robot(f'<link name="{"a" * n}"/>'),
     "one long tag": lambda n: _in_base(f"<{'a' * n}/>"),
     "one long attribute's name": lambda n: _in_base(f'<visual {"a" * n}="1"/>'),
@@ -124,7 +124,7 @@ KINDS: dict[str, Kind] = {
     "declared prefixes": lambda n: _robot(
         '<link name="l"/>' + _filled(n, lambda i: f'<gazebo xmlns:p{i}="http://p" p{i}:a="1"/>')
     ),
-    # attributes
+    # inputs with many attributes
     "attributes of one link": lambda n: _robot(
         f'<link name="l" {_filled(n, lambda i: f"a{i}={chr(34)}1{chr(34)} ")}/>'
     ),
@@ -134,7 +134,7 @@ KINDS: dict[str, Kind] = {
     "one long value": lambda n: _robot(f'<link name="l"/><material file="{"a" * n}"/>'),
     "openings of expressions": lambda n: _robot(f'<link name="l"/><material file="{"${" * (n // 2)}"/>'),
     "references in a value": lambda n: _robot(f'<link name="l"/><material file="{"&amp;" * (n // 5)}"/>'),
-    # content between elements
+    # inputs with long or much content between elements
     "text": lambda n: _robot('<link name="l"/>' + "words " * (n // 6)),
     "lines": lambda n: _robot('<link name="l"/>' + "\n" * n),
     "lines, then a broken tag": lambda n: _robot('<link name="l"/>' + "\n" * n + "<"),

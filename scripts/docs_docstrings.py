@@ -15,9 +15,9 @@ import griffe
 
 from urdfkin.robot import Robot
 
-#: A section `Example:` and its indented lines.
+#: Pattern of a section `Example:` with its indented lines.
 _EXAMPLE = re.compile(r"^( *)Examples?:\n((?:\1 +\S.*\n?|\n)+)", re.MULTILINE)
-#: The lines from a prompt to the next blank line.
+#: Pattern of the lines from a Python prompt to the next blank line.
 _DOCTEST = re.compile(r"^( *)>>> .*(?:\n *\S.*)*", re.MULTILINE)
 
 

@@ -20,7 +20,7 @@ import urdfkin
 from urdfkin.cli import cli
 
 LESSONS = "lessons/"
-#: The equation numbers that the first line of a docstring contains.
+#: Pattern of the equation numbers in the first line of a docstring.
 _EQUATIONS = re.compile(r" \(eq\. [^)]*\)")
 _ROBOT = "urdfkin.robot.Robot"
 #: Pages of the library. For each path: title, introduction, and names. A name of the package and the name of

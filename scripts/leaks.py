@@ -16,7 +16,7 @@ from pathlib import Path
 
 import urdfkin
 
-#: Number of parts of a run.
+#: Number of parts of a run. The memory in use is printed after each part.
 PARTS = 5
 _ROBOT = """<robot name="r{k}">
   <link name="base{k}"/><link name="arm"/><link name="{odd}tip{k}"/>

@@ -169,7 +169,7 @@ class MeasuredMotion:
         mujoco.mj_rnePostConstraint(self.mj_model, self.mj_data)
         self.body = self.mj_model.body("l3").id
 
-    # The candidate definitions use only placements at times around 0.
+    # The candidate definitions use only placements at times close to t = 0.
 
     def path(self, t: float) -> FloatArray:
         """Return T_world_frame at time t, for q(t) = q + v t + a t^2 / 2."""

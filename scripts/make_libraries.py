@@ -38,13 +38,13 @@ PAGE, FIGURES, LISTED = (DOCS / f"libraries.{suffix}" for suffix in ("md", "json
 DATA: dict[str, Any] = tomllib.loads(LISTED.read_text("utf-8"))
 #: The features of the table, by name.
 FEATURES = {name: features()[name] for name in DATA["features"]}
-#: Number of random configurations of each feature.
+#: Number of random configurations for which each feature is tested.
 CONFIGURATIONS = 3
 #: Largest difference (m, and entries of a rotation matrix) of a pose that counts as right. Libraries that
 #: compute in double precision differ by less than 1e-14 for these robots. A misread element causes a
 #: difference of more than 1e-3.
 RIGHT = 1e-9
-#: Longest time (seconds) that a library may take for all features that are left.
+#: Longest time (seconds) that a library may take for all features that it has not read yet.
 _SECONDS = 60
 _QUOTED = 160
 
@@ -241,7 +241,7 @@ def _documented(figures: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _reasons(cells: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the lines with messages and notes; each library and reason has a line."""
+    """Yield the lines of a table with a line for each message or note of each library."""
     yield "| Library | Features | Message, or the joints |\n|---|---|---|\n"
     for library, column in cells.items():
         reasons: dict[str, list[str]] = {}

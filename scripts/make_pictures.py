@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 POSE = [0.0, -0.8, 0.0, -2.4, 0.0, 1.6, 0.8, 0.04]
 
 
-#: Endings of the names of screenshots, and whether the theme is dark.
+#: For each suffix of a screenshot's file name: whether the screenshot has the dark theme.
 THEMES = (("", False), ("-dark", True))
 
 
@@ -73,7 +73,8 @@ def reference_frames() -> Any:
         _axes(axes, at, R)
         numbers = arm.velocity(q, v, "tip", reference)[:2]
         arrow(axes, at, 0.6 * R @ numbers, INK)
-        for k, color in enumerate((VERMILION, GREEN)):  # the two components of the arrow, along the axes
+        # draw the two components of the arrow, along the two axes
+        for k, color in enumerate((VERMILION, GREEN)):
             begin = at + (0.6 * R[:, 0] * numbers[0] if k else 0)
             axes.plot(
                 *np.array([begin, begin + 0.6 * R[:, k] * numbers[k]]).T, color=color, linewidth=1.2, ls="--"

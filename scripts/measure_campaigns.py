@@ -39,7 +39,8 @@ def store(*robots: Any, **how: Any) -> ValidationReport:
 def cluster(*robots: Any, **how: Any) -> ValidationReport:
     """Validate with two local Dask workers; the time includes the end of the workers, but not their start."""
     with connected("local:2") as two:
-        validate("planar_two_link", samples=400, executor=two)  # load the modules of the workers before
+        # load the modules of the worker processes before the measurement
+        validate("planar_two_link", samples=400, executor=two)
         chunks = len(Cut(how["samples"])) * len(robots[0])
         begin, before = time.perf_counter(), time.process_time()
         report = validate(*robots, executor=two, **how)

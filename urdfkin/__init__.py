@@ -69,7 +69,8 @@ _HOMES = {
     "verify_function": "urdfkin.validation.functions",
 }
 
-# Methods of earlier packages call these functions of later packages. They cannot import them.
+# Methods of earlier packages call these functions of later packages.
+# An earlier package cannot import from a later package.
 register_hook("a table in a form", lazy_import("urdfkin.dh.export:export"))
 register_hook("code of a robot", lazy_import("urdfkin.export.forms:code_of_robot"))
 register_hook("code of a chain", lazy_import("urdfkin.export.forms:code_of_chain"))

@@ -1,4 +1,6 @@
-"""Write the calls of a library for one configuration as lines of Python, which run in a loop or one by one.
+"""Write Python lines that call a library to compute one quantity of one configuration.
+
+The benchmark runs these lines in a loop over many configurations, or for a single configuration.
 
 The lines become the body of a loop, and their names become local variables. Therefore, the measured time of a
 library includes no function call of the benchmark.

@@ -140,7 +140,7 @@ def _urdfkin_lines(
 
 
 def pinocchio_calls(urdf: str, frame: str, quantity: str) -> Calls:
-    """Return the cheapest calls.
+    """Return Pinocchio's cheapest calls for a quantity.
 
     The calls are `computeFrameJacobian`, or a recursion and `getFrameClassicalAcceleration`.
     """
@@ -182,7 +182,7 @@ def _pinocchio_batches(subject: Subject, quantity: str) -> Iterator[Work]:
     yield _in_processes(subject, quantity)
 
 
-#: State of a worker: the loop of each quantity, and the arrays that it reads and writes.
+#: State of a worker process. For each quantity, it contains the loop and the arrays of this loop.
 _here: dict[str, Any] = {}
 
 
@@ -225,7 +225,7 @@ def _share(start: int, stop: int) -> None:
     _here["loop"](out, *inputs)
 
 
-# -- everyone --------------------------------------------------------------------------------------------
+# -- all contenders --------------------------------------------------------------------------------------
 
 #: Contenders that must be installed.
 ALWAYS = (

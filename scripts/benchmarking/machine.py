@@ -24,10 +24,11 @@ from urdfkin.compiled.preload import only
 from urdfkin.robot import Robot
 
 ROOT = Path(__file__).parents[2]
-#: Keys of the two times of a first use. For the first time, the kernel cache is empty. For the second time,
-#: the compiled kernels are on disk.
+#: Keys of the two measured times of a first use.
+#: For the first time, the kernel cache is empty. For the second time, the compiled kernels are on disk.
 EMPTY, KEPT = "empty_ms", "kept_ms"
-#: For each quantity whose first use compiles a kernel: the number of its inputs among q, v and a.
+#: For each quantity whose first use compiles a kernel: its number of inputs.
+#: One input means q; two mean q and v; three mean q, v and a.
 USES = {
     "placement": 1,
     "velocity": 2,

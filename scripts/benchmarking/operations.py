@@ -18,9 +18,9 @@ from urdfkin.compiled.plan import CompiledTree
 from urdfkin.compiled.program import KEPT_ROWS, WIDTH, Head, Op, program_of
 from urdfkin.kinematics.arithmetic import bound
 
-#: Operations to compute a sine and a cosine (`compiled.python_numbers`). The reduction of the angle needs 10.
-#: z and 1 - z/2 with their rounding errors need 8. The two polynomials need 20 operations, and the last steps
-#: 13.
+#: Number of operations that compute the sine and the cosine of an angle (`compiled.python_numbers`).
+#: The reduction of the angle needs 10 operations. z and 1 - z/2 with their rounding errors need 8.
+#: The two polynomials need 20 operations, and the last steps need 13.
 _SINE_COSINE = 51
 
 

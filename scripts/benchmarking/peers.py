@@ -1,4 +1,4 @@
-"""Write the calls of other libraries as users of these libraries do; a library is imported when it is needed.
+"""Call other libraries as their users call them; a library is imported only when it is needed.
 
 If a library has another order of rows or coordinates, inputs and results are reordered outside the measured
 time.
@@ -189,7 +189,7 @@ def toolbox(subject: Subject, quantity: str) -> Iterator[Calls]:
     import roboticstoolbox as rtb  # noqa: PLC0415
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the URDF reader of the toolbox is deprecated
+        warnings.simplefilter("ignore")  # the library warns that its URDF reader is deprecated
         robot: Any = rtb.Robot.URDF(str(subject.file))
     path = robot.ets(end=subject.frame)
     moving = sorted((link for link in robot.links if link.jindex is not None), key=lambda x: x.jindex)
@@ -248,7 +248,7 @@ def torch(subject: Subject, quantity: str) -> Iterator[Work]:
         return Work(who, n, lambda: jacobian(q), result, _SINGLE, remark)
 
     yield work("PyTorch Kinematics", chain.jacobian)
-    if shutil.which("g++"):  # torch.compile needs it
+    if shutil.which("g++"):  # torch.compile needs a C++ compiler
         yield work("PyTorch Kinematics, compiled", torch.compile(chain.jacobian_tensor))
 
 

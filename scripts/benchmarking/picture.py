@@ -13,8 +13,8 @@ from typing import Any
 
 from urdfkin.view.figure import BLUE, GREEN, VERMILION, new_figure, save, style
 
-#: For each beginning of a contender's name: its colour, its hatch and its name in the legend. The last entry
-#: is for all other contenders.
+#: For each prefix of a contender's name: the contender's colour, hatch and name in the legend.
+#: The last entry is for all other contenders.
 KINDS = {
     "urdfkin": (BLUE, "", "urdfkin"),
     "Pinocchio": (VERMILION, "////", "Pinocchio"),
@@ -25,7 +25,7 @@ KINDS = {
 MARKS = {"jacobian": ("o", "-"), "acceleration": ("s", "--")}
 TITLES = {"jacobian": "Jacobian", "acceleration": "acceleration"}
 
-#: A row of the measurements, as data.
+#: The measurements of one contender, as a mapping.
 Entry = Mapping[str, Any]
 
 

@@ -17,11 +17,12 @@ from urdfkin.robot import Robot
 
 #: The quantities of the tables.
 QUANTITIES = ("jacobian", "acceleration")
-#: Robots and frames: two arms, and a humanoid whose frame has a path that is a small part of the tree.
+#: The robots of the benchmark, each with its frame.
+#: The third robot is a humanoid; the path to its frame is only a small part of its tree.
 SUBJECTS = (("panda", "panda_hand"), ("ur5", "tool0"), ("talos", "gripper_left_base_link"))
 #: Number of configurations in a loop of calls; the time for a single call does not depend on this number.
 LOOP = 2_000
-#: The frame at the end of a chain.
+#: Name of the frame at the tip of a generated chain of joints.
 TIP = "tip"
 
 
@@ -104,7 +105,7 @@ class Subject:
 # -- the URDF that every library reads -------------------------------------------------------------------
 
 _INERTIA = {"ixx": "1", "iyy": "1", "izz": "1", "ixy": "0", "ixz": "0", "iyz": "0"}
-#: Elements of a joint that are preserved.
+#: Child elements of `<joint>` that `bare_urdf` keeps.
 _KEPT = ("origin", "parent", "child", "axis", "limit")
 
 

@@ -15,7 +15,7 @@ from scripts.benchmarking.contenders import COMPILED, FLOOR, ONE
 from scripts.benchmarking.generated import GENERATED
 from scripts.benchmarking.machine import EMPTY, KEPT
 
-#: A row of the measurements, as data.
+#: The measurements of one contender, as a mapping.
 Entry = Mapping[str, Any]
 
 
@@ -110,7 +110,8 @@ def _contest(section: str, title: str, rows: list[Entry]) -> Words:
 
 
 _SHARE = "times generated code"
-#: Name of urdfkin with all threads. The number of threads depends on the machine of the measurements.
+#: Pattern of urdfkin's name in the measurements with all threads.
+#: The name contains the number of threads of the measuring machine.
 _SEVERAL = re.compile(r"urdfkin, \d+ threads")
 
 

@@ -25,7 +25,8 @@ from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
-#: For each part of a batch, in the order in which the parts are added: its instructions.
+#: For each part of a batch computation: the instructions of this part.
+#: The script adds the parts in this order.
 PARTS: Mapping[str, frozenset[Op]] = {
     "reading inputs": frozenset(),
     "sines and cosines": frozenset(),
@@ -41,7 +42,8 @@ def parts_of_batches(n: int, rounds: int) -> Iterator[dict[str, Any]]:
         program = program_of(subject.plan, turned=False, columns=quantity == "jacobian")
         works = [_core(subject, quantity, cut(program, end), part) for end, part in enumerate(PARTS, start=1)]
         if quantity == "acceleration":
-            works = [work for work in works if work.who != "columns"]  # no Jacobian, no columns
+            # an acceleration has no Jacobian columns to compute
+            works = [work for work in works if work.who != "columns"]
         found = _times(works, rounds)
         before, parts = np.zeros(rounds), {}
         for who, taken in found.items():
@@ -55,7 +57,7 @@ def cut(program: Program, parts: int) -> Program:
     words = program.words.copy()
     code = words[words[Head.CODE] :].reshape(-1, WIDTH)
     chosen = [line for line in code if Op(line[0]) in ops]
-    end = np.zeros((1, WIDTH), dtype=np.int64)  # Op.END
+    end = np.zeros((1, WIDTH), dtype=np.int64)  # an instruction with the operation Op.END
     words = np.concatenate([words[: words[Head.CODE]], *chosen, *end])
     if parts < 2:
         words[Head.ANGLES_END] = words[Head.ANGLES]
@@ -139,7 +141,7 @@ def _function(quantity: str) -> Callable[..., object]:
     return method
 
 
-# -- both ------------------------------------------------------------------------------------------------
+# -- for batches and for single calls --------------------------------------------------------------------
 
 
 def _subjects(n: int) -> Iterator[tuple[Subject, str]]:

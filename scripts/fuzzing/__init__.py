@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-#: Outcome of a readable table.
+#: Outcome of a test in which the table was read, and was compared with the UR5.
 COMPARED = "read and compared"
-#: Allowed outcomes of a robot.
+#: Outcomes with which the test of a robot passes.
 GOOD = (
     "refused",
     "verified",

@@ -25,7 +25,7 @@ FORMS = {
     "toml": ".toml",
     "json": ".json",
 }
-#: Replacements of a damaged character.
+#: Texts that replace a character of the table, to damage it.
 PIECES = (
     *",;\t|& \"'\n\\{}[]()_^$-+*/0123456789eqadtheta.\x00\ufeffα",
     "nan",
@@ -34,8 +34,8 @@ PIECES = (
     "1e155",
     "(i-1)",
 )
-#: On average, one of this number of changes is anywhere in the table, and all other changes are in the
-#: headings.
+#: On average, one of every `_ANYWHERE` changes is at any place in the table.
+#: All other changes are in the headings.
 _ANYWHERE = 3
 
 

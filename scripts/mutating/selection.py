@@ -110,7 +110,7 @@ def named_slips() -> list[Named]:
     return [Named(**slip) for slip in tomllib.loads(text)["slip"]]
 
 
-#: - `urdfkin.model.tree.build_tree`: `1  ->  2`: the reason.
+#: Pattern of a line such as "- `urdfkin.model.tree.build_tree`: `1  ->  2`: the reason."
 _ARGUMENT = re.compile(r"^- `(?P<place>[\w.]+)`: `(?P<what>[^`]+)`: (?P<why>\S.+)$", re.MULTILINE)
 
 

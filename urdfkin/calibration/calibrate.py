@@ -63,15 +63,15 @@ _UNLIKELY = 4.0
 #: A warning is given if the uncertainty of a parameter is more than this factor times the uncertainty that
 #: random configurations would give.
 _WEAK = 10.0
-#: Seed of the random configurations for this factor; the configurations for `general` have another seed.
+#: Seed of the random configurations for `_WEAK`. The configurations for `general` have another seed.
 _OTHERS = 1
 #: If a column's diagonal entry of R is below this fraction of the largest entry, the column depends on the
 #: columns before it.
 _DEPENDENT = 1e-12
 #: The robot's size divided by these numbers gives x, y and z of a target in general position.
 _ASIDE = {"x": 5.0, "y": 6.0, "z": 7.0}
-#: Factor on `ParametricChain.rounding`, because Pinocchio computes the pose of the base and the pose of the
-#: tip, and from rewritten origins.
+#: `ParametricChain.rounding` is multiplied by this factor.
+#: Pinocchio computes the poses of base and tip separately, and it computes them from rewritten origins.
 _READ_BACK = 4.0
 #: Number of parameters or poses that a warning names.
 _NAMED = 6

@@ -50,11 +50,11 @@ _ONE_CONFIGURATION = 1e-6
 #: Number of standard deviations that are subtracted from a change, because the tilt of an axis near the
 #: target is poorly observable.
 _UNCERTAIN = 5.0
-#: Largest ratio of the error after a correction to the error of the fit, for an accepted fit and for a
-#: refused one.
+#: A correction must make the error smaller than `_BETTER` times the error of the fit if the fit is accepted.
+#: For a refused fit, `_NOT_WORSE` replaces `_BETTER`.
 _BETTER, _NOT_WORSE = 0.25, 1.5
-#: Number of corrections that are fitted, beginning with the most promising corrections; numbers of rows by
-#: which q is shifted in the trials.
+#: Number of corrections that are fitted, beginning with the most promising corrections.
+#: Numbers of rows by which q is shifted in these trials.
 _FITTED, _SHIFTS = 4, (1, -1, 2, -2)
 #: Number of joints that an objection names.
 _NAMED = 4

@@ -242,7 +242,7 @@ def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None
     from urdfkin.verify.pinocchio import pinocchio, version  # noqa: PLC0415
 
     click.echo(f"urdfkin {own_version()}, Pinocchio {version()}")
-    pinocchio()  # raises an error with the cause and the remedy if it is missing
+    pinocchio()  # raises an error with the cause and the remedy if Pinocchio is missing
     ctx.exit()
 
 

@@ -102,7 +102,7 @@ def _failures(state: CampaignProgress) -> str:
 
 @contextmanager
 def _at_intervals(seconds: float, show: Callable[[CampaignProgress], Any]) -> Iterator[Progress]:
-    """Show the progress every `seconds`. With JSON also show the first and the last one."""
+    """Show the progress once in `seconds`; with JSON, also show the first and the last progress."""
     shown, last = time.monotonic(), None
     first = seconds == _JSON
 
@@ -215,7 +215,7 @@ def _print_accuracy_progress(store: Store, counts: dict[int, tuple[int, bool]]) 
 
 
 def _why(store: Store, robot: int) -> str:
-    """Return the reason of the robot's first failure."""
+    """Return the reason why the first failed chunk of a robot failed."""
     from urdfkin.validation.answer import Failure  # noqa: PLC0415
 
     for index in range(len(store.manifest.cut)):

@@ -82,7 +82,7 @@ class Outcome:
     unsafe: int = 0
 
     def add(self, file: str, found: Examined) -> None:
-        """Add the results of one file."""
+        """Add the check's results for one file."""
         excerpts = Excerpts(found.data)
         self.files.append(file)
         self.findings += found.findings
@@ -158,7 +158,7 @@ def say_fixed(file: str, fixed: Sequence[Finding]) -> None:
 
 
 def difference(file: str, before: bytes, after: bytes) -> str:
-    """Return the change as a patch."""
+    """Return the changes by the fixes as a patch."""
     return patch(file, before, after, harmless)
 
 
@@ -230,7 +230,7 @@ settings_options = together(
         help="File with a table [tool.urdfkin] of settings.  [default: nearest pyproject.toml]",
     ),
 )  # fmt: skip
-#: Field of `Limits` -> help of its option.
+#: For each field of `Limits`: the help text of its option.
 _MOST = {
     "bytes": "Largest size of a file in bytes.",
     "depth": "Largest nesting depth of elements.",
@@ -389,7 +389,7 @@ class Run:
         look: A function that checks one file.
         choice: Selects the findings to report.
         strict: Whether warnings become errors.
-        fold: Whether many findings of one kind become one.
+        fold: Whether many findings with one code become one.
         fix: Whether to apply fixes.
         diff: Whether to collect fixes as patches.
         unsafe: Whether to include the fixes of --unsafe-fixes.
@@ -411,7 +411,7 @@ class Run:
     _taken: set[str] = field(default_factory=set)
 
     def take(self, word: str, exclude: Sequence[str]) -> None:
-        """Check the files that an argument matches, each once."""
+        """Check each file that an argument matches, but no file twice."""
         settings = self.choice.settings
         try:
             files = collected(word, settings, settings.values.get("include", INCLUDE), exclude)
@@ -467,7 +467,7 @@ class Run:
         return mended.text
 
     def _safe(self, chosen: Callable[[Finding], bool]) -> Callable[[Finding], bool]:
-        """Restrict a choice to the findings with an allowed fix."""
+        """Restrict a selection of findings to those with a fix that may be applied."""
         return lambda finding: chosen(finding) and (self.unsafe or finding.fix is None or finding.fix.is_safe)
 
     def _with_severity(self, finding: Finding) -> Finding:

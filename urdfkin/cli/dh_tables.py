@@ -1,4 +1,4 @@
-"""Compute the tables of `urdfkin dh`, once its options are read."""
+"""Compute the tables of `urdfkin dh` after its options have been read."""
 
 from __future__ import annotations
 
@@ -40,11 +40,12 @@ from urdfkin.verify.verifier import TABLE_SAMPLES
 
 #: Formats that can contain several tables.
 _FORMATS_OF_SEVERAL = ("terminal", "markdown", "latex", "json")
-#: Formats with the check's result below the table; for the others it goes to stderr.
+#: In these formats, the check's result is printed below the table. With other formats, it goes to stderr.
 _PRINTED = ("terminal", "markdown")
-#: Formats of a document.
+#: Formats for reading, in contrast to formats for data and code.
 _TEXTS = (*_PRINTED, "html", "latex")
-#: Formats that round numbers, with their digits of base and tool (None: the option --digits).
+#: Formats that round numbers, each with the number of digits of base and tool.
+#: None stands for the option --digits.
 _ROUNDED = {"terminal": None, "markdown": None, "latex": 6}
 
 
@@ -141,7 +142,8 @@ def _make_table(work: Work, tip: str | None, snap: float) -> DHTable:
     robot, base = work.robot, work.base
     if work.written is not None:
         table = read_table_or_screws(at_home(work.written))
-        if isinstance(table, DHTable):  # `Robot.dh` can derive a table from screws, as from a URDF
+        # screws need no conversion here: `Robot.dh` derives a table from them, as from a URDF
+        if isinstance(table, DHTable):
             return to_convention(table, work.convention or table.convention)
     like = None
     if work.like is not None:

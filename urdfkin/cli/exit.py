@@ -19,7 +19,8 @@ from urdfkin.cli import streams
 from urdfkin.cli.streams import say
 from urdfkin.errors import UrdfkinError
 
-#: Sent by a scheduler, `kill` or a shutdown (SIGTERM), and by a terminal that closes (SIGHUP).
+#: Signals that end a command. A scheduler, `kill` or a shutdown sends SIGTERM.
+#: A terminal that closes sends SIGHUP.
 _SIGNALS = (signal.SIGTERM, signal.SIGHUP)
 
 

@@ -230,7 +230,7 @@ robot_argument = together(
 
 
 def frame_name(option: str, help_: str) -> Callable[[_F], _F]:
-    """Make an option that takes a frame's name, with shell completion."""
+    """Make an option that takes a frame's name, with shell completion of the name."""
     return click.option(option, metavar="NAME", help=help_, shell_complete=complete_frame)
 
 
@@ -295,7 +295,7 @@ convention_option = click.option(
     help="Convention of --q, --v, --a, --trajectory and of the result: the name of a tool (`urdfkin order`"
     " lists them), or a TOML file.",
 )
-#: The same for a command whose result is in urdfkin's convention.
+#: The option --convention of a command that prints its result in urdfkin's own convention.
 convention_of_input_option = click.option(
     "--convention",
     metavar="NAME|FILE",
@@ -347,7 +347,7 @@ def tell_limits(robot: Robot, q: FloatArray) -> None:
 
 
 def said_of(robot: Robot) -> dict[str, Any]:
-    """Return the settings of a robot that JSON lists with a result: its locked joints."""
+    """Return the robot's locked joints, which the JSON output lists with a result."""
     return {"lock": dict(robot.origin.lock)} if robot.origin.lock else {}
 
 
@@ -567,7 +567,7 @@ _OPTIONS = {
 
 
 def base_options(inputs: str) -> Callable[[_F], _F]:
-    """Make the options of the base for a quantity of q, v and a; `with_base` reads them."""
+    """Make the options for the base's motion, for a quantity of q, v and a; `with_base` reads them."""
     return together(*(_OPTIONS[letter] for letter in inputs))
 
 
@@ -605,7 +605,7 @@ def with_base(
 
 
 def _rows(text: str, option: str, layouts: Sequence[Sequence[str]]) -> tuple[FloatArray, Sequence[str]]:
-    """Return the (n, width) numbers, and the layout that has as many columns."""
+    """Return the (n, width) numbers, and the layout that has this number of columns."""
     import numpy as np  # noqa: PLC0415
 
     from urdfkin.robot.trajectory import numbers  # noqa: PLC0415

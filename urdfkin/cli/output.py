@@ -165,7 +165,7 @@ def format_option(
 
 @contextmanager
 def compiling() -> Iterator[None]:
-    """Print a line when a kernel is compiled, and then the time that this took.
+    """Print a line when a kernel is compiled, and then the time of the compilation.
 
     A kernel is compiled only once on a machine.
     """
@@ -259,7 +259,7 @@ def check_of_path(check: object | None) -> tuple[str, int]:
 
 
 def finite(value: Any) -> Any:
-    """Replace infinity and nan, which JSON does not have, by None."""
+    """Replace infinity and NaN by None, because JSON has neither."""
     if isinstance(value, dict):
         return {key: finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -143,7 +143,7 @@ def _checked(x: Inputs, title: str, parts: Callable[[], Iterable[str | Table]], 
 
 
 def _samples(x: Inputs, shown: int, others: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield the index of each sample that a table shows, with its heading."""
+    """Yield the index and the heading of each sample that the output shows as a table."""
     n = len(x.q)
     for k in range(min(n, shown)):
         heading = f"sample {k}" if x.t is None else f"t = {x.t[k]:.6g} s"
@@ -194,7 +194,7 @@ def command_of(quantity: Quantity) -> click.Command:
 
 
 def _answer(x: Inputs, quantity: Quantity, result: FloatArray, reference: str | None = None) -> Answer:
-    """Return (n, ...) results as an answer."""
+    """Return the results (n, ...) of n samples as an answer."""
     x = x.converted()
     if x.conversion and x.conversion.angular_first and quantity.labels == SIX:
         units = dict(reversed(list(quantity.units.items())))
@@ -260,7 +260,8 @@ def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[ob
         yield from ([t, *map(repr, row)] for t, row in samples)
 
 
-#: Heading of the first column of CSV, without times and with them.
+#: Headings of the first CSV column: the first is for results without times, the second for results with
+#: times.
 _TIME = ("sample", "t")
 
 
@@ -288,7 +289,7 @@ def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
 
 
 def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Table:
-    """Return a row for each joint velocity.
+    """Return the table's rows: one row for each joint velocity.
 
     For a Hessian, return a row for each pair of joint velocities whose numbers are not all zero.
     """
@@ -353,7 +354,7 @@ def _parts(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
 # -- commands with options of their own --------------------------------------------------------------
 
 _POSITION = ("x", "y", "z")
-#: Forms of a pose besides the matrix.
+#: Forms in which a pose can be printed, besides the matrix.
 _FORMS = {
     "rpy": replace(
         PLACEMENT,
@@ -623,7 +624,7 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
 
 
 def _between(names: list[str], found: SingularValues, k: int) -> Iterator[tuple[str, list[float]]]:
-    """Yield each number of a sample: its name, its value, its lower bound and its upper bound."""
+    """Yield (name, value, lower bound, upper bound) for each number of a sample."""
     for i, name in enumerate(names):
         yield name, [float(side[k, i]) for side in found.values]
     for name, between in (("condition", found.condition), ("manipulability", found.manipulability)):

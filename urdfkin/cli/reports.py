@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from urdfkin.validation.document import Document
 
 
-#: The files of a format, each with its path: one file, or a page with a folder of files.
+#: The files of a report in one format, each with its path.
+#: They are a single file, or a page with a folder of files.
 Files = Iterator[tuple[Path, bytes]]
 
 _PATH = click.Path(path_type=Path, dir_okay=False)

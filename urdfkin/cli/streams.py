@@ -77,7 +77,7 @@ class _Raw(io.FileIO):
 
 
 def _with_errors(stream: Any, descriptor: int) -> Any:
-    """Replace a standard stream by one that reports errors; leave a substitute, such as a test's."""
+    """Replace a standard stream by one that reports errors; keep a stream that a test has substituted."""
     try:
         if stream.fileno() != descriptor:
             return stream
@@ -121,7 +121,8 @@ def _warn(
 
 #: Escape sequences of rich: colours, and cursor movements of a progress bar.
 _STYLE = re.compile(r"(\x1b\[[0-9;?]*[A-Za-z]|\r)")
-#: Number of characters of a line that are stored to check the next piece written to it.
+#: Number of stored characters of an unfinished line.
+#: They are checked again together with the next piece of text.
 _STORED = 64
 
 
@@ -175,7 +176,7 @@ class SafeStream:
         self.stream.write(text)
 
     def _without_commands(self, text: str) -> str:
-        """Escape CI commands, also those that are written in pieces."""
+        """Escape CI commands, including commands that are written in several pieces."""
         first, *rest = text.split("\n")
         lines = [self._line_without_commands(first)]
         for line in rest:
@@ -217,7 +218,7 @@ def say(line: str, *, err: bool = False) -> None:
 
 
 def say_styled(*words: tuple[str, dict[str, Any]]) -> None:
-    """Print one line of words, with styles on a terminal."""
+    """Print one line of words; on a terminal, the words may have styles."""
     stream = SafeStream(sys.stdout, styled=sys.stdout.isatty())
     texts = (
         click.style(printable(text), **style) if stream.styled else printable(text) for text, style in words
@@ -231,7 +232,7 @@ def say_file(text: str) -> None:
 
 
 def harmless(text: str) -> str:
-    """Return a file's text, which consists of whole lines, in the form that `say_file` writes."""
+    """Return a text of whole lines in the escaped form that `say_file` writes."""
     return SafeStream(sys.stdout).tamed_file(text)
 
 

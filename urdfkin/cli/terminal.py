@@ -14,7 +14,7 @@ _TRAILING = re.compile(r" +$", re.MULTILINE)
 
 
 class Terminal(Console):
-    """Rich's console without markup; each printed text is one line."""
+    """Rich's console without markup; each printed text stays on one line."""
 
     def __init__(self, stream: TextIO, **options: Any) -> None:
         safe = SafeStream(stream, styled=True)

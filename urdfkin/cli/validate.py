@@ -115,7 +115,7 @@ def _open_results(
 def _study(
     source: Robot | str, settings: StudySettings, stamp: str | None, how: Mapping[str, Any]
 ) -> tuple[Judgement | NotJudged, bool]:
-    """Return the accuracy result of a robot, and whether another study would give the same."""
+    """Return the accuracy result of a robot, and whether another study would give the same result."""
     import numpy as np  # noqa: PLC0415  keeps --help fast
 
     from urdfkin.validation.accuracy import judge  # noqa: PLC0415

@@ -65,11 +65,11 @@ from urdfkin.robot import Robot
 from urdfkin.verify.oracle import QueryBatch
 from urdfkin.verify.sampling import sample
 
-#: Number of random configurations at the start of a search, and number of configurations with each variable
-#: at an end of its range.
+#: Number of random configurations at the start of a search.
+#: Number of further configurations, in which each variable is at an end of its range.
 SAMPLES, CORNERS = 512, 128
-#: Number of configurations from which the search starts, which are the worst random configurations; number of
-#: values that are tried along a coordinate.
+#: The search starts from the `STARTS` worst random configurations.
+#: Along each coordinate, it tries `ALONG` values.
 STARTS, ALONG = 4, 13
 #: Frames that are searched in one batch.
 SEARCHED_TOGETHER = 24
@@ -350,7 +350,7 @@ def _second_derivatives(
 def _pass_to_front(
     vectors: _Vectors, steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables
 ) -> float:
-    """Return the largest length of d in front of all steps, from the vectors behind the last step's L."""
+    """Return the largest length of d in front of all steps, from the vectors after the last step's L."""
     vectors = before_it(steps[-1], *vectors)
     for step, pair in zip(reversed(steps[:-1]), reversed(pairs[: len(steps) - 1]), strict=True):
         slides = step.kind != "turns"
@@ -359,7 +359,7 @@ def _pass_to_front(
 
 
 def _derivatives(step: Step, pair: Pair, variables: Variables, d: Support, y: Support) -> _Vectors:
-    """Return the derivatives of d and y by a joint's value, behind the rigid motion L of the joint."""
+    """Return the derivatives of d and y by a joint's value, after the rigid motion L of the joint."""
     if step.kind != "turns":
         u, other = step.axis.direction, step.other.direction
         return point(d.grid, other - u), point(d.grid, other)
@@ -391,7 +391,8 @@ def _as_free_vectors(step: Step) -> Step:
     return replace(step, axis=axis, other=other, before=before)
 
 
-#: Largest number of boxes at a time. With this number, a frame takes one or two seconds of processor time.
+#: Largest number of boxes that exist at a time; a box is a range for each variable.
+#: With this number, a frame takes one or two seconds of processor time.
 MOST = 2**17
 #: Number of boxes computed in one batch. The Jacobians of more boxes would take gigabytes of memory.
 TOGETHER = 2**16
@@ -482,7 +483,7 @@ def tightened(search: Search, frame: FramePair, target: float, upper: float, mos
     c, h, proven = ends.mean(axis=1)[np.newaxis], (ends[:, 1] - ends[:, 0]) / 2.0, np.array([upper])
     if not np.isfinite(M).all() or 2 ** _halvings(h, M, upper) > most:
         return upper
-    if not names:  # no joint of the path changes the frame's distance
+    if not names:  # no variable changes the distance between the frame's poses in A and B
         return min(upper, float(boxes.bounds(c, h)[0]))
     while len(c) and 2 * len(c) <= most:
         i = _longest(h, M)
@@ -504,7 +505,7 @@ def moved_together(
     """Return the steps to a frame that can change the frame's distance.
 
     A joint before the first difference of the models rotates D and does not change its length. However, the
-    variable of this joint may also move a mimic joint behind the difference. Then D depends on both motions,
+    variable of this joint may also move a mimic joint after the difference. Then D depends on both motions,
     and the step is included. The result begins with the first step that differs, or that shares a variable
     with a differing step.
     """

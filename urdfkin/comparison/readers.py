@@ -290,7 +290,7 @@ def _motion(joint: Joint, T: FloatArray, found: FloatArray, equal: float) -> str
 
 
 def _sense(joint: Joint, mine: FloatArray) -> float:
-    """Return the sign of the joint's first motion about or along its axis, which is the axis' sense."""
+    """Return the sign of the joint's first motion about or along its axis."""
     own = mine[:3, 3]
     if joint.kind is not JointKind.PRISMATIC:
         own = np.array([mine[2, 1] - mine[1, 2], mine[0, 2] - mine[2, 0], mine[1, 0] - mine[0, 1]])

@@ -194,7 +194,7 @@ def _range(ends: Value) -> str:
 class Tool:
     """Two matched links that count as different end-effector frames.
 
-    `pose` (4, 4) is that of B's `b` in A's `a`.
+    `pose` (4, 4) is the pose of B's link `b` in the frame of A's link `a`.
     """
 
     a: str
@@ -771,7 +771,7 @@ def remarks(found: Alignment, variables: Variables, tolerance: Tolerance) -> tup
 
 
 def _in_order(which: str, value: Value) -> tuple[Value, Value]:
-    """Return the values of a parameter in A and in B, if only the model `which` has it."""
+    """Return the parameter's values in A and in B, where only the model `which` has a value."""
     return (value, None) if which == "A" else (None, value)
 
 

@@ -53,8 +53,8 @@ from urdfkin.verify.sampling import checked_choice
 
 #: Number of configurations at which Pinocchio checks the distances between matching frames.
 CONFIRMED = 8
-#: Number of frames among which the frame with the largest distance is searched; these are the frames that are
-#: farthest apart at random configurations.
+#: The frame with the largest distance between A and B is searched among this number of frames.
+#: These frames have the largest distances at random configurations.
 FARTHEST = 4
 #: Longest allowed path length, metres. The squares of longer lengths would overflow.
 LONGEST = 1e150
@@ -114,7 +114,7 @@ def same(
         within = real_number(within, "within")
     for which, robot, names in (("A", robots[0], list(given)), ("B", robots[1], list(given.values()))):
         demand_joint_names(robot.tree, names, which)
-    # The compiled trees of a comparison are many, and the copies own them, not the user's robots.
+    # A comparison makes many compiled trees. They are stored in copies, not in the user's robots.
     return Comparator((copy(robots[0]), copy(robots[1])), given, bounds, boxes, within).judged()
 
 

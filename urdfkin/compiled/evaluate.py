@@ -293,7 +293,8 @@ def _check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
         )
 
 
-#: Smallest batch for several threads by default; starting a thread costs about ten microseconds.
+#: By default, a batch with fewer configurations is computed with one thread.
+#: Starting a thread takes about ten microseconds.
 _WORTH_THREADS = 4096
 
 #: Number of configurations that NumPy computes at a time, so that the intermediate results fit into the

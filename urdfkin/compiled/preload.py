@@ -25,12 +25,12 @@ from urdfkin.system.locks import importing
 if TYPE_CHECKING:
     import subprocess
 
-#: Seconds that a kernel must save before Numba is imported, and seconds before this process compiles the
-#: kernel.
+#: Computing time (s) that a kernel must save before Numba is imported for it.
+#: Computing time (s) that a kernel must save before this process compiles it.
 LOADING, COMPILING = 0.3, 3.0
-#: When this many seconds were spent without a kernel, a second process compiles the kernel.
+#: When computing without a kernel has taken this many seconds, a second process compiles the kernel.
 BESIDE = 1.0
-#: The number of seconds in place of `LOADING` if Numba is imported already.
+#: This number of seconds replaces `LOADING` if Numba is imported already.
 _LOADING_MORE = 0.03
 #: Seconds that each call saves through the fast function for single configurations.
 _SAVED = 5e-5
@@ -130,7 +130,7 @@ def _on_disk(name: str) -> bool:
     return found
 
 
-# -- the process beside ----------------------------------------------------------------------------------
+# -- the second process ----------------------------------------------------------------------------------
 
 #: Code that ends the second process when its standard input closes, which happens when this process ends.
 _UNTIL_CLOSED = (

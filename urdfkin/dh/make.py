@@ -56,8 +56,8 @@ def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tu
     ends = replace(there, base=np.eye(4), tool=np.eye(4))
     names = [joint.name for joint in chain.joints]
     patterns = [one.senses for one in align(chain, ends)]
-    # Base and tool can absorb the sense of the first and of the last joint. Therefore, the two senses of each
-    # of these joints are tried.
+    # Base and tool can absorb the sign of the first and of the last joint.
+    # Therefore, both signs are tried for each of these two joints.
     patterns += [(-first, *rest) for first, *rest in patterns]
     patterns += [(*rest, -last) for *rest, last in patterns]
     best, flip = (math.inf, 0, 0, 0.0, 0), tuple[str, ...]()

@@ -117,7 +117,7 @@ class _Column:
 
 @dataclass(frozen=True, slots=True)
 class _Grid:
-    """The parts of a text with a table.
+    """A table that was found in a text, and the lines of the text outside the table.
 
     Attributes:
         columns: The columns, from the line of headings.

@@ -253,15 +253,16 @@ def travel(limit: Limit | None) -> float:
     return 1.0 if limit is None else max(abs(limit.lower), abs(limit.upper))
 
 
-#: Largest difference between a cell that looks rounded and the nearest round value. Angles differ from a
-#: multiple of 15 degrees, in radians. Lengths differ from 0, in metres per metre of span.
+#: A cell nearly equals a round value if it differs from this value by at most this number.
+#: For an angle, the round values are the multiples of 15 degrees, and the difference is in radians.
+#: For a length, the round value is 0, and the difference is divided by the table's span.
 LARGEST = 1e-4
 #: Tolerances for snapping that the hint tries, in radians, in ascending order.
 TOLERANCES = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
 
 
 def noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
-    """Return (joint, cell, difference from the nearest round value in rad or m) of cells that look rounded.
+    """Return (joint, cell, difference in rad or m) for each cell that nearly equals a round value.
 
     The cell with the smallest difference is first.
     """
@@ -278,16 +279,16 @@ def noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
 
 
 def snap_hint(table: DHTable, snapped: Callable[[float], DHTable]) -> str | None:
-    """Return a line of text that names a cell that looks rounded, and a tolerance for snapping.
+    """Return a line of text with a cell that nearly equals a round value, and a tolerance for snapping.
 
-    This tolerance snaps most of the cells that look rounded.
+    No other tolerance in `TOLERANCES` snaps more of these cells.
 
     Args:
         table: An exact table.
         snapped: Function that returns the same table, snapped with a tolerance (rad).
 
     Returns:
-        The line of text. None if no cell looks rounded, or if no tolerance snaps such a cell.
+        The line of text. None if there is no such cell, or if no tolerance snaps such a cell.
     """
     noisy = noisy_cells(table) if table.snap is None else []
     if not noisy:

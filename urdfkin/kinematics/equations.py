@@ -101,7 +101,7 @@ def interorigin_vector(d, z, a, x):
 
 
 def angular_velocity(w, z, v):
-    """7.127, rotary: angular velocity behind a joint that turns about z with joint velocity v."""
+    """7.127, rotary: angular velocity of the link after a joint that turns about z with joint velocity v."""
     return plus(w, times(v, z))
 
 
@@ -116,7 +116,7 @@ def point_velocity(vel, w, d):
 
 
 def sliding_velocity(vel, z, v):
-    """7.128, prismatic: velocity behind a joint that slides along z with joint velocity v."""
+    """7.128, prismatic: velocity of the link after a joint that slides along z with joint velocity v."""
     return plus(vel, times(v, z))
 
 
@@ -144,7 +144,7 @@ def coriolis(w, u):
 
 
 def angular_acceleration(alpha, w, z, v, a):
-    """7.129, rotary: angular acceleration behind a joint, whose axis turns with w of the link before it."""
+    """7.129, rotary: angular acceleration of the link after a joint; the link before has w and alpha."""
     return plus(plus(alpha, times(a, z)), times(v, cross(w, z)))
 
 
@@ -154,7 +154,7 @@ def point_acceleration(acc, alpha, w, d):
 
 
 def sliding_acceleration(acc, w, z, v, a):
-    """7.130, prismatic: acceleration behind a joint that slides along z; z turns with the link before it."""
+    """7.130, prismatic: acceleration of the link after a joint; the axis z turns with the link before it."""
     return plus(plus(acc, times(a, z)), coriolis(w, times(v, z)))
 
 
@@ -203,12 +203,12 @@ def rate_in_turning_axes(rate, w, x):
 
 
 def turned_along(w, linear, angular):
-    """Return the rate of a column of 7.85 when a joint before it turns axis and arm with w."""
+    """Return the rate of a column of 7.85 when an earlier joint turns its axis and its arm with w."""
     return cross(w, linear), cross(w, angular)
 
 
 def end_moved(z, linear):
-    """Return the rate of the rows z x d of a column when a later joint moves the end of d with `linear`."""
+    """Return the rate of the rows z x d of a column when a later joint moves the end of d at `linear`."""
     return cross(z, linear)
 
 

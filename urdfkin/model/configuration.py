@@ -45,7 +45,7 @@ WIDEST = 10.0
 
 @dataclass(frozen=True, slots=True)
 class NarrowedRange:
-    """The range of a mimicked joint that the limits of its mimic joints make smaller.
+    """A mimicked joint's own range, and the smaller range in which its mimic joints keep their limits.
 
     Attributes:
         joint: Name of the mimicked joint.
@@ -82,8 +82,8 @@ def range_words(ends: tuple[float, float]) -> str:
 def axis_range(kind: JointKind, limit: Limit | None, slide: float = 1.0) -> tuple[float, float]:
     """Return the range of a joint with one axis.
 
-    Without limits, the range of a revolute joint is -pi to pi (rad), and that of a prismatic joint is -slide
-    to slide (m).
+    Without limits, the range of a revolute joint is -pi to pi (rad), and that of a prismatic joint is
+    -`slide` to `slide` (m).
     """
     if kind is not JointKind.CONTINUOUS and is_bounded(limit):
         return limit.lower, limit.upper
@@ -115,7 +115,7 @@ def coordinate_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
 
 
 def narrowed_ranges(tree: KinematicTree) -> tuple[NarrowedRange, ...]:
-    """Return the ranges of mimicked joints that the limits of mimic joints make smaller."""
+    """Return a `NarrowedRange` for each joint whose mimic joints restrict its range further."""
     followers: dict[str, list[Joint]] = {}
     for joint in tree.joints:
         if joint.mimic is not None and joint.limit is not None:
@@ -211,7 +211,7 @@ def rate_names(tree: KinematicTree) -> tuple[str, ...]:
 def _names_and_units(
     tree: KinematicTree, of: Mapping[JointKind, Mapping[str, str]]
 ) -> Iterator[tuple[str, str]]:
-    """Yield a unique name and a unit for each number; a name with a suffix differs from every joint name."""
+    """Yield a unique name and the unit of each number of q or v; no name with a suffix is a joint's name."""
     taken = set[str]()
     for joint in tree.joints:
         if not joint.nv:

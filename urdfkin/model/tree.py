@@ -125,8 +125,8 @@ class Limit:
 #: Largest plausible joint angle, radians. The angle is more than one turn, because some industrial wrists
 #: turn 400 degrees.
 LARGEST_ANGLE = 2.5 * math.pi
-#: Smallest excess over a joint's limits that is far outside, in radians or metres, and as a share of the
-#: joint's range.
+#: A value is far outside a joint's limits if it exceeds them by more than the larger of these two amounts.
+#: The first amount is in radians or metres. The second is a share of the joint's range.
 _OUTSIDE, _OF_RANGE = 0.5, 0.25
 
 

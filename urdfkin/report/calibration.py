@@ -83,7 +83,7 @@ def document(found: Calibration) -> TextDocument:
 
 
 def moved_table(written: Rewritten) -> Table:
-    """Return by how much each joint's origin moved."""
+    """Return a table with the distance and the angle by which each joint's origin changed."""
     rows = [(joint, length(shift), angle(turn)) for joint, (shift, turn) in written.moved.items()]
     return Table(["joint", "origin moved by", "rotated by"], rows)
 

@@ -222,7 +222,7 @@ class Comparison:
         return 1 if self.regressions else 0
 
     def as_dict(self, command: str | None = None) -> ComparisonDocument:
-        """Return plain data for JSON; `command` made it."""
+        """Return plain data for JSON; `command` is the command that asked for it."""
         document = {
             "schema": COMPARISON.name,
             "versions": versions(),
@@ -245,7 +245,7 @@ class ChangeEntry(TypedDict):
 
 
 class ComparisonDocument(Header):
-    """The output of `urdfkin report compare --format json`; `sha256` is of the robots of the new report."""
+    """The output of `urdfkin report compare --format json`; `sha256` belongs to the new report's robots."""
 
     changes: Annotated[list[ChangeEntry], says("All changes between the two reports.")]
 
@@ -275,7 +275,7 @@ def compare(old: Document, new: Document, factor: float = FACTOR) -> Comparison:
 
 
 def _run(old: Document, new: Document) -> Iterator[Change]:
-    """Yield changes of versions, settings and outcome, and an interruption of one run only."""
+    """Yield changed versions, settings and outcomes, and whether only one of the two runs was interrupted."""
     yield from _mapping("version of ", old["versions"], new["versions"])
     yield from _mapping("", *({"seed": str(d["seed"])} for d in (old, new)))
     if old["samples"] != new["samples"]:
@@ -327,7 +327,7 @@ def by_source(document: Document) -> dict[str, Robot]:
 
 
 def renamed_files(before: Mapping[str, Robot], after: Mapping[str, Robot]) -> dict[str, str]:
-    """Return renamed files: a missing and a new source with the same robot name."""
+    """Return the renamed files. A file was renamed if a missing and a new source have the same robot name."""
     gone, new = _by_name(before, after), _by_name(after, before)
     return {
         gone[name][0]: new[name][0] for name in gone if len(gone[name]) == 1 and len(new.get(name, [])) == 1
@@ -370,7 +370,7 @@ def _robot(source: str, old: Robot, new: Robot, factor: float) -> Iterator[Chang
 
 
 def _tables(source: str, old: Robot, new: Robot) -> Iterator[Change]:
-    """Yield Denavit-Hartenberg tables that are compared in one report only."""
+    """Yield a change for each Denavit-Hartenberg table that only one report compares with Pinocchio."""
     before, after = ({(c["base"], c["tip"]): bool(c["samples"]) for c in r["chains"]} for r in (old, new))
     for base, tip in dict.fromkeys([*before, *after]):
         ends = [compared.get((base, tip), False) for compared in (before, after)]

@@ -214,7 +214,7 @@ def _table(table: Table, joints: dict[str, int]) -> dict[str, Any]:
 
 
 def _link(frame: str, links: dict[str, int], joints: dict[str, int]) -> int:
-    """Return the index of the link with a frame."""
+    """Return the index of the link that carries a frame."""
     kind, _, rest = frame.partition(":")
     if kind in ("link", "joint") and (rest in links or rest in joints):
         frame = rest

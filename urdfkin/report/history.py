@@ -44,7 +44,7 @@ _LOWEST = -3.0
 
 
 class Run(TypedDict):
-    """A validation."""
+    """One validation run, as the history lists it."""
 
     file: Annotated[str, says("The report: a file, or the folder of a store.")]
     started: Annotated[str, says("Start time, ISO 8601, UTC.")]
@@ -63,7 +63,7 @@ class Run(TypedDict):
 
 
 class Point(TypedDict):
-    """A robot in one run."""
+    """The results of one robot in one validation run."""
 
     run: Annotated[Count, says("Index of the run.")]
     source: Annotated[str, says("The robot's source in this run.")]
@@ -83,21 +83,21 @@ class Point(TypedDict):
 
 
 class RobotHistory(TypedDict):
-    """A robot in all runs that have it."""
+    """The results of one robot in all validation runs that contain it."""
 
     robot: Annotated[str, says("The robot's latest source.")]
     points: Annotated[list[Point], says("The runs of this robot, the oldest first.")]
 
 
 class Unused(TypedDict):
-    """A file that is not part of the history."""
+    """A file that is left out of the history, with the reason."""
 
     file: Annotated[str, says("The file.")]
     reason: Annotated[str, says("Why the file is not used.")]
 
 
 class HistoryDocument(Header):
-    """The output of `urdfkin report history --format json`; verdict and `sha256` are of the latest run."""
+    """The output of `urdfkin report history --format json`, with verdict and `sha256` of the latest run."""
 
     runs: Annotated[list[Run], says("The runs, the oldest first.")]
     robots: Annotated[list[RobotHistory], says("The robots; worse verdicts first.")]
@@ -140,7 +140,7 @@ class History:
         return 2 if self.unusable else 0
 
     def as_dict(self, command: str | None = None) -> HistoryDocument:
-        """Return plain data for JSON; `command` made it."""
+        """Return plain data for JSON; `command` is the command that asked for it."""
         last = len(self.runs) - 1
         latest = [points[-1]["sha256"] for points in self.robots.values() if points[-1]["run"] == last]
         document = {
@@ -410,7 +410,7 @@ def _by_robot(found: History) -> Told:
 
 
 def _of(told: Told, points: Sequence[Point]) -> list[tuple[int, ChangeEntry]]:
-    """Return the changes of a robot under all its sources."""
+    """Return the changes of a robot whose file may have been renamed, from the names of all its files."""
     return [
         one for source in dict.fromkeys(point["source"] for point in points) for one in told.get(source, [])
     ]

@@ -168,7 +168,7 @@ def _page(document: Document, robots: list[dict[str, Any]], token: str = "", fol
 
 
 def _summary(robot: Robot, index: int) -> dict[str, Any]:
-    """Return the data of a folded robot."""
+    """Return the data for the heading of a robot's section, which is visible while the section is closed."""
     opened = robot["verdict"] != "verified" and index < _FAILURES_OPEN
     return {"index": index, "data": robot, "summary": pages.overview(robot, []), "file": "", "opened": opened}
 

@@ -34,12 +34,12 @@ def print_named(
     *,
     left: Collection[int] = (0,),
 ) -> None:
-    """Print the table of these columns and rows; columns in `left` are left-aligned."""
+    """Print a table with the given columns and rows; the columns in `left` are left-aligned."""
     print_table(out, Table(columns, list(rows), left))
 
 
 def print_table(out: Console, table: Table) -> None:
-    """Print a table with numbers at six digits. The names in the first column are never folded.
+    """Print a table with numbers at six digits. The names in the first column are never split over two lines.
 
     Numbers below the rounding error of the table's largest number are shown as 0; JSON output has full
     precision. On a narrow terminal a long name is on its own line, above the other cells of its row. If the

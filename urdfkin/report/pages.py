@@ -108,7 +108,7 @@ def joint_rows(model: Model) -> list[dict[str, Any]]:
 
 
 def _remaining_range(joint: Joint) -> str:
-    """Return a sentence on the range that the limits of mimic joints leave; empty for the whole range."""
+    """Return a sentence on the range that mimic joints' limits allow a joint; empty for its whole range."""
     kept = joint.get("kept")
     if kept is None:
         return ""
@@ -209,7 +209,7 @@ def chain_rows(chain: Chain, convention: str) -> list[list[str]]:
 
 
 def has_beta(chain: Chain) -> bool:
-    """Whether any row of either table is a Hayati row."""
+    """Whether the standard or the modified table has a Hayati row."""
     return any(row["beta"] != 0.0 for key in ("standard", "modified") for row in _rows(chain, key))
 
 
@@ -290,7 +290,7 @@ def check_rows(robot: Robot) -> list[dict[str, Any]]:
 
 
 def failures(robot: Robot) -> list[dict[str, Any]]:
-    """Return the rows of the failing checks, the largest ratio to its bound first."""
+    """Return the rows of the failed checks, those with the largest ratios of disagreement to bound first."""
     failing = sorted(
         (check for check in robot["checks"] if check["failed"]),
         key=lambda check: -_sortable(check["share_of_bound"]),

@@ -78,7 +78,7 @@ def _both(metres: float, radians: float) -> str:
 
 
 def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
-    """Return the largest distance and angle of all frames in words.
+    """Return in words the largest distance and the largest angle between matching frames.
 
     Return an empty text if distance and angle are within rounding.
     """
@@ -98,7 +98,7 @@ def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
 
 
 def _off(frame: Interval, rounding: tuple[float, float]) -> str:
-    """Return the distance and angle of one frame in words.
+    """Return in words the distance and the angle between a frame of A and the matching frame of B.
 
     Return an empty text if distance and angle are within rounding.
     """
@@ -108,7 +108,7 @@ def _off(frame: Interval, rounding: tuple[float, float]) -> str:
 
 
 def far_frames(found: Sameness) -> list[Interval]:
-    """Return the frames that may be off by more than rounding, the farthest first."""
+    """Return the frames that may differ between A and B by more than rounding, the farthest first."""
     return sorted(
         (
             frame
@@ -125,7 +125,7 @@ def rows(frames: Sequence[Interval]) -> list[list[str]]:
 
 
 def as_written(found: Sameness) -> str:
-    """Return in words how far a frame is off if the models are compared without any changes of B.
+    """Return in words how far a frame of B is from A's frame if the models are compared as they are written.
 
     Return an empty text if the distance is within rounding.
     """
@@ -207,9 +207,9 @@ def as_document(found: Sameness) -> TextDocument:
 
 
 def attained(frame: Interval) -> str:
-    """Return in words how far a frame is off at its worst configuration.
+    """Return in words how far a frame of B is from A's frame at the worst configuration.
 
-    Return an empty text if it is not off.
+    Return an empty text if the two frames coincide.
     """
     parts = [length(frame.lower)] if frame.lower else []
     parts += [angle(frame.radians_seen)] if frame.radians_seen and not frame.lower else []

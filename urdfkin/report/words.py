@@ -137,7 +137,7 @@ def nearer_counts(lines: Sequence[Judged]) -> str:
 
 
 def judged_on(judgement: Judgement) -> str:
-    """Return a text about an accuracy result.
+    """Return a text about the result of the accuracy study.
 
     The text states the number of samples, whether the base moved, and the counts of `nearer_counts`.
     """

@@ -166,7 +166,7 @@ class Robot(Displayable):
         self._tip_frame = tip_frame
         self._has_one_tip = tip_frame is not None or len(list(tree.leaves())) == 1
         self._plans: dict[tuple[int, ...], CompiledTree] = {}
-        #: The evaluators of unchecked and of checked calls, by frame.
+        #: For each frame: the evaluator of unchecked calls, and the evaluator of checked calls.
         self._prepared: dict[object, PreparedFrame] = {}
         self._checked: dict[object, PreparedFrame] = {}
         self._compiled: dict[object, CompiledFrame] = {}
@@ -328,7 +328,7 @@ class Robot(Displayable):
 
     @property
     def link_frames(self) -> tuple[LinkFrame, ...]:
-        """All links as frames `link:NAME`, a list for `placement` and others; each name is unique.
+        """Names `link:NAME` of the frames of all links, each unique; `placement` and others accept this list.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -371,7 +371,7 @@ class Robot(Displayable):
 
     @property
     def all_frames(self) -> tuple[str, ...]:
-        """All links and all joints as frames `link:NAME` and `joint:NAME`, each once.
+        """Names `link:NAME` and `joint:NAME` of the frames of all links and joints, each once.
 
         Each is a `FrameName`, so it is never ambiguous: it means the link or joint NAME, even if another link
         or joint has the literal name `link:NAME`.
@@ -514,7 +514,7 @@ class Robot(Displayable):
         >>> urdfkin.load("planar_two_link").limit_violations([[4.0, 0.0], [0.0, 0.0]])
         ['joint joint_1: 4 is outside [-3, 3]']
         """
-        found = configuration.checked(self.tree, q, "q", look=False)  # the lines themselves ask about degrees
+        found = configuration.checked(self.tree, q, "q", look=False)  # limit_violations asks about degrees
         return configuration.limit_violations(self.tree, found)
 
     def integrate(self, q: Given, v: Given) -> FloatArray:
@@ -805,7 +805,8 @@ class Robot(Displayable):
             from urdfkin.kinematics.bodies import seen_from  # noqa: PLC0415  few calls need these imports
 
         name = as_str(relative_to, "relative_to")
-        name = name if isinstance(name, FrameName) else str(name)  # a replay line prints plain strings
+        # the line that repeats a failed call contains plain strings
+        name = name if isinstance(name, FrameName) else str(name)
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (q,), also=(name,), relative_to=name)
         to = call.flat(out, (4, 4))
         self.verifier.ready(verify)

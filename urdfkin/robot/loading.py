@@ -210,7 +210,7 @@ def _load_mjcf(
 
 
 def _is_plain(robot: Robot) -> bool:
-    """Return whether a robot has the joints of its source: no root joint, no freed and no locked joints."""
+    """Return whether no root joint was added, no joint was locked, and every mimic joint kept its rule."""
     origin = robot.origin
     return origin.mimic is not False and origin.root_joint is None and not origin.lock
 

@@ -738,7 +738,7 @@ def _without_jumps(angle: FloatArray) -> FloatArray:
 
 
 def _floating(joint: Joint, own: FloatArray) -> tuple[FloatArray, list[str]]:
-    """Give each quaternion of a floating joint the sign that makes it closer to the previous quaternion."""
+    """Choose the sign of each floating joint's quaternion so that it is closer to the previous sample's."""
     along = np.sum(own[1:, 3:] * own[:-1, 3:], axis=1)
     new = own.copy()
     new[1:, 3:] *= np.cumprod(np.where(along < 0.0, -1.0, 1.0))[:, np.newaxis]

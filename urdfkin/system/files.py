@@ -175,7 +175,7 @@ def read_start_of_standard_input(count: int) -> bytes:
         SourceError: standard input is closed, or cannot be read.
     """
     try:
-        if sys.stdin is None:  # the parent process closed it
+        if sys.stdin is None:  # the parent process closed standard input
             raise OSError(errno.EBADF, os.strerror(errno.EBADF))
         data: bytes = sys.stdin.buffer.read(count)
     except OSError as error:

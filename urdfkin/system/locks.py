@@ -24,7 +24,7 @@ def lock_over_forks() -> threading.RLock:
     def release() -> None:
         with suppress(
             RuntimeError
-        ):  # another thread made the lock during the fork, before which it was not taken
+        ):  # another thread created this lock during the fork, so the lock was not acquired before the fork
             lock.release()
 
     os.register_at_fork(before=lock.acquire, after_in_parent=release, after_in_child=release)

@@ -468,15 +468,15 @@ class Silences:
 #: are compared with each misspelt name, and the argument `work` of `nearest`.
 SEARCHES, CANDIDATES, WORK = 20, 5_000, 250_000
 
-#: If a file has at least this number of warnings or notes of one kind, they are combined into one finding.
+#: If a file has at least this number of warnings or notes with one code, they are combined into one finding.
 #: The second number is for the codes URDF7xx, which concern content that kinematics does not use.
 FOLDED, FOLDED_EXTRAS = 4, 2
 
-#: Number of errors of one kind that are not combined.
+#: Number of errors with one code that are reported separately. Of further errors, only the lines are listed.
 ERRORS_SHOWN = 100
 
-#: Largest number of findings of one kind that are stored completely. Of each further finding, only its line
-#: is stored.
+#: Largest number of findings with one code that are stored completely.
+#: Of each further finding, only its line is stored.
 WRITTEN_OUT = 10_000
 
 

@@ -258,7 +258,7 @@ class Mistakes:
             yield "angles of the result are in degrees", partial(np.asarray, angles)
         for factor, words in (
             (np.radians(1.0), "the function takes q in degrees"),
-            (np.degrees(1.0), "the function converts q to degrees, or takes it in degrees twice"),
+            (np.degrees(1.0), "the function multiplies q by 180/pi, although q must be in radians"),
         ):
             yield words, partial(case.compute, self._scaled(case.inputs, turns, factor, 1))
             if len(case.inputs) > 1:

@@ -380,7 +380,7 @@ class SecondReading(TypedDict):
     by: Annotated[str, says("Name and version of the second reader.")]
     joints: Annotated[Count, says("Number of joints compared in both readings, fixed joints included.")]
     differences: Annotated[
-        list[str], says("Differences between the two readings that are an error of one reader.")
+        list[str], says("Differences between the two readings, each caused by an error of one reader.")
     ]
     known: Annotated[list[str], says("Known faults of the second reader that explain a difference.")]
     unread: Annotated[str | None, says("Reason why the second reader cannot read the text; null if it can.")]

@@ -49,7 +49,7 @@ class Row:
         return task
 
     def put_back(self, task: Task) -> None:
-        """Put a task back, so that it is the next task of this row."""
+        """Put a task back, so that it is the robot's next task."""
         self._tasks = chain([task], self._tasks)
 
 
@@ -68,7 +68,7 @@ class WorkQueue:
         self._ended = set[int]()
 
     def first(self) -> tuple[Task, Row] | None:
-        """Return a task for a worker that has no robot yet, and the row of this task.
+        """Return a task for a worker that has no robot yet, and the remaining tasks of the task's robot.
 
         Return None if no task is left.
         """
@@ -82,7 +82,7 @@ class WorkQueue:
         return None
 
     def next(self, row: Row) -> Task | None:
-        """Return the next task of a row; None if the row has no task, or if its robot was ended."""
+        """Return the next task of a robot; None if no task is left, or if the robot was ended."""
         task = next(row, None)
         if task is None or task.robot in self._ended:
             if row in self._begun:
@@ -91,7 +91,7 @@ class WorkQueue:
         return task
 
     def put_back(self, task: Task, row: Row) -> None:
-        """Put a task back into its row, so that a worker without a robot can take this row."""
+        """Put a task back into its `Row`, so that a worker without a robot can take over its robot."""
         row.put_back(task)
         self._begun.remove(row)
         self._waiting = chain([row], self._waiting)

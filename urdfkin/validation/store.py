@@ -312,7 +312,7 @@ def _check_or_write_manifest(store: Store, *, retry_failed: bool) -> Store:
 
 
 def _only_failed_ones_differ(store: Store, manifest: Manifest) -> bool:
-    """Return whether two manifests differ only in the texts of robots that failed."""
+    """Return whether two manifests differ only in the digests of failed robots, whose files have changed."""
     own, theirs = store.manifest, manifest
     if len(own.robots) != len(theirs.robots):
         return False

@@ -1,8 +1,9 @@
 """Test vectors: robots, configurations, and results at 50 digits with a tolerance for every number.
 
-The robots are those of `robots/features.toml`, with one feature of URDF each, and those of the catalogue by
-reference. The reader of `urdfkin.verify.exact` computes all values from the decimals of the URDF. The files
-depend on nothing but these texts: configurations are made from digests, not by a random generator.
+The file `robots/features.toml` defines small robots with one feature of URDF each. The other robots are those
+of the catalogue, which the files name but do not contain. The reader of `urdfkin.verify.exact` computes all
+values from the decimals of the URDF. The files depend on nothing but these texts: configurations are made
+from digests, not by a random generator.
 """
 
 from __future__ import annotations
@@ -49,16 +50,19 @@ from urdfkin.verify.quantities import (
     Quantity,
 )
 
-#: Version of the vectors. Another first number: other files do not fit programs that read these.
+#: Version of the file format of the test vectors.
+#: If its first number changes, programs for the old format cannot read the new files.
 VERSION = "1.0"
 LICENCE = "CC0-1.0"
 #: Number of configurations of each robot; the first is the zero configuration, as far as limits allow it.
 SAMPLES = 3
-#: Range of joint velocities and accelerations, and of positions of planar and floating joints, +-.
+#: Joint velocities, accelerations, and positions of planar and floating joints lie between -_RANGE and
+#: _RANGE.
 _RANGE = 2.0
 #: Inputs are multiples of 1 / _GRID where limits allow it, so that their few decimals are exactly doubles.
 _GRID = 1024.0
-#: Digits of a tolerance, and those before it is rounded up.
+#: Number of digits of a written tolerance, which is rounded up.
+#: Before that, the tolerance is rounded to `_SAME` digits.
 _DIGITS, _SAME = 3, 12
 
 SPATIAL_ACCELERATION = replace(
@@ -66,14 +70,15 @@ SPATIAL_ACCELERATION = replace(
     name="spatial acceleration",
     exact=lazy_import("urdfkin.verify.exact.recursion:spatial_acceleration_values"),
 )
-#: The quantities of the vectors. The scale of an acceleration includes w x vel, the difference of the two.
+#: The quantities of the test vectors.
+#: The scale of a classical and of a spatial acceleration includes w x vel, which is their difference.
 QUANTITIES = (
     PLACEMENT, VELOCITY, JACOBIAN, JACOBIAN_RATE, HESSIAN, ACCELERATION, SPATIAL_ACCELERATION,
 )  # fmt: skip
 
 
 class JointEntry(TypedDict):
-    """A joint with coordinates of its own, and their places in q, v and a."""
+    """A joint with its own coordinates, and the indices of its numbers in q, v and a."""
 
     name: Annotated[str, says("Name of the joint.")]
     type: Annotated[str, says("Type of the joint in the URDF.")]
@@ -82,7 +87,7 @@ class JointEntry(TypedDict):
 
 
 class Result(TypedDict):
-    """A quantity of a frame; metres, radians, seconds."""
+    """The values of one quantity of one frame, in metres, radians and seconds."""
 
     quantity: Literal[
         "placement",
@@ -207,7 +212,7 @@ def _robot(row: Mapping[str, Any]) -> str:
 
 
 def _fraction(*words: object) -> float:
-    """Return a number of [0, 1) that depends on the words alone."""
+    """Return a number in [0, 1) that depends only on the given words."""
     digest = hashlib.sha256("\n".join(map(str, words)).encode()).digest()
     return int.from_bytes(digest[:6], "big") / 2.0**48
 
@@ -263,7 +268,7 @@ class _Decimals:
         return angles, rules
 
     def _value(self, name: str, at: Mapping[str, float]) -> tuple[float, float, int]:
-        """Return the size of a joint's value, its error in eps, and the number of rules of its chain."""
+        """Return a joint value's size, its error in eps, and the number of mimic rules that determine it."""
         rule = self.elements[name].find("mimic")
         if rule is None or name in at:
             return abs(at[name]), 0.0, 0
@@ -276,7 +281,7 @@ def _tolerance(k: float, scale: float) -> str:
     """Return k eps scale as a decimal, rounded up; 0 if the scale is 0."""
     if scale == 0.0:
         return "0"
-    with localcontext(prec=_SAME):  # without the last digits, in which processors may differ
+    with localcontext(prec=_SAME):  # drop the last digits, in which processors may differ
         number = +Decimal(k * max(EPS * scale, LEAST_UNIT))
     with localcontext(prec=_DIGITS, rounding=ROUND_CEILING):
         return str((+number).normalize())
@@ -332,7 +337,7 @@ def write_features(folder: Path, samples: int = SAMPLES) -> Iterator[Written]:
 
 
 def write_robot(folder: Path, robot: Robot, samples: int = SAMPLES) -> Written:
-    """Write the vectors of a robot: of the catalogue by reference, any other robot with its URDF.
+    """Write the test vectors of a robot, with its URDF if the robot is not in the catalogue.
 
     Args:
         folder: An existing folder.
@@ -368,7 +373,7 @@ def write_catalogue(folder: Path, samples: int = SAMPLES) -> Iterator[Written]:
 
 
 def name_of(robot: Robot) -> str:
-    """Return the name of a robot in its vectors: that in the catalogue, or that in its URDF."""
+    """Return a robot's name in its test vectors: the catalogue's name, or else the URDF's name."""
     return robot.source if robot.source in catalogue() else robot.name
 
 

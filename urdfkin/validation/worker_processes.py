@@ -248,7 +248,7 @@ class _Crew:
 
 
 class _Worker(WorkerProcess):
-    """A worker process with its current task, and the row of tasks of its robot."""
+    """A worker process, its current task, and the remaining tasks of the robot that it works on."""
 
     def __init__(self) -> None:
         super().__init__()

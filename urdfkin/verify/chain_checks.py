@@ -113,7 +113,7 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
     own = screws.coupling.select(verifier.tree, q)
     off = np.abs(base @ screws.placement(own) - tip)[:, :3]
     path = chain(verifier.tree, screws.tip_frame, screws.base_frame)
-    # Pinocchio computes from the root to the base and to the tip; the product, from the base to the tip.
+    # Pinocchio computes the poses of base and tip from the root. The product goes from the base to the tip.
     lever = np.linalg.norm(base[:, :3, 3], axis=-1) + path.reach + float(path.lengths[0])
     joints = sum(len(verifier.tree.path(verifier.tree.frame_link(end))) for end in (path.base, path.tip))
     unit = EPS * (of_joints(joints) + np.abs(own).sum(axis=-1)) + left_out(path)

@@ -17,7 +17,7 @@ from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.configuration import coordinate_ranges, neutral, own_ranges
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
-#: Range of positions of planar and floating joints, +- m.
+#: Positions of planar and floating joints lie between -_RANGE and _RANGE, in metres.
 _RANGE = 2.0
 
 

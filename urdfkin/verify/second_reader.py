@@ -62,7 +62,7 @@ class SecondReading:
     Attributes:
         by: Name and version of the reader.
         joints: Number of compared joints, fixed joints included.
-        differences: Differences that are an error of one of the two readers.
+        differences: Differences between the two readings, each caused by an error of one reader.
         known: Differences that are known faults of yourdfpy.
         unread: Why yourdfpy cannot read the text; None if it can.
     """

@@ -168,7 +168,7 @@ PANELS: dict[str, Panel] = {
     "disagreement": disagreement,
 }
 
-#: Suffix of the unit of a coordinate in the panels of q, v and a.
+#: Text that follows the unit of a joint coordinate: nothing for q, "/s" for v, "/s²" for a.
 _PER = {"q": "", "v": "/s", "a": "/s²"}
 #: Names of the panels of coordinates. Each panel has one plot for each unit.
 COORDINATES = tuple(_PER)
@@ -320,7 +320,7 @@ def _panels(robot: Robot, trajectory: Trajectory, names: Sequence[str]) -> list[
 
 
 def way(x: FrameMotion, trajectory: Trajectory) -> str:
-    """Return a line with the start, the end and the duration of the frame's motion."""
+    """Return a line of text with the start, the end and the duration of the frame's motion."""
     ends = [
         "({})".format(", ".join(f"{p:.3g}" for p in x.placement[k, :3, 3].round(9) + 0.0)) for k in (0, -1)
     ]
@@ -328,7 +328,7 @@ def way(x: FrameMotion, trajectory: Trajectory) -> str:
 
 
 def foot(x: FrameMotion, trajectory: Trajectory) -> str:
-    """Return a line with the result of the check, and the values that were not checked."""
+    """Return a line of text with the result of the check and with the values that were not checked."""
     rates = f"rates {trajectory.rates}" + (", exactly" if trajectory.exact else f"; {_RATES_UNCHECKED}")
     if x.not_verified is not None:
         return f"NOT VERIFIED by Pinocchio {version()}: {x.not_verified}; {rates}"

@@ -325,7 +325,7 @@ class Stage:
             client.camera.position, client.camera.look_at = position, middle
 
     def show(self, *, shapes: str, skeleton: bool, axes: bool, names: str) -> None:
-        """Show or hide parts: `shapes` is one of `SHAPES`, `names` one of `NAMES`."""
+        """Show or hide shapes and names; `shapes` is one of `SHAPES`, and `names` is one of `NAMES`."""
         self.skeleton_shown = skeleton
         if shapes == SEE_THROUGH and not self._transparent:
             self._transparent = self._add_transparent()

@@ -54,7 +54,7 @@ _MOST_MISSING = 5
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """The number of one slider.
+    """The number that one slider sets.
 
     Attributes:
         at: Index in the vector.
@@ -77,7 +77,7 @@ class Sliders:
         gui: Viser's GUI.
         folder: The folder of the sliders.
         rows: The numbers to show.
-        rate: Suffix of a unit: "", "/s" or "/s²".
+        rate: Text after the unit: "" for q, "/s" for v, "/s²" for a.
         moved: Called with the index and the number when the user moves a slider.
     """
 
@@ -180,7 +180,7 @@ def fixed_coordinates(robot: Robot) -> list[str]:
 
 
 def rate_rows(robot: Robot, *, second: bool) -> list[Row]:
-    """Return a row for each joint velocity or, with `second`, for each joint acceleration."""
+    """Return a row for each joint velocity or, if `second` is true, for each joint acceleration."""
     rows = []
     for joint, at in zip(robot.tree.joints, robot.tree.v_index, strict=True):
         for k in range(joint.nv):
@@ -343,7 +343,7 @@ class Viewer:
 
     @property
     def file_name(self) -> str:
-        """The name of a saved file, without its suffix: the robot's, in letters that every system allows."""
+        """The robot's name in letters that every system allows in a file name, without a suffix."""
         return re.sub(r"[^A-Za-z0-9_-]+", "-", self.robot.name).strip("-") or "robot"
 
     # -- controls ------------------------------------------------------------------------------------
@@ -351,7 +351,7 @@ class Viewer:
     def _build(self, trajectory: Trajectory | None) -> None:
         gui, robot = self.server.gui, self.robot
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
-        gui.main_panel.dock_right()  # beside the picture, not over it
+        gui.main_panel.dock_right()  # show the controls beside the picture, not over it
         gui.set_panel_label(printable(robot.name))
         if self.stage.missing:
             gui.add_markdown(missing_words(self.stage.missing))

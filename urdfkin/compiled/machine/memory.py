@@ -119,8 +119,8 @@ def _at_address(kind: Any) -> Any:
     return at_address
 
 
-#: The first function returns a pointer to the doubles at an address, the second function a pointer to the
-#: integers.
+#: The first function returns a pointer to the doubles at an address.
+#: The second function returns a pointer to the integers at an address.
 numbers_at, whole_numbers_at = map(_at_address, (NUMBERS, WHOLE_NUMBERS))
 
 

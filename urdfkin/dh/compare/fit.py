@@ -442,8 +442,8 @@ def _opposite_rotations(model: Model) -> list[Model]:
 
 #: Number of sign patterns that `align` returns, and number of patterns that it keeps at each joint.
 PATTERNS, BEAM = 12, 128
-#: Cost of each reversed joint (metres). Among equally good patterns, this cost selects the pattern with the
-#: URDF's senses.
+#: A pattern costs this much (metres) more for each joint that it reverses.
+#: Among equally good patterns, the search therefore selects the joint signs of the URDF.
 REVERSAL = 1e-9
 #: Weight of a difference in a cell next to a prismatic axis. The line of this axis is free, so such a
 #: difference decides only between otherwise equal patterns.
@@ -520,8 +520,9 @@ def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: in
             for extended in _extend(partial, chain, reference, i, sense, reach)
         ]
         partials = _without_equivalents(sorted(longer, key=lambda partial: partial.cost))[:beam]
-    # If axes nearly coincide, many directions of x are nearly equivalent. A fit that starts from one of these
-    # directions can reach the others, so one pattern for each set of senses is enough.
+    # If axes nearly coincide, many directions of x are nearly equivalent.
+    # A fit that starts from one of these directions can reach all of them.
+    # Therefore, only the best pattern is kept for each combination of joint signs.
     by_senses: dict[tuple[int, ...], _Partial] = {}
     for partial in partials:
         by_senses.setdefault(partial.senses, partial)

@@ -94,7 +94,7 @@ class Search:
         return ()
 
     def _needs_one_thing(self, table: DHTable) -> bool:
-        """Whether a table agrees after a fit of a single parameter: the base, the tool, a zero or a sense."""
+        """Whether a table agrees after a fit of one parameter: base, tool, a joint zero or a joint sign."""
         if self._with_one_end(table) is not None:
             return True
         model = self._with_zeros(table)

@@ -36,10 +36,11 @@ from urdfkin.errors import InputError, Question, RangeError
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
 
-#: Number of readings that are fitted; largest tilt (rad) of axes that count as parallel; relative cost of
-#: each further difference from the reading that the file states.
+#: Number of readings that are fitted.
+#: Axes with a smaller tilt (rad) count as parallel.
+#: The relative cost of each difference between a reading and the reading that the file states.
 _TRIED, _PARALLEL, _WORTH = 3, 2e-2, 0.1
-#: Largest fraction of the tip error that may remain with another reading.
+#: Another reading explains a disagreement if at most this fraction of the tip error remains.
 _EXPLAINS = 0.05
 
 

@@ -333,11 +333,11 @@ def transcoded(name: str) -> str:
 
     Different names give different results.
 
-    The result begins with "tn__", followed by the characters that are allowed and "_". After that comes a
-    number with digits of base 62 for each other character, in the order of code points. The number encodes
-    the character and its position in the name: the difference of its code point from the previous code point,
-    times the number of possible positions, plus the position (Bootstring encoding). Source:
-    github.com/PixarAnimationStudios/OpenUSD-proposals, proposals/transcoding_invalid_identifiers.
+    The result begins with "tn__". The characters of the name that OpenUSD allows follow, and then "_". After
+    that comes a number with digits of base 62 for each other character, in the order of code points. The
+    number encodes the character and its position in the name: the difference of its code point from the
+    previous code point, times the number of possible positions, plus the position (Bootstring encoding).
+    Source: github.com/PixarAnimationStudios/OpenUSD-proposals, proposals/transcoding_invalid_identifiers.
 
     >>> transcoded("1"), transcoded("arm-2"), transcoded("arm_2")
     ('tn__1_', 'tn__arm2_g6', 'arm_2')

@@ -137,7 +137,7 @@ class Pairing:
         return known
 
     def same_shape(self, bodies: tuple[int, int], via: Via) -> bool:
-        """Return whether the subtrees behind two bodies have equal branches with equal kinds of joints."""
+        """Return whether the subtrees after two bodies have equal branches with equal kinds of joints."""
         shapes = (
             sorted(self._signature(m, body, edge) for edge in m.edges_of[body] if edge is not by)
             for m, body, by in zip((self.a, self.b), bodies, via, strict=True)
@@ -145,7 +145,7 @@ class Pairing:
         return next(shapes) == next(shapes)
 
     def alike(self, bodies: tuple[int, int], e: Edge, f: Edge) -> bool:
-        """Return whether the subtrees behind two joints have equal branches with equal kinds of joints."""
+        """Return whether the subtrees after two joints have equal branches with equal kinds of joints."""
         return self._signature(self.a, bodies[0], e) == self._signature(self.b, bodies[1], f)
 
     def all_lie_alike(self, bodies: tuple[int, int], X: FloatArray) -> bool:
@@ -229,7 +229,7 @@ class Pairing:
         return one.shape != other.shape, off, place + self.a.size * points_back
 
     def _signature(self, mechanism: Mechanism, body: int, edge: Edge) -> str:
-        """Return a text that lists the kinds of the joints in the subtree behind a joint."""
+        """Return a text that lists the kinds of the joints in the subtree after a joint."""
         key = mechanism is self.a, body, edge.joint
         if (known := self._signatures.get(key)) is None:
             beyond = edge.beyond(body)
@@ -374,7 +374,7 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
     """Yield poses of B's root that align the first axis of B with the first axis of A, then the later axes.
 
     After the first axis is aligned, a rotation about it and a translation along it are still free. The axes
-    behind the first axis determine this rotation and this translation. If no axes follow, as for a rotor, the
+    after the first axis determine this rotation and this translation. If no axes follow, as for a rotor, the
     other axes of the same body determine the rotation and the translation.
     """
     firsts = _firsts((a, b), (None, None), bodies, ())
@@ -455,7 +455,7 @@ def _guesses(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: boo
 def _firsts(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], near: tuple[Both[Axis], ...]
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
-    """Return pairs of first revolute axes, one of A and one of B, with the axes before and behind each pair.
+    """Return pairs of first revolute axes, one of A and one of B, with the axes before and after each pair.
 
     If there is no revolute axis, pairs of prismatic axes are returned.
     """
@@ -492,8 +492,8 @@ def _axis(mechanism: Mechanism, edge: Edge, seen: Screw | None = None) -> Axis:
     return Axis(screw, mechanism.joint(edge).kind.turns, seen or screw)
 
 
-#: A function that returns candidate poses of B's body behind two joints. The arguments of the function are
-#: the bodies behind the joints, the joints, and the pose of B's body before the joints.
+#: A function that returns candidate poses of B's body after two joints. The arguments of the function are
+#: the bodies after the joints, the joints, and the pose of B's body before the joints.
 Poses = Callable[[tuple[int, int], Pair, FloatArray], Iterable[FloatArray]]
 
 #: Largest number of joints on a path for the recursive search. Robots with longer paths are matched joint by
@@ -511,10 +511,10 @@ Rates = Mapping[str, tuple[str, float]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Match:
-    """The match of the subtrees behind two joints.
+    """The match of the subtrees after two joints.
 
     Attributes:
-        X: (4, 4) pose of B's body behind the joint.
+        X: (4, 4) pose of B's body after the joint.
         rates: The corresponding coordinates of A and B in these subtrees.
     """
 
@@ -530,7 +530,7 @@ class Congruence:
         b: The other mechanism.
         pairing: Joints and links paired by name.
         tolerance: Tolerance for the comparison of joint axes.
-        poses: Returns candidate poses of B's body behind a joint.
+        poses: Returns candidate poses of B's body after a joint.
     """
 
     def __init__(
@@ -547,7 +547,7 @@ class Congruence:
         self._known.clear()
 
     def at(self, bodies: tuple[int, int], via: Via, X: FloatArray) -> Sequence[Pair] | None:
-        """Return the joint pairs at two bodies if the subtrees behind these bodies match exactly, else None.
+        """Return the joint pairs at two bodies if the subtrees after these bodies match exactly, else None.
 
         Args:
             bodies: Of A and of B.
@@ -558,7 +558,7 @@ class Congruence:
         return None if found is None else found[0]
 
     def behind(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> FloatArray | None:
-        """Return the pose (4, 4) of B's body behind two joints that gives an exact match, or None.
+        """Return the pose (4, 4) of B's body after two joints that gives an exact match, or None.
 
         Args:
             e: Joint of A.
@@ -595,7 +595,7 @@ class Congruence:
         tries: list[int],
         rates: Rates,
     ) -> tuple[Sequence[Pair], Rates] | None:
-        """Assign a different joint of B to each joint of A, so that the subtrees behind each pair match.
+        """Assign a different joint of B to each joint of A, so that the subtrees after each pair match.
 
         If there is no such assignment, the result is None.
         """
@@ -634,7 +634,7 @@ class Congruence:
         return found
 
     def _rate(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> Rates:
-        """Return the correspondence of the coordinates of two joints.
+        """Return which coordinate of A corresponds to which coordinate of B, for two matched joints.
 
         The result is empty if one of the two joints has no coordinate.
         """

@@ -257,11 +257,11 @@ class MechanismMatcher:
         return self.pairing.edges(place.bodies, place.via, place.G, place.XC)
 
     def _exact_pairs(self, bodies: tuple[int, int], via: Via, X: FloatArray) -> Sequence[Pair] | None:
-        """Return the joint pairs at two bodies if the subtrees behind the bodies match exactly, else None."""
+        """Return the joint pairs at two bodies if the subtrees after the bodies match exactly, else None."""
         return None if self.exact is None else self.exact.at(bodies, via, X)
 
     def _poses_behind(self, beyond: tuple[int, int], via: Pair, X: FloatArray) -> Iterator[FloatArray]:
-        """Yield candidate poses of B's body behind two joints of the same kind.
+        """Yield candidate poses of B's body after two joints of the same kind.
 
         The candidates follow from the pose of B's body before the joint.
         """
@@ -327,7 +327,7 @@ class MechanismMatcher:
         return ours, [j for j in self.b.bodies[place.bodies[1]] if names_b[j] not in names_a]
 
     def _step(self, place: Place, e: Edge, f: Edge, index: int, depth: int) -> tuple[Step, Place, Score]:
-        """Return the step over a pair of joints, the position behind the joints and that position's score."""
+        """Return the step over a pair of joints, the position after the joints and that position's score."""
         kinds = family(self.a.joint(e).kind), family(self.b.joint(f).kind)
         via = e, f
         backwards = e.outer == place.bodies[0], f.outer == place.bodies[1]
@@ -400,17 +400,17 @@ class MechanismMatcher:
         plane: FloatArray | None,
         poses_behind: Iterable[FloatArray],
     ) -> Iterator[FloatArray]:
-        """Yield candidates for the rigid motion N between B's joint frame and the body behind the joint.
+        """Yield candidates for the rigid motion N between B's joint frame and the body after the joint.
 
         The candidates are the identity, N in the zero configuration, and motions that align a link or an
         axis.
 
         Args:
-            there: The position behind the joint, with B in its zero configuration.
+            there: The position after the joint, with B in its zero configuration.
             at: (4, 4) the joint's frame.
             home_b: (4, 4) the frame of B's joint in the zero configuration.
             plane: (4, 4) N of a planar joint, up to a motion in the joint's plane; None for a floating joint.
-            poses_behind: (4, 4) poses that align B's axes behind the joint with A's.
+            poses_behind: (4, 4) poses that align B's axes after the joint with A's.
         """
         yield IDENTITY if plane is None else plane
         wanted = [there.XC]
@@ -458,7 +458,7 @@ class MechanismMatcher:
         return Step(a, b, kind, place.previous, sense, with_it[0], before, s, s, tilt, shift), *with_it[1:]
 
     def _exact_pose(self, place: Place, there: Place) -> FloatArray | None:
-        """Return the motion XC (4, 4) behind two joints that gives an exact match, or None."""
+        """Return the motion XC (4, 4) after two joints that gives an exact match, or None."""
         if self.exact is None:
             return None
         X = self.exact.behind(*_both(there.via), place.bodies, inverse(place.G) @ place.XC)
@@ -473,7 +473,7 @@ class MechanismMatcher:
     def _best_zero(
         self, there: Place, G: FloatArray, t: Screw, turns: bool, zero: float | None, depth: int
     ) -> tuple[float, Place, Score]:
-        """Return the offset of B's joint with which most links and axes behind it agree; 0 is tried first."""
+        """Return the offset of B's joint with which most links and axes after it agree; 0 is tried first."""
         offsets = self._offsets(there, G, t, turns) if zero is None else (zero,)
         moved = (
             (offset, there.XC @ along(t, offset, turns=turns) if offset else there.XC) for offset in offsets
@@ -508,7 +508,7 @@ class MechanismMatcher:
         return _best_of(seen)
 
     def _with_behind(self, place: Place, here: Score, depth: int) -> Score:
-        """Return the score of a position, including the scores of the joints behind it."""
+        """Return the score of a position, including the scores of the joints after it."""
         pairs = self.pairing.edges(place.bodies, place.via, place.G, place.XC)[0]
         self.ahead.left -= len(pairs)
         scores = [here, *(self._step(place, e, f, -1, depth - 1)[2] for e, f in pairs)]
@@ -526,7 +526,7 @@ class MechanismMatcher:
         return len(off) - len(wrong), max(wrong, default=0.0)
 
     def _offsets(self, there: Place, G: FloatArray, t: Screw, turns: bool) -> Iterator[float]:
-        """Yield candidate zeros of B's joint: 0, then zeros that align a link or an axis behind the joint."""
+        """Yield candidate zeros of B's joint: 0, then zeros that align a link or an axis after the joint."""
         yield 0.0
         u = t.moved(there.XC)
         for i, j in self.pairing.links(*there.bodies):
@@ -589,7 +589,7 @@ def _both(via: tuple[Edge | None, Edge | None]) -> tuple[Edge, Edge]:
 
 
 def _all_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> list[int]:
-    """Return the indices of the given joints at a body and of all joints behind these joints."""
+    """Return the indices of the given joints at a body and of all joints after these joints."""
     found, stack = [], [(body, edge) for edge in edges]
     while stack:
         here, edge = stack.pop()
@@ -778,7 +778,7 @@ class _Rule:
         offset: The offset o that the alignment found.
         turns: Whether the joint is revolute.
         free: Whether o is free: no axis and no common link determines it.
-        meets: Whether links of A and of B coincide on the body behind the joint.
+        meets: Whether links of A and of B coincide on the body after the joint.
     """
 
     step: int
@@ -859,7 +859,7 @@ def _as_rule(joint: Joint) -> tuple[str, float, float]:
 def _is_determined(found: Alignment, i: int) -> tuple[bool, bool]:
     """Return whether axes or common links determine a joint's zero, and whether other links coincide.
 
-    The other links are links of A and B without common names, on the body behind the joint.
+    The other links are links of A and B without common names, on the body after the joint.
     """
     names = set(found.a.tree.links) & set(found.b.tree.links)
     behind = {i}

@@ -6,7 +6,7 @@ this product, so links that are fixed to each other may be merged or split. Any 
 path from another body passes some joints backwards, with reversed screws.
 
 The coordinates of a planar or floating joint are a pose P. If the frame of B's joint, or the frame of the
-body behind this joint, is another than in A, the motions are equal for
+body after this joint, is another than in A, the motions are equal for
 
     P_b = M P_a N,      or      M P_a^-1 N if one model's joint is reversed.
 
@@ -477,7 +477,7 @@ class FramePair:
         b: Link of B (index in its tree).
         previous: Index of the step whose joints move the links; -1 if no joint moves them.
         home: (4, 4) pose of A's link in the zero configuration.
-        end: (4, 4) the rigid motion L that is inserted behind the last joint, in A's zero configuration.
+        end: (4, 4) the rigid motion L that is inserted after the last joint, in A's zero configuration.
         tilt: Angle (rad) between the frames of A's link and B's link on the matched body.
         shift: Distance (m) between the origins of these two frames on the matched body.
         tool: (4, 4) pose of B's link in the frame of A's link, if B's link counts as a different end-effector

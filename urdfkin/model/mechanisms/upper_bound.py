@@ -13,7 +13,7 @@ directions form an arc. The arc lies in a circumscribed polygon, and h on the po
 For each joint, the grid makes the bound too large by a fraction. This fraction decreases with the square of
 the distance between grid points.
 
-Recursion. Let y be the position of B's frame, as the joints behind joint i move it, and let d be y minus the
+Recursion. Let y be the position of B's frame, as the joints after joint i move it, and let d be y minus the
 position of A's frame. The joint and its L change d to
 
     d' = (L - 1) e(S' t') y  +  (e(S' t') - e(S t')) y  +  (e(S t') - e(S t)) y  +  e(S t) d.
@@ -215,7 +215,7 @@ def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]
 
 #: The two grids: a coarse grid for every frame, and a fine grid for the frame with the largest bound.
 COARSE, FINE = Grid(8, 24), Grid(16, 48)
-#: Largest number of values of a variable that are treated one by one.
+#: If the range of a variable needs more grid values than this number, they are not examined one by one.
 MOST_VALUES = 1024
 
 
@@ -295,7 +295,7 @@ def _off(L: FloatArray, reach: float) -> float:
 
 
 def at_the_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
-    """Return the support functions of d and y behind the last joint."""
+    """Return the support functions of d and y after the last joint."""
     p, end = frame.home[:3, 3], frame.end
     y = end[:3, :3] @ p + end[:3, 3]
     return point(grid, y - p), point(grid, y)
@@ -304,8 +304,9 @@ def at_the_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
 def passed(
     step: Step, pair: Pair | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
-    """Return the support functions of d and y in front of a step, from those behind the step."""
-    # a planar or floating joint has no limits, so it may rotate to the direction with the largest value
+    """Return the support functions of d and y in front of a step, from those after the step."""
+    # A planar or floating joint has no limits, so it may rotate d into any direction.
+    # The largest value of d's support function therefore holds for all directions.
     if pair is None:
         d = Support(d.grid, d.largest() * d.grid.lengths)
         y = Support(d.grid, np.full(len(d.grid.points), math.inf))

@@ -34,7 +34,8 @@ _TWO_DOUBLES = 30
 #: Bits for each decimal digit, and additional bits. Fifteen digits get 55 bits, two more than a double has,
 #: because a ball with 53 bits is up to four times as wide as an interval whose ends have 53 bits.
 _BITS, _MORE_BITS = math.log2(10.0), 5
-#: Significant digits of a decimal: every double is determined by so many. Digits while it is computed.
+#: Number of significant digits of a written decimal. Every double is determined by so many digits.
+#: Number of digits of the decimal while it is computed.
 _SIGNIFICANT, _ALL_DIGITS = 17, 200
 #: Additional bits of precision during iterations.
 _SPARE = 30

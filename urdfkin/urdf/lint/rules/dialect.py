@@ -233,7 +233,7 @@ _ONCE = {
 #: Elements that have their values in attributes. Readers ignore text between their tags.
 _VALUES = {"origin", "axis", "limit", "mimic", "parent", "child"}
 
-#: Elements in which text between the tags can only be a value in the wrong position.
+#: In these elements, any text between the tags is a value that belongs in an attribute.
 _VECTORS = ("origin", "axis")
 
 
