@@ -191,7 +191,7 @@ def test_a_stores_folder_for_writing_that_is_a_link_leaves_what_it_leads_to_as_i
 def test_arrays_that_unpack_to_more_than_the_limit_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("urdfkin.motion.trajectory.MOST_DATA", 2 * 10**7)
+    monkeypatch.setattr("urdfkin.robot.trajectory.MOST_DATA", 2 * 10**7)
     head = io.BytesIO()
     np.lib.format.write_array_header_1_0(head, {"descr": "<f8", "fortran_order": False, "shape": (2**29, 1)})
     with (
