@@ -146,6 +146,7 @@ def test_a_wrong_cell_is_named_with_its_size(row: int, cell: str) -> None:
     named = [(one.row, one.cell) for one in found.differences]
     parallel = {(1, "d"), (2, "d"), (3, "d")} if (row, cell) in {(1, "d"), (2, "d")} else set()
     assert len(named) == 1
+    assert found.mistakes == ()  # the value is wrong, and not its sign or its place
     assert named[0] == (row, cell) or (parallel and named[0] in parallel)
     assert abs(found.differences[0].difference) == pytest.approx(2e-3, rel=1e-6)
 
