@@ -16,7 +16,7 @@ from typing import Any
 from urllib.parse import quote
 
 from urdfkin.urdf.findings import Finding, Fix, Rule, Severity
-from urdfkin.urdf.lint.pages import RULES, page
+from urdfkin.urdf.lint.pages import OF_OTHERS, RULES, find_rule, page
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 
@@ -30,13 +30,13 @@ def as_sarif(findings: Sequence[Finding], version: str, silenced: Sequence[tuple
         silenced: The findings that comments silence, each with its reason. SARIF marks them as "suppressed in
             source".
     """
-    index = {code: number for number, code in enumerate(RULES)}
+    index = {code: number for number, code in enumerate(RULES | OF_OTHERS)}
     run = {
         "tool": {
             "driver": {
                 "name": "urdfkin",
                 "version": version,
-                "rules": [_rule(rule) for rule in RULES.values()],
+                "rules": [_rule(rule) for rule in (RULES | OF_OTHERS).values()],
             }
         },
         "columnKind": "unicodeCodePoints",
@@ -147,7 +147,7 @@ def statistics(findings: Sequence[Finding]) -> Iterator[str]:
         fixable |= {finding.code} if finding.fix else set()
     for code, count in sorted(counts.items(), key=lambda item: (-item[1], item[0])):
         mark = "[*]" if code in fixable else "   "
-        yield f"{count:7}  {code}  {worst[code].value:7}  {mark}  {RULES[code].slug}: {page(code).title}"
+        yield f"{count:7}  {code}  {worst[code].value:7}  {mark}  {find_rule(code).slug}: {page(code).title}"
 
 
 def as_json(
