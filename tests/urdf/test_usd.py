@@ -779,6 +779,9 @@ def test_check_states_the_place_of_a_finding(write: Write) -> None:
     assert command("check", "--strict", str(path)).code == 1
     assert command("check", "--strict", "--ignore", "USD303", str(path)).code == 0
     assert command("check", "--strict", "--select", "USD2", str(path)).code == 0
+    run = json.loads(command("check", "--output-format", "sarif", str(path)).text)["runs"][0]
+    result = run["results"][0]
+    assert run["tool"]["driver"]["rules"][result["ruleIndex"]]["id"] == result["ruleId"] == "USD303"
     ball = write(stage(LINKS + joint("ball", "Spherical", "base", "upper")))
     done = command("check", str(ball))
     assert done.code == 2

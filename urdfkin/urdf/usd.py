@@ -1083,7 +1083,8 @@ def _schemas(prim: Any) -> list[str]:
 
 
 def _unit(i: int) -> FloatArray:
-    return np.eye(3)[i]
+    axis: FloatArray = np.eye(3)[i]
+    return axis
 
 
 def _called(edge: _Edge) -> str:

@@ -24,19 +24,23 @@ SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sar
 def as_sarif(findings: Sequence[Finding], version: str, silenced: Sequence[tuple[Finding, str]] = ()) -> str:
     """Return one SARIF run with every code as a rule and every finding as a result.
 
+    The codes about MJCF and USD are rules only if a finding has them.
+
     Args:
         findings: The reported findings.
         version: The version of urdfkin.
         silenced: The findings that comments silence, each with its reason. SARIF marks them as "suppressed in
             source".
     """
-    index = {code: number for number, code in enumerate(RULES | OF_OTHERS)}
+    codes = {finding.code for finding in findings}
+    rules = RULES | {code: rule for code, rule in OF_OTHERS.items() if code in codes}
+    index = {code: number for number, code in enumerate(rules)}
     run = {
         "tool": {
             "driver": {
                 "name": "urdfkin",
                 "version": version,
-                "rules": [_rule(rule) for rule in (RULES | OF_OTHERS).values()],
+                "rules": [_rule(rule) for rule in rules.values()],
             }
         },
         "columnKind": "unicodeCodePoints",
