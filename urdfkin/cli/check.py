@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
@@ -20,19 +21,19 @@ from urdfkin.cli.options import (
     mimic_option,
     reject_unused_options,
     root_joint_option,
+    source_options,
     together,
-    xacro_option,
 )
 from urdfkin.cli.streams import command_lines, harmless, say, say_file, say_styled
-from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
+from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
 from urdfkin.system.files import demand_regular, write_file
 from urdfkin.system.git import Version, version_before
 from urdfkin.system.lazy_import import installed_version
-from urdfkin.urdf.findings import Excerpts
+from urdfkin.urdf.findings import Excerpts, UrdfError, UrdfWarning
 from urdfkin.urdf.lint import Finding, Limits, Severity
 from urdfkin.urdf.lint.autofix import mend, patch
 from urdfkin.urdf.lint.formats import as_github, as_json, as_sarif, statistics, summary
-from urdfkin.urdf.lint.pages import RULES, page
+from urdfkin.urdf.lint.pages import OF_OTHERS, RULES, page
 from urdfkin.urdf.lint.runner import Examined, examine, file_of
 from urdfkin.urdf.lint.settings import (
     INCLUDE,
@@ -46,7 +47,7 @@ from urdfkin.urdf.lint.settings import (
     read_baseline,
     read_settings,
 )
-from urdfkin.urdf.sources import Text, is_xacro, read_source
+from urdfkin.urdf.sources import Text, is_usd, is_xacro, read_source
 from urdfkin.urdf.xacro import XacroError
 
 STYLES = ("terminal", "concise", "json", "sarif", "github")
@@ -275,18 +276,18 @@ limit_options = together(
 )
 @mimic_option("Check the file for use with mimic joints coupled, or free.  [default: mimic]")
 @root_joint_option("Also check that no name of the robot collides with this root joint.")
-@xacro_option
+@source_options
 @settings_options
 @limit_options
 @click.pass_context
 def command(context: click.Context, /, files: Sequence[str], **options: Any) -> None:
     """Check URDF files and print the findings, each with its code, line, cause and remedy.
 
-    A FILE is a path, a name from `urdfkin robots`, or - for standard input. A FOLDER means all *.urdf files
-    in it. Without FILE and FOLDER, the current folder is checked. A .xacro file is expanded in a restricted
-    process that can only compute and read the files of its package (docs/xacro.md). --changed-since
-    origin/main reports the new findings of a pull request. Settings are in [tool.urdfkin] of pyproject.toml
-    (docs/check.md).
+    A FILE is a path, also of a USD or MJCF file, a name from `urdfkin robots`, or - for standard input. A
+    FOLDER means all *.urdf files in it. Without FILE and FOLDER, the current folder is checked. A .xacro file
+    is expanded in a restricted process that can only compute and read the files of its package
+    (docs/xacro.md). --changed-since origin/main reports the new findings of a pull request. Settings are in
+    [tool.urdfkin] of pyproject.toml (docs/check.md).
 
     Exit 0: no error. 1: an error, or changes with --diff. 2: an unreadable file or a wrong option.
 
@@ -378,7 +379,7 @@ def _chosen(options: dict[str, Any]) -> frozenset[str]:
             found[name] = codes(parts)
         except UnknownNameError as error:
             raise click.UsageError(f"--{name}: {error}") from error
-    return (found["select"] if words["select"] else frozenset(RULES)) - found["ignore"]
+    return (found["select"] if words["select"] else frozenset(RULES | OF_OTHERS)) - found["ignore"]
 
 
 @dataclass(slots=True)
@@ -428,10 +429,13 @@ class Run:
                     ):  # the file was found in a folder that the user named
                         demand_regular(Path(file))
                     self._check(file)
-                except (SourceError, UnknownNameError, XacroError) as error:
+                except (InputError, SourceError, UnknownNameError, XacroError) as error:
                     self.outcome.unreadable.append(error)
 
     def _check(self, file: str) -> None:
+        if _is_other(file):
+            self._check_other(file)
+            return
         text = read_source(file, self.look.keywords["limits"].bytes, how_to_load()["xacro_args"])
         before = None
         if self.version is not None:
@@ -444,6 +448,26 @@ class Run:
         found = self.look(text, fold=self.fold, wanted=self.choice.of(text, before))
         findings = [self._with_severity(finding) for finding in found.findings]
         self.outcome.add(file, replace(found, findings=tuple(findings)))
+
+    def _check_other(self, file: str) -> None:
+        """Check a USD or MJCF file. An invalid robot also has findings about the URDF made of it."""
+        from urdfkin.robot.loading import load  # noqa: PLC0415  keeps --help fast
+
+        how = how_to_load()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UrdfWarning)
+            try:
+                usd = {
+                    name: how[name] for name in ("variant", "articulation") if name in how and is_usd(file)
+                }
+                robot = load(file, verify=False, **usd)
+                found = tuple(one for one in robot.findings if one.code in OF_OTHERS)
+            except UrdfError as error:
+                found = error.findings
+        text = Text(b"", file, file)
+        wanted = self.choice.of(text)
+        findings = tuple(self._with_severity(finding) for finding in found if wanted(finding))
+        self.outcome.add(file, Examined(text, b"", None, findings, ()))
 
     def _fix(self, file: str, text: Text, choose: Any) -> Text:
         path = None if text.entry is not None or is_xacro(text.source) else file_of(text)
@@ -480,6 +504,17 @@ class Run:
         failed = any(finding.severity is Severity.ERROR for finding in self.outcome.findings)
         bad = self.outcome.to_fix > 0 if self.diff else failed and not self.accepting
         return 2 if self.outcome.unreadable else int(bad)
+
+
+def _is_other(file: str) -> bool:
+    """Return whether a file is USD or MJCF."""
+    if is_usd(file):
+        return True
+    if Path(file).suffix.lower() not in (".xml", ".mjcf"):
+        return False
+    from urdfkin.urdf.mjcf import is_mjcf  # noqa: PLC0415  a URDF needs none of its imports
+
+    return is_mjcf(file)
 
 
 def _write_baseline(run: Run, path: Path) -> None:

@@ -16,7 +16,7 @@ from urdfkin.kinematics.registry import explain as explain_equation
 from urdfkin.system.files import read_text
 from urdfkin.system.resources import questions_page
 from urdfkin.urdf.findings import Rule
-from urdfkin.urdf.lint.pages import OF_MJCF, RULES, WIDTH, explain, find_rule, page
+from urdfkin.urdf.lint.pages import OF_OTHERS, RULES, WIDTH, explain, find_rule, page
 
 _LINK = re.compile(r"\[([^\]]+)\]\([^)\s]+\)")
 _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -85,7 +85,7 @@ def command(topic: str | None) -> None:
       urdfkin explain reference-frames
     """  # noqa: D301 - a backspace tells click not to wrap the paragraph
     if topic is None:
-        for rule in (*RULES.values(), *OF_MJCF.values()):
+        for rule in (*RULES.values(), *OF_OTHERS.values()):
             click.echo(f"{rule.id}  {rule.severity.value:7}  {rule.slug:26}  {page(rule.id).title}")
         click.echo(f"questions: {', '.join(answers())}")
     elif (equation := explain_equation(topic)) is not None:
@@ -95,7 +95,7 @@ def command(topic: str | None) -> None:
     elif (answer := answer_to(topic)) is not None:
         click.echo(as_text(answer))
     else:
-        rules = (*RULES.values(), *OF_MJCF.values())
+        rules = (*RULES.values(), *OF_OTHERS.values())
         known = [name for one in rules for name in (one.id, one.slug)]
         raise UnknownNameError("code, equation or question", topic, [*known, *answers()])
 

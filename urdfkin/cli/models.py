@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from urdfkin.cli.completion import complete_robot
-from urdfkin.cli.options import NumberFrom, Whole, load_two, xacro_option
+from urdfkin.cli.options import NumberFrom, Whole, load_several, reject_unused_options, source_options
 from urdfkin.cli.output import TEXTS, Answer, answering, check_writable, compiling, write_file
 from urdfkin.cli.streams import say
 from urdfkin.errors.display import TextDocument
@@ -19,11 +19,14 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
 _PATH = click.Path(path_type=Path, dir_okay=False)
+#: Options of `same` for two robots only.
+_OF_TWO = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "all_")
 
 
 @click.command("same", epilog="Example: urdfkin same ur5 ur5_limited --certificate same.json")
 @click.argument("a", metavar="A", required=False, shell_complete=complete_robot)
 @click.argument("b", metavar="B", required=False, shell_complete=complete_robot)
+@click.argument("more", metavar="[C]...", nargs=-1, shell_complete=complete_robot)
 @click.option(
     "--map",
     "pairs",
@@ -63,11 +66,12 @@ _PATH = click.Path(path_type=Path, dir_okay=False)
     "--html", type=_PATH, help="Write an HTML page with a picture of both robots at the worst configuration."
 )
 @click.option("--schema", is_flag=True, help="Print the JSON Schema of a certificate and exit.")
-@xacro_option
+@source_options
 @answering(*TEXTS, "json")
 def same_command(
     a: str | None,
     b: str | None,
+    more: tuple[str, ...],
     pairs: tuple[str, ...],
     strict: bool,
     within: float | None,
@@ -77,16 +81,18 @@ def same_command(
     schema: bool,
     **paths: Path | None,
 ) -> Answer:
-    """Prove whether A and B are the same robot in every configuration.
+    """Prove whether A and B are the same robot in every configuration; with C, all pairs of them.
 
     A and B are robots as in other commands, or Denavit-Hartenberg tables. They are the same if the screws of
     all joints and the zero-configuration poses of all links agree. A different base pose, joint zeros and
     senses, fixed links, names and order are allowed. If they differ, the command prints an interval for the
     largest distance of each frame over all configurations within limits. Its lower bound is attained at a
-    printed configuration; its upper bound is proven.
+    printed configuration; its upper bound is proven. The numbers of a USD file have single precision. If
+    rounding them explains all differences, the models are the same up to single precision.
 
-    Exit 0: same, or equivalent up to the printed changes. 1: different; with --strict also if only
-    equivalent. With --within: 0 if all frames stay within the distance as written, else 1. 2: bad input.
+    Exit 0: same, also up to single precision, or equivalent up to the printed changes. 1: different; with
+    --strict also if only equivalent. With --within: 0 if all frames stay within the distance as written, else
+    1. 2: bad input.
     """
     if schema:
         from urdfkin.comparison.certificate import SAME  # noqa: PLC0415  keeps --help fast
@@ -96,7 +102,11 @@ def same_command(
     if a is None or b is None:
         raise click.UsageError("name two robots to compare: urdfkin same A B")
     check_writable(*paths.values())
-    robots = load_two(a, b)
+    if more:
+        reject_unused_options(click.get_current_context(), _OF_TWO, "with more than two robots")
+        return _all_pairs((a, b, *more), within, strict=strict, boxes=boxes)
+    first, second = load_several(a, b)
+    robots = first, second
     with compiling():
         if recheck is not None:
             return _recheck(robots, recheck)
@@ -127,6 +137,35 @@ def same_command(
     return Answer(lambda: document(found, question, all_=all_), data, code=code)
 
 
+def _all_pairs(sources: tuple[str, ...], within: float | None, *, strict: bool, boxes: int | None) -> Answer:
+    """Compare each pair of several robots, such as the URDF, the MJCF and the USD of one robot."""
+    from itertools import combinations  # noqa: PLC0415  keeps --help fast
+
+    robots = load_several(*sources)
+    with compiling():
+        from urdfkin.comparison.bounds import MOST  # noqa: PLC0415
+        from urdfkin.comparison.certificate import certificate  # noqa: PLC0415
+        from urdfkin.comparison.result import Question  # noqa: PLC0415
+        from urdfkin.comparison.verdict import same  # noqa: PLC0415
+        from urdfkin.report.same import command_of, pairs_document, pairs_markdown  # noqa: PLC0415
+
+        how_many = MOST if boxes is None else boxes
+        question = Question(within, strict)
+        twos = list(combinations(robots, 2))
+        found = [same(*two, boxes=how_many, within=within) for two in twos]
+    data = {
+        "json": lambda: {
+            "holds": all(one.holds(question) for one in found),
+            "pairs": [
+                certificate(one, command_of(two, question, [])) for one, two in zip(found, twos, strict=True)
+            ],
+        },
+        "markdown": lambda: pairs_markdown(found, question),
+    }
+    code = int(not all(one.holds(question) for one in found))
+    return Answer(lambda: pairs_document(found, question), data, code=code)
+
+
 def _recheck(robots: tuple[Robot, Robot], path: Path) -> Answer:
     from urdfkin.comparison.certificate import SAME, recheck, words_of  # noqa: PLC0415  keeps --help fast
 
@@ -151,7 +190,7 @@ def _recheck(robots: tuple[Robot, Robot], path: Path) -> Answer:
     help="Compute bounds of the motion of frames by the changes (default).",
 )
 @click.option("--markdown", type=_PATH, help="Write the result as Markdown for a pull request comment.")
-@xacro_option
+@source_options
 @answering()
 def diff_command(a: str, b: str, effects: bool, markdown: Path | None) -> Answer:
     """List the changes from OLD to NEW, attribute by attribute, and how far they move the robot's frames.
@@ -166,7 +205,7 @@ def diff_command(a: str, b: str, effects: bool, markdown: Path | None) -> Answer
     from urdfkin.report.diff import HEADS, as_data, document, lines_of, markdown_of, rows_of  # noqa: PLC0415
 
     check_writable(markdown)
-    old, new = load_two(a, b)
+    old, new = load_several(a, b)
     with compiling():
         found = diff(old, new, effects=effects)
     if markdown is not None:

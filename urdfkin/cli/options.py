@@ -172,8 +172,24 @@ def _remember_joints(context: click.Context, _: click.Parameter, words: str | No
         context.meta.setdefault(_HOW, {})["joints"] = [name.strip() for name in words.split(",")]
 
 
+def _remember_variants(context: click.Context, _: click.Parameter, words: Sequence[str]) -> None:
+    chosen = {}
+    for word in words:
+        name, equals, value = word.partition("=")
+        if not equals or not name or not value:
+            raise click.BadParameter(f"{word!r} is not SET=NAME")
+        chosen[name] = value
+    if chosen:
+        context.meta.setdefault(_HOW, {})["variant"] = chosen
+
+
+def _remember_articulation(context: click.Context, _: click.Parameter, word: str | None) -> None:
+    if word is not None:
+        context.meta.setdefault(_HOW, {})["articulation"] = word
+
+
 def how_to_load() -> dict[str, Any]:
-    """Return the running command's options for `load`: its arguments from `mimic` to `joints`."""
+    """Return the running command's options for `load`: its arguments from `mimic` to `articulation`."""
     return dict(click.get_current_context().meta.get(_HOW, {}))
 
 
@@ -185,6 +201,27 @@ xacro_option = click.option(
     callback=_remember_xacro_args,
     help="Argument of a .xacro file; repeatable. xacro runs in a restricted process.",
 )
+
+
+usd_options = together(
+    click.option(
+        "--variant",
+        multiple=True,
+        metavar="SET=NAME",
+        expose_value=False,
+        callback=_remember_variants,
+        help="Select a variant of a USD stage; repeatable.",
+    ),
+    click.option(
+        "--articulation",
+        metavar="PATH",
+        expose_value=False,
+        callback=_remember_articulation,
+        help="Articulation of a USD stage with several.",
+    ),
+)
+#: The options that concern the source of a robot, not its joints.
+source_options = together(xacro_option, usd_options)
 
 
 def mimic_option(help_: str) -> Callable[[_F], _F]:
@@ -221,7 +258,7 @@ lock_options = together(
 robot_options = together(
     mimic_option("Couple mimic joints to the mimicked joints, as in the URDF (default)."),
     root_joint_option("Add a moving joint between the world and the root link."),
-    xacro_option,
+    source_options,
     lock_options,
 )
 robot_argument = together(
@@ -415,19 +452,27 @@ def load_robot(source: str, *, verify: bool = True, oracle: OracleName = "pinocc
     return robot
 
 
-def load_two(a: str, b: str) -> tuple[Robot, Robot]:
-    """Load a command's two robots; `--xacro-arg` applies to those that are .xacro files.
+def load_several(*sources: str) -> tuple[Robot, ...]:
+    """Load a command's robots; `--xacro-arg` applies to .xacro files, `--variant` to USD files.
 
     Raises:
-        UsageError: both come from standard input.
+        UsageError: more than one comes from standard input.
     """
-    from urdfkin.urdf.sources import is_xacro  # noqa: PLC0415  keeps --help fast
+    from urdfkin.urdf.sources import is_usd, is_xacro  # noqa: PLC0415  keeps --help fast
 
-    if a == b == "-":
-        raise click.UsageError("only one of the two robots can come from standard input")
-    none: dict[str, Any] = {"xacro_args": None} if is_xacro(a) or is_xacro(b) else {}
-    one, other = (load_robot(source, **({} if is_xacro(source) else none)) for source in (a, b))
-    return one, other
+    if sources.count("-") > 1:
+        raise click.UsageError("only one of the robots can come from standard input")
+
+    def others(source: str) -> dict[str, Any]:
+        """Return the options for the formats of the other robots, without their values."""
+        none: dict[str, Any] = {}
+        if not is_xacro(source) and any(map(is_xacro, sources)):
+            none["xacro_args"] = None
+        if not is_usd(source) and any(map(is_usd, sources)):
+            none |= {"variant": {}, "articulation": None}
+        return none
+
+    return tuple(load_robot(source, **others(source)) for source in sources)
 
 
 def read_inputs(

@@ -16,11 +16,12 @@ from urdfkin.cli.exit import stoppable
 from urdfkin.cli.options import (
     Whole,
     how_to_load,
+    load_robot,
     lock_options,
     mimic_option,
     reject_unused_options,
     root_joint_option,
-    xacro_option,
+    source_options,
 )
 from urdfkin.cli.output import check_writable, compiling, console
 from urdfkin.cli.reports import FILES, report_options, say_written, write_reports
@@ -179,7 +180,7 @@ def _with_quantities(command: _T) -> _T:
     is_flag=True,
     help="Run each robot in its own process; a crash is reported as that robot's result.",
 )
-@xacro_option
+@source_options
 @lock_options
 @click.option(
     "--store",
@@ -259,7 +260,9 @@ def command(
     how = how_to_load()
     if how["xacro_args"] and not any(map(is_xacro, robots)):
         reject_unused_options(context, ("xacro_arg",), "without a .xacro file")
+    usd: dict[str, Any] = {name: how.pop(name) for name in ("variant", "articulation") if name in how}
     given = [_load_stdin(robot, how) if judged else robot for robot in robots or examples()]
+    given = [_load_usd(robot, how, usd) if usd else robot for robot in given]
     with stoppable() as stop, compiling(), _cluster(scheduler) as on, progress(as_json=json_progress) as tell:
         report = validate(given, executor=on, progress=tell, **options, **how)
         if judged and not report.interrupted:
@@ -297,6 +300,16 @@ def _load_stdin(source: str, how: dict[str, Any]) -> Robot | str:
     from urdfkin.robot.loading import load  # noqa: PLC0415  keeps --help fast
 
     return load(source, **how) if source == "-" else source
+
+
+def _load_usd(source: Robot | str, how: dict[str, Any], usd: dict[str, Any]) -> Robot | str:
+    """Load a USD stage now, with its variants and its articulation; another robot is returned as it is."""
+    from urdfkin.urdf.sources import is_usd  # noqa: PLC0415  keeps --help fast
+
+    loading = {name: how[name] for name in ("mimic", "root_joint") if name in how}
+    if not isinstance(source, str) or not is_usd(source):
+        return source
+    return load_robot(str(source), **loading, **usd)
 
 
 def _say_shard(report: ValidationReport, shard: str, store: Path | None) -> None:

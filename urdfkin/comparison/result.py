@@ -271,6 +271,8 @@ class Sameness(Displayable):
         base_links: A link of A and a link of B. The poses of A are compared relative to the first link, and
             the poses of B relative to the second link. The two links belong to matching rigid bodies.
         rounding: (m, rad) largest distance and angle between matching frames that count as rounding.
+        single: (m, rad) largest distance and angle between matching frames that rounding the numbers of a USD
+            file to single precision can cause; None if both files have double precision.
         frames: The interval for each pair of matching links, after the changes in `after`.
         as_written: The interval for the frame that is farthest apart without the changes in `after`. None if
             there are no changes.
@@ -303,6 +305,7 @@ class Sameness(Displayable):
     base: FloatArray
     base_links: tuple[str, str]
     rounding: tuple[float, float]
+    single: tuple[float, float] | None
     frames: tuple[Interval, ...]
     as_written: Interval | None
     written: tuple[float, float]
@@ -354,6 +357,19 @@ class Sameness(Displayable):
         """
         return self.as_written or self.worst
 
+    @property
+    def up_to_single(self) -> bool:
+        """Whether rounding to single precision explains all differences of the models as they are written.
+
+        >>> import urdfkin
+        >>> urdfkin.same("ur5", "ur10").up_to_single
+        False
+        """
+        if self.single is None or self.verdict is Verdict.SAME or "senses" in self.up_to:
+            return False
+        explained = {one.what for one in self.differences} <= BOUNDED
+        return explained and self.written[0] <= self.single[0] and self.written[1] <= self.single[1]
+
     def within(self, most: float) -> bool:
         """Return whether all matching frames are proven to be within a distance (m and rad) of each other.
 
@@ -376,7 +392,8 @@ class Sameness(Displayable):
         >>> found.holds(Question(within=1.0))
         True
         """
-        if not (bool(self) if question.within is None else self.within(question.within)):
+        equal = bool(self) or (self.up_to_single and not question.strict)
+        if not (equal if question.within is None else self.within(question.within)):
             return False
         return not (question.strict and (self.verdict is Verdict.SAME_AFTER or self.remarks))
 
@@ -751,12 +768,23 @@ def _of_frame(found: Alignment, frame: FramePair) -> Difference:
     return Difference(f"link {found.a.tree.links[frame.a]}", "place", None, None, *sizes)
 
 
-def remarks(found: Alignment, variables: Variables, tolerance: Tolerance) -> tuple[Difference, ...]:
-    """Return the differences without effect on motion: joint limits, joint types, links of one model only."""
+def remarks(
+    found: Alignment, variables: Variables, tolerance: Tolerance, single: float = 0.0
+) -> tuple[Difference, ...]:
+    """Return the differences without effect on motion: joint limits, joint types, links of one model only.
+
+    Args:
+        found: The alignment of the models.
+        variables: Their common variables.
+        tolerance: The tolerance within which numbers are equal.
+        single: The share of itself by which rounding to single precision changes a number, or 0.
+    """
     some = list[Difference]()
     for step in found.steps:
         if not step.unlike:
-            some += _of_limits(step, found.a.tree.joints[step.a], found.b.tree.joints[step.b], tolerance)
+            some += _of_limits(
+                step, found.a.tree.joints[step.a], found.b.tree.joints[step.b], tolerance, single
+            )
     for tree, which in ((found.a.tree, "A"), (found.b.tree, "B")):
         for lock in filter(None, map(idle, tree.joints)):
             value = lock.joint.kind.value, lock.value
@@ -781,23 +809,23 @@ def idle(joint: Joint) -> Lock | None:
     return lock if lock and lock.joint.mimic and lock.joint.mimic.multiplier == 0.0 else None
 
 
-def _of_limits(step: Step, a: Joint, b: Joint, tolerance: Tolerance) -> Iterator[Difference]:
+def _of_limits(step: Step, a: Joint, b: Joint, tolerance: Tolerance, single: float) -> Iterator[Difference]:
     place = f"joint {a.name}"
     if a.kind is not b.kind:
         yield Difference(place, "kind", a.kind.value, b.kind.value)
     back = sorted(step.sense * (end - step.offset) for end in limits(b))
     ours = limits(a)
-    if any(not _close(x, y, tolerance.angle) for x, y in zip(ours, back, strict=True)):
+    if any(not _close(x, y, tolerance.angle, single) for x, y in zip(ours, back, strict=True)):
         detail = "converted" if step.sense < 0 or step.offset else ""
         yield Difference(place, "limits", tuple(map(_finite, ours)), tuple(map(_finite, back)), detail=detail)
     for what in ("velocity", "effort"):
         x, y = (getattr(joint.limit, what, math.inf) for joint in (a, b))
-        if not _close(x, y, tolerance.angle):
+        if not _close(x, y, tolerance.angle, single):
             yield Difference(place, what, _finite(x), _finite(y))
 
 
-def _close(x: float, y: float, share: float) -> bool:
-    return x == y or abs(x - y) <= share * max(1.0, abs(x), abs(y))
+def _close(x: float, y: float, share: float, single: float) -> bool:
+    return x == y or abs(x - y) <= share * max(1.0, abs(x), abs(y)) + single * max(abs(x), abs(y))
 
 
 def _finite(x: float) -> float | None:

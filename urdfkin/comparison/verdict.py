@@ -28,8 +28,9 @@ from urdfkin.comparison.result import (
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.validators import real_number, whole_number
-from urdfkin.kinematics.roundings import EPS
+from urdfkin.kinematics.roundings import EPS, SINGLE
 from urdfkin.model.configuration import WIDEST, narrowed_ranges
+from urdfkin.model.conventions.convention import spellings
 from urdfkin.model.mechanisms.matcher import align
 from urdfkin.model.mechanisms.mechanism import (
     AS_WRITTEN,
@@ -47,7 +48,7 @@ from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
 from urdfkin.model.tree import FloatArray, KinematicTree, Lock, inverse
 from urdfkin.robot import Robot
 from urdfkin.robot.loading import load
-from urdfkin.urdf.sources import Source
+from urdfkin.urdf.sources import Source, is_usd
 from urdfkin.verify.oracles import PINOCCHIO
 from urdfkin.verify.sampling import checked_choice
 
@@ -163,7 +164,11 @@ class Comparator:
         back = {theirs: ours for ours, theirs in given.items()}
         trees = _with_idle_joints_fixed(a, b, given), _with_idle_joints_fixed(b, a, back)
         parting = _fixed_here(trees[0], trees[1]), _fixed_here(trees[1], trees[0])
-        self.mechanisms = Mechanism(trees[0], parting[0]), Mechanism(trees[1], parting[1])
+        labels, self.spelled = _spelled_alike(robots)
+        self.mechanisms = (
+            Mechanism(trees[0], parting[0], labels[0]),
+            Mechanism(trees[1], parting[1], labels[1]),
+        )
         for which, mechanism, robot in zip("AB", self.mechanisms, robots, strict=True):
             if not mechanism.size <= LONGEST:
                 raise InputError(
@@ -176,7 +181,7 @@ class Comparator:
 
     def judged(self) -> Sameness:
         """Return the complete result: verdict, intervals and Pinocchio's confirmation."""
-        found = align(*self.mechanisms, self.given)
+        found = align(*self.mechanisms, {**self.spelled, **self.given})
         self._check_map(found)
         variables = variables_of(found, self.tolerance)
         said = self.said(found, variables)
@@ -205,6 +210,7 @@ class Comparator:
         after = put_right(found, self.tolerance, tables=tables)
         free = {what for what, _ in after}
         wrong = differences(found, variables)
+        single = self.single(found, variables)
         return Sameness(
             names=(self.robots[0].name, self.robots[1].name),
             sources=(self.robots[0].source, self.robots[1].source),
@@ -213,7 +219,7 @@ class Comparator:
             after=tuple(dict.fromkeys(words for _, words in after)),
             up_to=tuple(what for what in FREE if what in free),
             differences=wrong,
-            remarks=remarks(found, variables, self.tolerance),
+            remarks=remarks(found, variables, self.tolerance, SINGLE if single else 0.0),
             joints=tuple(
                 JointMap(names[0][s.a], names[1][s.b], s.sense, s.offset, s.conversion) for s in found.steps
             ),
@@ -225,6 +231,7 @@ class Comparator:
             base=found.X,
             base_links=(links[0][found.base[0]], links[1][found.base[1]]),
             rounding=self.rounding(found, variables),
+            single=single,
             frames=(),
             as_written=None,
             written=(math.inf, math.inf),
@@ -236,6 +243,22 @@ class Comparator:
             checked=Confirmation(),
             trees=self.trees,
         )
+
+    def single(self, found: Alignment, variables: Variables) -> tuple[float, float] | None:
+        """Return the distance and angle (m, rad) between frames that single precision can cause, or None.
+
+        The errors of both files add up, and those of double precision.
+        """
+        if all(robot.single is None for robot in self.robots):
+            return None
+        most = np.array(self.rounding(found, variables))
+        pairs = [(frame.a, frame.b) for frame in found.frames]
+        off = np.zeros((len(pairs), 2))
+        for which, robot in enumerate(self.robots):
+            if robot.single is not None and pairs:
+                off += robot.single[[pair[which] for pair in pairs]]
+        metres, radians = (most + off.max(axis=0, initial=0.0)).tolist()
+        return metres, radians
 
     def as_written(self, found: Alignment) -> Alignment:
         """Return the alignment of the models as they are written, for the joint and link pairs of `found`.
@@ -466,15 +489,46 @@ def _with_idle_joints_fixed(
     return tree if joints == tree.joints else replace(tree, joints=joints)
 
 
+def _spelled_alike(
+    robots: tuple[Robot, Robot],
+) -> tuple[tuple[Sequence[str], Sequence[str]], dict[str, str]]:
+    """Return a label for each link of two models, and pairs of joints that USD spells otherwise.
+
+    A name that USD does not allow is written in one of several ways. If the USD file has the result, and only
+    one name of the other model gives it, the two are the same name.
+    """
+    labels, joints = [list(robot.tree.links) for robot in robots], dict[str, str]()
+    for k, own in enumerate(robots):
+        other = robots[1 - k]
+        if not is_usd(own.source) or is_usd(other.source):
+            continue
+        for link, name in _originals(other.tree.links, own.tree.links).items():
+            labels[k][own.tree.link_index(link)] = name
+        names = [[joint.name for joint in robot.tree.joints] for robot in (other, own)]
+        for joint, name in _originals(*names).items():
+            joints |= {name: joint} if k else {joint: name}
+    return (labels[0], labels[1]), joints
+
+
+def _originals(names: Sequence[str], spelt: Sequence[str]) -> dict[str, str]:
+    """Return for each name in USD the name that it stands for, if that is not in the USD file itself."""
+    known, found = set(spelt), dict[str, set[str]]()
+    for name in names:
+        if name not in known:
+            for word in spellings(name) & known - set(names):
+                found.setdefault(word, set()).add(name)
+    return {word: own.pop() for word, own in found.items() if len(own) == 1}
+
+
 def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
     """Return the pose (4, 4) of B's root in A's root frame for models that are compared as they are written.
 
     The roots may have different names, and one model may also have a link with the name of the other model's
     root. Then the two links of that name coincide. Otherwise the two roots coincide.
     """
-    if (root := a.tree.links[0]) in b.tree.links and not b.body_of[link := b.tree.link_index(root)]:
+    if (root := a.labels[0]) in b.labels and not b.body_of[link := b.labels.index(root)]:
         return inverse(b.homes[link])
-    if (root := b.tree.links[0]) in a.tree.links and not a.body_of[link := a.tree.link_index(root)]:
+    if (root := b.labels[0]) in a.labels and not a.body_of[link := a.labels.index(root)]:
         return a.homes[link]
     return IDENTITY
 

@@ -149,6 +149,8 @@ from numpy.typing import ArrayLike, NDArray
 FloatArray = NDArray[np.float64]
 
 EPS = sys.float_info.epsilon
+#: Relative error of a number that was rounded to single precision.
+SINGLE = 2.0**-24
 #: The smallest normal number.
 SMALLEST = sys.float_info.min
 #: The smallest unit of rounding: eps times the smallest normal number. It is the smallest subnormal number.

@@ -18,6 +18,7 @@ from urdfkin.comparison.verdict import base_as_written
 from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.errors.escape import markdown_text
 from urdfkin.kinematics.roundings import NOT_ZERO
+from urdfkin.model.conventions.convention import spellings
 from urdfkin.model.mechanisms.mechanism import Mechanism
 from urdfkin.model.tree import FloatArray, inverse
 from urdfkin.report.words import counted
@@ -45,11 +46,15 @@ def headline(found: Sameness, question: Question = EQUIVALENT) -> str:
     besides = f"; limits of {counted(limits, 'joint')} differ" if limits else ""
     if question.within is not None:
         return _within(found, question.within) + besides
+    if found.up_to_single and found.single is not None:
+        off = f"in every configuration no frame is off by more than {_both(*found.written)}"
+        return f"SAME UP TO SINGLE PRECISION: {off}; it explains up to {_both(*found.single)}{besides}"
     if found.verdict is Verdict.DIFFERS:
         by = _by(found.frames, found.rounding)
         if found.frames and not by:
             by = ", although no common frame is off by more than rounding"
-        return f"DIFFERS{by}; first difference: {found.differences[0].words}{besides}"
+        single = "" if found.single is None else f"; single precision explains up to {_both(*found.single)}"
+        return f"DIFFERS{by}; first difference: {found.differences[0].words}{single}{besides}"
     metres, radians = found.rounding
     off = f"no frame is off by more than rounding, {length(metres)} and {angle(radians)}"
     if found.verdict is Verdict.SAME:
@@ -145,12 +150,14 @@ def where(found: Sameness, frame: Interval) -> str:
 
 def renamed(found: Sameness) -> list[str]:
     """Return lines about joints and links that have different names, and about other orders of joints."""
-    joints = [f"joint {one.a} is {one.b}" for one in found.joints if one.a != one.b]
+    pairs = [one for one in found.joints if one.a != one.b]
+    guessed = [one for one in pairs if one.b not in spellings(one.a) and one.a not in spellings(one.b)]
+    joints = [f"joint {one.a} is {one.b}" for one in pairs]
     joints += [
         f"joints of B have another order, which their axes allow; compared in the order {', '.join(names)}"
         for names in found.orders
     ]
-    if joints and not found:
+    if (guessed or found.orders) and not found:
         joints = [GUESSED, *joints]
     return joints + [f"link {ours} is {theirs}" for ours, theirs in found.links if ours != theirs]
 
@@ -183,6 +190,44 @@ def document(found: Sameness, question: Question = EQUIVALENT, *, all_: bool = F
     parts += _lines("different names", renamed(found), some)
     parts += _lines("differences without effect on motion", [one.words for one in found.remarks], some)
     return TextDocument("", [*parts, str(found.checked)])
+
+
+#: Columns of the table of several pairs.
+PAIRS = ("A", "B", "verdict", "at most apart", "single precision")
+
+
+def _pair_rows(found: Sequence[Sameness], question: Question) -> list[tuple[str, ...]]:
+    """Return a row for each pair: sources, verdict, largest distance, and that of single precision."""
+    rows = list[tuple[str, ...]]()
+    for one in found:
+        words = "differs" if not one else "same" if one.verdict is Verdict.SAME else "equivalent"
+        if one.up_to_single:
+            words = "same up to single precision"
+        if question.within is not None:
+            words = f"{'' if one.within(question.within) else 'not '}within {question.within:g}"
+        metres, radians = one.written
+        off = "no bound" if math.isinf(metres) else _both(metres, radians)
+        single = "" if one.single is None else _both(*one.single)
+        rows.append((*one.sources, words, off, single))
+    return rows
+
+
+def pairs_document(found: Sequence[Sameness], question: Question = EQUIVALENT) -> TextDocument:
+    """Return a table of several pairs of models, and the first difference of each pair that differs."""
+    rows = _pair_rows(found, question)
+    different = [
+        f"{one.sources[0]} and {one.sources[1]}: {headline(one, question)}"
+        for one in found
+        if not one.holds(question)
+    ]
+    return TextDocument("", [Table(PAIRS, rows, left=3), *different])
+
+
+def pairs_markdown(found: Sequence[Sameness], question: Question = EQUIVALENT) -> str:
+    """Return the table of several pairs as Markdown."""
+    rows = [PAIRS, ("---",) * len(PAIRS), *_pair_rows(found, question)]
+    lines = [f"| {' | '.join(map(markdown_text, row) if k != 1 else row)} |" for k, row in enumerate(rows)]
+    return "\n".join(lines) + "\n"
 
 
 def as_document(found: Sameness) -> TextDocument:

@@ -162,6 +162,9 @@ class Robot(Displayable):
             urdf, tree, origin, policy=verify, mimic=mimic, unverifiable=unverifiable, oracle=oracle
         )
         self.findings = Findings(findings)
+        #: (links, 2) how far rounding to single precision may have moved (m) and turned (rad) each link; None
+        #: if the file's numbers have double precision.
+        self.single: FloatArray | None = None
         self.base_frame = base_frame or tree.frame_name(0)
         self._tip_frame = tip_frame
         self._has_one_tip = tip_frame is not None or len(list(tree.leaves())) == 1

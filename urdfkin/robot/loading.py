@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack, cast
 from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError
+from urdfkin.errors.validators import as_str, safe_repr
 from urdfkin.model.tree import with_poses, with_tilts
 from urdfkin.robot import Robot
 from urdfkin.system.files import at_home, read_bytes
@@ -21,7 +22,7 @@ from urdfkin.urdf.lint.rules.left_out import left_out
 from urdfkin.urdf.lint.runner import read_urdf
 from urdfkin.urdf.parser import NEWER_VERSION
 from urdfkin.urdf.reader import read_tree
-from urdfkin.urdf.sources import Origin, Source, Text, as_word, entry_of, is_urdf_path, read_source
+from urdfkin.urdf.sources import Origin, Source, Text, as_word, entry_of, is_urdf_path, is_usd, read_source
 from urdfkin.urdf.writer import to_urdf as write_urdf
 from urdfkin.verify.oracles import OracleName, oracle_library
 from urdfkin.verify.sampling import Verify, checked_choice
@@ -47,7 +48,7 @@ class How(TypedDict):
     joints: Sequence[str] | None
 
 
-def load(
+def load(  # noqa: PLR0911  a line for each kind of source
     source: Source | DHTable | ProductOfExponentials | ModuleType | XmlElement | XmlTree,
     *,
     verify: Verify = True,
@@ -57,12 +58,14 @@ def load(
     oracle: OracleName = "pinocchio",
     lock: str | Mapping[str, ArrayLike] = MappingProxyType({}),
     joints: Sequence[str] | None = None,
+    variant: Mapping[str, str] = MappingProxyType({}),
+    articulation: str | None = None,
 ) -> Robot:
-    """Return a robot from a URDF, an MJCF file, a table or an object of another library.
+    """Return a robot from a URDF, an MJCF or USD file, a table or an object of another library.
 
     The input is checked first. These sources are accepted:
 
-    - a path: .urdf, .xacro, or .xml for MJCF (`docs/mjcf.md`)
+    - a path: .urdf, .xacro, .xml for MJCF (`docs/mjcf.md`), .usd, .usda, .usdc or .usdz (`docs/usd.md`)
     - a name of the catalogue; `urdfkin robots` lists them
     - URDF or MJCF as text, bytes or an open file; `-` is standard input
     - a `DHTable`, or a file with one (.toml, .json, .csv, .tsv, .md, .tex, .txt); the table's base frame
@@ -82,6 +85,8 @@ def load(
         oracle: Oracle that checks quantities, "pinocchio" or "mujoco" (needs the extra `mujoco`).
         lock: Value (rad or m) of each joint to lock, such as `{"finger": 0.04}`; see `Robot.locked`.
         joints: The joints that remain movable; see `Robot.locked`.
+        variant: Variant to select of each variant set of a USD stage, such as `{"Gripper": "Robotiq"}`.
+        articulation: Path or name of the articulation of a USD stage with several.
 
     Returns:
         The robot. Each warning about the file is issued as an `UrdfWarning`, except for catalogue robots.
@@ -113,6 +118,10 @@ def load(
         "lock": lock,
         "joints": joints,
     }
+    if is_usd(source):
+        return _load_usd(source, xacro_args, variant, articulation, **how)
+    if variant or articulation is not None:
+        raise InputError("`variant` and `articulation` need the path of a USD file", found=safe_repr(source))
     if is_urdf_path(source) or (isinstance(source, str) and entry_of(source)):
         return robot_of(read_source(source, xacro_args=xacro_args), **how)
     from urdfkin.dh.parse_table import is_table_file  # noqa: PLC0415  a URDF needs none of these
@@ -209,6 +218,48 @@ def _load_mjcf(
     return robot
 
 
+def _load_usd(
+    source: str | os.PathLike[str],
+    xacro_args: Mapping[str, object] | None,
+    variant: Mapping[str, str],
+    articulation: str | None,
+    **how: Unpack[How],
+) -> Robot:
+    import hashlib  # noqa: PLC0415
+
+    from urdfkin.urdf.lint.rules.left_out import of_usd  # noqa: PLC0415
+    from urdfkin.verify.usd_check import check_usd_source, read_usd, single_precision  # noqa: PLC0415
+
+    _refuse_arguments(xacro_args, "USD")
+    if not isinstance(variant, Mapping):
+        raise InputError(
+            "`variant` must be a mapping from variant sets to variants", found=safe_repr(variant)
+        )
+    variants = tuple((as_str(name, "variant"), as_str(one, "variant")) for name, one in variant.items())
+    if articulation is not None:
+        as_str(articulation, "articulation")
+    wanted = bool(checked_choice(how["verify"]))
+    read = read_usd(source, variants=variants, articulation=articulation)
+    digest = hashlib.sha256(read_bytes(Path(read.path))).hexdigest()
+    name = as_word(Path(read.path))
+    text = Text(
+        read.urdf.encode(),
+        f"{name} (as a URDF)",
+        name,
+        sha256=digest,
+        variants=variants,
+        articulation=articulation,
+    )
+    verifier = robot_of(text, verify=False, made=True, quiet=True).verifier
+    line, remarks = check_usd_source(verifier, read)
+    listed = tuple(of_usd(one, name) for one in (*read.remarks, *remarks))
+    robot = robot_of(text, **how, listed=listed, made=True)
+    robot.single = single_precision(robot.tree, read.answer["single"])
+    if wanted:
+        robot.verifier.reading = line
+    return robot
+
+
 def _is_plain(robot: Robot) -> bool:
     """Return whether no root joint was added, no joint was locked, and every mimic joint kept its rule."""
     origin = robot.origin
@@ -262,6 +313,7 @@ def robot_of(
     listed: tuple[Finding, ...] = (),
     made: bool = False,
     table: bool = False,
+    quiet: bool = False,
 ) -> Robot:
     """Return the robot of a URDF text that is already in memory.
 
@@ -276,13 +328,24 @@ def robot_of(
         listed: Findings about the original source, if the text was generated from another format.
         made: Whether the text was generated, so that no file contains it.
         table: Whether the original source is a table.
+        quiet: Whether to issue no warnings.
 
     Raises:
         UrdfError: the text has errors.
     """
     oracle_library(oracle)
     other = None if oracle == "pinocchio" else oracle
-    origin = Origin(text.source, mimic, root_joint, text.xacro_args, other, table, text.sha256)
+    origin = Origin(
+        text.source,
+        mimic,
+        root_joint,
+        text.xacro_args,
+        other,
+        table,
+        text.sha256,
+        variants=text.variants,
+        articulation=text.articulation,
+    )
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic
     report = Reporter(text.label, text.data)
@@ -290,7 +353,7 @@ def robot_of(
     findings = (*listed, *report.findings())
     if urdf is None or report.failed:
         raise UrdfError(findings)
-    if text.entry is None:
+    if text.entry is None and not quiet:
         for finding in findings:
             if finding.severity is Severity.WARNING and not (made and finding.code in _OF_A_TEXT):
                 warnings.warn(str(finding), UrdfWarning, stacklevel=4 if made else 3)

@@ -18,6 +18,9 @@ from urdfkin.errors.validators import as_bool, as_str, safe_repr
 from urdfkin.system.files import MOST, at_home, exists, read_start, read_start_of_standard_input
 from urdfkin.urdf.catalogue import Entry, catalogue, find_package, split_uri
 
+#: Suffixes of USD files.
+USD = (".usd", ".usda", ".usdc", ".usdz")
+
 
 @dataclass(frozen=True, slots=True)
 class Origin:
@@ -31,8 +34,10 @@ class Origin:
         oracle: The argument `oracle`, the name of an oracle; None for the default.
         table: Whether the robot comes from a Denavit-Hartenberg table. If so, the table's convention
             determines the frames between base and tip.
-        sha256: The digest of the MJCF file behind the URDF; empty if the source is a URDF.
+        sha256: The digest of the MJCF or USD file behind the URDF; empty if the source is a URDF.
         lock: Name and value (rad or m) of each locked joint, without its mimic joints.
+        variants: Variant sets and variants that were selected in a USD stage.
+        articulation: The articulation that was chosen in a USD stage, or None.
 
     Raises:
         InputError: `mimic` is neither True, False nor None, or `root_joint` is not a string.
@@ -46,6 +51,8 @@ class Origin:
     table: bool = False
     sha256: str = ""
     lock: tuple[tuple[str, float], ...] = ()
+    variants: tuple[tuple[str, str], ...] = ()
+    articulation: str | None = None
 
     def __post_init__(self) -> None:
         if self.mimic is not None:
@@ -66,6 +73,9 @@ class Origin:
         "--xacro-arg 'arm:=left one' --no-mimic"
         """
         words = [f"--xacro-arg {shlex.quote(f'{name}:={value}')}" for name, value in self.xacro_args]
+        words += [f"--variant {shlex.quote(f'{name}={one}')}" for name, one in self.variants]
+        if self.articulation is not None:
+            words.append(f"--articulation {shlex.quote(self.articulation)}")
         if self.mimic is not None:
             words.append("--mimic" if self.mimic else "--no-mimic")
         if self.root_joint is not None:
@@ -109,6 +119,8 @@ class Origin:
             "xacro_args": dict(self.xacro_args) or None,
             "oracle": self.oracle,
             "lock": dict(self.lock) or None,
+            "variant": dict(self.variants) or None,
+            "articulation": self.articulation,
         }
         arguments = [f"{name}={value!r}" for name, value in values.items() if value is not None]
         return f"urdfkin.load({', '.join([repr(self.again), *arguments])})"
@@ -128,7 +140,9 @@ class Text:
         source: The source for a second reading; `<text>`, `<bytes>` or `<file>` if it has no name.
         entry: The catalogue entry, or None.
         xacro_args: Names and values of the xacro arguments.
-        sha256: The digest of the MJCF file behind the URDF; empty for a URDF.
+        sha256: The digest of the MJCF or USD file behind the URDF; empty for a URDF.
+        variants: Variant sets and variants that were selected in a USD stage.
+        articulation: The articulation that was chosen in a USD stage, or None.
     """
 
     data: bytes
@@ -137,6 +151,8 @@ class Text:
     entry: Entry | None = None
     xacro_args: tuple[tuple[str, str], ...] = ()
     sha256: str = ""
+    variants: tuple[tuple[str, str], ...] = ()
+    articulation: str | None = None
 
 
 def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, object] | None = None) -> Text:
@@ -198,6 +214,15 @@ def is_urdf_path(source: object) -> TypeGuard[str | os.PathLike[str]]:
     (True, False, False)
     """
     return _suffix(source) == ".urdf"
+
+
+def is_usd(source: object) -> TypeGuard[str | os.PathLike[str]]:
+    """Return whether a source is the path of a USD file, by its suffix.
+
+    >>> is_usd("arm.usda"), is_usd("arm.USDZ"), is_usd("arm.urdf"), is_usd("<robot/>")
+    (True, True, False, False)
+    """
+    return _suffix(source) in USD
 
 
 def _suffix(source: object) -> str:

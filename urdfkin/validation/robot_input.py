@@ -25,7 +25,7 @@ from urdfkin.robot.loading import load, robot_of
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.lint import Finding, UrdfWarning
 from urdfkin.urdf.mjcf import is_mjcf
-from urdfkin.urdf.sources import Origin, Source, Text, as_word, is_xacro, read_source
+from urdfkin.urdf.sources import Origin, Source, Text, as_word, is_usd, is_xacro, read_source
 from urdfkin.verify.oracles import ORACLES, PINOCCHIO
 
 #: Input of a validation: anything that `load` accepts, or a loaded robot.
@@ -41,7 +41,7 @@ class RobotInput:
         origin: Source of the robot (also if `source` is the text) and its loading options.
         stamp: The sha256 of the robot's text; empty if the text cannot be read.
         file: The file name in findings, if `source` is the text.
-        listed: Findings in the MJCF that the text was converted from.
+        listed: Findings in the MJCF or USD that the text was converted from.
         made: Whether the text was converted from another format than URDF.
     """
 
@@ -58,7 +58,7 @@ class RobotInput:
         if robot.source in catalogue():
             found = _word(robot.source, robot.origin.mimic, robot.origin.root_joint)
             return replace(found, origin=replace(found.origin, lock=robot.origin.lock))
-        listed = tuple(finding for finding in robot.findings if finding.code.startswith("MJCF"))
+        listed = tuple(finding for finding in robot.findings if finding.code.startswith(("MJCF", "USD")))
         return replace(_text(robot.urdf.encode(), robot.origin, robot.source), listed=listed)
 
     @property
@@ -154,7 +154,7 @@ def subject(
 def _subject(
     robot: Given, mimic: bool | None, root_joint: str | None, xacro_args: Mapping[str, object] | None
 ) -> RobotInput:
-    if isinstance(robot, DHTable) or is_table_file(robot) or is_mjcf(robot):
+    if isinstance(robot, DHTable) or is_table_file(robot) or is_mjcf(robot) or is_usd(robot):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)  # the robot's summary contains the findings
             return replace(RobotInput.of(load(robot, mimic=mimic, root_joint=root_joint)), made=True)

@@ -1,19 +1,39 @@
 """What an MJCF file says and a tree cannot hold is said by `load`, word for word, and nothing else is."""
 
 import warnings
+from pathlib import Path
 
 import pytest
 
 import urdfkin
 from tests.urdf.lint.cases.left_out import CASES, Mjcf
-from urdfkin.urdf.lint.pages import OF_MJCF
+from urdfkin.urdf.lint.pages import OF_OTHERS, page
 
-pytest.importorskip("mujoco")
+OF_MJCF = [code for code in OF_OTHERS if code.startswith("MJCF")]
+OF_USD = [code for code in OF_OTHERS if code.startswith("USD")]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("code", OF_USD)
+def test_the_examples_of_a_page_about_usd_have_the_finding_and_their_cures_have_none(
+    code: str, tmp_path: Path
+) -> None:
+    pytest.importorskip("pxr")
+    found = {}
+    for which in ("example", "cure"):
+        file = tmp_path / f"{which}.usda"
+        file.write_text(getattr(page(code), which).lstrip())
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            robot = urdfkin.load(file, verify=False)
+        found[which] = [finding.code for finding in robot.findings if finding.code in OF_USD]
+    assert found == {"example": [code], "cure": []}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_each_thing_alone_is_said_in_its_words_and_nothing_else(case: Mjcf) -> None:
+    pytest.importorskip("mujoco")
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         robot = urdfkin.load(case.text, verify=False)

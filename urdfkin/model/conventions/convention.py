@@ -318,6 +318,15 @@ def spelled(name: str, how: str) -> str:
     return name
 
 
+def spellings(name: str) -> frozenset[str]:
+    """Return a name as programs write it in USD, and the name itself.
+
+    >>> sorted(spellings("arm-2"))
+    ['arm-2', 'arm_2', 'tn__arm2_g6']
+    """
+    return frozenset(spelled(name, how) for how in ("urdf", "usd", "identifier", "isaacsim"))
+
+
 def identifier(name: str) -> str:
     """Return a name as OpenUSD's `TfMakeValidIdentifier` does: each byte that is not allowed becomes "_".
 

@@ -84,11 +84,11 @@ class Pairing:
     def links(self, body_a: int, body_b: int) -> tuple[tuple[int, int], ...]:
         """Return pairs of links that have the same name, one on a body of A and one on a body of B."""
         if (known := self._links.get((body_a, body_b))) is None:
-            there = {self.b.tree.links[link]: link for link in self.b.bodies[body_b]}
+            there = {self.b.labels[link]: link for link in self.b.bodies[body_b]}
             known = self._links[body_a, body_b] = tuple(
                 (link, there[name])
                 for link in self.a.bodies[body_a]
-                if (name := self.a.tree.links[link]) in there
+                if (name := self.a.labels[link]) in there
             )
         return known
 
@@ -198,9 +198,9 @@ class Pairing:
             if (f := by_name.get(self.given.get(name, name))) is not None:
                 yield e, f
         for e in ours:
-            links = {self.a.tree.links[k] for k in self.a.bodies[e.beyond(bodies[0])]}
+            links = {self.a.labels[k] for k in self.a.bodies[e.beyond(bodies[0])]}
             for f in theirs:
-                if links & {self.b.tree.links[k] for k in self.b.bodies[f.beyond(bodies[1])]}:
+                if links & {self.b.labels[k] for k in self.b.bodies[f.beyond(bodies[1])]}:
                     yield e, f
 
     def _geometries(

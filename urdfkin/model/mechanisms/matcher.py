@@ -322,7 +322,7 @@ class MechanismMatcher:
 
     def _own_links(self, place: Place) -> tuple[list[int], list[int]]:
         """Return those links of two matched bodies that have no link of the same name in the other model."""
-        names_a, names_b = self.a.tree.links, self.b.tree.links
+        names_a, names_b = self.a.labels, self.b.labels
         ours = [i for i in self.a.bodies[place.bodies[0]] if names_a[i] not in names_b]
         return ours, [j for j in self.b.bodies[place.bodies[1]] if names_b[j] not in names_a]
 
@@ -544,8 +544,8 @@ def _most_shared(one: Mechanism, other: Mechanism) -> int | None:
 
     If no body has a name in common, the result is None.
     """
-    names = {one.tree.links[link] for link in one.bodies[0]}
-    shared = [len(names & {other.tree.links[k] for k in body}) for body in other.bodies]
+    names = {one.labels[link] for link in one.bodies[0]}
+    shared = [len(names & {other.labels[k] for k in body}) for body in other.bodies]
     return max(range(len(shared)), key=shared.__getitem__) if any(shared) else None
 
 
@@ -861,7 +861,7 @@ def _is_determined(found: Alignment, i: int) -> tuple[bool, bool]:
 
     The other links are links of A and B without common names, on the body after the joint.
     """
-    names = set(found.a.tree.links) & set(found.b.tree.links)
+    names = set(found.a.labels) & set(found.b.labels)
     behind = {i}
     for k, step in enumerate(found.steps):
         if step.previous in behind:
@@ -869,7 +869,7 @@ def _is_determined(found: Alignment, i: int) -> tuple[bool, bool]:
                 return True, True
             behind.add(k)
     carried = [frame for frame in found.frames if frame.previous in behind]
-    determined = any(found.a.tree.links[frame.a] in names for frame in carried)
+    determined = any(found.a.labels[frame.a] in names for frame in carried)
     return determined, any(frame.tool is IDENTITY for frame in carried)
 
 

@@ -248,10 +248,14 @@ class Mechanism:
         tree: The robot.
         parting: Indices of fixed joints that separate two bodies, because these joints move in the other
             model.
+        labels: For each link the name by which links are paired; None: the names in the tree.
     """
 
-    def __init__(self, tree: KinematicTree, parting: Collection[int] = ()) -> None:
+    def __init__(
+        self, tree: KinematicTree, parting: Collection[int] = (), labels: Sequence[str] | None = None
+    ) -> None:
         self.tree = tree
+        self.labels = tree.links if labels is None else tuple(labels)
         homes, body, edges, bodies = [np.eye(4)], [0], list[Edge](), [[0]]
         lengths, depths = [0.0], [0]
         for i, joint in enumerate(tree.joints):

@@ -16,7 +16,7 @@ from typing import Any
 from urllib.parse import quote
 
 from urdfkin.urdf.findings import Finding, Fix, Rule, Severity
-from urdfkin.urdf.lint.pages import RULES, page
+from urdfkin.urdf.lint.pages import OF_OTHERS, RULES, find_rule, page
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 
@@ -24,19 +24,23 @@ SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sar
 def as_sarif(findings: Sequence[Finding], version: str, silenced: Sequence[tuple[Finding, str]] = ()) -> str:
     """Return one SARIF run with every code as a rule and every finding as a result.
 
+    The codes about MJCF and USD are rules only if a finding has them.
+
     Args:
         findings: The reported findings.
         version: The version of urdfkin.
         silenced: The findings that comments silence, each with its reason. SARIF marks them as "suppressed in
             source".
     """
-    index = {code: number for number, code in enumerate(RULES)}
+    codes = {finding.code for finding in findings}
+    rules = RULES | {code: rule for code, rule in OF_OTHERS.items() if code in codes}
+    index = {code: number for number, code in enumerate(rules)}
     run = {
         "tool": {
             "driver": {
                 "name": "urdfkin",
                 "version": version,
-                "rules": [_rule(rule) for rule in RULES.values()],
+                "rules": [_rule(rule) for rule in rules.values()],
             }
         },
         "columnKind": "unicodeCodePoints",
@@ -147,7 +151,7 @@ def statistics(findings: Sequence[Finding]) -> Iterator[str]:
         fixable |= {finding.code} if finding.fix else set()
     for code, count in sorted(counts.items(), key=lambda item: (-item[1], item[0])):
         mark = "[*]" if code in fixable else "   "
-        yield f"{count:7}  {code}  {worst[code].value:7}  {mark}  {RULES[code].slug}: {page(code).title}"
+        yield f"{count:7}  {code}  {worst[code].value:7}  {mark}  {find_rule(code).slug}: {page(code).title}"
 
 
 def as_json(

@@ -9,6 +9,7 @@ replace `{name}` in examples. Such a text is a string, or a pair [text, times] f
 
 from __future__ import annotations
 
+import string
 import textwrap
 from dataclasses import dataclass
 from functools import cache
@@ -33,15 +34,15 @@ TOPICS: dict[str, tuple[Rule, ...]] = {
 
 #: For each code, in ascending order: the rule with this code.
 RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lambda rule: rule.id)}
-#: For each code of `load`'s findings about MJCF files: the rule. `check` does not read MJCF files.
-OF_MJCF = {rule.id: rule for rule in (left_out.LEFT_OUT_MOTION, left_out.LEFT_OUT)}
+#: For each code of the findings about MJCF and USD files: the rule.
+OF_OTHERS = {x.id: x for x in vars(left_out).values() if isinstance(x, Rule)}
 
 #: For each name of a rule in lower case: the code of the rule. Each rule has three names: its code, the
 #: digits of the code, and its short name.
 CODES = {word: rule.id for rule in RULES.values() for word in (rule.id.lower(), rule.id[4:], rule.slug)}
 
 _TOPIC = {rule.id: topic for topic, own in TOPICS.items() for rule in own} | dict.fromkeys(
-    OF_MJCF, "left_out"
+    OF_OTHERS, "left_out"
 )
 
 
@@ -88,7 +89,9 @@ def topic_pages(topic: str) -> dict[str, Page]:
     data = tomllib.loads(page_files()[topic].read_text(encoding="utf-8"))
     defaults = {key: value for key, value in data.items() if isinstance(value, str)}
     return {
-        code: _page({**data, **defaults, **data[code]}) for code in data if code.startswith(("URDF", "MJCF"))
+        code: _page({**data, **defaults, **data[code]})
+        for code in data
+        if code.startswith(("URDF", "MJCF", "USD"))
     }
 
 
@@ -112,8 +115,8 @@ def find_rule(word: str) -> Rule:
     Raises:
         UnknownNameError: there is no such rule. The message lists the nearest names.
     """
-    known, name_or_code = RULES | OF_MJCF, word.strip().lower()
-    codes = CODES | {name: rule.id for rule in OF_MJCF.values() for name in (rule.id.lower(), rule.slug)}
+    known, name_or_code = RULES | OF_OTHERS, word.strip().lower()
+    codes = CODES | {name: rule.id for rule in OF_OTHERS.values() for name in (rule.id.lower(), rule.slug)}
     if name_or_code not in codes:
         raise UnknownNameError("code", word, [*known, *(rule.slug for rule in known.values())])
     return known[codes[name_or_code]]
@@ -130,10 +133,11 @@ def find_rules(word: str) -> tuple[Rule, ...]:
     """
     prefix = word.strip().upper()
     prefix = f"URDF{prefix}" if prefix.isdigit() else prefix
-    family = tuple(rule for rule in RULES.values() if rule.id.startswith(prefix))
+    every = RULES | OF_OTHERS
+    family = tuple(rule for rule in every.values() if rule.id.startswith(prefix))
     if prefix == "ALL":
-        return tuple(RULES.values())
-    return family if family and prefix[4:] else (find_rule(word),)
+        return tuple(every.values())
+    return family if family and prefix.lstrip(string.ascii_uppercase) else (find_rule(word),)
 
 
 #: Largest number of characters in a line of an example. Longer lines are cut.

@@ -1,0 +1,818 @@
+"""USD stages become the robots that UsdPhysics describes, and what a tree cannot hold is listed."""
+
+import contextlib
+import json
+import math
+import os
+import re
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("pxr")
+
+import urdfkin
+from tests.cli.running import urdfkin as command
+from urdfkin.comparison.result import Question
+from urdfkin.errors import InputError, OracleError, SourceError
+from urdfkin.kinematics.rotation import quaternion_of, rotation_of
+from urdfkin.model.conventions.convention import transcoded
+from urdfkin.model.tree import LARGEST_ANGLE, Joint, KinematicTree, pose
+from urdfkin.urdf import usd
+from urdfkin.verify import usd_check
+
+HEAD = '#usda 1.0\n(\n    defaultPrim = "arm"\n    metersPerUnit = {unit}\n    upAxis = "{up}"\n)\n'
+
+
+def body(name: str, place: str = "", inside: str = "", schemas: str = "") -> str:
+    """Write a rigid body; `place` is (x, y, z), in stage units."""
+    ops = (
+        f'double3 xformOp:translate = {place}\nuniform token[] xformOpOrder = ["xformOp:translate"]'
+        if place
+        else ""
+    )
+    head = f'def Xform "{name}" (prepend apiSchemas = ["PhysicsRigidBodyAPI"{schemas}])'
+    return f"{head} {{\n{ops}\n{inside}\n}}\n"
+
+
+def joint(name: str, kind: str, first: str, second: str, more: str = "", schemas: str = "") -> str:
+    """Write a joint between two bodies of /arm; an empty name is the world."""
+    ends = "".join(f"rel physics:body{i} = </arm/{end}>\n" for i, end in enumerate((first, second)) if end)
+    api = f" (prepend apiSchemas = [{schemas}])" if schemas else ""
+    return f'def Physics{kind}Joint "{name}"{api} {{\n{ends}{more}\n}}\n'
+
+
+ROOT = ', "PhysicsArticulationRootAPI"'
+#: An arm of two links: a turn about z at (0, 0, 1), then a slide along y from (2, 0, 0).
+LINKS = body("base", schemas=ROOT) + body("upper", "(0, 0, 1)") + body("lower", "(2, 0, 1)")
+JOINTS = joint(
+    "shoulder", "Revolute", "base", "upper",
+    'uniform token physics:axis = "Z"\npoint3f physics:localPos0 = (0, 0, 1)\n'
+    "float physics:lowerLimit = -90\nfloat physics:upperLimit = 180",
+) + joint(
+    "rail", "Prismatic", "upper", "lower",
+    'uniform token physics:axis = "Y"\npoint3f physics:localPos0 = (2, 0, 0)\n'
+    "float physics:lowerLimit = -1\nfloat physics:upperLimit = 3",
+)  # fmt: skip
+
+
+def stage(content: str, unit: float = 1.0, up: str = "Z") -> str:
+    return f'{HEAD.format(unit=unit, up=up)}def Xform "arm" {{\n{content}\n}}\n'
+
+
+Write = Callable[..., Path]
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    def of(text: str, name: str = "robot.usda") -> Path:
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+        return path
+
+    return of
+
+
+def loaded(path: Path, **options: Any) -> urdfkin.Robot:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        return urdfkin.load(path, **options)
+
+
+def codes(robot: urdfkin.Robot) -> dict[str, str | None]:
+    return {finding.code: finding.name for finding in robot.findings if finding.code.startswith("USD")}
+
+
+def of_urdf(T: Any) -> Any:
+    return pytest.approx(T, abs=1e-6)
+
+
+def test_joints_move_as_usdphysics_defines_them(write: Write) -> None:
+    robot = loaded(write(stage(LINKS + JOINTS)))
+    assert robot.name == "arm"
+    assert robot.link_names == ("base", "upper", "lower")
+    T = robot.placement([math.pi / 2, 0.5], "lower")
+    assert T[:3, 3] == pytest.approx([-0.5, 2.0, 1.0])
+    assert T[:3, 0] == pytest.approx([0.0, 1.0, 0.0])
+    assert codes(robot) == {}
+
+
+def test_the_certificate_states_what_openusd_confirms(write: Write) -> None:
+    robot = loaded(write(stage(LINKS + JOINTS)))
+    robot.placement([0.1, 0.2], "lower")
+    certificate = robot.certificate()
+    assert certificate.verified
+    assert re.search(
+        r"OpenUSD [\d.]+: its UsdPhysics parser reads the same 2 joints \(.*\); "
+        r"UsdGeom's transforms of 3 prims agree at q = 0",
+        certificate.reading or "",
+    )
+
+
+def test_limits_are_degrees_and_a_joint_without_limits_is_continuous(write: Write) -> None:
+    free = joint("shoulder", "Revolute", "base", "upper", 'uniform token physics:axis = "Z"')
+    robot = loaded(write(stage(LINKS + JOINTS)))
+    limit = robot.tree.joints[0].limit
+    assert limit is not None
+    assert (limit.lower, limit.upper) == pytest.approx((-math.pi / 2, math.pi))
+    robot = loaded(write(stage(body("base") + body("upper") + free)))
+    assert robot.tree.joints[0].kind.value == "continuous"
+
+
+@pytest.mark.parametrize(("unit", "length"), [(1.0, 2.0), (0.01, 0.02), (0.0254, 0.0508)])
+def test_lengths_are_in_the_stages_unit(write: Write, unit: float, length: float) -> None:
+    robot = loaded(write(stage(LINKS + JOINTS, unit=unit)))
+    assert robot.placement([0.0, 0.0], "lower")[0, 3] == pytest.approx(length)
+    limit = robot.tree.joints[1].limit
+    assert limit is not None
+    assert limit.upper == pytest.approx(3.0 * unit)
+
+
+def test_a_stage_with_y_up_is_turned_so_that_z_is_up(write: Write) -> None:
+    fixed = joint("mount", "Fixed", "", "base")
+    robot = loaded(write(stage(LINKS + JOINTS + fixed, up="Y")))
+    # upper is at z = 1 of the stage, which is y = -1 of a world with z up
+    assert robot.placement([0.0, 0.0], "upper")[:3, 3] == pytest.approx([0.0, -1.0, 0.0])
+    assert robot.link_names[0] == "world"
+
+
+def test_a_joint_frame_counts_on_both_sides(write: Write) -> None:
+    offset = joint(
+        "j", "Revolute", "base", "tip",
+        'uniform token physics:axis = "X"\npoint3f physics:localPos0 = (1, 0, 0)\n'
+        "quatf physics:localRot0 = (0.70710677, 0, 0, 0.70710677)\n"
+        "point3f physics:localPos1 = (0, 3, 0)\nquatf physics:localRot1 = (0.70710677, 0, 0, 0.70710677)",
+    )  # fmt: skip
+    robot = loaded(write(stage(body("base", schemas=ROOT) + body("tip", "(1, -3, 0)") + offset)))
+    assert robot.placement([0.0], "tip")[:3, 3] == pytest.approx([1.0, -3.0, 0.0])
+    # the axis is the y axis of the base through (1, 0, 0)
+    turned = robot.placement([math.pi / 2], "tip")
+    assert turned[:3, 3] == pytest.approx([1.0, -3.0, 0.0])
+    assert turned[:3, 2] == pytest.approx([1.0, 0.0, 0.0])
+    assert codes(robot) == {}
+
+
+def test_a_joint_that_is_written_from_the_child_to_the_parent_moves_the_other_way(write: Write) -> None:
+    reverse = joint(
+        "j", "Revolute", "tip", "base",
+        'uniform token physics:axis = "Z"\npoint3f physics:localPos1 = (1, 0, 0)',
+    )  # fmt: skip
+    robot = loaded(write(stage(body("base", schemas=ROOT) + body("tip", "(1, 0, 0)") + reverse)))
+    assert robot.link_names[0] == "base"
+    T = robot.placement([math.pi / 2], "tip")
+    assert T[:3, 3] == pytest.approx([1.0, 0.0, 0.0])
+    assert T[:3, 0] == pytest.approx([0.0, -1.0, 0.0])
+
+
+def test_nested_bodies_and_scaled_bodies_have_rigid_frames(write: Write) -> None:
+    inner = body("tip", "(1, 0, 0)")
+    scaled = (
+        'def Xform "base" (prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsArticulationRootAPI"]) {\n'
+        "float3 xformOp:scale = (2, 2, 2)\n"
+        'uniform token[] xformOpOrder = ["xformOp:scale"]\n' + inner + "}\n"
+    )
+    own = joint(
+        "j", "Revolute", "base", "base/tip",
+        'uniform token physics:axis = "Z"\npoint3f physics:localPos0 = (1, 0, 0)',
+    )  # fmt: skip
+    robot = loaded(write(stage(scaled + own)))
+    assert robot.placement([0.0], "tip")[:3, 3] == pytest.approx([2.0, 0.0, 0.0])
+    assert codes(robot) == {}
+
+
+def test_a_joint_to_a_prim_below_a_body_moves_the_body(write: Write) -> None:
+    base = body(
+        "base",
+        inside='def Xform "flange" {\ndouble3 xformOp:translate = (0, 0, 2)\n'
+        'uniform token[] xformOpOrder = ["xformOp:translate"]\n}',
+        schemas=ROOT,
+    )
+    own = joint("j", "Revolute", "base/flange", "tip", 'uniform token physics:axis = "Z"')
+    robot = loaded(write(stage(base + body("tip", "(0, 0, 2)") + own)))
+    assert robot.placement([0.0], "tip")[:3, 3] == pytest.approx([0.0, 0.0, 2.0])
+    # a plain Xform of a body is a frame
+    assert robot.placement([0.0], "flange")[:3, 3] == pytest.approx([0.0, 0.0, 2.0])
+
+
+def test_a_spherical_joint_is_refused_with_its_path(write: Write) -> None:
+    ball = joint("ball", "Spherical", "base", "upper")
+    with pytest.raises(InputError, match=r"joint /arm/ball: urdfkin does not support spherical joints"):
+        loaded(write(stage(LINKS + ball)))
+
+
+def locked(*names: str) -> str:
+    return "".join(
+        f"float limit:{name}:physics:low = 1\nfloat limit:{name}:physics:high = -1\n" for name in names
+    )
+
+
+def limited(*names: str) -> str:
+    return ", ".join(f'"PhysicsLimitAPI:{name}"' for name in names)
+
+
+ALL = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
+
+
+@pytest.mark.parametrize(
+    ("free", "kind"),
+    [
+        ((), "fixed"),
+        (("rotY",), "continuous"),
+        (("transZ",), "prismatic"),
+        (("transX", "transY", "rotZ"), "planar"),
+    ],
+)
+def test_a_d6_joint_with_the_freedoms_of_another_kind_is_that_joint(
+    write: Write, free: tuple[str, ...], kind: str
+) -> None:
+    shut = [name for name in ALL if name not in free]
+    d6 = joint("j", "", "base", "tip", locked(*shut), limited(*shut))
+    robot = loaded(write(stage(body("base", schemas=ROOT) + body("tip") + d6)))
+    assert robot.tree.joints[0].kind.value == kind
+    if free == ("rotY",):
+        assert robot.placement([math.pi / 2], "tip")[:3, 0] == pytest.approx([0.0, 0.0, -1.0])
+
+
+def test_a_d6_joint_with_other_freedoms_is_refused(write: Write) -> None:
+    shut = ALL[:4]
+    d6 = joint("j", "", "base", "tip", locked(*shut), limited(*shut))
+    with pytest.raises(InputError, match=r"degrees of freedom.*rotY, rotZ"):
+        loaded(write(stage(body("base") + body("tip") + d6)))
+
+
+def test_a_joint_that_closes_a_loop_is_listed_with_its_path(write: Write) -> None:
+    closing = joint(
+        "closing",
+        "Revolute",
+        "lower",
+        "base",
+        "point3f physics:localPos1 = (2, 0, 1)\nbool physics:excludeFromArticulation = true",
+    )
+    robot = loaded(write(stage(LINKS + JOINTS + closing)))
+    assert robot.nq == 2
+    assert codes(robot) == {"USD101": "/arm/closing"}
+    robot = loaded(write(stage(LINKS + JOINTS + closing.replace("true", "false"))))
+    assert codes(robot) == {"USD101": "/arm/closing"}
+
+
+def test_a_disabled_joint_and_a_lost_target_are_listed(write: Write) -> None:
+    off = joint("off", "Fixed", "upper", "lower", "bool physics:jointEnabled = false")
+    lost = joint("lost", "Fixed", "upper", "nowhere")
+    robot = loaded(write(stage(LINKS + JOINTS + off + lost)))
+    assert codes(robot) == {"USD101": "/arm/off", "USD201": "/arm/lost"}
+
+
+def test_a_body_without_a_joint_is_listed(write: Write) -> None:
+    robot = loaded(write(stage(LINKS + JOINTS + body("stray"))))
+    assert codes(robot) == {"USD202": "/arm/stray"}
+
+
+NEWTON = '"NewtonMimicAPI"'
+PHYSX = '"PhysxMimicJointAPI:rotZ"'
+
+
+@pytest.mark.parametrize(
+    ("schema", "words"),
+    [
+        (
+            NEWTON,
+            "rel newton:mimicJoint = </arm/shoulder>\n"
+            "float newton:mimicCoef0 = 30\nfloat newton:mimicCoef1 = -2",
+        ),
+        (
+            PHYSX,
+            "rel physxMimicJoint:rotZ:referenceJoint = </arm/shoulder>\n"
+            "float physxMimicJoint:rotZ:gearing = 2\nfloat physxMimicJoint:rotZ:offset = -30",
+        ),
+    ],
+)
+def test_mimic_joints_of_newton_and_physx_follow_their_rule(write: Write, schema: str, words: str) -> None:
+    follower = joint(
+        "wrist", "Revolute", "upper", "hand", f'uniform token physics:axis = "Z"\n{words}', schema
+    )
+    robot = loaded(
+        write(
+            stage(
+                body("base", schemas=ROOT)
+                + body("upper", "(0, 0, 1)")
+                + body("hand", "(0, 0, 1)")
+                + JOINTS.partition("def PhysicsPrismatic")[0]
+                + follower
+            )
+        )
+    )
+    rule = robot.tree.joints[1].mimic
+    assert robot.nq == 1
+    assert rule is not None
+    assert rule.leader == "shoulder"
+    assert (rule.multiplier, rule.offset) == pytest.approx((-2.0, math.pi / 6))
+
+
+def test_a_mimic_rule_without_its_leader_is_listed(write: Write) -> None:
+    lost = JOINTS.replace(
+        'def PhysicsPrismaticJoint "rail"',
+        'def PhysicsPrismaticJoint "rail" (prepend apiSchemas = ["NewtonMimicAPI"])',
+    )
+    robot = loaded(write(stage(LINKS + lost)))
+    assert codes(robot) == {"USD203": "/arm/rail"}
+    assert robot.nq == 2
+
+
+def test_units_and_axes_that_a_stage_does_not_state_are_findings(write: Write) -> None:
+    text = stage(LINKS + JOINTS)
+    plain = text.replace("    metersPerUnit = 1.0\n", "").replace('    upAxis = "Z"\n', "")
+    assert plain != text
+    robot = loaded(write(plain))
+    assert codes(robot) == {"USD301": None, "USD302": None}
+    assert "centimetre" in next(one.message for one in robot.findings if one.code == "USD301")
+
+
+def test_limits_in_radians_are_found(write: Write) -> None:
+    robot = loaded(write(stage(LINKS + JOINTS.replace("= -90", "= -1.5708").replace("= 180", "= 3.14159"))))
+    assert codes(robot) == {"USD303": "/arm/shoulder"}
+
+
+def test_a_prim_that_is_not_where_its_joints_place_it_is_found(write: Write) -> None:
+    robot = loaded(
+        write(stage((LINKS + JOINTS).replace("localPos0 = (0, 0, 1)", "localPos0 = (0, 0, 1.001)")))
+    )
+    assert codes(robot) == {"USD304": "/arm/upper"}
+    finding = next(one for one in robot.findings if one.code == "USD304")
+    assert "0.001 m" in finding.message
+    assert "elsewhere" in str(robot.certificate().reading)
+
+
+def test_a_stage_may_show_the_robot_in_another_configuration(write: Write) -> None:
+    posed = LINKS.replace("(2, 0, 1)", "(2, 0.75, 1)")
+    robot = loaded(write(stage(posed + JOINTS)))
+    assert codes(robot) == {}
+    robot.placement([0.0, 0.0], "lower")
+    assert "with 1 joints off zero" in str(robot.certificate().reading)
+
+
+def test_several_articulations_need_a_choice(write: Write) -> None:
+    two = (
+        stage(LINKS + JOINTS)
+        + stage(LINKS + JOINTS).replace("/arm", "/other").replace('"arm"', '"other"').partition(")\n")[2]
+    )
+    path = write(two)
+    with pytest.raises(InputError, match=r"2 articulations.*/arm/base, /other/base"):
+        loaded(path)
+    assert loaded(path, articulation="/other/base").name == "other"
+    with pytest.raises(InputError, match="/arm/base"):
+        loaded(path, articulation="/arm/bas")
+
+
+VARIANTS = """def Xform "arm" (
+    variants = { string gripper = "short" }
+    prepend variantSets = "gripper"
+) {
+CONTENT
+    variantSet "gripper" = {
+        "short" {
+            over "lower" {
+                double3 xformOp:translate = (2, 0, 1)
+            }
+            over "rail" {
+                point3f physics:localPos0 = (2, 0, 0)
+            }
+        }
+        "long" {
+            over "lower" {
+                double3 xformOp:translate = (5, 0, 1)
+            }
+            over "rail" {
+                point3f physics:localPos0 = (5, 0, 0)
+            }
+        }
+    }
+}
+"""
+
+
+def test_a_variant_is_selected(write: Write) -> None:
+    inner = LINKS.replace("translate = (2, 0, 1)", "translate")
+    # an attribute in the file itself is stronger than one in a variant
+    rail = JOINTS.replace("point3f physics:localPos0 = (2, 0, 0)\n", "")
+    path = write(HEAD.format(unit=1, up="Z") + VARIANTS.replace("CONTENT", inner + rail))
+    before = path.read_bytes()
+    assert loaded(path).placement([0.0, 0.0], "lower")[0, 3] == pytest.approx(2.0)
+    robot = loaded(path, variant={"gripper": "long"})
+    assert robot.placement([0.0, 0.0], "lower")[0, 3] == pytest.approx(5.0)
+    assert codes(robot) == {}
+    assert path.read_bytes() == before
+    assert "--variant gripper=long" in robot.origin.words
+    with pytest.raises(InputError, match="long"):
+        loaded(path, variant={"gripper": "lon"})
+    with pytest.raises(InputError, match="gripper"):
+        loaded(path, variant={"griper": "long"})
+    found = command("placement", str(path), "--variant", "gripper=long", "--q", "0 0", "--format", "json")
+    assert found.code == 0, found.err
+    assert "5.0" in found.text
+
+
+def test_references_payloads_and_instances_are_followed(write: Write) -> None:
+    write(stage(LINKS + JOINTS), "parts/arm.usda")
+    for arc in ("references", "payload", "instanceable = true\n    references"):
+        head = '#usda 1.0\n(\n    metersPerUnit = 1\n    upAxis = "Z"\n)\n'
+        text = f'{head}def "mine" (\n    {arc} = @./parts/arm.usda@</arm>\n) {{ }}\n'
+        robot = loaded(write(text))
+        assert robot.link_names == ("base", "upper", "lower")
+        assert robot.placement([0.0, 0.0], "lower")[0, 3] == pytest.approx(2.0)
+        assert codes(robot) == {}
+
+
+def test_crate_files_and_packages_are_read(write: Write, tmp_path: Path) -> None:
+    from pxr import Sdf, UsdUtils  # noqa: PLC0415
+
+    path = write(stage(LINKS + JOINTS))
+    crate, package = tmp_path / "robot.usdc", tmp_path / "robot.usdz"
+    assert Sdf.Layer.FindOrOpen(str(path)).Export(str(crate))
+    assert UsdUtils.CreateNewUsdzPackage(str(path), str(package))
+    for file in (crate, package):
+        robot = loaded(file)
+        assert robot.placement([0.0, 0.0], "lower")[0, 3] == pytest.approx(2.0)
+
+
+# -- hostile files ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("reference", "why"),
+    [
+        ("../../secret.usda", "outside"),
+        ("/etc/passwd.usda", "outside"),
+        ("https://example.org/a.usda", "fetches nothing"),
+        ("omniverse://host/a.usda", "fetches nothing"),
+        ("./link.usda", "outside"),
+        ("./.hidden/a.usda", "outside"),
+        ("./notes.txt", "not USD"),
+        ('`"./${X}.usda"`', "expression"),
+    ],
+)
+@pytest.mark.parametrize("arc", ["sublayer", "reference", "payload", "variant"])
+def test_a_reference_outside_the_folder_is_refused(
+    write: Write, tmp_path: Path, reference: str, why: str, arc: str
+) -> None:
+    (tmp_path / "secret.usda").write_text(stage(LINKS + JOINTS))
+    path = write("", "robot/robot.usda")
+    (path.parent / "link.usda").symlink_to(tmp_path / "secret.usda")
+    (path.parent / "notes.txt").write_text("#usda 1.0\n")
+    own = f"({'payload' if arc == 'payload' else 'references'} = @{reference}@</arm>)"
+    text = {
+        "sublayer": f"#usda 1.0\n(\n    subLayers = [@{reference}@]\n)\n",
+        "variant": "#usda 1.0\n"
+        'def "x" (\n variants = { string s = "a" }\n prepend variantSets = "s"\n) {\n'
+        f'variantSet "s" = {{\n"a" {{ }}\n"b" {own} {{ }}\n}}\n}}\n',
+    }.get(arc, f'#usda 1.0\ndef "x" {own} {{ }}\n')
+    path.write_text(text)
+    with pytest.raises(InputError, match=why):
+        usd.files_of(usd.library(), str(path))
+    if arc == "reference":
+        with pytest.raises(InputError, match=why):
+            loaded(path)
+
+
+def test_layers_that_refer_to_each_other_end(write: Write) -> None:
+    write(stage(LINKS + JOINTS).replace("(\n", "(\n    subLayers = [@./b.usda@]\n", 1), "a.usda")
+    path = write(stage(LINKS + JOINTS).replace("(\n", "(\n    subLayers = [@./a.usda@]\n", 1), "b.usda")
+    robot = loaded(path)
+    assert "USD103" in codes(robot)
+
+
+def test_a_missing_layer_is_a_finding(write: Write) -> None:
+    robot = loaded(write(stage(LINKS + JOINTS + 'def "x" (references = @./gone.usda@</a>) { }')))
+    assert codes(robot) == {"USD103": None}
+
+
+def test_a_crate_file_that_is_cut_short_is_an_error(write: Write, tmp_path: Path) -> None:
+    from pxr import Sdf  # noqa: PLC0415
+
+    crate = tmp_path / "robot.usdc"
+    Sdf.Layer.FindOrOpen(str(write(stage(LINKS + JOINTS)))).Export(str(crate))
+    whole = crate.read_bytes()
+    for share in (0.01, 0.3, 0.6, 0.9, 0.99):
+        cut = tmp_path / f"cut{share}.usdc"
+        cut.write_bytes(whole[: int(share * len(whole))])
+        with pytest.raises(InputError):
+            loaded(cut)
+
+
+def test_a_changed_crate_file_never_ends_the_callers_process(write: Write, tmp_path: Path) -> None:
+    from pxr import Sdf  # noqa: PLC0415
+
+    crate, rng = tmp_path / "robot.usdc", np.random.default_rng(0)
+    Sdf.Layer.FindOrOpen(str(write(stage(LINKS + JOINTS)))).Export(str(crate))
+    whole = np.frombuffer(crate.read_bytes(), np.uint8)
+    for k in range(12):
+        damaged = whole.copy()
+        damaged[rng.integers(0, len(whole), 20)] = rng.integers(0, 256, 20)
+        file = tmp_path / f"damaged{k}.usdc"
+        file.write_bytes(damaged.tobytes())
+        with contextlib.suppress(urdfkin.UrdfkinError):
+            loaded(file, verify=False)
+
+
+def test_large_layers_and_devices_are_refused(write: Write, tmp_path: Path) -> None:
+    path = write(stage(LINKS + JOINTS + 'def "x" (references = @./large.usda@</a>) { }'))
+    with (tmp_path / "large.usda").open("wb") as file:
+        file.truncate(200_000_000)
+    with pytest.raises(InputError, match="too large"):
+        loaded(path)
+    (tmp_path / "large.usda").unlink()
+    os.mkfifo(tmp_path / "large.usda")
+    with pytest.raises(InputError, match="not a regular file"):
+        loaded(path)
+    with pytest.raises(SourceError):
+        loaded(tmp_path / "none.usda")
+
+
+def test_text_that_is_no_usd_is_an_error(write: Write) -> None:
+    for text in ("<robot/>", "#usda 1.0\ndef Xform {", "PXR-USDC"):
+        with pytest.raises(InputError):
+            loaded(write(text))
+
+
+def test_a_stage_without_joints_is_an_error(write: Write) -> None:
+    with pytest.raises(InputError, match="no joint between bodies"):
+        loaded(write(stage(LINKS)))
+
+
+# -- a slip of the reader is noticed -------------------------------------------------------------------------
+
+
+def slipped(monkeypatch: pytest.MonkeyPatch, path: Path) -> urdfkin.Robot:
+    """Load a stage in this process, where a slip can be planted."""
+    from urdfkin.verify import usd_process  # noqa: PLC0415
+
+    def ask(_: list[str], request: bytes, *rest: Any) -> tuple[bytes, int]:
+        return json.dumps(usd_process.answer_of(json.loads(request))).encode() + b"\n", 0
+
+    monkeypatch.setattr(usd_check, "ask_python", ask)
+    return loaded(path)
+
+
+@pytest.mark.parametrize("slip", ["unit", "degrees", "swapped", "axis"])
+def test_openusds_parser_notices_a_slip_of_our_reader(
+    write: Write, monkeypatch: pytest.MonkeyPatch, slip: str
+) -> None:
+    path = write(stage(LINKS + JOINTS, unit=0.5))
+    assert slipped(monkeypatch, path).nq == 2
+    side, motion = usd._Reader._side, usd._Reader._motion
+
+    def wrong_side(self: Any, prim: Any, i: int, target: str | None) -> Any:
+        found = side(self, prim, 1 - i if slip == "swapped" else i, target)
+        assert found is not None
+        T = found[1].copy()
+        T[:3, 3] *= 2.0 if slip == "unit" else 1.0
+        return found[0], T, *found[2:]
+
+    def wrong_motion(self: Any, prim: Any) -> Any:
+        kind, axis, (lower, upper), free = motion(self, prim)
+        factor = 180.0 / math.pi if slip == "degrees" else 1.0
+        return kind, axis, (lower * factor, upper * factor), "rotX" if slip == "axis" else free
+
+    monkeypatch.setattr(usd._Reader, "_side", wrong_side)
+    monkeypatch.setattr(usd._Reader, "_motion", wrong_motion)
+    with pytest.raises(OracleError, match="OpenUSD's parser of UsdPhysics reads another joint"):
+        slipped(monkeypatch, path)
+
+
+# -- the same robot in several formats -----------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Slip:
+    """A mistake of a converter, in one joint."""
+
+    kind: str
+    joint: str
+
+
+def as_usd(robot: urdfkin.Robot, spell: Callable[[str], str] = str, slip: Slip | None = None) -> str:
+    """Write a robot of revolute, continuous, prismatic and fixed joints as a stage, as a converter would."""
+    tree = robot.tree
+    place = robot.placement(np.zeros(robot.nq), list(robot.link_names))
+    lines = []
+    for k, link in enumerate(tree.links):
+        api = '"PhysicsRigidBodyAPI"' + (', "PhysicsArticulationRootAPI"' if k == 0 else "")
+        x, y, z, w = quaternion_of(place[k, :3, :3]).tolist()
+        lines.append(
+            f'def Xform "{spell(link)}" (prepend apiSchemas = [{api}]) {{\n'
+            f"double3 xformOp:translate = {tuple(place[k, :3, 3].tolist())}\n"
+            f"quatd xformOp:orient = ({w!r}, {x!r}, {y!r}, {z!r})\n"
+            'uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:orient"]\n}\n'
+        )
+    lines.append('def Scope "joints" {\n')
+    for k, one in enumerate(tree.joints):
+        lines.append(_joint_in_usd(tree, k, one, spell, slip if slip and slip.joint == one.name else None))
+    lines.append("}\n")
+    return stage("".join(lines))
+
+
+def _joint_in_usd(
+    tree: KinematicTree, k: int, one: Joint, spell: Callable[[str], str], slip: Slip | None
+) -> str:
+    kind = slip.kind if slip else ""
+    turns = one.kind.turns
+    R = _with_first_axis(-one.axis if kind == "axis sign" else one.axis)
+    A, B = one.T_parent_joint @ pose(R), pose(R)
+    if kind == "centimetres":
+        A = pose(A[:3, :3], 100.0 * A[:3, 3])
+    if kind == "mirrored frame":
+        mirror = np.diag([1.0, -1.0, 1.0])
+        A = pose(A[:3, :3], mirror @ A[:3, 3])
+    ends = [spell(tree.links[one.parent]), spell(tree.links[k + 1])]
+    if kind == "exchanged bodies":
+        ends.reverse()
+    words = [f"rel physics:body{i} = </arm/{end}>" for i, end in enumerate(ends)]
+    for i, T in enumerate((A, B)):
+        x, y, z, w = quaternion_of(T[:3, :3]).tolist()
+        words.append(f"point3f physics:localPos{i} = {tuple(T[:3, 3].tolist())}")
+        words.append(f"quatf physics:localRot{i} = ({w!r}, {x!r}, {y!r}, {z!r})")
+    schemas = ""
+    if one.mimic is not None and kind != "mimic dropped":
+        factor = 180.0 / math.pi if turns else 1.0
+        schemas = ' (prepend apiSchemas = ["NewtonMimicAPI"])'
+        words.append(f"rel newton:mimicJoint = </arm/joints/{spell(one.mimic.leader)}>")
+        words.append(f"float newton:mimicCoef0 = {one.mimic.offset * factor!r}")
+        words.append(f"float newton:mimicCoef1 = {one.mimic.multiplier!r}")
+    if one.limit is not None and one.kind.bounded:
+        factor = 180.0 / math.pi if turns and kind != "radians" else 1.0
+        words.append(f"float physics:lowerLimit = {one.limit.lower * factor!r}")
+        words.append(f"float physics:upperLimit = {one.limit.upper * factor!r}")
+    name = {"fixed": "Fixed", "prismatic": "Prismatic"}.get(one.kind.value, "Revolute")
+    return f'def Physics{name}Joint "{spell(one.name)}"{schemas} {{\n' + "\n".join(words) + "\n}\n"
+
+
+def _with_first_axis(axis: Any) -> Any:
+    """A rotation whose x axis is a unit vector."""
+    other = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    y = np.cross(axis, other)
+    y /= np.linalg.norm(y)
+    return np.column_stack((axis, y, np.cross(axis, y)))
+
+
+ROBOTS = (
+    "panda",
+    "ur5",
+    "so101",
+    "talos_left_arm",
+    "ur10",
+    "solo12",
+    "finger_edu",
+    "g1",
+    "allegro_left_hand",
+    "bolt",
+)
+
+
+@pytest.mark.parametrize("name", ROBOTS[:3])
+def test_rounding_to_single_precision_explains_the_difference_from_the_urdf(write: Write, name: str) -> None:
+    robot = loaded_name(name)
+    found = urdfkin.same(robot, loaded(write(as_usd(robot, transcoded))), boxes=0)
+    assert found.single is not None
+    assert found.up_to_single
+    assert 0.0 < found.written[0] <= found.single[0] < 5e-6
+    assert found.holds(Question())
+    assert not found.holds(Question(strict=True))
+
+
+def loaded_name(name: str) -> urdfkin.Robot:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        return urdfkin.load(name)
+
+
+def test_a_millimetre_is_not_explained_by_single_precision(write: Write) -> None:
+    robot = loaded_name("panda")
+    text = as_usd(robot)
+    assert "0.333" in text
+    found = urdfkin.same(robot, loaded(write(text.replace("0.333", "0.33300001"))), boxes=0)
+    assert found.up_to_single
+    found = urdfkin.same(robot, loaded(write(text.replace("0.333", "0.333002"))), boxes=0)
+    assert not found.up_to_single
+    assert not found
+
+
+SLIPS = {
+    "axis sign": "senses",
+    "centimetres": "USD304",
+    "radians": "USD303",
+    "mimic dropped": "independent joint in B",
+    "exchanged bodies": "USD304",
+    "mirrored frame": "USD304",
+}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ROBOTS)
+def test_each_slip_of_a_converter_is_found_and_named(write: Write, name: str) -> None:
+    robot = loaded_name(name)
+    for kind, slip_word in SLIPS.items():
+        word = slip_word
+        moving = [one for one in robot.tree.joints if one.kind.nq == 1]
+        if kind == "mimic dropped":
+            moving = [one for one in moving if one.mimic is not None]
+        elif kind == "radians":
+            moving = [one for one in moving if one.kind.value == "revolute"]
+        elif kind == "mirrored frame":
+            moving = [one for one in moving if abs(one.T_parent_joint[1, 3]) > 1e-3]
+        elif kind in ("centimetres", "exchanged bodies"):
+            moving = [one for one in moving if np.linalg.norm(one.T_parent_joint[:3, 3]) > 1e-3]
+        if not moving:
+            continue
+        slipped_stage = loaded(write(as_usd(robot, transcoded, Slip(kind, moving[len(moving) // 2].name))))
+        found = urdfkin.same(robot, slipped_stage, boxes=0)
+        said = [
+            *found.up_to,
+            *(one.words for one in (*found.differences, *found.remarks)),
+            *codes(slipped_stage),
+        ]
+        limit = moving[len(moving) // 2].limit
+        if kind == "radians" and limit is not None and limit.upper > LARGEST_ANGLE:
+            word = ": limits "  # too large for a joint angle in radians, so only `same` finds it
+        assert not found.up_to_single or kind == "radians", (kind, name)
+        assert any(word in one for one in said), (kind, name, said)
+        if kind == "radians":
+            assert any(one.what == "limits" for one in found.remarks)
+
+
+def test_three_formats_are_compared_in_pairs(write: Write, tmp_path: Path) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    robot = loaded_name("planar_two_link")
+    urdf = tmp_path / "arm.urdf"
+    urdf.write_text(robot.urdf)
+    stage_file = write(as_usd(robot), "arm.usda")
+    mjcf = tmp_path / "arm.xml"
+    links = '<body name="link_1"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+    assert mujoco
+    T, tip = (robot.placement([0.0, 0.0], name)[:3, 3].tolist() for name in ("link_2", "tip"))
+    tip = np.subtract(tip, T).tolist()
+    mjcf.write_text(
+        f'<mujoco><compiler angle="radian"/><worldbody>{links}<joint name="joint_1" axis="0 0 1"/>'
+        f'<body name="link_2" pos="{T[0]!r} {T[1]!r} {T[2]!r}">'
+        '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+        f'<joint name="joint_2" axis="0 0 1"/><site name="tip" pos="{tip[0]!r} {tip[1]!r} {tip[2]!r}"/>'
+        "</body></body></worldbody></mujoco>"
+    )
+    done = command("same", str(urdf), str(mjcf), str(stage_file), "--boxes", "0")
+    assert done.code == 0, done.text + done.err
+    assert done.text.count("same up to single precision") == 2
+    assert done.text.count("arm.urdf") == 2
+    done = command("same", str(urdf), str(mjcf), str(stage_file), "--map", "a=b")
+    assert done.code == 2
+    assert "more than two robots" in done.err
+
+
+def test_check_states_the_place_of_a_finding(write: Write) -> None:
+    path = write(stage(LINKS + JOINTS.replace("= -90", "= -1.5708").replace("= 180", "= 3.14159")))
+    done = command("check", str(path))
+    assert done.code == 0
+    assert "USD303 warning: prim '/arm/shoulder'" in done.text
+    assert command("check", "--strict", str(path)).code == 1
+    assert command("check", "--strict", "--ignore", "USD303", str(path)).code == 0
+    assert command("check", "--strict", "--select", "USD2", str(path)).code == 0
+    run = json.loads(command("check", "--output-format", "sarif", str(path)).text)["runs"][0]
+    result = run["results"][0]
+    assert run["tool"]["driver"]["rules"][result["ruleIndex"]]["id"] == result["ruleId"] == "USD303"
+    ball = write(stage(LINKS + joint("ball", "Spherical", "base", "upper")))
+    done = command("check", str(ball))
+    assert done.code == 2
+    assert "spherical" in done.err
+
+
+@pytest.mark.parametrize("up", ["Z", "Y"])
+def test_newtons_importer_and_kinematics_place_the_links_alike(write: Write, up: str) -> None:
+    sim = pytest.importorskip("newton")
+    offset = joint(
+        "wrist", "Revolute", "lower", "hand",
+        'uniform token physics:axis = "X"\npoint3f physics:localPos0 = (0.3, 0.1, -0.2)\n'
+        "quatf physics:localRot0 = (0.8, 0, 0.6, 0)\npoint3f physics:localPos1 = (0, 0.4, 0)\n"
+        "quatf physics:localRot1 = (0.6, 0.8, 0, 0)",
+    )  # fmt: skip
+    mount = joint("mount", "Fixed", "", "base")
+    path = write(stage(LINKS + body("hand") + JOINTS + offset + mount, up=up))
+    robot = loaded(path)
+    builder = sim.ModelBuilder()
+    builder.add_usd(str(path))
+    model = builder.finalize(device="cpu")
+    state, names = model.state(), [label.split("/")[-1] for label in builder.joint_label]
+    starts = model.joint_q_start.numpy()
+    for q in robot.sample(5, seed=1):
+        own = state.joint_q.numpy()
+        for name, value in zip(robot.coordinate_names, q, strict=True):
+            own[starts[names.index(name)]] = value
+        state.joint_q.assign(own)
+        sim.eval_fk(model, state.joint_q, state.joint_qd, state)
+        for label, seven in zip(builder.body_label, state.body_q.numpy(), strict=True):
+            T = robot.placement(q, str(label).rpartition("/")[2])
+            assert seven[:3] == pytest.approx(T[:3, 3], abs=1e-5)
+            x, y, z, w = seven[3:].astype(float) / np.linalg.norm(seven[3:])
+            assert pose(rotation_of([x, y, z, w]))[:3, :3] == pytest.approx(T[:3, :3], abs=1e-5)

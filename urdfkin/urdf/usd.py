@@ -1,0 +1,1097 @@
+"""Convert the UsdPhysics joints of a USD stage to a kinematic tree.
+
+- A prim with `PhysicsRigidBodyAPI` becomes a link with the prim's frame, without its scale. A plain `Xform`
+  of a body becomes a link on a fixed joint.
+- A joint prim gives its frame in each of its two bodies: A in the first and B in the second. With the motion
+  J(q), the second body is at A J(q) B^-1 in the first. If the tree reaches the joint from its second body,
+  the first is at B J(q)^-1 A^-1 in the second: the same form with the opposite axis.
+- Lengths are multiplied by `metersPerUnit`, angles are converted from degrees. A stage whose up axis is Y is
+  rotated, so that z is up.
+- Joints that close a loop, point to nothing or are excluded from the articulation are findings.
+
+A stage may consist of many files. `files_of` reads each layer alone and refuses a layer that refers to a file
+outside the robot's folder, package and repository, or to an address, before the layers are composed.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import stat
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import astuple, dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from urdfkin.errors import InputError, SourceError, UnknownNameError
+from urdfkin.kinematics.rotation import quaternion_of, rotation_of
+from urdfkin.kinematics.roundings import SINGLE
+from urdfkin.model.tree import (
+    LARGEST_ANGLE,
+    FloatArray,
+    Joint,
+    JointKind,
+    KinematicTree,
+    Limit,
+    Mimic,
+    build_tree,
+    inverse,
+    pose,
+)
+from urdfkin.system.files import MOST
+from urdfkin.system.lazy_import import installed_version
+from urdfkin.urdf.confinement import Ground
+from urdfkin.urdf.mjcf import UNBOUNDED
+from urdfkin.urdf.sources import USD
+
+#: Largest number of layers of a stage.
+_LAYERS = 1_000
+#: Largest number in single precision. Files write it, or infinity, for a missing limit.
+_LARGEST = float(np.finfo(np.float32).max)
+#: Largest cosine between the axes of a frame without shear, for numbers in single precision.
+_SHEAR = 16.0 * SINGLE
+_NONE = (-math.inf, math.inf)
+_MIMICS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
+_AXES = {"X": 0, "Y": 1, "Z": 2}
+_FREEDOMS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
+#: Names of Xforms that hold the shapes of a body.
+_SHAPES = ("visual", "visuals", "collision", "collisions")
+#: Rotates the up axis y to z.
+_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+
+#: The kind of a remark; `urdfkin.urdf.lint.rules.left_out` has the rule of each.
+Kind = Literal[
+    "left-out-of-usd", "unit-scale", "up-axis", "lost-mimic", "limit-unit", "loose-body", "outside-joint",
+    "rest-pose", "mirrored-body", "missing-layer", "unused-in-usd",
+]  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Remark:
+    """A part of the stage that the tree does not represent, or that is probably a mistake.
+
+    Attributes:
+        kind: The kind.
+        where: The path of the prim; empty for the stage.
+        what: A description in one clause.
+        remedy: The remedy, or None.
+    """
+
+    kind: Kind
+    where: str
+    what: str
+    remedy: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class JointReading:
+    """The numbers of a joint prim, in the stage's axes.
+
+    Attributes:
+        free: The free directions, such as `rotZ`.
+        body0: Path of the first body; empty for the world.
+        body1: Path of the second body; empty for the world.
+        p0: (3,) origin of the joint's frame in the first body, m.
+        quat0: (4,) its unit quaternion, scalar last.
+        p1: (3,) origin of the joint's frame in the second body, m.
+        quat1: (4,) its unit quaternion, scalar last.
+        limits: Lower and upper limit, rad or m.
+        size: Sum of the lengths (m) of the terms of both origins.
+    """
+
+    free: str
+    body0: str
+    body1: str
+    p0: FloatArray
+    quat0: FloatArray
+    p1: FloatArray
+    quat1: FloatArray
+    limits: tuple[float, float]
+    size: float
+
+    def as_list(self) -> list[Any]:
+        """Return plain data for JSON."""
+        return [one.tolist() if isinstance(one, np.ndarray) else one for one in astuple(self)]
+
+
+@dataclass(frozen=True, slots=True)
+class Usd:
+    """A robot from a USD stage.
+
+    Attributes:
+        tree: The links and joints.
+        prims: The path of the prim of each link that has one.
+        rest: (n, 4, 4) placement in the world of each prim of `prims` by UsdGeom, in m with z up.
+        rest_q: (nq,) coordinates of the tree in which the stage shows the robot.
+        single: For each joint of the tree by name: how far rounding to single precision can move and turn its
+            frames (m, rad), the length (m) that turns with them, and the share of its value that the rounding
+            of its mimic rule can change.
+        joints: The numbers of each joint prim of the tree, by its path.
+        stage: The stage.
+        unit: metersPerUnit.
+        remarks: Parts of the stage that the tree does not represent, and probable mistakes.
+        files: The files of the stage.
+    """
+
+    tree: KinematicTree
+    prims: dict[str, str]
+    rest: FloatArray
+    rest_q: FloatArray
+    single: dict[str, tuple[float, float, float, float]]
+    joints: dict[str, JointReading]
+    stage: Any
+    unit: float
+    remarks: tuple[Remark, ...]
+    files: tuple[str, ...]
+
+
+def version() -> str:
+    """Return the installed version of OpenUSD, without importing it."""
+    found = installed_version("usd-core") or installed_version("usd-exchange")
+    if found is None:
+        raise InputError("OpenUSD is not installed", remedy="pip install 'urdfkin[usd]'")
+    return found
+
+
+def library() -> Any:
+    """Return the modules of OpenUSD, as the attributes of one object.
+
+    Raises:
+        InputError: OpenUSD is not installed.
+    """
+    try:
+        from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdPhysics  # noqa: PLC0415  an extra, and heavy
+    except ImportError:
+        raise InputError("OpenUSD is not installed", remedy="pip install 'urdfkin[usd]'") from None
+    return type(
+        "OpenUSD",
+        (),
+        {"Ar": Ar, "Gf": Gf, "Sdf": Sdf, "Tf": Tf, "Usd": Usd, "UsdGeom": UsdGeom, "UsdPhysics": UsdPhysics},
+    )
+
+
+def files_of(pxr: Any, path: str) -> tuple[str, ...]:
+    """Return the files of a stage. Each layer is read alone, before its references are followed.
+
+    Raises:
+        InputError: a layer refers to an address, to a file outside the robot's folder, package and
+            repository, to an expression, or to a file that is not USD; or there are too many layers.
+        SourceError: a file is too large, or not a regular file.
+    """
+    ground = Ground.around(Path(path), [], [])
+    open_, known, total = deque([(path, path)]), {path}, 0
+    files: dict[str, None] = {}
+    while open_:
+        identifier, where = open_.popleft()
+        outer = pxr.Ar.SplitPackageRelativePathOuter(identifier)[0]
+        if outer not in files:
+            total += _size(outer, where)
+            if total > MOST:
+                raise SourceError(
+                    "the files of this stage are too large", where=where, found=f"over {MOST} bytes"
+                )
+            files[outer] = None
+        layer = pxr.Sdf.Layer.FindOrOpen(identifier)
+        if layer is None:
+            raise InputError("OpenUSD does not accept this file", where=identifier)
+        for asset in layer.GetCompositionAssetDependencies():
+            address = _address(pxr, layer, asset, ground, identifier)
+            if address is None or address in known:
+                continue
+            known.add(address)
+            if len(known) > _LAYERS:
+                raise InputError("this stage has too many layers", where=path, found=f"over {_LAYERS}")
+            open_.append((address, identifier))
+    return tuple(files)
+
+
+def _address(pxr: Any, layer: Any, asset: str, ground: Ground, where: str) -> str | None:
+    """Return the resolved path of an asset; None if the file does not exist."""
+    written = asset.partition(":SDF_FORMAT_ARGS:")[0]
+    if not written:
+        return None
+    if written.startswith("`"):
+        raise _refused("a reference is an expression", where, written)
+    if "://" in written:
+        raise _refused("a reference is an address, and urdfkin fetches nothing", where, written)
+    address = str(pxr.Sdf.ComputeAssetPathRelativeToLayer(layer, written))
+    outer, inner = pxr.Ar.SplitPackageRelativePathOuter(address)
+    if not os.path.isabs(outer):  # noqa: PTH117  resolved below
+        outer = os.path.abspath(outer)  # noqa: PTH100  `Ground.holds` resolves links
+    if not ground.holds(outer):
+        raise _refused(
+            "a reference leads outside the folder, package and repository of the stage", where, written
+        )
+    if Path(inner or outer).suffix.lower() not in USD:
+        raise _refused("a reference names a file that is not USD", where, written)
+    return address if os.path.exists(outer) else None  # noqa: PTH110  a name may be no path
+
+
+def _refused(what: str, where: str, found: str) -> InputError:
+    return InputError(
+        what,
+        where=where,
+        found=found[:200],
+        remedy="copy the file beside the stage, or flatten the stage: usdcat --flatten",
+    )
+
+
+def _size(path: str, where: str) -> int:
+    try:
+        found = os.stat(path)  # noqa: PTH116  a name may be no path
+    except OSError as error:
+        raise SourceError("the file cannot be read", where=path, found=error.strerror) from None
+    if not stat.S_ISREG(found.st_mode):
+        raise SourceError("this is not a regular file", where=path, found=f"named in {where}")
+    if found.st_size > MOST:
+        raise SourceError("the file is too large", where=path, found=f"{found.st_size} bytes, over {MOST}")
+    return found.st_size
+
+
+def read_usd(
+    path: str, name: str, *, variants: Sequence[tuple[str, str]] = (), articulation: str | None = None
+) -> Usd:
+    """Read a USD file in this process (`urdfkin.verify.usd_check` confines the process).
+
+    Args:
+        path: The file.
+        name: The name of the file in messages.
+        variants: (variant set, variant) to select, wherever the stage has that set, in this order.
+        articulation: Path or name of the articulation to read; None if there is only one.
+
+    Raises:
+        InputError: OpenUSD is not installed or does not accept the file, a reference is refused, the robot
+            has a joint that urdfkin does not support, or it is not clear which articulation is meant.
+    """
+    pxr = library()
+    try:
+        files = files_of(pxr, path)
+        stage = pxr.Usd.Stage.Open(path)
+        _select(pxr, stage, variants, name)
+        used = {
+            os.path.realpath(layer.realPath.partition("[")[0])
+            for layer in stage.GetUsedLayers()
+            if layer.realPath
+        }
+        if more := sorted(used - {os.path.realpath(file) for file in files}):
+            raise _refused("the stage uses a file that none of its layers names", name, more[0])
+        return _Reader(pxr, stage, name).read(articulation, files)
+    except pxr.Tf.ErrorException as error:
+        words = "; ".join(str(getattr(one, "commentary", one)) for one in error.args)
+        found = " ".join(words.split())[:300]
+        raise InputError("OpenUSD does not accept this file", where=name, found=found) from None
+
+
+def _select(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str) -> None:
+    """Select variants in the session layer, so that no file changes.
+
+    Raises:
+        UnknownNameError: no prim has such a variant set, or such a variant.
+    """
+    stage.SetEditTarget(stage.GetSessionLayer())
+    for word, variant in variants:
+        sets: dict[str, list[Any]] = {}
+        for prim in stage.TraverseAll():
+            for one in prim.GetVariantSets().GetNames():
+                sets.setdefault(one, []).append(prim)
+        if word not in sets:
+            raise UnknownNameError("variant set", word, list(sets), where=name)
+        own = [prim.GetVariantSet(word) for prim in sets[word]]
+        known = [one for one in own if variant in one.GetVariantNames()]
+        if not known:
+            raise UnknownNameError("variant", variant, own[0].GetVariantNames(), where=f"{name}: {word}")
+        for one in known:
+            one.SetVariantSelection(variant)
+
+
+@dataclass(slots=True)
+class _Body:
+    path: str
+    T: FloatArray
+    scale: FloatArray
+    owner: str | None
+
+
+@dataclass(slots=True)
+class _Edge:
+    """A joint prim: `ends` are its bodies (None: the world), `frames` the joint's frame in each."""
+
+    prim: Any
+    name: str
+    path: str
+    kind: JointKind
+    axis: FloatArray
+    ends: tuple[str | None, str | None]
+    frames: tuple[FloatArray, FloatArray]
+    limits: tuple[float, float]
+    size: float
+    rounded: tuple[float, float]
+
+
+@dataclass(slots=True)
+class _Articulation:
+    path: str
+    bodies: list[str]
+    edges: list[_Edge]
+
+
+@dataclass(slots=True)
+class _Reader:
+    """Read one stage; `source` is its name in messages."""
+
+    pxr: Any
+    stage: Any
+    source: str
+    remarks: list[Remark] = field(default_factory=list)
+    _bodies: dict[str, _Body] = field(default_factory=dict)
+    _edges: list[_Edge] = field(default_factory=list)
+    _read: dict[str, JointReading] = field(default_factory=dict)
+    _single: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)
+    # `root_joint` and `universe` are Pinocchio's names of the joint and the link of a moving base
+    _names: dict[str, set[str]] = field(
+        default_factory=lambda: {"link": {"universe"}, "joint": {"root_joint"}}
+    )
+    _unit: float = 1.0
+    _up: FloatArray = field(default_factory=lambda: np.eye(3))
+    _cache: Any = None
+
+    def read(self, articulation: str | None, files: tuple[str, ...]) -> Usd:
+        """Return the robot."""
+        pxr, stage = self.pxr, self.stage
+        self._unit = float(pxr.UsdGeom.GetStageMetersPerUnit(stage))
+        if not (math.isfinite(self._unit) and self._unit > 0.0):
+            raise InputError(
+                "metersPerUnit must be a positive number", where=self.source, found=f"{self._unit:g}"
+            )
+        if pxr.UsdGeom.GetStageUpAxis(stage) == "Y":
+            self._up = _Y_UP
+        self._cache = pxr.UsdGeom.XformCache(pxr.Usd.TimeCode.Default())
+        self._missing()
+        prims = list(stage.Traverse(pxr.Usd.TraverseInstanceProxies()))
+        self._collect(prims)
+        found = self._articulations()
+        chosen = self._choose(found, articulation)
+        tree, links = self._tree(chosen)
+        self._loose(chosen, found)
+        rest = np.array([self._placed(stage.GetPrimAtPath(path))[0] for path in links.values()])
+        rest_q = self._rest(tree, chosen, links, rest)
+        self._of_the_stage(rest)
+        self._unused(prims)
+        return Usd(
+            tree, links, rest, rest_q, self._single, self._read, stage, self._unit, tuple(self.remarks), files
+        )
+
+    # -- the stage -----------------------------------------------------------------------------------
+
+    def _say(self, kind: Kind, where: str, what: str, remedy: str | None = None) -> None:
+        self.remarks.append(Remark(kind, where, what, remedy))
+
+    def _missing(self) -> None:
+        for error in self.stage.GetCompositionErrors():
+            words = " ".join(str(error).split())[:300]
+            self._say("missing-layer", "", f"OpenUSD cannot compose a part of this stage: {words}")
+
+    def _placed(self, prim: Any) -> tuple[FloatArray, FloatArray]:
+        """Return the pose of a prim in the world (4, 4), in m with z up, and its scale (3,)."""
+        M = np.array(self._cache.GetLocalToWorldTransform(prim)).T
+        if not np.isfinite(M).all():
+            raise InputError(
+                "the transform of a prim is not finite", where=f"{self.source}: {prim.GetPath()}"
+            )
+        scale = np.linalg.norm(M[:3, :3], axis=0)
+        if not (scale > 0.0).all():
+            raise InputError("the scale of a prim is zero", where=f"{self.source}: {prim.GetPath()}")
+        if np.linalg.det(M[:3, :3]) < 0.0:
+            scale = -scale
+        R = M[:3, :3] / scale
+        if np.abs(R.T @ R - np.eye(3)).max() > _SHEAR:
+            raise InputError(
+                "the frame of a prim has shear, so it is no frame of a rigid body",
+                where=f"{self.source}: {prim.GetPath()}",
+                remedy="apply the scale to the shapes, not to a parent of a rotated body",
+            )
+        U, _, V = np.linalg.svd(R)
+        return pose(self._up @ (U @ V), self._up @ M[:3, 3] * self._unit), scale
+
+    def _collect(self, prims: list[Any]) -> None:
+        """Collect the bodies and the joints of the stage."""
+        physics = self.pxr.UsdPhysics
+        for prim in prims:
+            if not prim.HasAPI(physics.RigidBodyAPI) or _value(prim, "physics:rigidBodyEnabled") is False:
+                continue
+            path = str(prim.GetPath())
+            T, scale = self._placed(prim)
+            if scale[0] < 0.0:
+                self._say(
+                    "mirrored-body",
+                    path,
+                    "the transform of this body mirrors it",
+                    "mirror the shapes instead",
+                )
+            self._bodies[path] = _Body(path, T, scale, self._owner(prim))
+        for prim in prims:
+            if prim.IsA(physics.Joint) and (edge := self._edge(prim)) is not None:
+                self._edges.append(edge)
+
+    def _owner(self, prim: Any) -> str | None:
+        """Return the path of the nearest prim at or above a prim that is the root of an articulation."""
+        while prim and str(prim.GetPath()) != "/":
+            if prim.HasAPI(self.pxr.UsdPhysics.ArticulationRootAPI):
+                return str(prim.GetPath())
+            prim = prim.GetParent()
+        return None
+
+    # -- joints --------------------------------------------------------------------------------------
+
+    def _edge(self, prim: Any) -> _Edge | None:
+        """Return a joint that connects two bodies, or a body and the world; otherwise a remark."""
+        path = str(prim.GetPath())
+        if _value(prim, "physics:jointEnabled") is False:
+            self._say("left-out-of-usd", path, "this joint is disabled")
+            return None
+        sides = []
+        for i in (0, 1):
+            targets = list(prim.GetRelationship(f"physics:body{i}").GetTargets())
+            if len(targets) > 1:
+                self._say("left-out-of-usd", path, f"body{i} of this joint has {len(targets)} targets")
+                return None
+            side = self._side(prim, i, str(targets[0]) if targets else None)
+            if side is None:
+                what = f"body{i} of this joint names a prim that does not exist: {targets[0]}"
+                self._say("outside-joint", path, what, "correct the relationship")
+                return None
+            sides.append(side)
+        (first, A, size_A, off_A), (second, B, size_B, off_B) = sides
+        if first == second:
+            where = "the world" if first is None else "one body"
+            self._say("left-out-of-usd", path, f"both ends of this joint are in {where}")
+            return None
+        called = str(prim.GetTypeName()).removeprefix("Physics")
+        if _value(prim, "physics:excludeFromArticulation") or called == "DistanceJoint":
+            what = f"a tree cannot represent this {called}, which is outside the articulation"
+            self._say("left-out-of-usd", path, what)
+            return None
+        kind, axis, limits, free = self._motion(prim)
+        rounded = off_A[0] + off_B[0], off_A[1] + off_B[1]
+        size, ends, frames = size_A + size_B, (first, second), (A, B)
+        edge = _Edge(prim, prim.GetName(), path, kind, axis, ends, frames, limits, size, rounded)
+        seen = [
+            quaternion_of(self._in_stage(end, T)[:3, :3])
+            for end, T in zip(edge.ends, edge.frames, strict=True)
+        ]
+        p0, p1 = (self._in_stage(end, T)[:3, 3] for end, T in zip(edge.ends, edge.frames, strict=True))
+        self._read[path] = JointReading(
+            free, first or "", second or "", p0, seen[0], p1, seen[1], limits, edge.size
+        )
+        return edge
+
+    def _in_stage(self, body: str | None, T: FloatArray) -> FloatArray:
+        """Return a pose in a body, or in the world with the stage's axes instead of z up."""
+        return T if body is not None else pose(self._up.T) @ T
+
+    def _side(
+        self, prim: Any, i: int, target: str | None
+    ) -> tuple[str | None, FloatArray, float, tuple[float, float]] | None:
+        """Return a joint's body and its frame in it (m); None if the target does not exist.
+
+        Then follow the length of the origin's terms (m), and how far rounding to single precision can move
+        and turn the frame (m, rad).
+        """
+        p = np.array(_value(prim, f"physics:localPos{i}"), float)
+        quaternion = _value(prim, f"physics:localRot{i}")
+        xyzw = np.array([*quaternion.GetImaginary(), quaternion.GetReal()], float)
+        size = float(np.linalg.norm(xyzw))
+        if not (np.isfinite(p).all() and math.isfinite(size) and size > 0.0):
+            raise InputError(
+                f"localPos{i} or localRot{i} of a joint is not finite, or the quaternion is zero",
+                where=f"{self.source}: joint {prim.GetPath()}",
+                found=f"{p.tolist()}, {quaternion}",
+            )
+        off = float(np.linalg.norm(_rounding(p))) * self._unit, _turned(xyzw)
+        R, p = rotation_of(xyzw / size), p * self._unit
+        if target is None:
+            return None, pose(self._up @ R, self._up @ p), float(np.linalg.norm(p)), off
+        other = self.stage.GetPrimAtPath(target)
+        if not other:
+            return None
+        T, scale = self._placed(other)
+        A, length = pose(R, scale * p), float(np.linalg.norm(scale * p))
+        off = off[0] * float(np.abs(scale).max()), off[1]
+        while other and str(other.GetPath()) not in self._bodies:
+            other = other.GetParent()
+        body = str(other.GetPath()) if other else None
+        if body != target:
+            T = T if body is None else inverse(self._bodies[body].T) @ T
+            A, length = T @ A, length + float(np.linalg.norm(T[:3, 3]))
+            off = off[0] + SINGLE * length, off[1] + 2.0 * SINGLE
+        return body, A, length, off
+
+    def _motion(self, prim: Any) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
+        """Return the kind, the axis, the limits (rad or m) and the free directions of a joint.
+
+        Raises:
+            InputError: urdfkin has no such joint.
+        """
+        physics, path = self.pxr.UsdPhysics, f"{self.source}: joint {prim.GetPath()}"
+        if prim.IsA(physics.FixedJoint):
+            return JointKind.FIXED, _unit(0), _NONE, ""
+        for schema, turns in ((physics.RevoluteJoint, True), (physics.PrismaticJoint, False)):
+            if prim.IsA(schema):
+                letter = str(_value(prim, "physics:axis"))
+                if letter not in _AXES:
+                    raise InputError("the axis of a joint is X, Y or Z", where=path, found=letter)
+                ends = (float(_value(prim, f"physics:{end}Limit")) for end in ("lower", "upper"))
+                return self._bounded(path, f"{'rot' if turns else 'trans'}{letter}", ends)
+        if prim.IsA(physics.SphericalJoint):
+            raise InputError(
+                "urdfkin does not support spherical joints",
+                where=path,
+                remedy="use three revolute joints (singular where the middle one is at a right angle)",
+            )
+        if prim.GetTypeName() != "PhysicsJoint":
+            raise InputError(
+                "urdfkin does not support this kind of joint",
+                where=path,
+                found=str(prim.GetTypeName()),
+                remedy="exclude it from the articulation, or use another joint",
+            )
+        return self._six(prim, path)
+
+    def _six(self, prim: Any, path: str) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
+        """Return a joint of any degrees of freedom as one of ours, as `_motion` does."""
+        free, limits = [], {}
+        for freedom in _FREEDOMS:
+            low, high = -math.inf, math.inf
+            if f"PhysicsLimitAPI:{freedom}" in _schemas(prim):
+                low, high = (float(_value(prim, f"limit:{freedom}:physics:{end}")) for end in ("low", "high"))
+            if low <= high:
+                free.append(freedom)
+                limits[freedom] = low, high
+        if not free:
+            return JointKind.FIXED, _unit(0), _NONE, ""
+        if len(free) == 1:
+            return self._bounded(path, free[0], iter(limits[free[0]]))
+        if free == ["transX", "transY", "rotZ"]:
+            return JointKind.PLANAR, _unit(0), _NONE, " ".join(free)
+        if len(free) == len(_FREEDOMS):
+            return JointKind.FLOATING, _unit(0), _NONE, " ".join(free)
+        raise InputError(
+            "urdfkin does not support a joint with these degrees of freedom",
+            where=path,
+            found=", ".join(free),
+            remedy="leave one degree of freedom free, or write several joints with a body between them",
+        )
+
+    def _bounded(
+        self, path: str, free: str, ends: Iterator[float]
+    ) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
+        lower, upper = (math.copysign(math.inf, end) if abs(end) >= _LARGEST else end for end in ends)
+        if not lower <= upper:
+            raise InputError(
+                "the lower limit of a joint is above its upper limit",
+                where=path,
+                found=f"{lower:g} and {upper:g}",
+            )
+        kind, factor = JointKind.PRISMATIC, self._unit
+        if free.startswith("rot"):
+            bounded = math.isfinite(lower) and math.isfinite(upper)
+            kind, factor = JointKind.REVOLUTE if bounded else JointKind.CONTINUOUS, math.pi / 180.0
+        return kind, _unit(_AXES[free[-1]]), (lower * factor, upper * factor), free
+
+    # -- articulations -------------------------------------------------------------------------------
+
+    def _articulations(self) -> list[_Articulation]:
+        """Return the groups of bodies that joints connect.
+
+        A joint between two articulations connects no groups; it is a remark.
+        """
+        above: dict[str, str] = {path: path for path in self._bodies}
+
+        def top(path: str) -> str:
+            while above[path] != path:
+                above[path] = above[above[path]]
+                path = above[path]
+            return path
+
+        owner = {path: body.owner for path, body in self._bodies.items()}
+        kept = []
+        for edge in self._edges:
+            first, second = edge.ends
+            if first is not None and second is not None:
+                a, b = top(first), top(second)
+                if a == b:
+                    self._closes(edge)
+                    continue
+                owners = {one for one in (owner[a], owner[b]) if one is not None}
+                if len(owners) > 1:
+                    self._say(
+                        "outside-joint",
+                        edge.path,
+                        f"this {_called(edge)} connects two articulations: {' and '.join(sorted(owners))}",
+                    )
+                    continue
+                above[b] = a
+                owner[a] = next(iter(owners), None)
+            kept.append(edge)
+        groups: dict[str, _Articulation] = {}
+        for edge in kept:
+            body = next(end for end in edge.ends if end is not None)
+            key = top(body)
+            group = groups.setdefault(key, _Articulation(owner[key] or "", [], []))
+            group.edges.append(edge)
+        for path in self._bodies:
+            if (key := top(path)) in groups:
+                groups[key].bodies.append(path)
+        # a body without own joints to other bodies, fixed to the world, is scenery
+        found = [
+            group
+            for group in groups.values()
+            if group.path or len(group.bodies) > 1 or group.edges[0].kind is not JointKind.FIXED
+        ]
+        for group in found:
+            self._name(group)
+        # an articulation whose base is no rigid body consists of several groups at the world
+        merged: dict[str, list[_Articulation]] = {}
+        for group in found:
+            merged.setdefault(self._root(group) or group.path, []).append(group)
+        return [own[0] if len(own) == 1 else self._together(own, path) for path, own in merged.items()]
+
+    def _name(self, group: _Articulation) -> None:
+        """Name a group by the root of its articulation; without one, by its root body."""
+        api = self.pxr.UsdPhysics.ArticulationRootAPI
+        for edge in group.edges:
+            if edge.prim.HasAPI(api):
+                group.path = edge.path
+        group.path = group.path or self._root(group) or group.bodies[0]
+
+    def _choose(self, found: list[_Articulation], wanted: str | None) -> _Articulation:
+        """Return the articulation with a path or name; all articulations below the path of another prim."""
+        if not found:
+            raise InputError(
+                "this stage has no joint between bodies",
+                where=self.source,
+                found=f"{len(self._bodies)} bodies",
+                remedy="apply PhysicsRigidBodyAPI to the links, and connect them with UsdPhysics joints",
+            )
+        paths = [group.path for group in found]
+        if wanted is None:
+            if len(found) > 1:
+                raise InputError(
+                    f"this stage has {len(found)} articulations",
+                    where=self.source,
+                    found=", ".join(paths[:8]),
+                    remedy="choose one with --articulation PATH, or all below the PATH of another prim",
+                )
+            return found[0]
+        own = [group for group in found if wanted in (group.path, group.path.rpartition("/")[2])]
+        if len(own) == 1:
+            return own[0]
+        below = [group for group in found if group.path.startswith(wanted.rstrip("/") + "/")]
+        if own or not below:
+            raise UnknownNameError("articulation", wanted, paths, where=self.source)
+        return self._together(below, wanted)
+
+    def _together(self, groups: list[_Articulation], path: str) -> _Articulation:
+        """Return one articulation for several that are attached to the world."""
+        for group in groups:
+            if len(groups) > 1 and self._root(group) is not None:
+                raise InputError(
+                    "this articulation is not attached to the world, so it has no place beside the others",
+                    where=f"{self.source}: {group.path}",
+                    remedy="choose one articulation",
+                )
+        bodies = [body for group in groups for body in group.bodies]
+        return _Articulation(path, bodies, [edge for group in groups for edge in group.edges])
+
+    def _root(self, group: _Articulation) -> str | None:
+        """Return the root body of a group; None if the world is its root."""
+        if any(None in edge.ends for edge in group.edges):
+            return None
+        if group.path in group.bodies:
+            return group.path
+        children = {edge.ends[1] for edge in group.edges}
+        return next((path for path in group.bodies if path not in children), group.bodies[0])
+
+    # -- the tree ------------------------------------------------------------------------------------
+
+    def _tree(self, group: _Articulation) -> tuple[KinematicTree, dict[str, str]]:
+        """Return the tree of an articulation, and the prim of each link."""
+        root = self._root(group)
+        around: dict[str | None, list[_Edge]] = {}
+        for edge in group.edges:
+            for end in edge.ends:
+                around.setdefault(end, []).append(edge)
+        ordered, reached, open_ = list[tuple[_Edge, bool]](), {root}, deque([root])
+        used = set[str]()
+        while open_:
+            here = open_.popleft()
+            for edge in around.get(here, []):
+                backwards = edge.ends[1] == here
+                there = edge.ends[0 if backwards else 1]
+                if edge.path in used:
+                    continue
+                used.add(edge.path)
+                if there in reached:
+                    self._closes(edge)
+                    continue
+                reached.add(there)
+                ordered.append((edge, backwards))
+                open_.append(there)
+        links: dict[str | None, str] = {None: self._new("link", "world")} if root is None else {}
+        for path in [root, *(edge.ends[0 if back else 1] for edge, back in ordered)]:
+            if path is not None:
+                links[path] = self._new("link", self._short(path))
+        names = {edge.path: self._new("joint", edge.name) for edge, _ in ordered}
+        joints = [made for edge, back in ordered for made in self._joints(edge, names, links, backwards=back)]
+        rules = dict(self._mimics([edge for edge, _ in ordered], names))
+        joints = [(replace(joint, mimic=rules.get(joint.name)), a, b) for joint, a, b in joints]
+        if outside := [edge for edge, _ in ordered if self._is_outside(edge, group)]:
+            for edge in outside:
+                self._say(
+                    "outside-joint", edge.path, f"this {_called(edge)} leads to a body outside {group.path}"
+                )
+        prims = {link: path for path, link in links.items() if path is not None}
+        for path, parent in self._frames(list(prims.values())):
+            link = self._new("link", path.rpartition("/")[2])
+            T = inverse(self._bodies[parent].T) @ self._placed(self.stage.GetPrimAtPath(path))[0]
+            joint = Joint(self._new("joint", f"{link}_fixed"), JointKind.FIXED, 0, T, _unit(0))
+            self._single[joint.name] = SINGLE * joint.length, 2.0 * SINGLE, joint.length, 0.0
+            joints.append((joint, links[parent], link))
+            prims[link] = path
+        self._read = {edge.path: self._read[edge.path] for edge, _ in ordered}
+        top = group.path.split("/")[1]
+        return build_tree(top, links[root], joints), prims
+
+    def _closes(self, edge: _Edge) -> None:
+        what = f"this {_called(edge)} closes a loop, which a tree cannot represent"
+        self._say("left-out-of-usd", edge.path, what)
+
+    def _is_outside(self, edge: _Edge, group: _Articulation) -> bool:
+        """Return whether a joint leads from a body below the articulation's root to another body."""
+        inside = group.path + "/"
+        if group.path in self._bodies or not any(path.startswith(inside) for path in group.bodies):
+            return False
+        below = [end == group.path or end.startswith(inside) for end in edge.ends if end is not None]
+        return len(set(below)) > 1
+
+    def _short(self, path: str) -> str:
+        """Return the name of a prim; with the names above it if another body has the same name."""
+        parts, same = path.split("/")[1:], [other.split("/")[1:] for other in self._bodies]
+        for n in range(1, len(parts) + 1):
+            if sum(other[-n:] == parts[-n:] for other in same) <= 1:
+                return "_".join(parts[-n:])
+        return parts[-1]
+
+    def _new(self, kind: str, name: str) -> str:
+        """Return the name, with underscores appended until it is unique."""
+        while name in self._names[kind]:
+            name += "_"
+        self._names[kind].add(name)
+        return name
+
+    def _joints(
+        self, edge: _Edge, names: Mapping[str, str], links: Mapping[str | None, str], *, backwards: bool
+    ) -> Iterator[tuple[Joint, str, str]]:
+        """Yield the joint, and if the child's frame is not on its axis, a link and a fixed joint."""
+        (A, B), (parent, child) = edge.frames, edge.ends
+        axis = edge.axis
+        shares = SINGLE if _is_mimic(edge.prim) else 0.0
+        self._single[names[edge.path]] = *edge.rounded, edge.size, shares
+        if backwards:
+            A, B, parent, child, axis = B, A, child, parent, -axis
+        name, here, there = names[edge.path], links[parent], links[child]
+        if edge.kind is JointKind.FIXED:
+            yield Joint(name, JointKind.FIXED, 0, A @ inverse(B), _unit(0)), here, there
+            return
+        if edge.kind in (JointKind.PLANAR, JointKind.FLOATING):
+            if backwards or (edge.kind is JointKind.FLOATING and parent is not None):
+                raise InputError(
+                    "urdfkin supports a joint with several degrees of freedom only from the root to a body",
+                    where=f"{self.source}: joint {edge.path}",
+                    found=edge.kind.value,
+                    remedy="exchange body0 and body1 of this joint, or write several joints",
+                )
+            direct = (np.eye(4) == B).all()
+            if edge.kind is JointKind.FLOATING:
+                A, direct = np.eye(4), True
+            yield from self._pair(Joint(name, edge.kind, 0, A, _unit(0)), here, there, B, direct=direct)
+            return
+        limit = self._limit(edge)
+        if edge.kind is JointKind.PRISMATIC or not B[:3, 3].any():
+            turn = B[:3, :3] @ axis
+            axis = turn / np.linalg.norm(turn)
+            yield Joint(name, edge.kind, 0, A @ inverse(B), axis, limit), here, there
+        else:
+            yield from self._pair(Joint(name, edge.kind, 0, A, axis, limit), here, there, B, direct=False)
+
+    def _pair(
+        self, joint: Joint, here: str, there: str, B: FloatArray, *, direct: bool
+    ) -> Iterator[tuple[Joint, str, str]]:
+        if direct:
+            yield joint, here, there
+            return
+        between = self._new("link", f"{joint.name}_link")
+        yield joint, here, between
+        yield (
+            Joint(self._new("joint", f"{there}_fixed"), JointKind.FIXED, 0, inverse(B), _unit(0)),
+            between,
+            there,
+        )
+
+    def _limit(self, edge: _Edge) -> Limit | None:
+        lower, upper = edge.limits
+        turns, prim = edge.kind is not JointKind.PRISMATIC, edge.prim
+        rate = next(
+            (
+                float(x)
+                for x in (
+                    _value(prim, word) for word in ("newton:velocityLimit", "physxJoint:maxJointVelocity")
+                )
+                if x is not None
+            ),
+            math.inf,
+        )
+        rate = math.inf if not 0.0 < rate < _LARGEST else rate * (math.pi / 180.0 if turns else self._unit)
+        if edge.kind is JointKind.CONTINUOUS:
+            if math.isfinite(lower) or math.isfinite(upper):
+                self._say(
+                    "unused-in-usd",
+                    edge.path,
+                    "a limit on one side only: the URDF, which has no such limit, has none",
+                )
+            return None if math.isinf(rate) else Limit(-math.inf, math.inf, rate, math.inf)
+        if turns and max(abs(lower), abs(upper)) <= math.radians(LARGEST_ANGLE) and upper > lower:
+            words = f"{math.degrees(lower):g} to {math.degrees(upper):g} degrees"
+            self._say(
+                "limit-unit", edge.path, f"the limits of this joint are {words}: they are probably radians",
+                "write the limits in degrees",
+            )  # fmt: skip
+        if not (math.isfinite(lower) and math.isfinite(upper)):
+            self._say(
+                "unused-in-usd",
+                edge.path,
+                f"a prismatic joint without limits: the URDF, which requires limits, has +-{UNBOUNDED:g} m",
+            )
+            lower, upper = (
+                end if math.isfinite(end) else math.copysign(UNBOUNDED, end) for end in (lower, upper)
+            )
+        return Limit(lower, upper, rate, math.inf)
+
+    def _frames(self, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:
+        """Yield each plain Xform of a body that marks a frame, with the path of the body.
+
+        An Xform that only groups shapes, or that is an instance, is none.
+        """
+        physics, geom = self.pxr.UsdPhysics, self.pxr.UsdGeom
+
+        def below(prim: Any, body: str) -> Iterator[tuple[str, str]]:
+            for child in prim.GetChildren():
+                if child.HasAPI(physics.RigidBodyAPI) or child.IsInstance():
+                    continue
+                kind = child.GetTypeName()
+                if kind == "Scope":
+                    yield from below(child, body)
+                if kind != "Xform" or child.GetName().lower() in _SHAPES:
+                    continue
+                children = list(child.GetChildren())
+                shapes = any(one.IsA(geom.Gprim) for one in children)
+                holds = any(one.HasAPI(physics.RigidBodyAPI) for one in self.pxr.Usd.PrimRange(child))
+                if (
+                    holds
+                    or shapes
+                    or not any(
+                        one.IsA(geom.Gprim)
+                        for one in self.pxr.Usd.PrimRange(child, self.pxr.Usd.TraverseInstanceProxies())
+                    )
+                ):
+                    yield str(child.GetPath()), body
+                    yield from below(child, body)
+
+        for body in bodies:
+            yield from below(self.stage.GetPrimAtPath(body), body)
+
+    # -- mimic joints --------------------------------------------------------------------------------
+
+    def _mimics(self, edges: Sequence[_Edge], names: Mapping[str, str]) -> Iterator[tuple[str, Mimic]]:
+        """Yield the mimic rules of Newton and PhysX; chains are resolved."""
+        by_path = {edge.path: edge for edge in edges}
+        rules: dict[str, tuple[str, float, float]] = {}
+        for edge in edges:
+            for rule in self._rules(edge):
+                leader = by_path.get(rule[0])
+                if leader is None or leader.kind.nq != 1 or edge.kind.nq != 1 or leader is edge:
+                    self._say(
+                        "lost-mimic",
+                        edge.path,
+                        f"this joint mimics {rule[0] or 'nothing'}, not a joint with one coordinate here",
+                        "correct the relationship",
+                    )
+                elif edge.path in rules or _leads(rules, rule[0], edge.path):
+                    self._say(
+                        "lost-mimic",
+                        edge.path,
+                        "this joint has two mimic rules, or its rules form a circle",
+                        "remove a rule",
+                    )
+                else:
+                    rules[edge.path] = rule
+        for path, rule in rules.items():
+            leader_path, multiplier, offset = rule
+            while leader_path in rules:
+                further, m, c = rules[leader_path]
+                leader_path, multiplier, offset = further, multiplier * m, multiplier * c + offset
+            yield names[path], Mimic(names[leader_path], multiplier, offset)
+
+    def _rules(self, edge: _Edge) -> Iterator[tuple[str, float, float]]:
+        """Yield the leader's path, the multiplier and the offset (rad or m) of each rule of a joint."""
+        prim, schemas = edge.prim, _schemas(edge.prim)
+        own = self._factor(edge.kind)
+        if "NewtonMimicAPI" in schemas:
+            if _value(prim, "newton:mimicEnabled") is False:
+                return
+            leader = _target(prim, "newton:mimicJoint")
+            c0, c1 = _value(prim, "newton:mimicCoef0"), _value(prim, "newton:mimicCoef1")
+            multiplier, offset = 1.0 if c1 is None else float(c1), 0.0 if c0 is None else float(c0)
+            yield leader, multiplier * own / self._factor_of(leader, own), offset * own
+            return
+        for schema in schemas:
+            base, _, freedom = schema.partition(":")
+            if base != "PhysxMimicJointAPI":
+                continue
+            leader = _target(prim, f"physxMimicJoint:{freedom}:referenceJoint")
+            gearing, offset = (
+                _value(prim, f"physxMimicJoint:{freedom}:{word}") for word in ("gearing", "offset")
+            )
+            multiplier = -1.0 if gearing is None else -float(gearing)
+            yield leader, multiplier * own / self._factor_of(leader, own), -float(offset or 0.0) * own
+
+    def _factor(self, kind: JointKind) -> float:
+        return self._unit if kind is JointKind.PRISMATIC else math.pi / 180.0
+
+    def _factor_of(self, leader: str, otherwise: float) -> float:
+        kinds = {edge.path: edge.kind for edge in self._edges}
+        return self._factor(kinds[leader]) if leader in kinds else otherwise
+
+    # -- the whole -----------------------------------------------------------------------------------
+
+    def _loose(self, chosen: _Articulation, found: Sequence[_Articulation]) -> None:
+        """Report bodies near the robot that no joint connects with it."""
+        joined = {path for group in found for path in group.bodies}
+        top = "/" + chosen.path.split("/")[1] + "/"
+        for path in self._bodies:
+            if path not in joined and (path + "/").startswith(top):
+                self._say(
+                    "loose-body",
+                    path,
+                    "no joint connects this body with the robot",
+                    "add a joint, or remove PhysicsRigidBodyAPI",
+                )
+
+    def _rest(
+        self, tree: KinematicTree, group: _Articulation, links: Mapping[str, str], rest: FloatArray
+    ) -> FloatArray:
+        """Return the coordinates (nq,) in which the stage shows the robot."""
+        q = np.zeros(tree.nq)
+        placed = dict(zip(links.values(), rest, strict=True))
+        values = {}
+        for edge in group.edges:
+            (A, B), (first, second) = edge.frames, edge.ends
+            T0 = np.eye(4) if first is None else placed[first]
+            T1 = np.eye(4) if second is None else placed[second]
+            J = inverse(T0 @ A) @ T1 @ B
+            if edge.kind is JointKind.PRISMATIC:
+                values[edge.path] = float(edge.axis @ J[:3, 3])
+            elif edge.kind in (JointKind.REVOLUTE, JointKind.CONTINUOUS):
+                S = J[:3, :3] - J[:3, :3].T
+                sine = float(edge.axis @ np.array([S[2, 1], S[0, 2], S[1, 0]])) / 2.0
+                values[edge.path] = math.atan2(sine, (float(np.trace(J[:3, :3])) - 1.0) / 2.0)
+        by_name = {edge.name: edge.path for edge in group.edges}
+        for joint, at in zip(tree.joints, tree.q_index, strict=True):
+            if joint.kind is JointKind.FLOATING:
+                q[at + 6] = 1.0
+            elif joint.nq == 1 and by_name.get(joint.name) in values:
+                q[at] = values[by_name[joint.name]]
+        return q
+
+    def _of_the_stage(self, rest: FloatArray) -> None:
+        geom = self.pxr.UsdGeom
+        if not self.stage.HasAuthoredMetadata("metersPerUnit"):
+            size = float(np.ptp(rest[:, :3, 3], axis=0).max(initial=0.0))
+            self._say(
+                "unit-scale",
+                "",
+                f"the stage has no metersPerUnit, so a unit is a centimetre: the robot spans {size:.3g} m",
+                "write metersPerUnit = 1 if lengths are metres",
+            )
+        if not self.stage.HasAuthoredMetadata("upAxis"):
+            self._say(
+                "up-axis",
+                "",
+                f"the stage has no upAxis, so {geom.GetStageUpAxis(self.stage)} is up",
+                'write upAxis = "Z"',
+            )
+
+    def _unused(self, prims: list[Any]) -> None:
+        counts: dict[str, int] = {}
+        for prim in prims:
+            if prim.IsA(self.pxr.UsdGeom.Gprim):
+                counts["shapes"] = counts.get("shapes", 0) + 1
+        if counts:
+            self._say("unused-in-usd", "", f"kinematics does not use the {counts['shapes']} shapes")
+
+
+def _value(prim: Any, name: str) -> Any:
+    """Return the value of an attribute, or its default; None if there is neither."""
+    attribute = prim.GetAttribute(name)
+    return attribute.Get() if attribute else None
+
+
+def _rounding(x: FloatArray) -> FloatArray:
+    """Return how far each number may be from the one that was rounded to it; a zero is exact.
+
+    It is half of the distance to the next number in single precision.
+    """
+    half = 0.5 * np.spacing(np.abs(x).astype(np.float32)).astype(np.float64)
+    return np.asarray(np.where(x == 0.0, 0.0, half))
+
+
+def _turned(xyzw: FloatArray) -> float:
+    """Return the angle (rad) that rounding its numbers can turn a quaternion: twice that of the 4-vector.
+
+    A quaternion with one number has the same direction for every value of this number.
+    """
+    if np.count_nonzero(xyzw) == 1:
+        return 0.0
+    return 2.0 * float(np.linalg.norm(_rounding(xyzw)) / np.linalg.norm(xyzw))
+
+
+def _is_mimic(prim: Any) -> bool:
+    return any(schema.partition(":")[0] in _MIMICS for schema in _schemas(prim))
+
+
+def _target(prim: Any, name: str) -> str:
+    targets = prim.GetRelationship(name).GetTargets() if prim.HasRelationship(name) else []
+    return str(targets[0]) if targets else ""
+
+
+def _schemas(prim: Any) -> list[str]:
+    """Return the applied API schemas as they are written, also those that this library does not know."""
+    return [str(one) for one in prim.GetPrimTypeInfo().GetAppliedAPISchemas()]
+
+
+def _unit(i: int) -> FloatArray:
+    axis: FloatArray = np.eye(3)[i]
+    return axis
+
+
+def _called(edge: _Edge) -> str:
+    return f"{edge.kind.value} joint"
+
+
+def _leads(rules: Mapping[str, tuple[str, float, float]], joint: str, to: str) -> bool:
+    while joint in rules and joint != to:
+        joint = rules[joint][0]
+    return joint == to

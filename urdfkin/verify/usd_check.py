@@ -1,0 +1,281 @@
+"""Read a USD stage in a process with limits on time and memory, and compare the robot with OpenUSD's readers.
+
+Pinocchio checks every result with the URDF text that urdfkin writes for the tree. This check does not include
+the conversion from the stage to the tree. Therefore `load` makes two comparisons:
+
+- with OpenUSD's own parser of UsdPhysics: the bodies, frames, free directions and limits of each joint. A
+  difference is an error.
+- with the transforms of the prims, by UsdGeom: the stage shows the robot in one configuration. The placement
+  of each link in this configuration must be that of its prim. The file states these transforms separately
+  from the joint frames, so a difference is a warning about the file.
+
+Both are exact up to the single precision of the numbers in a stage.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import ceil
+from typing import Any
+
+import numpy as np
+
+from urdfkin.compiled.plan import compile_tree
+from urdfkin.errors import InputError, OracleError
+from urdfkin.kinematics.rotation import rotation_of
+from urdfkin.kinematics.roundings import SINGLE
+from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.configuration import WIDEST
+from urdfkin.model.tree import (
+    FloatArray,
+    Joint,
+    JointKind,
+    KinematicTree,
+    LinkFrame,
+    inverse,
+    is_bounded,
+    pose,
+)
+from urdfkin.system.files import at_home, read_bytes
+from urdfkin.system.processes import ask_python, own_python
+from urdfkin.urdf.usd import Remark, version
+from urdfkin.verify.mjcf_process import unpacked
+from urdfkin.verify.quantities import PLACEMENT
+from urdfkin.verify.usd_process import TOO_MUCH
+from urdfkin.verify.verifier import Verifier
+
+#: Time limit for reading a stage, seconds.
+PATIENCE = 60.0
+#: Largest accepted size of the process's output, bytes.
+_MOST = 400_000_000
+#: Roundings to single precision of a joint's rotation in OpenUSD's parser: the angle of a quaternion with
+#: four rounded numbers is off by at most 2 of them; a product of two quaternions adds 4 to each number, whose
+#: vector of four is 8 and whose angle 16.
+_ROTATION = 18.0
+#: Roundings of a joint's origin: the scale, the product with the scale, the transformed origin.
+_ORIGIN = 3.0
+#: Roundings of a prim's rotation: three angles of at most a turn, 2 pi each.
+_TRANSFORM = 6.0 * np.pi
+
+
+@dataclass(frozen=True, slots=True)
+class UsdReading:
+    """The result of reading a USD stage in a separate process, as plain data.
+
+    Attributes:
+        urdf: The tree as a URDF text.
+        remarks: Parts of the stage that the tree does not contain, and probable mistakes.
+        path: The file.
+        answer: The process's answer.
+    """
+
+    urdf: str
+    remarks: tuple[Remark, ...]
+    path: str
+    answer: Mapping[str, Any]
+
+
+def read_usd(
+    source: str | os.PathLike[str],
+    *,
+    variants: Sequence[tuple[str, str]] = (),
+    articulation: str | None = None,
+    check: bool = True,
+    patience: float = PATIENCE,
+) -> UsdReading:
+    """Read the robot of a USD file in a process with limits on time and memory.
+
+    Args:
+        source: The path of a .usd, .usda, .usdc or .usdz file; the files that it refers to are read too.
+        variants: (variant set, variant) to select.
+        articulation: Path or name of the articulation; None if there is only one.
+        check: Whether to read the stage with OpenUSD's readers too, for `check_usd_source`.
+        patience: Time limit, seconds.
+
+    Raises:
+        SourceError: the file cannot be read or is too large.
+        InputError: OpenUSD is not installed, does not accept the file, or takes too much time or memory; or
+            the robot has a joint that urdfkin does not support.
+    """
+    version()
+    path = at_home(source)
+    read_bytes(path)  # a missing file has the usual error
+    request = {
+        "path": os.path.realpath(path),
+        "name": str(path),
+        "variants": [list(pair) for pair in variants],
+        "articulation": articulation,
+        "check": check,
+        "seconds": ceil(patience) + 1,
+    }
+    command = own_python(
+        "from urdfkin.verify.usd_process import serve; serve()", options=("-B", "-X", "utf8")
+    )
+    output, status = ask_python(command, json.dumps(request).encode(), patience, _MOST)
+    lines = [
+        line for line in output.splitlines(keepends=True) if line.startswith(b"{") and line.endswith(b"}\n")
+    ]
+    if not lines or len(output) > _MOST:
+        ending = f"its process ended with status {status}: perhaps {TOO_MUCH}"
+        if status is None:
+            ending = f"it did not finish within {patience:g} s"
+        raise InputError(
+            "OpenUSD cannot read this stage",
+            where=str(path),
+            found=ending,
+            remedy="check that the file is complete",
+        )
+    answer = json.loads(lines[-1])
+    if (error := answer.get("error")) is not None:
+        words = {key: error.get(key) for key in ("found", "remedy")}
+        raise InputError(error["what"], where=error.get("where") or str(path), **words)
+    return UsdReading(answer["urdf"], tuple(Remark(*one) for one in answer["remarks"]), str(path), answer)
+
+
+def check_usd_source(verifier: Verifier, read: UsdReading) -> tuple[str, tuple[Remark, ...]]:
+    """Compare a robot with OpenUSD's readings of the stage from which the robot was read.
+
+    Args:
+        verifier: Verifier of the robot.
+        read: The result of `read_usd`.
+
+    Returns:
+        A line of text about the result, for the certificate; and remarks about prims that are elsewhere.
+
+    Raises:
+        OracleError: OpenUSD's parser reads another joint.
+    """
+    joints = read.answer["joints"]
+    share = max((_demand(verifier.tree.name, path, *pair) for path, pair in joints.items()), default=0.0)
+    line = (
+        f"compared with OpenUSD {version()}: its UsdPhysics parser reads the same {len(joints)} joints"
+        f" ({share:.1%} of the bound of single precision)"
+    )
+    rest, remarks = _at_rest(verifier.tree, read.answer)
+    return f"{line}; {rest}", remarks
+
+
+def _demand(name: str, path: str, ours: list[Any], theirs: list[Any] | None) -> float:
+    """Demand that both readings of a joint agree; return the largest share of a bound."""
+    if theirs is None:
+        raise _error(f"{name}, joint {path}", "the parser does not find this joint")
+    if ours[:3] != theirs[:3]:
+        raise _error(f"{name}, joint {path}", f"{theirs[:3]} instead of {ours[:3]}")
+    size, shares = ours[8], [0.0]
+    for p, quaternion in ((3, 4), (5, 6)):
+        off = float(np.linalg.norm(np.subtract(ours[p], theirs[p])))
+        if off > 0.0:
+            shares.append(off / (_ORIGIN * SINGLE * size) if size else np.inf)
+        R = rotation_of(ours[quaternion]).T @ rotation_of(theirs[quaternion])
+        shares.append(_angle(R) / (_ROTATION * SINGLE))
+    for a, b in zip(ours[7], theirs[7], strict=True):
+        finite = abs(a) < np.inf
+        if finite and a != b:
+            shares.append(abs(a - b) / (SINGLE * abs(a)) if a else np.inf)
+    if not max(shares) <= 1.0:
+        raise _error(f"{name}, joint {path}", f"{max(shares):.3g} times the bound of single precision")
+    return max(shares)
+
+
+def _error(where: str, found: str) -> OracleError:
+    return OracleError(
+        "OpenUSD's parser of UsdPhysics reads another joint than urdfkin",
+        where=where,
+        found=found,
+        remedy="please report this as an error of urdfkin, with the file",
+    )
+
+
+def _angle(R: FloatArray) -> float:
+    """Return the angle (rad) of a rotation; also small angles are accurate."""
+    sine = np.linalg.norm([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2.0
+    return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
+
+
+#: For each joint by name, as in `urdfkin.urdf.usd.Usd.single`.
+Single = Mapping[str, tuple[float, float, float, float]]
+
+
+def single_precision(tree: KinematicTree, single: Single) -> FloatArray:
+    """Return how far single precision can move and turn each link, (links, 2): metres and radians.
+
+    A stored number is off by at most half of the distance to the next number in single precision; a zero is
+    exact. The origins of a joint's two frames are off by the length of the errors of their numbers. A unit
+    quaternion turns by twice the length of the errors of its numbers. An angle moves everything behind it by
+    the angle times the distance, at most the length of the path behind it. A mimic rule m q + c is off by
+    2^-24 (|m q| + |c|), at the largest |q| within the limits.
+
+    Args:
+        tree: The robot.
+        single: The errors of each joint. A joint without an entry is exact.
+    """
+    out = np.zeros((len(tree.links), 2))
+    for i, joint in enumerate(tree.joints):
+        way, angle, size, share = single.get(joint.name, (0.0, 0.0, 0.0, 0.0))
+        length = max(joint.length, size)
+        slides = joint.kind is JointKind.PRISMATIC
+        if slides:
+            length += _largest(joint)
+        if joint.mimic is not None:
+            rule, leader = joint.mimic, tree.joints[tree.joint_index(joint.mimic.leader)]
+            off = share * (abs(rule.multiplier) * _largest(leader) + abs(rule.offset))
+            way, angle = (way + off, angle) if slides else (way, angle + off)
+        above = out[joint.parent]
+        out[i + 1] = above[0] + way + (above[1] + angle) * length, above[1] + angle
+    return out
+
+
+def _largest(joint: Joint) -> float:
+    """Return the largest size of a joint's coordinate (rad or m) within its limits."""
+    return max(abs(joint.limit.lower), abs(joint.limit.upper)) if is_bounded(joint.limit) else WIDEST
+
+
+def _at_rest(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple[Remark, ...]]:
+    """Compare the placements of links with the transforms of their prims, in the stage's configuration."""
+    prims: dict[str, str] = answer["prims"]
+    rows = unpacked(answer["rest"])
+    rest = np.array([pose(row[:, :3], row[:, 3]) for row in rows])
+    q = np.array([answer["rest_q"]], dtype=np.float64)
+    plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in prims])
+    ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)[0]
+    if tree.links[0] in prims:  # the root is a body, wherever the stage places it
+        at = list(prims).index(tree.links[0])
+        rest = inverse(rest[at]) @ rest
+    own = single_precision(tree, answer["single"])
+    far = float(np.linalg.norm(unpacked(answer["rest"])[:, :, 3], axis=1).max(initial=0.0))
+    remarks, worst = [], (0.0, 0.0)
+    shares = []
+    for k, (name, path) in enumerate(prims.items()):
+        link = tree.link_index(name)
+        depth = len(tree.path(link)) + 1
+        off = float(np.linalg.norm(ours[k, :3, 3] - rest[k, :3, 3]))
+        angle = _angle(ours[k, :3, :3].T @ rest[k, :3, :3])
+        turn = own[link, 1] + depth * _TRANSFORM * SINGLE
+        length = own[link, 0] + depth * SINGLE * (1.0 + _TRANSFORM) * 2.0 * far
+        share = max(off / length if off else 0.0, angle / turn if angle else 0.0)
+        shares.append(share)
+        worst = max(worst[0], off), max(worst[1], angle)
+        if share > 1.0:
+            what = (
+                f"the prim is {off:.3g} m and {np.degrees(angle):.3g} degrees from where the joints place it"
+            )
+            remarks.append(
+                Remark("rest-pose", path, what, "correct the joint's frames or the prim's transform")
+            )
+    moved = (
+        int(np.count_nonzero(np.abs(q) > 0.0)) if not any(joint.kind.nq > 1 for joint in tree.joints) else 0
+    )
+    where = f"at the stage's configuration, with {moved} joints off zero" if moved else "at q = 0"
+    if remarks:
+        words = f"by UsdGeom's transforms {len(remarks)} of the {len(prims)} prims are elsewhere, by up to"
+        words = f"{words} {worst[0]:.3g} m"
+        # of bodies in one chain, the first is the cause
+        return words, tuple(remarks[:1])
+    return (
+        f"UsdGeom's transforms of {len(prims)} prims agree {where}"
+        f" ({max(shares, default=0.0):.1%} of the bound)",
+        (),
+    )

@@ -1,0 +1,134 @@
+"""Program that reads a USD stage in a separate process, with urdfkin's reader and with OpenUSD's own.
+
+A defect of OpenUSD's parsers, which are written in C++, can crash the process; a stage can require any amount
+of time and memory. The caller's process receives only plain data. The request comes on standard input, the
+answer is a line of JSON on standard output.
+
+OpenUSD contains a second reader of the joints: the parser of its package UsdPhysics. It resolves bodies,
+joint frames and limits with other code than `urdfkin.urdf.usd`. Its numbers are returned besides urdfkin's.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import warnings
+from collections.abc import Mapping
+from dataclasses import astuple
+from typing import Any
+
+import numpy as np
+
+from urdfkin.errors import UrdfkinError
+from urdfkin.urdf.confinement import MEMORY, limit
+from urdfkin.urdf.usd import JointReading, Usd, library, read_usd
+from urdfkin.urdf.writer import to_urdf
+from urdfkin.verify.mjcf_process import packed
+
+TOO_MUCH = f"it takes more than {MEMORY / 1024**3:g} GiB of memory"
+
+
+def serve() -> None:
+    """Read a request from standard input and write the answer to standard output."""
+    request = json.load(sys.stdin)
+    os.environ["PXR_WORK_THREAD_LIMIT"] = "1"  # a confined process cannot start threads
+    try:
+        library()
+        limit(request["seconds"])
+        answer = answer_of(request)
+    except MemoryError:
+        answer = {"error": {"what": "OpenUSD cannot read this stage", "found": TOO_MUCH}}
+    except UrdfkinError as error:
+        answer = {"error": {key: getattr(error, key) for key in ("what", "where", "found", "remedy")}}
+    except Exception as error:
+        answer = {
+            "error": {
+                "what": "OpenUSD cannot read this stage",
+                "found": f"{type(error).__name__}: {error}"[:2000],
+            }
+        }
+    sys.stdout.write(json.dumps(answer) + "\n")
+    sys.stdout.flush()
+    os._exit(0)  # end the process without the exit handlers of the libraries
+
+
+def answer_of(request: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the answer to a request.
+
+    Args:
+        request: `path`; `name`, the file's name in messages; `variants`; `articulation`; `check`, whether to
+            compare with OpenUSD's readers.
+    """
+    read = read_usd(
+        request["path"],
+        request["name"],
+        variants=[tuple(pair) for pair in request["variants"]],
+        articulation=request["articulation"],
+    )
+    answer: dict[str, Any] = {
+        "urdf": to_urdf(read.tree),
+        "single": read.single,
+        "remarks": [astuple(one) for one in read.remarks],
+        "files": read.files,
+    }
+    if request["check"]:
+        answer |= {
+            "prims": read.prims,
+            "rest": packed(read.rest[:, :3]),
+            "rest_q": read.rest_q.tolist(),
+            "joints": _second_reading(read),
+        }
+    return answer
+
+
+def _second_reading(read: Usd) -> dict[str, Any]:
+    """Return urdfkin's and OpenUSD's readings of each joint of the tree, by the path of the joint's prim."""
+    pxr = library()
+    physics, found = pxr.UsdPhysics, {}
+    load = getattr(physics, "UsdPhysicsLoadStageFromPrimRange", None) or physics.LoadUsdPhysicsFromRange
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        parsed = load(read.stage, ["/"])
+    for paths, descriptions in parsed.values():
+        for path, one in zip(paths, descriptions, strict=True):
+            if str(path) in read.joints:
+                found[str(path)] = _described(physics, one, read)
+    return {path: [ours.as_list(), found.get(path)] for path, ours in read.joints.items()}
+
+
+def _described(physics: Any, one: Any, read: Usd) -> list[Any]:
+    """Return a joint of OpenUSD's parser in the form of `JointReading.as_list`."""
+    frames = []
+    for i in (0, 1):
+        p, quaternion = getattr(one, f"localPose{i}Position"), getattr(one, f"localPose{i}Orientation")
+        xyzw = np.array([*quaternion.GetImaginary(), quaternion.GetReal()], float)
+        frames.append((np.array(p, float) * read.unit, xyzw / np.linalg.norm(xyzw)))
+    free = _freedoms(physics, one)
+    ends = getattr(one, "limit", None)
+    turns = isinstance(one, physics.RevoluteJointDesc)
+    factor = np.pi / 180.0 if turns else read.unit
+    limits = (
+        (float(ends.lower) * factor, float(ends.upper) * factor) if ends is not None else (-np.inf, np.inf)
+    )
+    return JointReading(free, str(one.body0), str(one.body1), *frames[0], *frames[1], limits, 0.0).as_list()
+
+
+def _freedoms(physics: Any, one: Any) -> str:
+    """Return the free directions of a joint."""
+    for kind, word in ((physics.RevoluteJointDesc, "rot"), (physics.PrismaticJointDesc, "trans")):
+        if isinstance(one, kind):
+            return f"{word}{str(one.axis).rpartition('.')[2][-1].upper()}"
+    if isinstance(one, physics.D6JointDesc):
+        names = {"Trans": "trans", "Rot": "rot"}
+        locked = set()
+        for pair in one.jointLimits:
+            word = str(pair.first).rpartition(".")[2]
+            if pair.second.lower > pair.second.upper:
+                locked.add(next(names[k] + word[len(k) :] for k in names if word.startswith(k)))
+        return " ".join(
+            freedom
+            for freedom in ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
+            if freedom not in locked
+        )
+    return ""
