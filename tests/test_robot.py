@@ -262,7 +262,7 @@ def test_a_frame_that_does_not_exist_offers_the_nearest_and_one_that_is_no_name_
         panda.jacobian(panda.neutral(), "hand")
     assert caught.value.nearest[0] == "panda_hand"
     for frame in (3, b"panda_hand", ["panda_hand", 3], iter(["panda_hand"])):
-        with pytest.raises(InputError, match="a frame is the name of a link or joint"):
+        with pytest.raises(InputError, match="a frame must be the name of a link or joint"):
             panda.jacobian(panda.neutral(), frame)  # type: ignore[arg-type]
 
 

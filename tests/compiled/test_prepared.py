@@ -241,7 +241,7 @@ def test_names_that_do_not_exist_are_refused_in_the_robots_words(panda: Robot) -
             assert str(caught.value) == str(long.value) or (
                 way == panda.prepare and not isinstance(frame, str)
             )
-    with pytest.raises(InputError, match="a frame is the name of a link or joint"):
+    with pytest.raises(InputError, match="a frame must be the name of a link or joint"):
         panda.prepare(["panda_hand"])  # type: ignore[arg-type]
     for reference in ("globe", "", None, 1, 1.0, True, ["local"], {"local": 1}):
         for refer in (panda.prepare, lambda frame, other: panda.jacobian(q, frame, other)):

@@ -58,7 +58,7 @@ class Answer:
     """The result of a command, from which every format is made.
 
     Attributes:
-        document: Returns what a person reads, for the formats of `TEXTS`.
+        document: Returns the document that a person reads, for the formats of `TEXTS`.
         data: For each other format, a function that returns its data: a mapping for JSON, rows for CSV, an
             array for npy, text for all others. An entry for a format of `TEXTS` replaces the document.
         check: The last line of the output, which states the result of the check. It is empty if the command

@@ -22,7 +22,11 @@ EXAMPLE = "urdfkin readers ur5 --with mujoco,yourdfpy"
 @robot_argument
 @click.option("--with", "libraries", metavar="NAME,...", help="Libraries. Default: all that are installed.")
 @click.option(
-    "--samples", type=Whole(0), default=5, show_default=True, help="Random configurations, besides q = 0."
+    "--samples",
+    type=Whole(0),
+    default=5,
+    show_default=True,
+    help="Number of random configurations, in addition to q = 0.",
 )
 @click.option("--seed", type=Whole(0), default=0, show_default=True, help="Seed of the configurations.")
 @answering()

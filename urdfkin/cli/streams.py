@@ -133,7 +133,8 @@ class SafeStream:
 
     Args:
         stream: The stream to write to.
-        styled: Whether styles pass; only for a stream that nothing but rich writes to.
+        styled: Whether escape sequences for styles are kept. Use it only for a stream that only rich writes
+            to.
         encoding: The encoding that this stream reports.
     """
 

@@ -59,7 +59,8 @@ def judge_all(
         given: Robots, or their sources.
         settings: Settings of the study.
         store: Folder of the campaign, which also stores the results of the study; None: no store.
-        shard: Only the robots with their first chunk in that part. The report covers the same part.
+        shard: Part of the campaign. Only robots with their first chunk in this part are studied. The report
+            covers the same part.
         retry: Whether to repeat studies that failed before.
         how: `mimic`, `root_joint`, `xacro_args`, `lock` and `joints`, as in `load`.
 

@@ -44,12 +44,14 @@ _QUANTITIES = ("placement", "velocity", "jacobian", "jacobian-rate", "hessian", 
 @click.option(
     "--quantity",
     type=click.Choice(_QUANTITIES),
-    help="Quantity that the function computes. By default the function has its name.",
+    help="Quantity that the function computes. Default: the quantity that the function is named after.",
 )
 @frame_option
 @reference_option
 @convention_option
-@click.option("--samples", type=Whole(0), default=1000, show_default=True, help="Random configurations.")
+@click.option(
+    "--samples", type=Whole(0), default=1000, show_default=True, help="Number of random configurations."
+)
 @seed_option
 @click.option(
     "--factor",

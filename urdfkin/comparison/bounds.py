@@ -402,7 +402,7 @@ class Boxes:
     """Bounds of the distance between a frame's origins in A and B, for boxes of configurations.
 
     Args:
-        search: Both robots.
+        search: The search, which contains both robots.
         frame: The frame.
         names: Names of the variables that change the distance (`moved_together` finds them).
     """
@@ -460,7 +460,7 @@ def tightened(search: Search, frame: FramePair, target: float, upper: float, mos
     """Return a proven bound (m) of a frame's distance: `target` if it can be proven, else at most `upper`.
 
     Args:
-        search: Both robots.
+        search: The search, which contains both robots.
         frame: The frame.
         target: The bound to prove.
         upper: The bound that is proven already.

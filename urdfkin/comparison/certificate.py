@@ -145,7 +145,8 @@ class FrameEntry(TypedDict):
     ]
     radians_seen: Annotated[Size, says("Angle between the orientations at `q_a` and `q_b`, radians.")]
     q_a: Annotated[
-        list[float], says("Configuration of A with this distance; empty if the frame does not differ.")
+        list[float],
+        says("Configuration of A at which the lower bound is attained; empty if the frame does not differ."),
     ]
     q_b: Annotated[list[float], says("Configuration of B that corresponds to `q_a`.")]
 

@@ -464,7 +464,7 @@ class Sameness(Displayable):
                     "a free joint has another frame in B",
                     where="map",
                     found=joint.name,
-                    remedy="convert q with to_b: a convention has no frames of joints",
+                    remedy="convert q with to_b: a convention cannot describe another frame of a joint",
                 )
             joints.append(joint.name)
             rule = JointRule(joint.name if one.b != one.a else None, float(one.sense), one.offset)

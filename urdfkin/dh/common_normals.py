@@ -118,7 +118,7 @@ def step_between(
 
     Args:
         A: (4, 4) pose of the next joint's frame in this joint's frame.
-        reach: Metres; a foot beyond it is far.
+        reach: Length in metres. A foot of the common normal that is farther away than `reach` counts as far.
         near_parallel: Kind of row for nearly parallel axes.
         phi_free: Value of phi if the axes coincide, so that every phi is correct.
         delta_each: Whether the offset between parallel axes becomes `delta` of this step instead of

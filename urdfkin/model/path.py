@@ -32,7 +32,7 @@ class Motion:
     """A rotation about, or a translation along, a coordinate axis of the current frame.
 
     Attributes:
-        axis: The axis: 0, 1 or 2.
+        axis: Index of the coordinate axis: 0 for x, 1 for y, 2 for z.
         turns: Whether the motion is a rotation.
     """
 

@@ -219,7 +219,7 @@ class Recursion:
         """Return the derivative of a Jacobian column in the direction of a joint velocity.
 
         Args:
-            six: The column.
+            six: The Jacobian column whose derivative is returned.
             by: The Jacobian column of the joint that moves.
             reference: The reference frame.
             before: Whether the moving joint is the joint of the column `six`, or is before it on the path.

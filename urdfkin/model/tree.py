@@ -426,7 +426,9 @@ class KinematicTree:
             InputError: a link and a joint at different places share the name.
         """
         if not isinstance(name, str):
-            raise InputError("a frame is the name of a link or joint", where=self.name, found=safe_repr(name))
+            raise InputError(
+                "a frame must be the name of a link or joint", where=self.name, found=safe_repr(name)
+            )
         if isinstance(name, FrameName):
             return self._frame_index(name)
         link, joint = self._link_index.get(name), self._joint_index.get(name)

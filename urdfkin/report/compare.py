@@ -205,7 +205,7 @@ class Comparison:
 
     Attributes:
         changes: The changes.
-        sha256: SHA-256 of the texts of the new report's robots.
+        sha256: SHA-256 of each robot's text in the new report.
     """
 
     changes: tuple[Change, ...]
@@ -237,7 +237,7 @@ class Comparison:
 class ChangeEntry(TypedDict):
     """One difference of two reports."""
 
-    robot: Annotated[str | None, says("Source of the robot; null for a value of the whole validation.")]
+    robot: Annotated[str | None, says("Source of the robot; null if the value does not belong to one robot.")]
     what: Annotated[str, says("Name of the changed value.")]
     old: Annotated[str, says("Value in the old report; empty if the old report has none.")]
     new: Annotated[str, says("Value in the new report; empty if the new report has none.")]

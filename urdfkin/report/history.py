@@ -75,7 +75,8 @@ class Point(TypedDict):
     failed: Annotated[Count, says("Number of results outside their bound.")]
     worst: Units
     share_of_bound: Annotated[
-        float | None, says("The largest ratio of a disagreement to its bound; null as for a disagreement.")
+        float | None,
+        says("The largest ratio of a disagreement to its bound; null if a disagreement is not finite."),
     ]
     errors: Annotated[Count, says("Number of errors in the file.")]
     warnings: Annotated[Count, says("Number of warnings in the file.")]
@@ -102,7 +103,7 @@ class HistoryDocument(Header):
     runs: Annotated[list[Run], says("The runs, the oldest first.")]
     robots: Annotated[list[RobotHistory], says("The robots; worse verdicts first.")]
     unusable: Annotated[list[Unused], says("Files that cannot be used, each with the reason.")]
-    repeated: Annotated[list[Unused], says("Files with the same run as another file.")]
+    repeated: Annotated[list[Unused], says("Files with a validation run that another file also contains.")]
 
 
 #: The layout of the document.
@@ -124,9 +125,9 @@ class History:
 
     Attributes:
         runs: The runs, the oldest first.
-        robots: The points of each robot, under its latest source; worse verdicts first.
+        robots: For each robot, under its latest source: the results in each run. Worse verdicts come first.
         unusable: Files that cannot be used, with the reason.
-        repeated: Files with the same run as another file, with its name.
+        repeated: Files whose run another file also contains, each with the name of that file.
     """
 
     runs: list[Run] = field(default_factory=list)

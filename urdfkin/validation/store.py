@@ -243,8 +243,8 @@ def opened(
         tell: Callback for each damaged file.
         shard: The part of the campaign to lock; other processes may work on other parts. None: lock the whole
             store.
-        retry_failed: Whether to delete the stored failures. The texts of the robots that failed may have
-            changed since.
+        retry_failed: Whether to delete the stored failures. The files of the failed robots may have changed
+            in the meantime.
 
     Raises:
         SourceError: The store cannot be made or written.

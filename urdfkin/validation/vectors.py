@@ -82,8 +82,16 @@ class JointEntry(TypedDict):
 
     name: Annotated[str, says("Name of the joint.")]
     type: Annotated[str, says("Type of the joint in the URDF.")]
-    q: Annotated[list[Count], of_length(2), says("First index in q, and the index after the last.")]
-    v: Annotated[list[Count], of_length(2), says("The same in v and a.")]
+    q: Annotated[
+        list[Count],
+        of_length(2),
+        says("Index of the joint's first number in q, and the index after its last number."),
+    ]
+    v: Annotated[
+        list[Count],
+        of_length(2),
+        says("Index of the joint's first number in v and a, and the index after its last number."),
+    ]
 
 
 class Result(TypedDict):
@@ -106,14 +114,20 @@ class Result(TypedDict):
     shape: Annotated[list[Count], says("Shape of the result. The last index varies fastest in the lists.")]
     k: Annotated[Size, says("The tolerance in multiples of 2^-52 times the size of the terms.")]
     value: Annotated[list[float], says("The true values, rounded to 17 significant digits.")]
-    tolerance: Annotated[list[float], says("Largest difference of a right result; 0: equal.")]
+    tolerance: Annotated[
+        list[float],
+        says("Largest allowed difference of a result from the true value; 0: they must be equal."),
+    ]
 
 
 class Sample(TypedDict):
     """A configuration with joint velocities and accelerations, and its results."""
 
     q: Annotated[list[float], says("Coordinates: rad, m, quaternion x y z w.")]
-    v: Annotated[list[float], says("Joint velocities. Those of a planar or floating joint: child's axes.")]
+    v: Annotated[
+        list[float],
+        says("Joint velocities. Those of a planar or floating joint are in the child link's axes."),
+    ]
     a: Annotated[list[float], says("Joint accelerations: the time derivatives of v.")]
     results: list[Result]
 
@@ -123,11 +137,13 @@ class Vectors(TypedDict):
 
     schema: Annotated[str, says("Name and version of the layout of this document.")]
     version: Annotated[str, says("Version of the vectors.")]
-    license: Annotated[str | None, says("SPDX identifier; null: that of the robot's file.")]
+    license: Annotated[
+        str | None, says("SPDX identifier of the licence; null: the licence of the robot's file applies.")
+    ]
     robot: Annotated[str, says("Name of the feature or robot.")]
     file: Annotated[str, says("Path of the URDF, in this folder or in example-robot-data.")]
-    sha256: Annotated[Sha256, says("SHA-256 of that file.")]
-    rule: Annotated[str | None, says("The rule of the standard, if the robot shows one.")]
+    sha256: Annotated[Sha256, says("SHA-256 of the URDF file.")]
+    rule: Annotated[str | None, says("The rule of the URDF standard that the robot shows, if there is one.")]
     note: Annotated[str | None, says("How libraries differ, or how the file was read.")]
     joints: list[JointEntry]
     samples: list[Sample]

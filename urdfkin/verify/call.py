@@ -199,7 +199,7 @@ def _frames(frame: str | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
         return True, tuple(frame)[: len(frame)]  # an iterator has no length and raises TypeError
     except TypeError:
         raise InputError(
-            "a frame is the name of a link or joint, or a list of names",
+            "a frame must be the name of a link or joint, or a list of such names",
             found=safe_repr(frame),
             remedy="robot.link_frames lists all links",
         ) from None

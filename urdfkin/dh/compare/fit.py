@@ -194,7 +194,7 @@ def fit_cells(model: Model, wanted: TargetPoses, cells_of: FloatArray, *, free: 
     Args:
         model: The table.
         wanted: Target poses from the URDF.
-        cells_of: (n, 5) mask of the cells: 1 for cells that may change, 0 for the others.
+        cells_of: (n, 5) mask of the cells: 1 for cells that may change, 0 for all other cells.
         free: Whether base, tool and joint offsets may change too.
     """
     start, best, best_size, scale = model, model, np.inf, wanted.scale

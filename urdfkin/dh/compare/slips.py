@@ -49,8 +49,8 @@ class CommonMistake:
     """A reading that a table's file does not state, and with which the table agrees with the URDF.
 
     Attributes:
-        reading: The reading.
-        said: The reading that the table's file states.
+        reading: The way to read the table with which it agrees with the URDF.
+        said: The way to read the table that its file states.
         metres: Position error of the tip at the worst sample, after a fit of base, tool and offsets.
         radians: Orientation error of the tip at the worst sample.
     """

@@ -777,7 +777,9 @@ class Conversion:
         if quantity == "hessian":
             return self.hessian(ours[0], jacobian(), result)
         raise InputError(
-            "a convention has no form of this quantity", where=self.convention.name, found=quantity
+            "a convention does not define how to convert this quantity",
+            where=self.convention.name,
+            found=quantity,
         )
 
     def _demand_own_columns(self) -> None:

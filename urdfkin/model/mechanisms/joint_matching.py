@@ -100,7 +100,7 @@ class Pairing:
         The joints of A without a partner and those of B without a partner are returned separately.
 
         Args:
-            bodies: Of A and of B.
+            bodies: The body of A and the body of B.
             via: The joints from which the matcher reached these bodies.
             G: (4, 4) motion that moves A's zero configuration to the current pose of B.
             XC: (4, 4) motion that moves B's zero configuration to the current pose of B.
@@ -170,7 +170,7 @@ class Pairing:
         The most similar joint comes first.
 
         Args:
-            bodies: Of A and of B.
+            bodies: The body of A and the body of B.
             e: Joint of A.
             edges: Joints of B.
             X: (4, 4) motion of B's zero configuration to A's pose.
@@ -550,7 +550,7 @@ class Congruence:
         """Return the joint pairs at two bodies if the subtrees after these bodies match exactly, else None.
 
         Args:
-            bodies: Of A and of B.
+            bodies: The body of A and the body of B.
             via: The joints through which the search reached these bodies.
             X: (4, 4) motion of B's body from B's zero configuration to the pose of A's body.
         """
