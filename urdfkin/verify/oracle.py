@@ -501,7 +501,7 @@ class OracleQuery:
         base: Motion of the base; None: fixed at the world origin.
         inputs: q, or q and v, or q, v and a, as numbers that broadcast.
         named: The original argument of each input that was given by names; None for every other input.
-        joints: Name and number of joint velocities of each joint with coordinates, in order.
+        joints: For each joint with coordinates, in order: its name and its number of joint velocities.
     """
 
     def __init__(
