@@ -690,7 +690,7 @@ def loaded_name(name: str) -> urdfkin.Robot:
         return urdfkin.load(name)
 
 
-def test_a_millimetre_is_not_explained_by_single_precision(write: Write) -> None:
+def test_two_micrometres_are_not_explained_by_single_precision(write: Write) -> None:
     robot = loaded_name("panda")
     text = as_usd(robot)
     assert "0.333" in text
