@@ -51,8 +51,12 @@ from urdfkin.urdf.sources import USD
 _LAYERS = 1_000
 #: Largest number in single precision. Files write it, or infinity, for a missing limit.
 _LARGEST = float(np.finfo(np.float32).max)
-#: Largest cosine between the axes of a frame without shear, for numbers in single precision.
-_SHEAR = 16.0 * SINGLE
+#: Largest cosine between two axes of a frame without shear, for each prim on the path, in roundings to
+#: single precision. A rotation matrix of rounded numbers has entries that are off by one rounding, and the product of
+#: two such matrices in single precision adds three roundings to each entry. An entry of the columns' products
+#: is then off by at most 2 sqrt(3) times as much, 14. A rounded quaternion changes its length by one
+#: rounding, and the cosine by four.
+_SHEAR = 14.0
 _NONE = (-math.inf, math.inf)
 _MIMICS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
 _AXES = {"X": 0, "Y": 1, "Z": 2}
@@ -407,7 +411,7 @@ class _Reader:
         if np.linalg.det(M[:3, :3]) < 0.0:
             scale = -scale
         R = M[:3, :3] / scale
-        if np.abs(R.T @ R - np.eye(3)).max() > _SHEAR:
+        if np.abs(R.T @ R - np.eye(3)).max() > _SHEAR * SINGLE * prim.GetPath().pathElementCount:
             raise InputError(
                 "the frame of a prim has shear, so it is no frame of a rigid body",
                 where=f"{self.source}: {prim.GetPath()}",
