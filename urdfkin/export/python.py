@@ -1,6 +1,7 @@
-"""Write Python code for NumPy, Numba, JAX, CasADi or SymPy.
+"""Write Python code for NumPy, any array API namespace, Numba, JAX, CasADi or SymPy.
 
-The expressions are the same for all libraries.
+The expressions are the same for all libraries. The code for JAX is that for any array API namespace, with
+JAX's own names.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from urdfkin.export.code import Code, Writer
+from urdfkin.export.expression import Node
 from urdfkin.export.function import Function
 
 
@@ -21,24 +23,27 @@ class Dialect:
     Attributes:
         about: Description of a function's inputs and results.
         imports: Import lines. A placeholder stands for the functions among `cos`, `sin` and `sqrt` that the
-            code uses.
-        result: Function that yields the lines of code that return the results in an array of a given shape.
+            code uses. A line with a placeholder is left out if the code uses none.
+        result: Function that yields the lines of code that return the results of a written function.
         values: Body of the written function `_values(function, inputs)`, which returns the results for a list
             of configurations.
         decorator: The decorator's line before each written function; "" if there is none.
-        entering: Function that returns the first lines of a written function, given the inputs of that
-            function.
+        entering: Function that returns the first lines of a written function, given its writer.
+        helpers: Code of functions that the written functions call; "" if there are none.
         index: Format of the text for an element of an input.
-        before: First line of the written check; "" if there is none.
+        given: Parameter of the written check, with its default; "" if there is none.
+        before: First line of the written program; "" if there is none.
     """
 
     about: str
     imports: str
-    result: Callable[[list[str], tuple[int, ...]], Iterator[str]]
+    result: Callable[[Writer], Iterator[str]]
     values: str
     decorator: str = ""
-    entering: Callable[[str], list[str]] = lambda inputs: []
+    entering: Callable[[Writer], list[str]] = lambda writer: []
+    helpers: str = ""
     index: str = "{}[{}]"
+    given: str = ""
     before: str = ""
 
 
@@ -46,28 +51,27 @@ def _rows(values: Sequence[str], width: int) -> list[Sequence[str]]:
     return [values[i : i + width] for i in range(0, len(values), width)] if width else []
 
 
-def _in_array(create: str, index: str) -> Callable[[list[str], tuple[int, ...]], Iterator[str]]:
+def _in_array(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
     """Return a function that yields code which writes the results into an array, element by element."""
 
-    def result(values: list[str], shape: tuple[int, ...]) -> Iterator[str]:
+    def result(writer: Writer) -> Iterator[str]:
+        shape = writer.function.shape
         yield f"out = {create.format(shape, ', '.join(map(str, shape)))}"
-        for place, value in zip(np.ndindex(shape), values, strict=True):
+        for place, value in zip(np.ndindex(shape), writer.results(), strict=True):
             yield f"out[{index}{', '.join(map(str, place))}] = {value}"
         yield "return out"
 
     return result
 
 
-def _nested(
-    opening: str, closing: str, row: str = "[{}]", deeper: str = ""
-) -> Callable[[list[str], tuple[int, ...]], Iterator[str]]:
-    """Return a function that yields code which creates the array of results in one call, row by row.
+def _nested(opening: str, closing: str, row: str = "[{}]") -> Callable[[Writer], Iterator[str]]:
+    """Return a function that yields code which creates the matrix of results in one call, row by row.
 
-    The rows of a Hessian (6, nv, nv) are written as one matrix, unless the code in `deeper` gives the array
-    its three axes.
+    The rows of a Hessian (6, nv, nv) are written as one matrix.
     """
 
-    def result(values: list[str], shape: tuple[int, ...]) -> Iterator[str]:
+    def result(writer: Writer) -> Iterator[str]:
+        values, shape = writer.results(), writer.function.shape
         yield f"return {opening}"
         if len(shape) == 1:
             yield from (f"    {value}," for value in values)
@@ -76,17 +80,67 @@ def _nested(
             yield f"    {first}"
             yield from (f"        {value}," for value in line)
             yield f"    {last},"
-        yield closing + (deeper.format(shape) if len(shape) > 2 else "")
+        yield closing
 
     return result
 
 
-def _shapes(inputs: str) -> list[str]:
+def _shapes(writer: Writer) -> list[str]:
+    inputs = writer.function.inputs
     lines = [f"{x} = np.asarray({x}, dtype=np.float64)" for x in inputs]
     shapes = ", ".join(f"{x}.shape[:-1]" for x in inputs)
     return [*lines, f"shape = np.broadcast_shapes({shapes})"]
 
 
+# -- array API ---------------------------------------------------------------------------------------------
+
+
+def _zero(writer: Writer, xp: str) -> str:
+    """Return the line of code that defines zeros of the batch shape, with the inputs' type and device."""
+    widths = writer.code.widths(writer.function)
+    columns = (f"{x}[..., 0]" if width else f"{xp}.sum({x}, axis=-1)" for x, width in widths.items())
+    return "zero = " + " + ".join(f"{xp}.zeros_like({column})" for column in columns)
+
+
+def _in_any_namespace(writer: Writer) -> list[str]:
+    used = [name for name in _FUNCTIONS if any(node.op == name for node in writer.function.nodes)]
+    names = [f"{', '.join(used)} = {', '.join(f'xp.{name}' for name in used)}"] if used else []
+    return ["xp = _namespace(q)", *names, _zero(writer, "xp")]
+
+
+def _stacked(xp: str) -> Callable[[Writer], Iterator[str]]:
+    """Return a function that yields code which creates the results without writing into an array."""
+
+    def result(writer: Writer) -> Iterator[str]:
+        function = writer.function
+        yield f"return _stacked({xp}["
+        for x, text in zip(function.results, writer.results(), strict=True):
+            yield f"    {text if isinstance(x, Node) else f'zero + {text}' if x else 'zero'},"
+        yield f"], zero, {function.shape})"
+
+    return result
+
+
+_NAMESPACE = '''
+def _namespace(x):
+    """Return the array API namespace of an array; for PyTorch that of array-api-compat."""
+    if hasattr(x, "__array_namespace__"):
+        return x.__array_namespace__()
+    from array_api_compat import array_namespace
+
+    return array_namespace(x)
+'''
+
+_STACKED = '''
+def _stacked({given}values, zero, shape):
+    """Return numbers of the batch shape of `zero`, or of one that broadcasts, as an array (..., *shape)."""
+    batch = tuple(zero.shape)
+    values = [{xp}.broadcast_to(x, batch) for x in values]
+    return {xp}.reshape({xp}.stack(values, {axis}=-1), batch + shape)
+'''
+
+
+_FUNCTIONS = ("cos", "sin", "sqrt")
 _ONE_BY_ONE = "return [{} for one in zip(*inputs)]"
 
 DIALECTS = {
@@ -98,6 +152,20 @@ DIALECTS = {
         result=_in_array("np.empty((*shape, {1}))", "..., "),
         values="return np.reshape(function(*map(np.array, inputs)), (len(inputs[0]), -1)).tolist()",
     ),
+    "array": Dialect(
+        about="Arrays q (..., {nq}), v and a (..., {nv}) of any array API namespace, type and device;\n"
+        "they broadcast. PyTorch's tensors need array-api-compat. No array is written in place.\n"
+        "check(xp) runs the test vectors in a namespace, for example check(jax.numpy).",
+        imports="import numpy",
+        helpers=_NAMESPACE + "\n" + _STACKED.format(given="xp, ", xp="xp", axis="axis"),
+        entering=_in_any_namespace,
+        index="{}[..., {}]",
+        result=_stacked("xp, "),
+        values="found = function(*(xp.asarray(x, dtype=xp.float64) for x in inputs))\n"
+        "    found = xp.reshape(found, (len(inputs[0]), -1))\n"
+        "    return [[float(found[i, k]) for k in range(found.shape[1])] for i in range(found.shape[0])]",
+        given="xp=numpy",
+    ),
     "numba": Dialect(
         about="One configuration, float64 arrays q ({nq},), v and a ({nv},); compiled when first called.",
         imports="from math import {}\n\nimport numpy as np\nfrom numba import njit",
@@ -106,16 +174,20 @@ DIALECTS = {
         values=_ONE_BY_ONE.format("function(*map(np.array, one)).ravel().tolist()"),
     ),
     "jax": Dialect(
-        about="One configuration, arrays q ({nq},), v and a ({nv},), of any precision; for jit, vmap, grad.\n"
+        about="Arrays q (..., {nq}), v and a (..., {nv}) of any precision, which broadcast; for jit, vmap, grad.\n"
         "XLA's fusion pass takes minutes to compile long chains; this disables it:\n"
-        'jax.jit(jax.vmap(function), compiler_options={{"xla_disable_hlo_passes": "fusion"}})',
+        'jax.jit(function, compiler_options={{"xla_disable_hlo_passes": "fusion"}})',
         imports="import jax\nimport jax.numpy as jnp\nfrom jax.numpy import {}",
-        entering=lambda inputs: [f"{x} = jnp.asarray({x})" for x in inputs],
-        result=_nested("jnp.array([", "], dtype=q.dtype)", deeper=".reshape({})"),
+        helpers=_STACKED.format(given="", xp="jnp", axis="axis"),
+        entering=lambda writer: [
+            *(f"{x} = jnp.asarray({x})" for x in writer.function.inputs),
+            _zero(writer, "jnp"),
+        ],
+        index="{}[..., {}]",
+        result=_stacked(""),
         values='unfused = {"xla_disable_hlo_passes": "fusion"}\n'
-        "    compiled = jax.jit(jax.vmap(function), compiler_options=unfused)\n"
-        "    found = compiled(*map(jnp.array, inputs))\n"
-        "    return found.reshape(len(inputs[0]), -1).tolist()",
+        "    compiled = jax.jit(function, compiler_options=unfused)\n"
+        "    return compiled(*map(jnp.array, inputs)).reshape(len(inputs[0]), -1).tolist()",
         before='jax.config.update("jax_enable_x64", True)',
     ),
     "casadi": Dialect(
@@ -152,7 +224,7 @@ def write(code: Code, to: str) -> str:
         '"""',
         "",
     ]
-    lines += [_imports(code, dialect), ""]
+    lines += [_imports(code, dialect), "", *([dialect.helpers] if dialect.helpers else [])]
     for function in code.functions:
         lines += ["", *_function(code, function, dialect), ""]
     return "\n".join([*lines, *_check(code, dialect), ""])
@@ -160,7 +232,7 @@ def write(code: Code, to: str) -> str:
 
 def _imports(code: Code, dialect: Dialect) -> str:
     nodes = [node.op for function in code.functions for node in function.nodes]
-    used = ", ".join(name for name in ("cos", "sin", "sqrt") if name in nodes)
+    used = ", ".join(name for name in _FUNCTIONS if name in nodes)
     lines = [line for line in dialect.imports.split("\n") if used or "{}" not in line]
     return "\n".join(lines).strip().format(used)
 
@@ -173,27 +245,27 @@ def _function(code: Code, function: Function, dialect: Dialect) -> Iterator[str]
     size = ", ".join(map(str, function.shape)) + ("," if len(function.shape) == 1 else "")
     numbers = ", ".join(function.quantity.equations)
     yield f'    """({size}), eq. {numbers}; {function.operations} operations."""'
-    yield from (f"    {line}" for line in dialect.entering(function.inputs))
+    yield from (f"    {line}" for line in dialect.entering(writer))
     for node in writer.given:
         yield f"    {writer.words[node]} = {dialect.index.format(node.op, node.of[0])}"
     for head, lines in writer.statements():
         yield f"    # {head}"
         yield from (f"    {word} = {value}" for word, value in lines)
-    yield from (f"    {line}" for line in dialect.result(writer.results(), function.shape))
+    yield from (f"    {line}" for line in dialect.result(writer))
 
 
 _CHECK = '''
-def _values(function, inputs):
+def _values(function, inputs{more}):
     {values}
 
 
-def check():
+def check({given}):
     """Return the largest error of each function as a share of its tolerance: at most 1."""
     shares = {{}}
     for function in ({functions}):
         name, worst = function.__name__, 0.0
         inputs = [GIVEN[letter] for letter in INPUTS[name]]
-        for found, true, within in zip(_values(function, inputs), TRUE[name], WITHIN[name]):
+        for found, true, within in zip(_values(function, inputs{more}), TRUE[name], WITHIN[name]):
             for x, y, k in zip(found, true, within):
                 error, least = abs(x - float(y)), k * 2.0**-52
                 share = error / least if least else (0.0 if error == 0.0 else float("inf"))
@@ -240,6 +312,8 @@ def _check(code: Code, dialect: Dialect) -> Iterator[str]:
         yield "}"
     yield _CHECK.format(
         values=dialect.values,
+        given=dialect.given,
+        more=f", {dialect.given.partition('=')[0]}" if dialect.given else "",
         functions=", ".join(function.name for function in code.functions)
         + ("," if len(code.functions) == 1 else ""),
         before=f"    {dialect.before}\n" if dialect.before else "",
