@@ -31,6 +31,8 @@ from urdfkin.verify.verifier import bound_of
 
 RUN = [to for to in LANGUAGES if to != "latex"]
 _THREE = ("placement", "jacobian", "acceleration")
+#: Languages whose check runs in double and in single precision.
+BOTH = ("c", "cpp", "array", "jax")
 
 
 def module(path: Path) -> ModuleType:
@@ -49,7 +51,7 @@ def test_an_arms_file_computes_its_fifty_digit_values(to: str, tmp_path: Path) -
     need(to)
     found = check(file(code(urdfkin.load("ur5", verify=False), quantities=_THREE), to, tmp_path))
     assert found.good, found.lines
-    assert len(found.lines) == len(_THREE) * (2 if to in ("c", "cpp") else 1)
+    assert len(found.lines) == len(_THREE) * (2 if to in BOTH else 1)
 
 
 def test_the_fifty_digits_of_a_test_vector_are_those_of_the_true_value() -> None:
@@ -92,7 +94,7 @@ def test_so_does_that_of_planar_and_floating_joints(to: str, tmp_path: Path) -> 
     asked = tuple(name for name in ALL if name != "hessian" or to != "c")
     found = check(file(code(robot_of("planar_and_floating_in_the_middle"), quantities=asked), to, tmp_path))
     assert found.good, found.lines
-    assert len(found.lines) == len(asked) * (2 if to == "c" else 1)
+    assert len(found.lines) == len(asked) * (2 if to in BOTH else 1)
 
 
 @pytest.mark.slow
@@ -205,7 +207,7 @@ def test_the_file_for_any_array_computes_true_values_in_a_namespace(name: str, t
     for robot in (urdfkin.load("ur5"), robot_of("planar_and_floating_in_the_middle")):
         asked = tuple(row for row in ALL if row != "hessian")
         found = module(file(code(robot, quantities=asked), "array", tmp_path)).check(xp)
-        assert len(found) == len(asked)
+        assert len(found) == 2 * len(asked)
         assert max(found.values()) < 1.0
 
 
@@ -319,7 +321,7 @@ def test_a_table_and_screws_are_code_in_every_language_with_its_check(
     found = check(path)
     assert found.good, found.lines
     assert found.verified
-    assert len(found.lines) == len(_THREE) * (2 if to == "c" else 1)
+    assert len(found.lines) == len(_THREE) * (2 if to in BOTH else 1)
     head = path.read_text("utf-8")[:3000]
     assert {"dh": "Rz(theta) Tz(d) Tx(a) Rx(alpha)", "screws": "space screws S"}[form] in head
 

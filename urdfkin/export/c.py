@@ -218,7 +218,7 @@ def _lane_sines(writer: Writer, layout: Layout) -> Iterator[str]:
 def vectors(code: Code) -> Iterator[str]:
     """Yield C arrays with the test vectors: their inputs, the true values and the tolerances."""
     found, n = code.proof.vectors, len(code.proof.vectors)
-    yield "/* True values at fifty digits, and the tolerance of each number, in eps of its precision. */"
+    yield "/* True values at fifty digits, and the tolerance of each number in eps, in double and single precision. */"
     for k, (letter, width) in enumerate(
         code.widths(max(code.functions, key=lambda f: len(f.inputs))).items()
     ):
@@ -228,6 +228,7 @@ def vectors(code: Code) -> Iterator[str]:
         size = f"{function.name}[{n}][{len(function.results)}]"
         yield _array(f"true_{size}", [vector.results[function.name] for vector in found])
         yield _array(f"within_{size}", [vector.within[function.name] for vector in found])
+        yield _array(f"single_{size}", [vector.single[function.name] for vector in found])
 
 
 def _array(declared: str, rows: Sequence[Sequence[str]]) -> str:

@@ -33,6 +33,7 @@ class Dialect:
         index: Format of the text for an element of an input.
         given: Parameter of the written check, with its default; "" if there is none.
         before: First line of the written program; "" if there is none.
+        single: Whether the functions also compute in single precision.
     """
 
     about: str
@@ -45,6 +46,7 @@ class Dialect:
     index: str = "{}[{}]"
     given: str = ""
     before: str = ""
+    single: bool = False
 
 
 def _rows(values: Sequence[str], width: int) -> list[Sequence[str]]:
@@ -161,10 +163,11 @@ DIALECTS = {
         entering=_in_any_namespace,
         index="{}[..., {}]",
         result=_stacked("xp, "),
-        values="found = function(*(xp.asarray(x, dtype=xp.float64) for x in inputs))\n"
+        values="found = function(*(xp.asarray(x, dtype=getattr(xp, kind)) for x in inputs))\n"
         "    found = xp.reshape(found, (len(inputs[0]), -1))\n"
         "    return [[float(found[i, k]) for k in range(found.shape[1])] for i in range(found.shape[0])]",
         given="xp=numpy",
+        single=True,
     ),
     "numba": Dialect(
         about="One configuration, float64 arrays q ({nq},), v and a ({nv},); compiled when first called.",
@@ -174,7 +177,8 @@ DIALECTS = {
         values=_ONE_BY_ONE.format("function(*map(np.array, one)).ravel().tolist()"),
     ),
     "jax": Dialect(
-        about="Arrays q (..., {nq}), v and a (..., {nv}) of any precision, which broadcast; for jit, vmap, grad.\n"
+        about="Arrays q (..., {nq}), v and a (..., {nv}) of any precision, which broadcast; for jit, vmap\n"
+        "and grad.\n"
         "XLA's fusion pass takes minutes to compile long chains; this disables it:\n"
         'jax.jit(function, compiler_options={{"xla_disable_hlo_passes": "fusion"}})',
         imports="import jax\nimport jax.numpy as jnp\nfrom jax.numpy import {}",
@@ -187,7 +191,9 @@ DIALECTS = {
         result=_stacked(""),
         values='unfused = {"xla_disable_hlo_passes": "fusion"}\n'
         "    compiled = jax.jit(function, compiler_options=unfused)\n"
-        "    return compiled(*map(jnp.array, inputs)).reshape(len(inputs[0]), -1).tolist()",
+        "    found = compiled(*(jnp.array(x, dtype=kind) for x in inputs))\n"
+        "    return found.reshape(len(inputs[0]), -1).tolist()",
+        single=True,
         before='jax.config.update("jax_enable_x64", True)',
     ),
     "casadi": Dialect(
@@ -255,39 +261,46 @@ def _function(code: Code, function: Function, dialect: Dialect) -> Iterator[str]
 
 
 _CHECK = '''
-def _values(function, inputs{more}):
+def _values(function, inputs, kind{more}):
     {values}
 
 
 def check({given}):
     """Return the largest error of each function as a share of its tolerance: at most 1."""
     shares = {{}}
-    for function in ({functions}):
-        name, worst = function.__name__, 0.0
-        inputs = [GIVEN[letter] for letter in INPUTS[name]]
-        for found, true, within in zip(_values(function, inputs{more}), TRUE[name], WITHIN[name]):
-            for x, y, k in zip(found, true, within):
-                error, least = abs(x - float(y)), k * 2.0**-52
-                share = error / least if least else (0.0 if error == 0.0 else float("inf"))
-                if not share <= worst:  # NaN is the worst
-                    worst = share
-        shares[name] = worst
+    for kind, eps, tolerance in {kinds}:
+        for function in ({functions}):
+            name, worst = function.__name__, 0.0
+            inputs = [GIVEN[letter] for letter in INPUTS[name]]
+            for found, true, within in zip(_values(function, inputs, kind{more}), TRUE[name], tolerance[name]):
+                for x, y, k in zip(found, true, within):
+                    error, least = abs(x - float(y)), k * eps
+                    share = error / least if least else (0.0 if error == 0.0 else float("inf"))
+                    if not share <= worst:  # NaN is the worst
+                        worst = share
+            shares[name, kind] = worst
     return shares
 
 
 if __name__ == "__main__":
 {before}    wrong = False
-    for name, worst in check().items():
+    for (name, kind), worst in check().items():
         good = worst <= 1.0
         wrong |= not good
-        line = f"{{name}}: {{len(TRUE[name])}} test vectors, worst error {{worst:.3g}} of the bound"
+        line = f"{{name}}: {{len(TRUE[name])}} test vectors, worst error {{worst:.3g}} of the bound{told}"
         print("good" if good else "WRONG", line)
     raise SystemExit(wrong)
 '''
 
 
+_DOUBLE = '[("float64", 2.0**-52, WITHIN)]'
+_BOTH = '[("float64", 2.0**-52, WITHIN), ("float32", 2.0**-23, SINGLE)]'
+
+
 def _check(code: Code, dialect: Dialect) -> Iterator[str]:
     yield "\n# Configurations, true values at fifty digits, and tolerances in eps = 2^-52."
+    if dialect.single:
+        yield "# SINGLE: tolerances in single precision, in eps = 2^-23."
     vectors = code.proof.vectors
     most = max((function.inputs for function in code.functions), key=len)
     yield "INPUTS = {" + ", ".join(f'"{f.name}": "{f.inputs}"' for f in code.functions) + "}"
@@ -297,7 +310,8 @@ def _check(code: Code, dialect: Dialect) -> Iterator[str]:
         yield from (f"        {v.inputs[k]!r}," for v in vectors)
         yield "    ],"
     yield "}"
-    for what, of, form in (("TRUE", "results", '"{}"'), ("WITHIN", "within", "{}")):
+    tables = [("TRUE", "results", '"{}"'), ("WITHIN", "within", "{}"), ("SINGLE", "single", "{}")]
+    for what, of, form in tables if dialect.single else tables[:2]:
         yield f"{what} = {{"
         for function in code.functions:
             yield f'    "{function.name}": ['
@@ -305,13 +319,15 @@ def _check(code: Code, dialect: Dialect) -> Iterator[str]:
                 yield "        ["
                 found = [form.format(x) for x in getattr(vector, of)[function.name]]
                 yield from (
-                    f"            {', '.join(row)}," for row in _rows(found, 4 if what == "WITHIN" else 2)
+                    f"            {', '.join(row)}," for row in _rows(found, 2 if what == "TRUE" else 4)
                 )
                 yield "        ],"
             yield "    ],"
         yield "}"
     yield _CHECK.format(
         values=dialect.values,
+        kinds=_BOTH if dialect.single else _DOUBLE,
+        told=" ({kind})" if dialect.single else "",
         given=dialect.given,
         more=f", {dialect.given.partition('=')[0]}" if dialect.given else "",
         functions=", ".join(function.name for function in code.functions)
