@@ -17,7 +17,7 @@ from tests.laws.subjects import robot_of, state
 from urdfkin.export import proof, single
 from urdfkin.export.expression import Graph, Node
 from urdfkin.export.function import Function
-from urdfkin.kinematics.roundings import SINGLE_EPS
+from urdfkin.kinematics.roundings import SINGLE_EPS, SINGLE_OPERATION
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.quantities import JACOBIAN
@@ -85,7 +85,7 @@ def test_the_error_of_an_operation_is_within_the_bound_and_not_without_its_term(
     op: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert 0.2 < worst(OPERATIONS[op]) <= 1.0
-    monkeypatch.setitem(single.SINGLE_OPERATION, op, 0.0)
+    monkeypatch.setitem(SINGLE_OPERATION, op, 0.0)
     monkeypatch.setattr(single, "SINGLE_POLYNOMIAL", 0.0)
     assert worst(OPERATIONS[op]) > 1.0
 

@@ -1,16 +1,19 @@
-"""Write Python code for NumPy, any array API namespace, Numba, JAX, CasADi or SymPy.
+"""Write Python code for NumPy, any array API namespace, Numba, JAX, PyTorch, CasADi or SymPy.
 
-The expressions are the same for all libraries. The code for JAX is that for any array API namespace, with
-JAX's own names.
+The expressions are the same for all libraries. The code for JAX and PyTorch is that for any array API
+namespace, with the library's own names.
 """
 
 from __future__ import annotations
 
+import importlib.util
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from urdfkin.errors import InputError
 from urdfkin.export.code import Code, Writer
 from urdfkin.export.expression import Node
 from urdfkin.export.function import Function
@@ -34,6 +37,8 @@ class Dialect:
         given: Parameter of the written check, with its default; "" if there is none.
         before: First line of the written program; "" if there is none.
         single: Whether the functions also compute in single precision.
+        closing: Function that returns code after the written functions.
+        after: Last lines of the written program; "" if there are none.
     """
 
     about: str
@@ -47,6 +52,8 @@ class Dialect:
     given: str = ""
     before: str = ""
     single: bool = False
+    closing: Callable[[Code], str] = lambda code: ""
+    after: str = ""
 
 
 def _rows(values: Sequence[str], width: int) -> list[Sequence[str]]:
@@ -142,6 +149,47 @@ def _stacked({given}values, zero, shape):
 '''
 
 
+_MODULE = '''
+class Kinematics(torch.nn.Module):
+    """The functions of this file; `forward` is `{first}`. Results have the inputs' type and device."""
+
+{functions}
+
+    def forward(self, {inputs}):
+        """Return {first}({inputs})."""
+        return {first}({inputs})
+
+
+def gradients(device="cpu"):
+    """Return, for each function, whether `torch.autograd.gradcheck` accepts its derivatives in float64."""
+    accepted = {{}}
+    for function in ({all}):
+        kind = {{"dtype": torch.float64, "device": device, "requires_grad": True}}
+        inputs = [torch.tensor(GIVEN[letter][:1], **kind) for letter in INPUTS[function.__name__]]
+        accepted[function.__name__] = torch.autograd.gradcheck(function, inputs, raise_exception=False)
+    return accepted
+
+
+'''
+
+
+def _torch_module(code: Code) -> str:
+    """Return code of a `torch.nn.Module` with the functions, and of their check by `gradcheck`."""
+    # A module's forward has the inputs q if there is a function of q alone.
+    first = min(code.functions, key=lambda function: len(function.inputs))
+    return _MODULE.format(
+        first=first.name,
+        inputs=", ".join(first.inputs),
+        functions="\n".join(f"    {f.name} = staticmethod({f.name})" for f in code.functions),
+        all=_all(code),
+    ).lstrip("\n")
+
+
+def _all(code: Code) -> str:
+    """Return the names of all functions as the elements of a tuple."""
+    return ", ".join(f.name for f in code.functions) + ("," if len(code.functions) == 1 else "")
+
+
 _FUNCTIONS = ("cos", "sin", "sqrt")
 _ONE_BY_ONE = "return [{} for one in zip(*inputs)]"
 
@@ -195,6 +243,23 @@ DIALECTS = {
         "    return found.reshape(len(inputs[0]), -1).tolist()",
         single=True,
         before='jax.config.update("jax_enable_x64", True)',
+    ),
+    "torch": Dialect(
+        about="Tensors q (..., {nq}), v and a (..., {nv}) of any floating type and device, which broadcast;\n"
+        "for autograd, torch.func, vmap and compile. Kinematics() has the functions as a module.",
+        imports="import torch\nfrom torch import {}",
+        helpers=_STACKED.format(given="", xp="torch", axis="dim"),
+        entering=lambda writer: [_zero(writer, "torch")],
+        index="{}[..., {}]",
+        result=_stacked(""),
+        values="tensors = [torch.tensor(x, dtype=getattr(torch, kind), device=device) for x in inputs]\n"
+        "    return function(*tensors).reshape(len(inputs[0]), -1).tolist()",
+        given='device="cpu"',
+        single=True,
+        closing=_torch_module,
+        after="    for name, good in gradients().items():\n"
+        "        wrong |= not good\n"
+        '        print("good" if good else "WRONG", f"{name}: derivatives by gradcheck (float64)")\n',
     ),
     "casadi": Dialect(
         about="Columns SX, MX or DM: q ({nq}), v and a ({nv}); a Hessian is ({nv} times 6, {nv}).",
@@ -261,7 +326,7 @@ def _function(code: Code, function: Function, dialect: Dialect) -> Iterator[str]
 
 
 _CHECK = '''
-def _values(function, inputs, kind{more}):
+{classes}def _values(function, inputs, kind{more}):
     {values}
 
 
@@ -272,7 +337,8 @@ def check({given}):
         for function in ({functions}):
             name, worst = function.__name__, 0.0
             inputs = [GIVEN[letter] for letter in INPUTS[name]]
-            for found, true, within in zip(_values(function, inputs, kind{more}), TRUE[name], tolerance[name]):
+            numbers = _values(function, inputs, kind{more})
+            for found, true, within in zip(numbers, TRUE[name], tolerance[name]):
                 for x, y, k in zip(found, true, within):
                     error, least = abs(x - float(y)), k * eps
                     share = error / least if least else (0.0 if error == 0.0 else float("inf"))
@@ -289,7 +355,7 @@ if __name__ == "__main__":
         wrong |= not good
         line = f"{{name}}: {{len(TRUE[name])}} test vectors, worst error {{worst:.3g}} of the bound{told}"
         print("good" if good else "WRONG", line)
-    raise SystemExit(wrong)
+{after}    raise SystemExit(wrong)
 '''
 
 
@@ -330,7 +396,26 @@ def _check(code: Code, dialect: Dialect) -> Iterator[str]:
         told=" ({kind})" if dialect.single else "",
         given=dialect.given,
         more=f", {dialect.given.partition('=')[0]}" if dialect.given else "",
-        functions=", ".join(function.name for function in code.functions)
-        + ("," if len(code.functions) == 1 else ""),
+        functions=_all(code),
+        classes=dialect.closing(code),
+        after=dialect.after,
         before=f"    {dialect.before}\n" if dialect.before else "",
     ).rstrip()
+
+
+def torch_module(text: str) -> Any:
+    """Return the module of the exported text of the language "torch".
+
+    Raises:
+        InputError: PyTorch is not installed.
+    """
+    need_torch()
+    scope: dict[str, Any] = {"__name__": "urdfkin_torch"}
+    exec(compile(text, "<urdfkin export --to torch>", "exec"), scope)
+    return scope["Kinematics"]()
+
+
+def need_torch() -> None:
+    """Raise InputError if PyTorch is not installed."""
+    if importlib.util.find_spec("torch") is None:
+        raise InputError("robot.torch needs PyTorch", found="no module torch", remedy="pip install torch")
