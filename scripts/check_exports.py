@@ -134,7 +134,7 @@ def check(tips: bool, keep: Path | None, ways: Collection[str]) -> int:
     return tell(lines_of(keep) if keep else here)
 
 
-def check_library(library: str, environment: Path, package: str | None) -> int:
+def check_library(library: str, environment: Path, package: str | None, keep: Path | None) -> int:
     """Run the files of all tips in an environment that has PyTorch or JAX; return 1 if there is an error."""
     python = environment / "bin" / "python"
     if not python.exists():
@@ -143,22 +143,26 @@ def check_library(library: str, environment: Path, package: str | None) -> int:
         subprocess.run([str(python), "-m", "pip", "install", "--quiet", "numpy", *packages], check=True)
     version = [str(python), "-c", f"import {library}; print('{library}', {library}.__version__)"]
     print(subprocess.run(version, capture_output=True, text=True, check=True).stdout.strip(), flush=True)
+    stored = lines_of(keep)
     with tempfile.TemporaryDirectory() as folder:
         paths = list(_files(library, Path(folder)))
-        command = [str(python), str(Path(__file__).with_name("run_exported.py")), *map(str, paths)]
-        done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder)
-    print(done.stderr, end="", file=sys.stderr)
-    found = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
+        left = [path for path in paths if path.stem not in {line["file"] for line in stored}]
+        command = [str(python), str(Path(__file__).with_name("run_exported.py")), *map(str, left)]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=folder) as process:
+            for line in process.stdout or ():
+                print(line, end="", flush=True)
+                stored.append(json.loads(line))
+                if keep:
+                    with keep.open("a", encoding="utf-8") as file:
+                        file.write(line)
     wrong, worst = 0, dict[str, float]()
-    for line in found:
-        name = Path(line.pop("path")).stem
-        if not all(share <= 1.0 for share in line.values()):
-            wrong += 1
-            print("WRONG", name, line)
-        worst |= {way: max(share, worst.get(way, 0.0)) for way, share in line.items()}
-    print(f"{len(found)} of {len(paths)} files, {wrong} with an error outside the bound; worst share of it:")
+    for line in stored:
+        found = {way: share for way, share in line.items() if isinstance(share, float)}
+        wrong += not all(share <= 1.0 for share in found.values())
+        worst |= {way: max(share, worst.get(way, 0.0)) for way, share in found.items()}
+    print(f"{len(stored)} of {len(paths)} files, {wrong} with an error outside the bound; worst share of it:")
     print(", ".join(f"{way} {share:.2g}" for way, share in worst.items()))
-    return int(wrong > 0 or len(found) < len(paths) or done.returncode != 0)
+    return int(wrong > 0 or len(stored) < len(paths) or process.returncode != 0)
 
 
 def _files(library: str, folder: Path) -> Iterator[Path]:
@@ -246,7 +250,7 @@ def main(words: Sequence[str] | None = None) -> int:
     if arguments.tell:
         return tell(lines_of(arguments.keep))
     if arguments.library:
-        return check_library(arguments.library, arguments.environment, arguments.package)
+        return check_library(arguments.library, arguments.environment, arguments.package, arguments.keep)
     if arguments.sizes:
         PAGE.write_text(page(PAGE.read_text("utf-8")), "utf-8")
         print(PAGE)

@@ -32,7 +32,7 @@ from urdfkin.verify.verifier import bound_of
 RUN = [to for to in LANGUAGES if to != "latex"]
 _THREE = ("placement", "jacobian", "acceleration")
 #: Languages whose check runs in double and in single precision.
-BOTH = ("c", "cpp", "array", "jax")
+BOTH = ("c", "cpp", "cuda", "array", "jax", "torch")
 
 
 def module(path: Path) -> ModuleType:
@@ -51,7 +51,8 @@ def test_an_arms_file_computes_its_fifty_digit_values(to: str, tmp_path: Path) -
     need(to)
     found = check(file(code(urdfkin.load("ur5", verify=False), quantities=_THREE), to, tmp_path))
     assert found.good, found.lines
-    assert len(found.lines) == len(_THREE) * (2 if to in BOTH else 1)
+    gradients = len(_THREE) if to == "torch" else 0
+    assert len(found.lines) == len(_THREE) * (2 if to in BOTH else 1) + gradients
 
 
 def test_the_fifty_digits_of_a_test_vector_are_those_of_the_true_value() -> None:
@@ -140,7 +141,7 @@ def test_c_touches_nothing_that_is_not_its_own(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("to", ["c", "numpy", "array"])
+@pytest.mark.parametrize("to", ["c", "cpp", "cuda", "numpy", "array", "torch"])
 def test_a_constant_that_was_changed_is_noticed(to: str, tmp_path: Path) -> None:
     need(to)
     path = file(code(urdfkin.load("ur5"), quantities=("placement", "acceleration")), to, tmp_path)
@@ -154,7 +155,7 @@ def test_a_constant_that_was_changed_is_noticed(to: str, tmp_path: Path) -> None
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("to", ["c", "numpy", "array", "matlab"])
+@pytest.mark.parametrize("to", ["c", "cuda", "numpy", "array", "torch", "matlab"])
 def test_a_frame_that_nothing_moves_has_code_too(to: str, tmp_path: Path) -> None:
     need(to)
     robot = urdfkin.load("planar_two_link")
@@ -242,6 +243,34 @@ def test_gradients_through_any_array_are_the_hessian_within_its_bound(tmp_path: 
     for slopes in (jax.jacfwd, jax.jacrev):
         found = np.asarray(jax.vmap(slopes(own.jacobian))(q))
         assert np.all(np.abs(found - right) <= within)
+
+
+@pytest.mark.slow
+def test_a_module_of_pytorch_has_the_quantities_and_their_derivatives() -> None:
+    torch: Any = pytest.importorskip("torch")
+    robot = urdfkin.load("planar_two_link")
+    own = robot.torch("tip")
+    q, v, a = (torch.tensor(x) for x in state(robot, 5, 2))
+    assert isinstance(own, torch.nn.Module)
+    assert torch.equal(own(q), own.placement(q))
+    assert np.abs(own.jacobian(q).numpy() - robot.jacobian(q.numpy(), "tip")).max() < 1e-15
+    right = robot.acceleration(q.numpy(), v.numpy(), a.numpy(), "tip")
+    assert np.abs(own.acceleration(q, v, a).numpy() - right).max() < 1e-13
+    slopes = torch.func.vmap(torch.func.jacrev(own.jacobian))(q)
+    assert np.abs(slopes.numpy() - robot.hessian(q.numpy(), "tip")).max() < 1e-15
+    assert own(q.float()).dtype == torch.float32
+    assert own.velocity(q.reshape(5, 1, 2), v).shape == (5, 5, 6)
+    moving = robot.torch("tip", ["velocity"])
+    assert torch.equal(moving(q, v), own.velocity(q, v))
+
+
+def test_pytorch_that_is_not_installed_is_one_clear_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "torch" else found(name))
+    with pytest.raises(
+        InputError, match=r"robot\.torch needs PyTorch: found no module torch; pip install torch"
+    ):
+        urdfkin.load("planar_two_link").torch("tip")
 
 
 @pytest.mark.slow

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import urdfkin
 from tests.export.test_languages import module
@@ -182,6 +184,12 @@ def test_a_file_needs_the_errors_of_its_double_constants(
     assert shares(text, tmp_path)["placement", "float32"] <= 1.0
     monkeypatch.setattr(proof, "EPS", 0.0)
     assert shares(text, tmp_path)["placement", "float32"] > 1.0
+
+
+@given(st.floats(1e-300, 1e300))
+def test_a_bound_is_written_rounded_up_and_by_less_than_two_millionths(x: float) -> None:
+    assert x <= float(proof._rounded_up(x)) <= x * (1.0 + 2e-6)
+    assert proof._rounded_up(np.inf) == "0.0"
 
 
 def test_a_file_states_its_bounds_and_what_single_precision_cannot_represent(tmp_path: Path) -> None:

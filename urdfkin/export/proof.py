@@ -173,10 +173,8 @@ def _vectors(
                 Vector(
                     tuple(x[k].tolist() for x in inputs),
                     {name: [decimal(x) for x in values] for name, values in true.items()},
-                    *(
-                        {name: [_rounded_down(x) for x in values[k]] for name, values in bounds.items()}
-                        for bounds in (within, single)
-                    ),
+                    {name: [_rounded_down(x) for x in values[k]] for name, values in within.items()},
+                    {name: [_rounded_up(x) for x in values[k]] for name, values in single.items()},
                 )
             )
     return tuple(found), most
@@ -206,8 +204,17 @@ def decimal(x: Number) -> str:
 
 
 def _rounded_down(x: float) -> str:
-    """Return x with six digits, rounded down; 0.0, which accepts only equal numbers, if it is not finite."""
-    if not np.isfinite(x):
-        return "0.0"
+    """Return x with six digits, rounded down."""
     text = f"{x:.6g}"
     return text if float(text) <= x else f"{x * (1.0 - 1e-6):.6g}"
+
+
+def _rounded_up(x: float) -> str:
+    """Return x with seven digits, rounded up; 0.0, which accepts only equal numbers, if it is not finite.
+
+    A bound in single precision is reached: a constant has exactly the error that its bound counts.
+    """
+    if not np.isfinite(x):
+        return "0.0"
+    text = f"{x:.7g}"
+    return text if float(text) >= x else f"{x * (1.0 + 1e-6):.7g}"
