@@ -156,8 +156,8 @@ def check_library(library: str, environment: Path, package: str | None, keep: Pa
                     with keep.open("a", encoding="utf-8") as file:
                         file.write(line)
     wrong, worst = 0, dict[str, float]()
-    for line in stored:
-        found = {way: share for way, share in line.items() if isinstance(share, float)}
+    for checked in stored:
+        found = {way: share for way, share in checked.items() if isinstance(share, float)}
         wrong += not all(share <= 1.0 for share in found.values())
         worst |= {way: max(share, worst.get(way, 0.0)) for way, share in found.items()}
     print(f"{len(stored)} of {len(paths)} files, {wrong} with an error outside the bound; worst share of it:")

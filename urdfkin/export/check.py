@@ -121,9 +121,7 @@ def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
     if found is None:
         raise InputError("the file has no test vectors", where=str(file))
     copy = _copy(text, folder / f"checked{file.suffix}")
-    command = _COMPILE[file.suffix]
-    if file.suffix == ".cuh" and _has_gpu():
-        command = _COMPILE_FOR_GPU
+    command = _COMPILE_FOR_GPU if file.suffix == ".cuh" and _has_gpu() else _COMPILE[file.suffix]
     compiler = _program(command[0], file)
     for real in ("double", "float"):
         macros = [f"-D{found[1]}_MAIN", f"-D{found[1]}_REAL={real}"]
