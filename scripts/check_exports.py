@@ -13,7 +13,7 @@
 
 When a function is written, it is compared with Pinocchio. When it runs, it is compared with results at fifty
 digits. The function runs with GCC and Clang if they are installed, for one configuration and in batches. It
-also runs with NumPy, and with NumPy as an array API namespace, in double and in single precision. GCC compiles
+also runs with NumPy, and with NumPy as an array API namespace, in both precisions. GCC compiles
 CUDA's host functions. Exit 1: a number is outside the derived bound, or a compiler prints a warning.
 """
 
@@ -47,7 +47,7 @@ _STRICT = ("-std=c99", "-O0", "-Wall", "-Wextra", "-pedantic", "-Wconversion", "
 #: Compiled languages: the suffix of the file, the compilers, and their options.
 _COMPILED = (
     ("c", ".c", ("gcc", "clang"), _STRICT),
-    ("cuda", ".hpp", ("g++",), ("-std=c++11", *_STRICT[1:])),
+    ("cuda", ".cpp", ("g++",), ("-std=c++11", *_STRICT[1:])),
 )
 _WAYS = ("c", "cuda", "numpy", "array")
 #: Largest nv of a robot whose Hessian is exported, to compare derivatives with.

@@ -161,12 +161,18 @@ class Kinematics(torch.nn.Module):
 
 
 def gradients(device="cpu"):
-    """Return, for each function, whether `torch.autograd.gradcheck` accepts its derivatives in float64."""
-    accepted = {{}}
+    """Return, for each function, whether `torch.autograd.gradcheck` accepts its derivatives in float64.
+
+    A difference quotient has the rounding errors of two values, divided by twice the step. The tolerance is
+    the largest bound of these errors; the quotient's truncation error is smaller.
+    """
+    accepted, step = {{}}, 1e-6
     for function in ({all}):
+        name = function.__name__
         kind = {{"dtype": torch.float64, "device": device, "requires_grad": True}}
-        inputs = [torch.tensor(GIVEN[letter][:1], **kind) for letter in INPUTS[function.__name__]]
-        accepted[function.__name__] = torch.autograd.gradcheck(function, inputs, raise_exception=False)
+        inputs = [torch.tensor(GIVEN[letter][:1], **kind) for letter in INPUTS[name]]
+        within = {{"eps": step, "atol": max(WITHIN[name][0]) * 2.0**-52 / step, "rtol": 0.0}}
+        accepted[name] = torch.autograd.gradcheck(function, inputs, raise_exception=False, **within)
     return accepted
 
 
