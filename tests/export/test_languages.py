@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import re
 from pathlib import Path
@@ -210,6 +211,17 @@ def test_the_file_for_any_array_computes_true_values_in_a_namespace(name: str, t
         found = module(file(code(robot, quantities=asked), "array", tmp_path)).check(xp)
         assert len(found) == 2 * len(asked)
         assert max(found.values()) < 1.0
+
+
+@pytest.mark.parametrize("to", ["array", "jax", "torch"])
+def test_no_array_is_written_in_place(to: str) -> None:
+    tree = ast.parse(write(code(robot_of("planar_and_floating_in_the_middle"), quantities=_THREE), to))
+    functions = [x for x in tree.body if isinstance(x, ast.FunctionDef) and x.name in _THREE]
+    assert len(functions) == len(_THREE)
+    for node in (node for function in functions for node in ast.walk(function)):
+        assert not isinstance(node, ast.AugAssign)
+        if isinstance(node, ast.Assign):
+            assert all(isinstance(x, ast.Name | ast.Tuple) for x in node.targets)
 
 
 @pytest.mark.slow
