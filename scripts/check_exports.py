@@ -1,26 +1,34 @@
-"""Export the catalogue's leaf frames to C and NumPy, compile the C code, and run the test vectors.
+"""Export the catalogue's leaf frames to C, NumPy and arrays, compile the C code, and run the test vectors.
 
     python scripts/check_exports.py --keep leaves.jsonl         # every leaf; continues a stopped run
+    python scripts/check_exports.py --ways array --keep array.jsonl  # every leaf, in some languages only
     python scripts/check_exports.py --keep leaves.jsonl --tell  # print the stored results only
     python scripts/check_exports.py --tips       # only the leaf with the longest path of each robot
     python scripts/check_exports.py --sizes      # write the sizes of the code to docs/export.md
+    python scripts/check_exports.py --library torch --environment /tmp/torch  # the tips, in PyTorch
+    python scripts/check_exports.py --library jax --environment /tmp/jax      # the tips, in JAX
+
+`--library` creates a virtual environment and installs the library there by pip, unless it is there already;
+`--package torch==2.13.0+cpu` chooses the version. `scripts/run_exported.py` describes the checks.
 
 When a function is written, it is compared with Pinocchio. When it runs, it is compared with results at fifty
-digits. The function runs with NumPy, and with GCC and Clang if they are installed, for one configuration and
-in batches. Exit 1: a number is outside the derived bound, or a compiler prints a warning.
+digits. The function runs with GCC and Clang if they are installed, for one configuration and in batches. It
+also runs with NumPy, and with NumPy as an array API namespace, in both precisions. GCC compiles
+CUDA's host functions. Exit 1: a number is outside the derived bound, or a compiler prints a warning.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 import re
 import shutil
 import subprocess
 import sys
 import tempfile
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,13 +37,21 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout 
 import urdfkin
 from scripts.benchmarking.subject import chain_urdf
 from scripts.pages import inserted
-from urdfkin.export import QUANTITIES, write
+from urdfkin.export import LANGUAGES, QUANTITIES, write
 from urdfkin.export.code import Code, code_of
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import examples
 
 PAGE = Path(__file__).parents[1] / "docs" / "export.md"
 _STRICT = ("-std=c99", "-O0", "-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Wshadow", "-Werror")
+#: Compiled languages: the suffix of the file, the compilers, and their options.
+_COMPILED = (
+    ("c", ".c", ("gcc", "clang"), _STRICT),
+    ("cuda", ".cpp", ("g++",), ("-std=c++11", *_STRICT[1:])),
+)
+_WAYS = ("c", "cuda", "numpy", "array")
+#: Largest nv of a robot whose Hessian is exported, to compare derivatives with.
+_HESSIANS = 16
 _SHARE = re.compile(r"worst error (\S+) of the bound")
 
 
@@ -46,20 +62,32 @@ def code(robot: Robot, frame: str, quantities: Sequence[str] = QUANTITIES) -> Co
     )
 
 
-def shares(written: Code, folder: Path) -> Iterator[tuple[str, float]]:
+def shares(written: Code, folder: Path, ways: Collection[str]) -> Iterator[tuple[str, float]]:
     """Yield, for each way to run the code, the largest error as a fraction of its bound."""
-    source, name = folder / "robot.c", written.name.upper()
-    source.write_text(write(written, "c"), encoding="utf-8")
-    for compiler in filter(shutil.which, ("gcc", "clang")):
-        program = folder / compiler
-        command = [compiler, *_STRICT, f"-D{name}_MAIN", str(source), "-o", str(program), "-lm"]
-        subprocess.run(command, check=True)
-        done = subprocess.run([str(program)], capture_output=True, text=True, check=False)
-        found = [float(share) for share in _SHARE.findall(done.stdout)]
-        yield compiler, max(found) if len(found) == len(written.functions) else float("nan")
-    scope: dict[str, Any] = {"__name__": "robot"}
-    exec(compile(write(written, "numpy"), "robot.py", "exec"), scope)
-    yield "numpy", max(scope["check"]().values())
+    for to, suffix, compilers, strict in _COMPILED:
+        source, name = folder / f"robot{suffix}", written.name.upper()
+        for compiler in filter(shutil.which, compilers if to in ways else ()):
+            source.write_text(write(written, to), encoding="utf-8")
+            for real in ("double", "float"):
+                program = folder / f"{compiler}_{real}"
+                macros = [f"-D{name}_MAIN", f"-D{name}_REAL={real}"]
+                command = [compiler, *strict, *macros, str(source), "-o", str(program), "-lm"]
+                subprocess.run(command, check=True)
+                done = subprocess.run([str(program)], capture_output=True, text=True, check=False)
+                found = [float(share) for share in _SHARE.findall(done.stdout)]
+                yield f"{compiler} {real}", _largest(found, len(written.functions))
+    for to in sorted({"numpy", "array"} & set(ways)):
+        scope: dict[str, Any] = {"__name__": "robot"}
+        exec(compile(write(written, to), "robot.py", "exec"), scope)
+        checked: dict[tuple[str, str], float] = scope["check"]()
+        for kind in {kind for _, kind in checked}:
+            found = [share for (_, of), share in checked.items() if of == kind]
+            yield f"{to} {kind}", _largest(found, len(written.functions))
+
+
+def _largest(found: Sequence[float], count: int) -> float:
+    """Return the largest share; NaN if one is NaN or their number is wrong."""
+    return max(found) if len(found) == count and not any(map(math.isnan, found)) else float("nan")
 
 
 def subjects(tips: bool) -> Iterator[tuple[str, Robot, str]]:
@@ -76,7 +104,7 @@ def subjects(tips: bool) -> Iterator[tuple[str, Robot, str]]:
                 yield name, robot, frame
 
 
-def found_of(robot: Robot, frame: str) -> dict[str, Any]:
+def found_of(robot: Robot, frame: str, ways: Collection[str]) -> dict[str, Any]:
     """Return the result of a leaf frame.
 
     The result contains the largest errors as fractions of their bounds, and states whether all errors are
@@ -85,25 +113,69 @@ def found_of(robot: Robot, frame: str) -> dict[str, Any]:
     wanted = QUANTITIES if robot.nv else ("placement",)
     with tempfile.TemporaryDirectory() as folder:
         written = code(robot, frame, wanted)
-        found = dict(shares(written, Path(folder)))
+        found = dict(shares(written, Path(folder), ways))
     good = all(share <= 1.0 for share in found.values()) and written.proof.certificate.verified
     return {"good": good, **found}
 
 
-def check(tips: bool, keep: Path | None) -> int:
+def check(tips: bool, keep: Path | None, ways: Collection[str]) -> int:
     """Check every leaf or tip that has no stored result."""
     stored = {(line["robot"], line["frame"]) for line in lines_of(keep)}
     here: list[dict[str, Any]] = []
     for name, robot, frame in subjects(tips):
         if (name, frame) in stored:
             continue
-        here.append({"robot": name, "frame": frame, **found_of(robot, frame)})
+        here.append({"robot": name, "frame": frame, **found_of(robot, frame, ways)})
         line = json.dumps(here[-1])
         print(line, flush=True)
         if keep:
             with keep.open("a", encoding="utf-8") as file:
                 file.write(f"{line}\n")
     return tell(lines_of(keep) if keep else here)
+
+
+def check_library(library: str, environment: Path, package: str | None, keep: Path | None) -> int:
+    """Run the files of all tips in an environment that has PyTorch or JAX; return 1 if there is an error."""
+    python = environment / "bin" / "python"
+    if not python.exists():
+        subprocess.run([sys.executable, "-m", "venv", str(environment)], check=True)
+        packages = [package or library, *(["array-api-compat"] if library == "torch" else [])]
+        subprocess.run([str(python), "-m", "pip", "install", "--quiet", "numpy", *packages], check=True)
+    version = [str(python), "-c", f"import {library}; print('{library}', {library}.__version__)"]
+    print(subprocess.run(version, capture_output=True, text=True, check=True).stdout.strip(), flush=True)
+    stored = lines_of(keep)
+    with tempfile.TemporaryDirectory() as folder:
+        paths = list(_files(library, Path(folder)))
+        left = [path for path in paths if path.stem not in {line["file"] for line in stored}]
+        command = [str(python), str(Path(__file__).with_name("run_exported.py")), *map(str, left)]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=folder) as process:
+            for line in process.stdout or ():
+                print(line, end="", flush=True)
+                stored.append(json.loads(line))
+                if keep:
+                    with keep.open("a", encoding="utf-8") as file:
+                        file.write(line)
+    wrong, worst = 0, dict[str, float]()
+    for checked in stored:
+        found = {way: share for way, share in checked.items() if isinstance(share, float)}
+        wrong += not all(share <= 1.0 for share in found.values())
+        worst |= {way: max(share, worst.get(way, 0.0)) for way, share in found.items()}
+    print(f"{len(stored)} of {len(paths)} files, {wrong} with an error outside the bound; worst share of it:")
+    print(", ".join(f"{way} {share:.2g}" for way, share in worst.items()))
+    return int(wrong > 0 or len(stored) < len(paths) or process.returncode != 0)
+
+
+def _files(library: str, folder: Path) -> Iterator[Path]:
+    """Write the files of all tips in a library's language, and for PyTorch also in that of any array."""
+    for number, (_, robot, frame) in enumerate(subjects(tips=True)):
+        wanted = ("placement", "jacobian", "velocity", "acceleration") if robot.nv else ("placement",)
+        if 0 < robot.nv <= _HESSIANS and all(joint.nv <= 1 for joint in robot.tree.joints):
+            wanted = (*wanted, "hessian")
+        written = code(robot, frame, wanted)
+        for to in (library, "array") if library == "torch" else (library,):
+            path = folder / f"{written.name}_{number}{LANGUAGES[to][1]}"
+            path.write_text(write(written, to), encoding="utf-8")
+            yield path
 
 
 def lines_of(keep: Path | None) -> list[dict[str, Any]]:
@@ -167,15 +239,23 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--sizes", action="store_true", help="write the sizes of the code of three robots into docs/export.md"
     )
+    parser.add_argument("--ways", nargs="+", choices=_WAYS, default=_WAYS, help="only these languages")
+    parser.add_argument("--library", choices=("torch", "jax"), help="check the tips in this library")
+    parser.add_argument("--environment", type=Path, help="folder of the library's virtual environment")
+    parser.add_argument("--package", help="what pip installs, for example torch==2.13.0+cpu")
     arguments = parser.parse_args(words)
+    if arguments.library and not arguments.environment:
+        parser.error("--library needs --environment")
     warnings.simplefilter("ignore", urdfkin.UrdfWarning)
     if arguments.tell:
         return tell(lines_of(arguments.keep))
+    if arguments.library:
+        return check_library(arguments.library, arguments.environment, arguments.package, arguments.keep)
     if arguments.sizes:
         PAGE.write_text(page(PAGE.read_text("utf-8")), "utf-8")
         print(PAGE)
         return 0
-    return check(arguments.tips, arguments.keep)
+    return check(arguments.tips, arguments.keep, arguments.ways)
 
 
 if __name__ == "__main__":

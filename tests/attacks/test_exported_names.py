@@ -95,7 +95,7 @@ def test_every_language_holds_the_same_code_under_any_names(robot: Robot) -> Non
 
 def code_alone(text: str, to: str) -> str:
     """Without comments."""
-    if to in ("c", "cpp"):
+    if to in ("c", "cpp", "cuda"):
         return re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
     if to == "matlab":
         return re.sub(r"%.*", "", text)
@@ -108,13 +108,35 @@ def test_python_holds_nothing_but_functions_and_tables(robot: Robot, to: str) ->
     module = ast.parse(write(code(robot, quantities=("placement",)), to))
     kinds = [type(node) for node in module.body]
     allowed = {ast.Expr, ast.Import, ast.ImportFrom, ast.FunctionDef, ast.Assign, ast.If}
-    assert set(kinds) <= allowed
+    classes = [node for node in module.body if isinstance(node, ast.ClassDef)]
+    assert [node.name for node in classes] == (["Kinematics"] if to == "torch" else [])
+    assert set(kinds) - ({ast.ClassDef} if classes else set()) <= allowed
     assert kinds.count(ast.Expr) == 1, "the docstring"
+    helpers = {"array": ["_namespace", "_stacked"], "jax": ["_stacked"], "torch": ["_stacked"]}.get(to, [])
     assert [node.name for node in module.body if isinstance(node, ast.FunctionDef)] == [
+        *helpers,
         "placement",
+        *(["gradients"] if to == "torch" else []),
         "_values",
         "check",
     ]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("g++") is None, reason="no g++")
+def test_cudas_header_declares_no_more_than_its_functions(robot: Robot, tmp_path: Path) -> None:
+    written = code(robot, quantities=("placement",))
+    path = file(written, "cuda", tmp_path)
+    shim = Path(__file__).parents[1] / "export"
+    macros = ["-D__CUDACC__", f"-D{written.name.upper()}_ENTRY_POINTS", f"-I{shim}"]
+    strict = ["-std=c++20", "-trigraphs", "-O0", "-Wall", "-Wextra", "-Werror", "-Wno-unknown-pragmas"]
+    built = str(tmp_path / "x.o")
+    subprocess.run(["g++", *strict, *macros, "-x", "c++", "-c", str(path), "-o", built], check=True)
+    symbols = subprocess.run(
+        ["nm", "-g", "--defined-only", built], capture_output=True, text=True, check=True
+    )
+    plain = {line.split()[-1] for line in symbols.stdout.splitlines() if " T " in line}
+    assert plain == {f"{written.name}_placement_{real}" for real in ("double", "float")}
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import re
 from pathlib import Path
@@ -22,12 +23,17 @@ from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.export import LANGUAGES, write
 from urdfkin.export.check import check
 from urdfkin.export.proof import decimal
+from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.reference import Reference
+from urdfkin.verify.call import Call
 from urdfkin.verify.exact.numbers import precision
 from urdfkin.verify.quantities import QUANTITIES
+from urdfkin.verify.verifier import bound_of
 
 RUN = [to for to in LANGUAGES if to != "latex"]
 _THREE = ("placement", "jacobian", "acceleration")
+#: Languages whose check runs in double and in single precision.
+BOTH = ("c", "cpp", "cuda", "array", "jax", "torch")
 
 
 def module(path: Path) -> ModuleType:
@@ -46,7 +52,8 @@ def test_an_arms_file_computes_its_fifty_digit_values(to: str, tmp_path: Path) -
     need(to)
     found = check(file(code(urdfkin.load("ur5", verify=False), quantities=_THREE), to, tmp_path))
     assert found.good, found.lines
-    assert len(found.lines) == len(_THREE) * (2 if to in ("c", "cpp") else 1)
+    gradients = len(_THREE) if to == "torch" else 0
+    assert len(found.lines) == len(_THREE) * (2 if to in BOTH else 1) + gradients
 
 
 def test_the_fifty_digits_of_a_test_vector_are_those_of_the_true_value() -> None:
@@ -82,14 +89,14 @@ def test_a_ball_is_written_with_fifty_digits_and_without_zeros_at_the_end(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("to", ["c", "numpy"])
+@pytest.mark.parametrize("to", ["c", "numpy", "array"])
 def test_so_does_that_of_planar_and_floating_joints(to: str, tmp_path: Path) -> None:
     need(to)
     # A Hessian of so many rates takes a compiler half a minute.
-    asked = tuple(name for name in ALL if name != "hessian" or to == "numpy")
+    asked = tuple(name for name in ALL if name != "hessian" or to != "c")
     found = check(file(code(robot_of("planar_and_floating_in_the_middle"), quantities=asked), to, tmp_path))
     assert found.good, found.lines
-    assert len(found.lines) == len(asked) * (2 if to == "c" else 1)
+    assert len(found.lines) == len(asked) * (2 if to in BOTH else 1)
 
 
 @pytest.mark.slow
@@ -135,7 +142,7 @@ def test_c_touches_nothing_that_is_not_its_own(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("to", ["c", "numpy"])
+@pytest.mark.parametrize("to", ["c", "cpp", "cuda", "numpy", "array", "torch"])
 def test_a_constant_that_was_changed_is_noticed(to: str, tmp_path: Path) -> None:
     need(to)
     path = file(code(urdfkin.load("ur5"), quantities=("placement", "acceleration")), to, tmp_path)
@@ -149,7 +156,7 @@ def test_a_constant_that_was_changed_is_noticed(to: str, tmp_path: Path) -> None
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("to", ["c", "numpy", "matlab"])
+@pytest.mark.parametrize("to", ["c", "cuda", "numpy", "array", "torch", "matlab"])
 def test_a_frame_that_nothing_moves_has_code_too(to: str, tmp_path: Path) -> None:
     need(to)
     robot = urdfkin.load("planar_two_link")
@@ -180,6 +187,102 @@ def test_numpys_functions_take_any_batch(tmp_path: Path) -> None:
     assert np.allclose(
         own.acceleration(q, v[0], a[0]), robot.acceleration(q, v[0], a[0], frame), rtol=0, atol=1e-12
     )
+
+
+#: Namespaces of the array API in which exported code runs here.
+NAMESPACES = ("numpy", "array_api_strict", "jax.numpy", "array_api_compat.torch")
+
+
+def namespace(name: str) -> Any:
+    """Return a namespace in double precision; skip the test if it is not installed."""
+    if name == "jax.numpy":
+        pytest.importorskip("jax").config.update("jax_enable_x64", True)
+    if name == "array_api_compat.torch":
+        pytest.importorskip("torch")
+    return pytest.importorskip(name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMESPACES)
+def test_the_file_for_any_array_computes_true_values_in_a_namespace(name: str, tmp_path: Path) -> None:
+    xp = namespace(name)
+    for robot in (urdfkin.load("ur5"), robot_of("planar_and_floating_in_the_middle")):
+        asked = tuple(row for row in ALL if row != "hessian")
+        found = module(file(code(robot, quantities=asked), "array", tmp_path)).check(xp)
+        assert len(found) == 2 * len(asked)
+        assert max(found.values()) < 1.0
+
+
+@pytest.mark.parametrize("to", ["array", "jax", "torch"])
+def test_no_array_is_written_in_place(to: str) -> None:
+    tree = ast.parse(write(code(robot_of("planar_and_floating_in_the_middle"), quantities=_THREE), to))
+    functions = [x for x in tree.body if isinstance(x, ast.FunctionDef) and x.name in _THREE]
+    assert len(functions) == len(_THREE)
+    for node in (node for function in functions for node in ast.walk(function)):
+        assert not isinstance(node, ast.AugAssign)
+        if isinstance(node, ast.Assign):
+            assert all(isinstance(x, ast.Name | ast.Tuple) for x in node.targets)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMESPACES)
+def test_functions_of_any_array_broadcast_leading_axes_and_keep_the_type(name: str, tmp_path: Path) -> None:
+    xp, robot = namespace(name), robot_of("panda")
+    own = module(file(code(robot), "array", tmp_path))
+    q, v, a = state(robot, 6, 1)
+    q = q.reshape(2, 3, -1)
+    for kind, exact in ((xp.float64, 1e-12), (xp.float32, 1e-4)):
+        arrays = [xp.asarray(x.tolist(), dtype=kind) for x in (q, v[0], a[:3])]
+        for row, inputs in (("placement", 1), ("jacobian", 1), ("velocity", 2), ("acceleration", 3)):
+            found = getattr(own, row)(*arrays[:inputs])
+            right = getattr(robot, row)(*(q, v[0], a[:3])[:inputs], robot.tip_frame)
+            assert tuple(found.shape) == right.shape
+            assert found.dtype == kind
+            assert np.abs(np.array(found.tolist() if name != NAMESPACES[1] else found) - right).max() < exact
+
+
+@pytest.mark.slow
+def test_gradients_through_any_array_are_the_hessian_within_its_bound(tmp_path: Path) -> None:
+    namespace("jax.numpy")
+    jax: Any = pytest.importorskip("jax")
+    robot = robot_of("panda")
+    own = module(file(code(robot, quantities=("jacobian",)), "array", tmp_path))
+    q, _, _ = state(robot, 5, 2)
+    call = Call(robot.tree, robot.plan, robot.tip_frame, Reference.LOCAL_WORLD_ALIGNED, None, (q,))
+    bound = bound_of(QUANTITIES["hessian"], call.part(slice(0, 5)))
+    within = (EPS * bound.k * bound.scale)[:, 0]
+    right = robot.hessian(q, robot.tip_frame)
+    for slopes in (jax.jacfwd, jax.jacrev):
+        found = np.asarray(jax.vmap(slopes(own.jacobian))(q))
+        assert np.all(np.abs(found - right) <= within)
+
+
+@pytest.mark.slow
+def test_a_module_of_pytorch_has_the_quantities_and_their_derivatives() -> None:
+    torch: Any = pytest.importorskip("torch")
+    robot = urdfkin.load("planar_two_link")
+    own = robot.torch("tip")
+    q, v, a = (torch.tensor(x) for x in state(robot, 5, 2))
+    assert isinstance(own, torch.nn.Module)
+    assert torch.equal(own(q), own.placement(q))
+    assert np.abs(own.jacobian(q).numpy() - robot.jacobian(q.numpy(), "tip")).max() < 1e-15
+    right = robot.acceleration(q.numpy(), v.numpy(), a.numpy(), "tip")
+    assert np.abs(own.acceleration(q, v, a).numpy() - right).max() < 1e-13
+    slopes = torch.func.vmap(torch.func.jacrev(own.jacobian))(q)
+    assert np.abs(slopes.numpy() - robot.hessian(q.numpy(), "tip")).max() < 1e-15
+    assert own(q.float()).dtype == torch.float32
+    assert own.velocity(q.reshape(5, 1, 2), v).shape == (5, 5, 6)
+    moving = robot.torch("tip", ["velocity"])
+    assert torch.equal(moving(q, v), own.velocity(q, v))
+
+
+def test_pytorch_that_is_not_installed_is_one_clear_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "torch" else found(name))
+    with pytest.raises(
+        InputError, match=r"robot\.torch needs PyTorch: found no module torch; pip install torch"
+    ):
+        urdfkin.load("planar_two_link").torch("tip")
 
 
 @pytest.mark.slow
@@ -259,7 +362,7 @@ def test_a_table_and_screws_are_code_in_every_language_with_its_check(
     found = check(path)
     assert found.good, found.lines
     assert found.verified
-    assert len(found.lines) == len(_THREE) * (2 if to == "c" else 1)
+    assert len(found.lines) == len(_THREE) * (2 if to in BOTH else 1)
     head = path.read_text("utf-8")[:3000]
     assert {"dh": "Rz(theta) Tz(d) Tx(a) Rx(alpha)", "screws": "space screws S"}[form] in head
 

@@ -18,8 +18,8 @@ from urdfkin.robot import Robot
 
 ALL = tuple(row.method for row in exported())
 #: What a file in a language needs to run.
-PROGRAMS = {"c": "cc", "cpp": "c++", "matlab": "octave-cli"}
-LIBRARIES = ("numba", "jax", "casadi", "sympy")
+PROGRAMS = {"c": "cc", "cpp": "c++", "cuda": "c++", "matlab": "octave-cli"}
+LIBRARIES = ("numba", "jax", "torch", "casadi", "sympy")
 
 
 def code(

@@ -15,9 +15,12 @@ if TYPE_CHECKING:
 LANGUAGES: dict[str, tuple[str, str, str]] = {
     "c": ("urdfkin.export.c", ".c", "C99, single or double precision, one configuration or a batch"),
     "cpp": ("urdfkin.export.cpp", ".hpp", "C++11, a header of templates for any number type"),
+    "cuda": ("urdfkin.export.cpp", ".cuh", "CUDA, a header for host and device, with a kernel for batches"),
     "numpy": ("urdfkin.export.python", "_numpy.py", "Python on NumPy, whole batches"),
+    "array": ("urdfkin.export.python", "_array.py", "Python on any array API namespace, whole batches"),
     "numba": ("urdfkin.export.python", "_numba.py", "Python that Numba compiles"),
     "jax": ("urdfkin.export.python", "_jax.py", "Python on JAX, for jit, vmap and grad"),
+    "torch": ("urdfkin.export.python", "_torch.py", "Python on PyTorch, a module and functions"),
     "casadi": ("urdfkin.export.python", "_casadi.py", "Python on CasADi's SX, MX and DM"),
     "sympy": ("urdfkin.export.python", "_sympy.py", "Python on SymPy's symbols"),
     "matlab": ("urdfkin.export.matlab", "_kinematics.m", "MATLAB and Octave"),

@@ -218,7 +218,7 @@ def _lane_sines(writer: Writer, layout: Layout) -> Iterator[str]:
 def vectors(code: Code) -> Iterator[str]:
     """Yield C arrays with the test vectors: their inputs, the true values and the tolerances."""
     found, n = code.proof.vectors, len(code.proof.vectors)
-    yield "/* True values at fifty digits, and the tolerance of each number, in eps of its precision. */"
+    yield "/* True values at fifty digits; the tolerances in double and single precision, in eps. */"
     for k, (letter, width) in enumerate(
         code.widths(max(code.functions, key=lambda f: len(f.inputs))).items()
     ):
@@ -228,6 +228,7 @@ def vectors(code: Code) -> Iterator[str]:
         size = f"{function.name}[{n}][{len(function.results)}]"
         yield _array(f"true_{size}", [vector.results[function.name] for vector in found])
         yield _array(f"within_{size}", [vector.within[function.name] for vector in found])
+        yield _array(f"single_{size}", [vector.single[function.name] for vector in found])
 
 
 def _array(declared: str, rows: Sequence[Sequence[str]]) -> str:
@@ -246,9 +247,10 @@ def _numbers(values: Sequence[str]) -> str:
     return "\n".join([*lines, line.rstrip(",")])
 
 
-def main(code: Code, frame: str) -> str:
-    """Return the text of a program that runs the test vectors."""
-    return framed("check.c", checks="".join(_check(code, function, frame) for function in code.functions))
+def main(code: Code, *frames: str) -> str:
+    """Return the text of a program that runs the test vectors, once for each frame of a check."""
+    checks = (_check(code, function, frame) for function in code.functions for frame in frames)
+    return framed("check.c", checks="".join(checks))
 
 
 def _check(code: Code, function: Function, frame: str) -> str:
@@ -256,6 +258,7 @@ def _check(code: Code, function: Function, frame: str) -> str:
     return framed(
         frame,
         title=code.name,
+        UP=code.name.upper(),
         name=function.name,
         n=n,
         count=len(function.results),
@@ -272,4 +275,6 @@ def _check(code: Code, function: Function, frame: str) -> str:
         all=", ".join(f"&{x}[0][0]" for x in widths),
         each_array=", ".join(f"{x}[{max(1, width)}]" for x, width in widths.items()),
         each=", ".join(f"{x}[k]" for x in widths),
+        on_device=", ".join(f"device_{x}(&{x}[0][0], sizeof {x})" for x in widths),
+        device=", ".join(f"device_{x}.at" for x in widths),
     )

@@ -25,6 +25,14 @@ _MARK = "straight-line code for this robot and frame"
 _MAIN = re.compile(r"^#ifdef (\w+)_MAIN$", re.MULTILINE)
 _FUNCTION = re.compile(r"^function f = ([A-Za-z]\w*)\(\)", re.MULTILINE | re.ASCII)
 _STRICT = ("-Wall", "-Wextra", "-pedantic", "-Werror")
+#: Suffix -> compiler and options.
+_COMPILE = {
+    ".c": ("cc", "-std=c99", "-x", "c", *_STRICT),
+    ".hpp": ("c++", "-std=c++11", "-x", "c++", *_STRICT),
+    ".cuh": ("c++", "-std=c++11", "-x", "c++", *_STRICT),
+}
+#: The same for CUDA with its kernels.
+_COMPILE_FOR_GPU = ("nvcc", "-Xcompiler", "-Wall,-Wextra,-Werror", "-x", "cu")
 #: Number of characters at the start of a file that are searched for `_MARK` and for the word UNVERIFIED.
 _HEAD = 2000
 #: Time limit of a command, seconds. The code of a robot with a thousand joints compiles in one minute.
@@ -63,7 +71,13 @@ def check(file: Path) -> Checked:
     if _MARK not in head:
         raise InputError("this file was not written by `urdfkin export`", where=str(file))
     with tempfile.TemporaryDirectory() as folder:
-        runs = {".c": _run_compiled, ".hpp": _run_compiled, ".py": _run_imported, ".m": _run_octave}
+        runs = {
+            ".c": _run_compiled,
+            ".hpp": _run_compiled,
+            ".cuh": _run_compiled,
+            ".py": _run_imported,
+            ".m": _run_octave,
+        }
         if (run := runs.get(file.suffix)) is None:
             raise InputError(
                 "a file of this kind cannot be run",
@@ -92,25 +106,27 @@ def _doubts(text: str) -> Iterator[str]:
         yield "the file was changed after it was written; export the file again"
 
 
-def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
-    """Compile and run a C or C++ file, in single and in double precision.
+def _has_gpu() -> bool:
+    """Return whether this machine has a compiler of CUDA and a GPU to run its code."""
+    return shutil.which("nvcc") is not None and Path("/dev/nvidia0").exists()
 
-    The system's compiler treats all warnings as errors.
+
+def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
+    """Compile and run a file of C, C++ or CUDA, in single and in double precision.
+
+    The system's compiler treats all warnings as errors. CUDA's kernels run if there is a GPU; if not, only
+    the functions of the host run.
     """
     found = _MAIN.search(text)
     if found is None:
         raise InputError("the file has no test vectors", where=str(file))
-    plain = file.suffix == ".c"
-    compiler = _program("cc" if plain else "c++", file)
     copy = _copy(text, folder / f"checked{file.suffix}")
-    language = ["-std=c99", "-x", "c"] if plain else ["-std=c++11", "-x", "c++"]
+    command = _COMPILE_FOR_GPU if file.suffix == ".cuh" and _has_gpu() else _COMPILE[file.suffix]
+    compiler = _program(command[0], file)
     for real in ("double", "float"):
         macros = [f"-D{found[1]}_MAIN", f"-D{found[1]}_REAL={real}"]
         built = folder / real
-        _run(
-            [compiler, *language, "-O1", *_STRICT, *macros, str(copy), "-o", str(built), "-lm"],
-            file,
-        )
+        _run([compiler, *command[1:], "-O1", *macros, str(copy), "-o", str(built), "-lm"], file)
         yield [f"{line} ({real})" for line in _run([str(built)], file)]
 
 

@@ -1,6 +1,8 @@
-"""Write a C++11 header with function templates for any number type.
+"""Write a header with function templates for any number type: for C++11, or for CUDA.
 
-Examples are `double`, `float`, and the types of libraries for automatic differentiation.
+Examples are `double`, `float`, and the types of libraries for automatic differentiation. CUDA's header has
+the same functions for the host and the device. It also has a kernel for batches, and C functions that start
+it.
 """
 
 from __future__ import annotations
@@ -14,6 +16,10 @@ from urdfkin.export.function import Function
 
 def write(code: Code, to: str = "cpp") -> str:
     """Return the text of a header. If `NAME_MAIN` is defined, it is a program that checks itself."""
+    return _cuda(code) if to == "cuda" else _cpp(code)
+
+
+def _cpp(code: Code) -> str:
     name, up = code.name, code.name.upper()
     first = code.functions[0]
     head = [
@@ -35,11 +41,81 @@ def write(code: Code, to: str = "cpp") -> str:
     )
 
 
-def _function(code: Code, function: Function) -> Iterator[str]:
+def _cuda(code: Code) -> str:
+    name, up = code.name, code.name.upper()
+    first = code.functions[0]
+    inputs = ", ".join(first.inputs)
+    head = [
+        *code.head,
+        "",
+        f"To try it:     nvcc -O2 -D{up}_MAIN -x cu {name}.cuh -o check && ./check",
+        f"Without a GPU: c++ -std=c++11 -O2 -D{up}_MAIN -x c++ {name}.cuh && ./a.out",
+        f"In float:      add -D{up}_REAL=float",
+        f"A library:     nvcc -O3 -shared -Xcompiler -fPIC -D{up}_ENTRY_POINTS -x cu {name}.cuh \\",
+        f"                 -o lib{name}.so",
+        f"To call it:    {name}_kinematics::{first.name}({inputs}, out) on host and device;",
+        f"               {name}_kinematics::{first.name}_batch(n, {inputs}, out, stream) for a batch;",
+        f"               from C: {name}_{first.name}_double(n, {inputs}, out, stream) of the library, with",
+        f'               #define {up}_DECLARATIONS, then #include "{name}.cuh"',
+        "CMake:         enable_language(CUDA)",
+        f"               configure_file({name}.cuh {name}.cu COPYONLY)",
+        f"               add_library({name} ${{CMAKE_CURRENT_BINARY_DIR}}/{name}.cu)",
+        f"               target_compile_definitions({name} PRIVATE {up}_ENTRY_POINTS)",
+        f"               target_include_directories({name} PUBLIC ${{CMAKE_CURRENT_SOURCE_DIR}})",
+    ]
+    functions = (line for function in code.functions for line in _function(code, function, f"{up}_BOTH "))
+    return framed(
+        "file.cuh",
+        head=comment(head),
+        title=name,
+        UP=up,
+        declarations="\n".join(f"{line};" for f in code.functions for line in _entries(code, f)),
+        functions="\n".join(functions),
+        kernels="".join(_kernel(code, function) for function in code.functions),
+        entries="\n".join(_started(code, function) for function in code.functions),
+        main="\n".join([*vectors(code), main(code, "check_one.hpp", "check_one.cuh")]),
+    )
+
+
+def _given(function: Function, real: str) -> str:
+    return ", ".join([*(f"const {real} *{letter}" for letter in function.inputs), f"{real} *out"])
+
+
+def _entries(code: Code, function: Function) -> list[str]:
+    """Return the declarations of a function's C entry points, in double and in single precision."""
+    name = f"{code.name}_{function.name}"
+    return [
+        f"int {name}_{real}(size_t n, {_given(function, real)}, struct CUstream_st *stream)"
+        for real in ("double", "float")
+    ]
+
+
+def _started(code: Code, function: Function) -> str:
+    call = f"{code.name}_kinematics::{function.name}_batch(n, {', '.join(function.inputs)}, out, stream)"
+    return "\n".join(f"{line}\n{{\n    return {call};\n}}" for line in _entries(code, function))
+
+
+def _kernel(code: Code, function: Function) -> str:
+    widths = code.widths(function)
+    return framed(
+        "kernel.cuh",
+        name=function.name,
+        given=_given(function, "T"),
+        count=len(function.results),
+        own=", ".join(f"own_{x}[{max(1, width)}]" for x, width in widths.items()),
+        reads="\n".join(
+            f"        read_rows<{width}>({x} + first * {width}, count, tile, own_{x});"
+            for x, width in widths.items()
+        ),
+        passed=", ".join(f"own_{x}" for x in widths),
+        addresses=", ".join(f"&{x}" for x in widths),
+    )
+
+
+def _function(code: Code, function: Function, before: str = "") -> Iterator[str]:
     writer = Writer(code, function, lambda x: f"T({x!r})")
-    given = ", ".join([*(f"const T *{letter}" for letter in function.inputs), "T *out"])
     yield f"\n/* {what(function)}, row by row; {function.operations} operations. */"
-    yield f"template <class T> void {function.name}({given})\n{{"
+    yield f"template <class T> {before}void {function.name}({_given(function, 'T')})\n{{"
     yield "    using std::cos;\n    using std::sin;\n    using std::sqrt;"
     yield from (f"    (void){letter};" for letter in function.inputs)
     for node in writer.given:

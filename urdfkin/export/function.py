@@ -25,7 +25,8 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.quantities import Quantity
 
-_INPUTS = ("q", "v", "a")
+#: Letters of the inputs.
+INPUTS = ("q", "v", "a")
 #: Operations that always become statements of their own.
 _ALWAYS = ("sin", "cos", "sqrt", "/")
 #: Largest number of operations in a statement.
@@ -71,7 +72,7 @@ class Function:
     @cached_property
     def operations(self) -> int:
         """The number of arithmetic operations in the function; a change of sign does not count."""
-        return sum(node.op not in (*_INPUTS, "neg") for node in self.nodes)
+        return sum(node.op not in (*INPUTS, "neg") for node in self.nodes)
 
     @cached_property
     def angles(self) -> list[Node]:
@@ -92,8 +93,8 @@ class Function:
         found, length = list[Node](), dict[Node, int]()
         for node in self.nodes:
             length[node] = 1 + sum(length[x] for x in node.operands)
-            if node.op in _INPUTS or node.op == "neg":
-                length[node] = 0 if node.op in _INPUTS else length[node.of[0]]
+            if node.op in INPUTS or node.op == "neg":
+                length[node] = 0 if node.op in INPUTS else length[node.of[0]]
             elif node.name or uses[node] > 1 or node.op in _ALWAYS or length[node] > _LONGEST:
                 found.append(node)
                 length[node] = 0
@@ -111,15 +112,20 @@ class Function:
                 waiting += [] if node.op in leaves else node.operands
         return found
 
-    def evaluated(self, inputs: Sequence[FloatArray]) -> FloatArray:
-        """Return the results (n, ...) for q (n, nq), v and a (n, nv), computed with NumPy."""
+    def values(self, inputs: Sequence[FloatArray]) -> dict[Node, FloatArray]:
+        """Return the value (n,) of each expression for q (n, nq), v and a (n, nv), computed with NumPy."""
         value: dict[Node, Any] = {}
-        given = dict(zip(_INPUTS, inputs, strict=False))
+        given = dict(zip(INPUTS, inputs, strict=False))
         for node in self.nodes:
             if node.op in given:
                 value[node] = given[node.op][:, node.of[0]]
             else:
                 value[node] = _OPERATIONS[node.op](*(value[x] if isinstance(x, Node) else x for x in node.of))
+        return value
+
+    def evaluated(self, inputs: Sequence[FloatArray]) -> FloatArray:
+        """Return the results (n, ...) for q (n, nq), v and a (n, nv), computed with NumPy."""
+        value = self.values(inputs)
         out = np.empty((len(inputs[0]), len(self.results)))
         for k, x in enumerate(self.results):
             out[:, k] = value[x] if isinstance(x, Node) else x
@@ -164,7 +170,7 @@ def function_of(plan: CompiledTree, quantity: Quantity, reference: Reference) ->
         [graph.input(letter, i) for i in range(plan.nq if letter == "q" else plan.nv)]
         if letter in quantity.inputs
         else [0.0] * plan.nv
-        for letter in _INPUTS
+        for letter in INPUTS
     ]
     results = recursion.QUANTITIES[quantity.name](plan, kind, inputs, reference)
     return Function(quantity, reference, plan, tuple(x if isinstance(x, Node) else x + 0.0 for x in results))

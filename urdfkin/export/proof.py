@@ -19,7 +19,8 @@ import numpy as np
 from urdfkin.compiled.plan import CompiledTree
 from urdfkin.export.function import Function
 from urdfkin.export.naming import quiet, shown
-from urdfkin.kinematics.roundings import SMALLEST
+from urdfkin.export.single import single_bounds
+from urdfkin.kinematics.roundings import EPS, SINGLE_EPS, SMALLEST
 from urdfkin.model.recursion import Number
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -45,11 +46,13 @@ class Vector:
         inputs: q, v and a.
         results: For each quantity, the true values as decimal numbers, row by row.
         within: For each quantity, the error bound of each number, in eps.
+        single: The same in single precision, in eps = 2^-23; 0.0 if a number is beyond its range.
     """
 
     inputs: tuple[list[float], ...]
     results: dict[str, list[str]]
     within: dict[str, list[str]]
+    single: dict[str, list[str]]
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,8 @@ class Proof:
         urdfkin: Version of urdfkin.
         certificate: The certificate of the printed expressions.
         vectors: The test vectors.
+        single: For each quantity, the largest bound in single precision, in multiples of eps * scale; inf if
+            a number is beyond the range of single precision.
         lock: Name and value of each locked joint.
     """
 
@@ -68,6 +73,7 @@ class Proof:
     urdfkin: str
     certificate: Certificate
     vectors: tuple[Vector, ...]
+    single: dict[str, float]
     lock: tuple[tuple[str, float], ...] = ()
 
     @property
@@ -85,9 +91,23 @@ class Proof:
             ]
         return [
             *verdict,
+            *self._single_lines,
             f"URDF sha256 {self.sha256}",
             *(f"Joint {shown(name)} is locked at {value!r}" for name, value in self.lock),
             f"Written by urdfkin {self.urdfkin}; {len(self.vectors)} test vectors at {DIGITS} digits below",
+        ]
+
+    @property
+    def _single_lines(self) -> list[str]:
+        beyond = [name for name, k in self.single.items() if not np.isfinite(k)]
+        bounds = ", ".join(f"{name} {k:.3g}" for name, k in self.single.items() if name not in beyond)
+        lines = [
+            "Bounds in single precision, in eps*scale with eps = 2^-23, the constants' rounding included:",
+            f"  {bounds}",
+        ]
+        return [
+            *(lines if bounds else []),
+            *(f"Single precision cannot represent a number of {name}" for name in beyond),
         ]
 
 
@@ -112,11 +132,13 @@ def prove(
         call = Call(tree, plan_of, frame, reference, None, inputs)
         found = function.evaluated((call.q, *call.rates))
         checker.check(function.quantity, call, found, bool(checker.wanted(verify)))
+    vectors, single = _vectors(verifier, plan_of, frame, reference, functions)
     return Proof(
         sha256=hashlib.sha256(verifier.text.encode()).hexdigest(),
         urdfkin=own_version(),
         certificate=checker.certificate(),
-        vectors=_vectors(verifier, plan_of, frame, reference, functions),
+        vectors=vectors,
+        single=single,
         lock=verifier.origin.lock,
     )
 
@@ -127,14 +149,20 @@ def _vectors(
     frame: str,
     reference: Reference,
     functions: Sequence[Function],
-) -> tuple[Vector, ...]:
+) -> tuple[tuple[Vector, ...], dict[str, float]]:
+    """Return the test vectors, and for each quantity the largest bound in single precision."""
     tree = verifier.tree
     link = tree.frame_link(frame)
     drawn = draw(tree, VECTORS, np.random.default_rng(1), with_special=False)
     inputs = tuple(_single(x) for x in (drawn.q, drawn.v, drawn.a))
     whole = Call(tree, plan_of, frame, reference, None, inputs)
     part = whole.part(slice(0, VECTORS))
-    within = {f.name: _within(f, part) for f in functions}
+    within, single, most = dict[str, FloatArray](), dict[str, FloatArray](), dict[str, float]()
+    for f in functions:
+        within[f.name], scale = _within(f, part)
+        single[f.name] = single_bounds(f, inputs) + EPS / SINGLE_EPS * within[f.name]
+        shares = np.divide(single[f.name], scale, out=np.zeros_like(scale), where=scale > 0.0)
+        most[f.name] = float(shares.max(initial=0.0))
     path, found = tree.path(link), []
     with precision(DIGITS + enough_digits(len(path))):
         joints = read_exact(verifier.text, tree, path)
@@ -146,21 +174,23 @@ def _vectors(
                     tuple(x[k].tolist() for x in inputs),
                     {name: [decimal(x) for x in values] for name, values in true.items()},
                     {name: [_rounded_down(x) for x in values[k]] for name, values in within.items()},
+                    {name: [_rounded_up(x) for x in values[k]] for name, values in single.items()},
                 )
             )
-    return tuple(found)
+    return tuple(found), most
 
 
 def _single(x: FloatArray) -> FloatArray:
     return x.astype(np.float32).astype(np.float64)
 
 
-def _within(function: Function, part: Part) -> FloatArray:
-    """Return the error bounds k * scale, (n, numbers), in eps."""
+def _within(function: Function, part: Part) -> tuple[FloatArray, FloatArray]:
+    """Return the error bounds k * scale, (n, numbers), in eps, and the scales."""
     bound, n = bound_of(function.quantity, part), len(part.q)
     scale = np.where(bound.scale > 0.0, np.maximum(bound.scale, SMALLEST), 0.0)
     shape = (n, 1, *function.shape)
-    return np.asarray(np.broadcast_to(scale * bound.k, shape)).reshape(n, -1)
+    within, scale = (np.broadcast_to(x, shape).reshape(n, -1) for x in (scale * bound.k, scale))
+    return within, scale
 
 
 def decimal(x: Number) -> str:
@@ -177,3 +207,14 @@ def _rounded_down(x: float) -> str:
     """Return x with six digits, rounded down."""
     text = f"{x:.6g}"
     return text if float(text) <= x else f"{x * (1.0 - 1e-6):.6g}"
+
+
+def _rounded_up(x: float) -> str:
+    """Return x with seven digits, rounded up; 0.0, which accepts only equal numbers, if it is not finite.
+
+    A bound in single precision is reached: a constant has exactly the error that its bound counts.
+    """
+    if not np.isfinite(x):
+        return "0.0"
+    text = f"{x:.7g}"
+    return text if float(text) >= x else f"{x * (1.0 + 1e-6):.7g}"

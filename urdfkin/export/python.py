@@ -1,16 +1,21 @@
-"""Write Python code for NumPy, Numba, JAX, CasADi or SymPy.
+"""Write Python code for NumPy, any array API namespace, Numba, JAX, PyTorch, CasADi or SymPy.
 
-The expressions are the same for all libraries.
+The expressions are the same for all libraries. The code for JAX and PyTorch is that for any array API
+namespace, with the library's own names.
 """
 
 from __future__ import annotations
 
+import importlib.util
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from urdfkin.errors import InputError
 from urdfkin.export.code import Code, Writer
+from urdfkin.export.expression import Node
 from urdfkin.export.function import Function
 
 
@@ -21,53 +26,61 @@ class Dialect:
     Attributes:
         about: Description of a function's inputs and results.
         imports: Import lines. A placeholder stands for the functions among `cos`, `sin` and `sqrt` that the
-            code uses.
-        result: Function that yields the lines of code that return the results in an array of a given shape.
+            code uses. A line with a placeholder is left out if the code uses none.
+        result: Function that yields the lines of code that return the results of a written function.
         values: Body of the written function `_values(function, inputs)`, which returns the results for a list
             of configurations.
         decorator: The decorator's line before each written function; "" if there is none.
-        entering: Function that returns the first lines of a written function, given the inputs of that
-            function.
+        entering: Function that returns the first lines of a written function, given its writer.
+        helpers: Code of functions that the written functions call; "" if there are none.
         index: Format of the text for an element of an input.
-        before: First line of the written check; "" if there is none.
+        given: Parameter of the written check, with its default; "" if there is none.
+        before: First line of the written program; "" if there is none.
+        single: Whether the functions also compute in single precision.
+        closing: Function that returns code after the written functions.
+        after: Last lines of the written program; "" if there are none.
     """
 
     about: str
     imports: str
-    result: Callable[[list[str], tuple[int, ...]], Iterator[str]]
+    result: Callable[[Writer], Iterator[str]]
     values: str
     decorator: str = ""
-    entering: Callable[[str], list[str]] = lambda inputs: []
+    entering: Callable[[Writer], list[str]] = lambda writer: []
+    helpers: str = ""
     index: str = "{}[{}]"
+    given: str = ""
     before: str = ""
+    single: bool = False
+    closing: Callable[[Code], str] = lambda code: ""
+    after: str = ""
 
 
 def _rows(values: Sequence[str], width: int) -> list[Sequence[str]]:
     return [values[i : i + width] for i in range(0, len(values), width)] if width else []
 
 
-def _in_array(create: str, index: str) -> Callable[[list[str], tuple[int, ...]], Iterator[str]]:
+def _in_array(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
     """Return a function that yields code which writes the results into an array, element by element."""
 
-    def result(values: list[str], shape: tuple[int, ...]) -> Iterator[str]:
+    def result(writer: Writer) -> Iterator[str]:
+        shape = writer.function.shape
         yield f"out = {create.format(shape, ', '.join(map(str, shape)))}"
-        for place, value in zip(np.ndindex(shape), values, strict=True):
+        for place, value in zip(np.ndindex(shape), writer.results(), strict=True):
             yield f"out[{index}{', '.join(map(str, place))}] = {value}"
         yield "return out"
 
     return result
 
 
-def _nested(
-    opening: str, closing: str, row: str = "[{}]", deeper: str = ""
-) -> Callable[[list[str], tuple[int, ...]], Iterator[str]]:
-    """Return a function that yields code which creates the array of results in one call, row by row.
+def _nested(opening: str, closing: str, row: str = "[{}]") -> Callable[[Writer], Iterator[str]]:
+    """Return a function that yields code which creates the matrix of results in one call, row by row.
 
-    The rows of a Hessian (6, nv, nv) are written as one matrix, unless the code in `deeper` gives the array
-    its three axes.
+    The rows of a Hessian (6, nv, nv) are written as one matrix.
     """
 
-    def result(values: list[str], shape: tuple[int, ...]) -> Iterator[str]:
+    def result(writer: Writer) -> Iterator[str]:
+        values, shape = writer.results(), writer.function.shape
         yield f"return {opening}"
         if len(shape) == 1:
             yield from (f"    {value}," for value in values)
@@ -76,17 +89,114 @@ def _nested(
             yield f"    {first}"
             yield from (f"        {value}," for value in line)
             yield f"    {last},"
-        yield closing + (deeper.format(shape) if len(shape) > 2 else "")
+        yield closing
 
     return result
 
 
-def _shapes(inputs: str) -> list[str]:
+def _shapes(writer: Writer) -> list[str]:
+    inputs = writer.function.inputs
     lines = [f"{x} = np.asarray({x}, dtype=np.float64)" for x in inputs]
     shapes = ", ".join(f"{x}.shape[:-1]" for x in inputs)
     return [*lines, f"shape = np.broadcast_shapes({shapes})"]
 
 
+# -- array API ---------------------------------------------------------------------------------------------
+
+
+def _zero(writer: Writer, xp: str) -> str:
+    """Return the line of code that defines zeros of the batch shape, with the inputs' type and device."""
+    widths = writer.code.widths(writer.function)
+    columns = (f"{x}[..., 0]" if width else f"{xp}.sum({x}, axis=-1)" for x, width in widths.items())
+    return "zero = " + " + ".join(f"{xp}.zeros_like({column})" for column in columns)
+
+
+def _in_any_namespace(writer: Writer) -> list[str]:
+    used = [name for name in _FUNCTIONS if any(node.op == name for node in writer.function.nodes)]
+    names = [f"{', '.join(used)} = {', '.join(f'xp.{name}' for name in used)}"] if used else []
+    return ["xp = _namespace(q)", *names, _zero(writer, "xp")]
+
+
+def _stacked(xp: str) -> Callable[[Writer], Iterator[str]]:
+    """Return a function that yields code which creates the results without writing into an array."""
+
+    def result(writer: Writer) -> Iterator[str]:
+        function = writer.function
+        yield f"return _stacked({xp}["
+        for x, text in zip(function.results, writer.results(), strict=True):
+            yield f"    {text if isinstance(x, Node) else f'zero + {text}' if x else 'zero'},"
+        yield f"], zero, {function.shape})"
+
+    return result
+
+
+_NAMESPACE = '''
+def _namespace(x):
+    """Return the array API namespace of an array; for PyTorch that of array-api-compat."""
+    if hasattr(x, "__array_namespace__"):
+        return x.__array_namespace__()
+    from array_api_compat import array_namespace
+
+    return array_namespace(x)
+'''
+
+_STACKED = '''
+def _stacked({given}values, zero, shape):
+    """Return numbers of the batch shape of `zero`, or of one that broadcasts, as an array (..., *shape)."""
+    batch = tuple(zero.shape)
+    values = [{xp}.broadcast_to(x, batch) for x in values]
+    return {xp}.reshape({xp}.stack(values, {axis}=-1), batch + shape)
+'''
+
+
+_MODULE = '''
+class Kinematics(torch.nn.Module):
+    """The functions of this file; `forward` is `{first}`. Results have the inputs' type and device."""
+
+{functions}
+
+    def forward(self, {inputs}):
+        """Return {first}({inputs})."""
+        return {first}({inputs})
+
+
+def gradients(device="cpu"):
+    """Return, for each function, whether `torch.autograd.gradcheck` accepts its derivatives in float64.
+
+    A difference quotient has the rounding errors of two values, divided by twice the step. The tolerance is
+    the largest bound of these errors; the quotient's truncation error is smaller.
+    """
+    accepted, step = {{}}, 1e-6
+    for function in ({all}):
+        name = function.__name__
+        kind = {{"dtype": torch.float64, "device": device, "requires_grad": True}}
+        inputs = [torch.tensor(GIVEN[letter][:1], **kind) for letter in INPUTS[name]]
+        within = {{"eps": step, "atol": max(WITHIN[name][0]) * 2.0**-52 / step, "rtol": 0.0}}
+        accepted[name] = torch.autograd.gradcheck(function, inputs, raise_exception=False, **within)
+    return accepted
+
+
+'''
+
+
+def _torch_module(code: Code) -> str:
+    """Return code of a `torch.nn.Module` with the functions, and of their check by `gradcheck`."""
+    # A module's forward has the inputs q if there is a function of q alone.
+    first = min(code.functions, key=lambda function: len(function.inputs))
+    return _MODULE.format(
+        first=first.name,
+        inputs=", ".join(first.inputs),
+        functions="\n".join(f"    {f.name} = staticmethod({f.name})" for f in code.functions),
+        all=_all(code),
+    ).lstrip("\n")
+
+
+def _all(code: Code) -> str:
+    """Return the names of all functions as the elements of a tuple."""
+    return ", ".join(f.name for f in code.functions) + ("," if len(code.functions) == 1 else "")
+
+
+_FUNCTIONS = ("cos", "sin", "sqrt")
 _ONE_BY_ONE = "return [{} for one in zip(*inputs)]"
 
 DIALECTS = {
@@ -98,6 +208,21 @@ DIALECTS = {
         result=_in_array("np.empty((*shape, {1}))", "..., "),
         values="return np.reshape(function(*map(np.array, inputs)), (len(inputs[0]), -1)).tolist()",
     ),
+    "array": Dialect(
+        about="Arrays q (..., {nq}), v and a (..., {nv}) of any array API namespace, type and device;\n"
+        "they broadcast. PyTorch's tensors need array-api-compat. No array is written in place.\n"
+        "check(xp) runs the test vectors in a namespace, for example check(jax.numpy).",
+        imports="import numpy",
+        helpers=_NAMESPACE + "\n" + _STACKED.format(given="xp, ", xp="xp", axis="axis"),
+        entering=_in_any_namespace,
+        index="{}[..., {}]",
+        result=_stacked("xp, "),
+        values="found = function(*(xp.asarray(x, dtype=getattr(xp, kind)) for x in inputs))\n"
+        "    found = xp.reshape(found, (len(inputs[0]), -1))\n"
+        "    return [[float(found[i, k]) for k in range(found.shape[1])] for i in range(found.shape[0])]",
+        given="xp=numpy",
+        single=True,
+    ),
     "numba": Dialect(
         about="One configuration, float64 arrays q ({nq},), v and a ({nv},); compiled when first called.",
         imports="from math import {}\n\nimport numpy as np\nfrom numba import njit",
@@ -106,17 +231,41 @@ DIALECTS = {
         values=_ONE_BY_ONE.format("function(*map(np.array, one)).ravel().tolist()"),
     ),
     "jax": Dialect(
-        about="One configuration, arrays q ({nq},), v and a ({nv},), of any precision; for jit, vmap, grad.\n"
+        about="Arrays q (..., {nq}), v and a (..., {nv}) of any precision, which broadcast; for jit, vmap\n"
+        "and grad.\n"
         "XLA's fusion pass takes minutes to compile long chains; this disables it:\n"
-        'jax.jit(jax.vmap(function), compiler_options={{"xla_disable_hlo_passes": "fusion"}})',
+        'jax.jit(function, compiler_options={{"xla_disable_hlo_passes": "fusion"}})',
         imports="import jax\nimport jax.numpy as jnp\nfrom jax.numpy import {}",
-        entering=lambda inputs: [f"{x} = jnp.asarray({x})" for x in inputs],
-        result=_nested("jnp.array([", "], dtype=q.dtype)", deeper=".reshape({})"),
+        helpers=_STACKED.format(given="", xp="jnp", axis="axis"),
+        entering=lambda writer: [
+            *(f"{x} = jnp.asarray({x})" for x in writer.function.inputs),
+            _zero(writer, "jnp"),
+        ],
+        index="{}[..., {}]",
+        result=_stacked(""),
         values='unfused = {"xla_disable_hlo_passes": "fusion"}\n'
-        "    compiled = jax.jit(jax.vmap(function), compiler_options=unfused)\n"
-        "    found = compiled(*map(jnp.array, inputs))\n"
+        "    compiled = jax.jit(function, compiler_options=unfused)\n"
+        "    found = compiled(*(jnp.array(x, dtype=kind) for x in inputs))\n"
         "    return found.reshape(len(inputs[0]), -1).tolist()",
+        single=True,
         before='jax.config.update("jax_enable_x64", True)',
+    ),
+    "torch": Dialect(
+        about="Tensors q (..., {nq}), v and a (..., {nv}) of any floating type and device, which broadcast;\n"
+        "for autograd, torch.func, vmap and compile. Kinematics() has the functions as a module.",
+        imports="import torch\nfrom torch import {}",
+        helpers=_STACKED.format(given="", xp="torch", axis="dim"),
+        entering=lambda writer: [_zero(writer, "torch")],
+        index="{}[..., {}]",
+        result=_stacked(""),
+        values="tensors = [torch.tensor(x, dtype=getattr(torch, kind), device=device) for x in inputs]\n"
+        "    return function(*tensors).reshape(len(inputs[0]), -1).tolist()",
+        given='device="cpu"',
+        single=True,
+        closing=_torch_module,
+        after="    for name, good in gradients().items():\n"
+        "        wrong |= not good\n"
+        '        print("good" if good else "WRONG", f"{name}: derivatives by gradcheck (float64)")\n',
     ),
     "casadi": Dialect(
         about="Columns SX, MX or DM: q ({nq}), v and a ({nv}); a Hessian is ({nv} times 6, {nv}).",
@@ -152,7 +301,7 @@ def write(code: Code, to: str) -> str:
         '"""',
         "",
     ]
-    lines += [_imports(code, dialect), ""]
+    lines += [_imports(code, dialect), "", *([dialect.helpers] if dialect.helpers else [])]
     for function in code.functions:
         lines += ["", *_function(code, function, dialect), ""]
     return "\n".join([*lines, *_check(code, dialect), ""])
@@ -160,7 +309,7 @@ def write(code: Code, to: str) -> str:
 
 def _imports(code: Code, dialect: Dialect) -> str:
     nodes = [node.op for function in code.functions for node in function.nodes]
-    used = ", ".join(name for name in ("cos", "sin", "sqrt") if name in nodes)
+    used = ", ".join(name for name in _FUNCTIONS if name in nodes)
     lines = [line for line in dialect.imports.split("\n") if used or "{}" not in line]
     return "\n".join(lines).strip().format(used)
 
@@ -173,49 +322,57 @@ def _function(code: Code, function: Function, dialect: Dialect) -> Iterator[str]
     size = ", ".join(map(str, function.shape)) + ("," if len(function.shape) == 1 else "")
     numbers = ", ".join(function.quantity.equations)
     yield f'    """({size}), eq. {numbers}; {function.operations} operations."""'
-    yield from (f"    {line}" for line in dialect.entering(function.inputs))
+    yield from (f"    {line}" for line in dialect.entering(writer))
     for node in writer.given:
         yield f"    {writer.words[node]} = {dialect.index.format(node.op, node.of[0])}"
     for head, lines in writer.statements():
         yield f"    # {head}"
         yield from (f"    {word} = {value}" for word, value in lines)
-    yield from (f"    {line}" for line in dialect.result(writer.results(), function.shape))
+    yield from (f"    {line}" for line in dialect.result(writer))
 
 
 _CHECK = '''
-def _values(function, inputs):
+{classes}def _values(function, inputs, kind{more}):
     {values}
 
 
-def check():
+def check({given}):
     """Return the largest error of each function as a share of its tolerance: at most 1."""
     shares = {{}}
-    for function in ({functions}):
-        name, worst = function.__name__, 0.0
-        inputs = [GIVEN[letter] for letter in INPUTS[name]]
-        for found, true, within in zip(_values(function, inputs), TRUE[name], WITHIN[name]):
-            for x, y, k in zip(found, true, within):
-                error, least = abs(x - float(y)), k * 2.0**-52
-                share = error / least if least else (0.0 if error == 0.0 else float("inf"))
-                if not share <= worst:  # NaN is the worst
-                    worst = share
-        shares[name] = worst
+    for kind, eps, tolerance in {kinds}:
+        for function in ({functions}):
+            name, worst = function.__name__, 0.0
+            inputs = [GIVEN[letter] for letter in INPUTS[name]]
+            numbers = _values(function, inputs, kind{more})
+            for found, true, within in zip(numbers, TRUE[name], tolerance[name]):
+                for x, y, k in zip(found, true, within):
+                    error, least = abs(x - float(y)), k * eps
+                    share = error / least if least else (0.0 if error == 0.0 else float("inf"))
+                    if not share <= worst:  # NaN is the worst
+                        worst = share
+            shares[name, kind] = worst
     return shares
 
 
 if __name__ == "__main__":
 {before}    wrong = False
-    for name, worst in check().items():
+    for (name, kind), worst in check().items():
         good = worst <= 1.0
         wrong |= not good
-        line = f"{{name}}: {{len(TRUE[name])}} test vectors, worst error {{worst:.3g}} of the bound"
+        line = f"{{name}}: {{len(TRUE[name])}} test vectors, worst error {{worst:.3g}} of the bound{told}"
         print("good" if good else "WRONG", line)
-    raise SystemExit(wrong)
+{after}    raise SystemExit(wrong)
 '''
+
+
+_DOUBLE = '[("float64", 2.0**-52, WITHIN)]'
+_BOTH = '[("float64", 2.0**-52, WITHIN), ("float32", 2.0**-23, SINGLE)]'
 
 
 def _check(code: Code, dialect: Dialect) -> Iterator[str]:
     yield "\n# Configurations, true values at fifty digits, and tolerances in eps = 2^-52."
+    if dialect.single:
+        yield "# SINGLE: tolerances in single precision, in eps = 2^-23."
     vectors = code.proof.vectors
     most = max((function.inputs for function in code.functions), key=len)
     yield "INPUTS = {" + ", ".join(f'"{f.name}": "{f.inputs}"' for f in code.functions) + "}"
@@ -225,7 +382,8 @@ def _check(code: Code, dialect: Dialect) -> Iterator[str]:
         yield from (f"        {v.inputs[k]!r}," for v in vectors)
         yield "    ],"
     yield "}"
-    for what, of, form in (("TRUE", "results", '"{}"'), ("WITHIN", "within", "{}")):
+    tables = [("TRUE", "results", '"{}"'), ("WITHIN", "within", "{}"), ("SINGLE", "single", "{}")]
+    for what, of, form in tables if dialect.single else tables[:2]:
         yield f"{what} = {{"
         for function in code.functions:
             yield f'    "{function.name}": ['
@@ -233,14 +391,37 @@ def _check(code: Code, dialect: Dialect) -> Iterator[str]:
                 yield "        ["
                 found = [form.format(x) for x in getattr(vector, of)[function.name]]
                 yield from (
-                    f"            {', '.join(row)}," for row in _rows(found, 4 if what == "WITHIN" else 2)
+                    f"            {', '.join(row)}," for row in _rows(found, 2 if what == "TRUE" else 4)
                 )
                 yield "        ],"
             yield "    ],"
         yield "}"
     yield _CHECK.format(
         values=dialect.values,
-        functions=", ".join(function.name for function in code.functions)
-        + ("," if len(code.functions) == 1 else ""),
+        kinds=_BOTH if dialect.single else _DOUBLE,
+        told=" ({kind})" if dialect.single else "",
+        given=dialect.given,
+        more=f", {dialect.given.partition('=')[0]}" if dialect.given else "",
+        functions=_all(code),
+        classes=dialect.closing(code),
+        after=dialect.after,
         before=f"    {dialect.before}\n" if dialect.before else "",
     ).rstrip()
+
+
+def torch_module(text: str) -> Any:
+    """Return the module of the exported text of the language "torch".
+
+    Raises:
+        InputError: PyTorch is not installed.
+    """
+    need_torch()
+    scope: dict[str, Any] = {"__name__": "urdfkin_torch"}
+    exec(compile(text, "<urdfkin export --to torch>", "exec"), scope)
+    return scope["Kinematics"]()
+
+
+def need_torch() -> None:
+    """Raise InputError if PyTorch is not installed."""
+    if importlib.util.find_spec("torch") is None:
+        raise InputError("robot.torch needs PyTorch", found="no module torch", remedy="pip install torch")

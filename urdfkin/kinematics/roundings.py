@@ -73,6 +73,23 @@ the omitted products with a row, or of those of a cross product. With Pinocchio'
 24.0 if nothing is fused, plus the sums above. The bound does not allow for this; the standard deviation is
 the same as urdfkin's. The comparison of an export with true values (test vectors) uses 7.2 of `ROUNDINGS`.
 
+**An export in single precision** has a bound of its own for each number of a test vector. The unit is eps =
+2^-23. `urdfkin.export.single` multiplies the error of each operation and of each constant by the derivative
+of the result, and adds the absolute values. The error of one operation is
+
+| | in eps of its value |
+|---|---|
+| a constant: its own rounding to single precision, 0 if it is a single-precision number | up to 0.5 |
+| a sum, a difference, a product; fused products and sums have fewer roundings | 0.5 |
+| a quotient, a square root; a compiler may write x / sqrt(y) as x rsqrt(y), with 1 for rsqrt and 0.5 | 1.0 |
+| sine and cosine of a library: two units in the last place, CUDA's bound; others have smaller ones | 2.0 |
+| sine and cosine by the polynomials of C's batches, in eps of 1 | 1.0 |
+
+A change of sign has no error. The inputs of test vectors are single-precision numbers, which have no error
+either. A number below the smallest normal number, 2^-126, has an error of 2^-126 at most, because GPUs and
+some compilers replace it by 0. The code's constants have the errors of the double code: its bound is added,
+multiplied by 2^-52 / 2^-23. These are the only errors: an export has no other operations.
+
 **MuJoCo**, the optional second oracle, computes the orientation as a unit quaternion. It multiplies this
 quaternion by those of the constant rotation and of the joint's rotation, about an axis that it normalises. At
 each link it normalises the quaternion and converts it to a matrix. If all roundings add up, the error is
@@ -166,6 +183,25 @@ MUJOCO = 30.0
 MJCF_RULE = 8.0
 #: Roundings for each row of a table; derived above.
 ROW = 8.0
+
+# An export in single precision (`urdfkin.export.single`); derived above.
+
+SINGLE_EPS = 2.0**-23
+#: The smallest normal number, and the largest number.
+SINGLE_SMALLEST, SINGLE_LARGEST = 2.0**-126, (2.0 - SINGLE_EPS) * 2.0**127
+#: Error of each operation, in eps of its value.
+SINGLE_OPERATION = {
+    "+": 0.5,
+    "-": 0.5,
+    "*": 0.5,
+    "/": 1.0,
+    "sqrt": 1.0,
+    "neg": 0.0,
+    "sin": 2.0,
+    "cos": 2.0,
+}
+#: Error of a sine or a cosine by polynomials, in eps of 1.
+SINGLE_POLYNOMIAL = 1.0
 
 # Rounding errors in the constant pose between two joint axes (`urdfkin.dh.common_normals`).
 

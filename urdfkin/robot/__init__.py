@@ -1349,6 +1349,42 @@ class Robot(Displayable):
         code = hook("code of a robot")(self, frame, quantities, reference, form, name=name, verify=verify)
         return str(hook("code in a language")(code, as_str(to, "to")))
 
+    def torch(
+        self,
+        frame: str | None = None,
+        quantities: Sequence[str] = ("placement", "jacobian", "velocity", "acceleration"),
+        reference: Reference | str = _ALIGNED,
+        *,
+        verify: bool | None = None,
+    ) -> Any:
+        """Return a `torch.nn.Module` with the kinematics of a frame, for PyTorch.
+
+        It is the class `Kinematics` of `export("torch", ...)`. `module(q)` is the placement (..., 4, 4), and
+        the quantities are its methods. Tensors have any leading shape, any floating type and any device;
+        derivatives are PyTorch's. PyTorch must be installed.
+
+        Args:
+            frame: As in `export`.
+            quantities: As in `export`. `module(q)` is the first quantity that depends on q alone.
+            reference: As in `export`.
+            verify: As in `export`.
+
+        Raises:
+            InputError: PyTorch is not installed; or as in `export`.
+            UnknownNameError: as in `export`.
+            VerificationError: Pinocchio's result differs by more than the bound.
+
+        >>> import urdfkin
+        >>> robot = urdfkin.load("planar_two_link")
+        >>> "class Kinematics(torch.nn.Module):" in robot.export("torch", "tip")
+        True
+        """
+        with importing:
+            from urdfkin.export.python import need_torch, torch_module  # noqa: PLC0415  rarely used
+
+        need_torch()
+        return torch_module(self.export("torch", frame, quantities, reference, verify=verify))
+
     # -- chains and Denavit-Hartenberg tables ---------------------------------------------------------
 
     def chain(self, tip: str | None = None, base: str | None = None) -> FrameChain:

@@ -1,4 +1,7 @@
 
+/* The tolerances of a function's test vectors in the precision of this program. */
+#define BOUND(name) (sizeof(real) == sizeof(float) ? single_##name : within_##name)
+
 /* NaN counts as larger than any number. */
 static double larger(double x, double y) { return y <= x ? x : y; }
 

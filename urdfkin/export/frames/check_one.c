@@ -8,7 +8,7 @@
         }
         @title@_@name@_batch(N, @all@, &all[0][0]);
         for (int k = 0; k < N; ++k) {
-            const double *right = true_@name@[k % @n@], *within = within_@name@[k % @n@];
+            const double *right = true_@name@[k % @n@], *within = BOUND(@name@)[k % @n@];
             @title@_@name@(@each@, one);
             worst = larger(worst, share(@count@, one, right, within));
             worst = larger(worst, share(@count@, all[k], right, within));

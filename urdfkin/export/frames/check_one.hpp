@@ -4,7 +4,7 @@
             real @each_array@, one[@count@];
 @fill_one@
             @name@(@passed@, one);
-            worst = larger(worst, share(@count@, one, true_@name@[k], within_@name@[k]));
+            worst = larger(worst, share(@count@, one, true_@name@[k], BOUND(@name@)[k]));
         }
         wrong |= report("@name@", @n@, worst);
     }

@@ -1,0 +1,107 @@
+"""Run exported Python files in this interpreter, which needs no urdfkin, and print one JSON line for each.
+
+    python scripts/run_exported.py robot_torch.py robot_jax.py robot_array.py
+
+It runs each file's own check. Derivatives of the Jacobian by PyTorch and JAX are compared with the Hessian's
+true values in the file, within the Hessian's bound, if the file has a Hessian. The functions of the first
+file of PyTorch are also compiled by `torch.compile`. `scripts/check_exports.py --library` calls this script.
+"""
+
+from __future__ import annotations
+
+import json
+import runpy
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+
+def shares(path: str, compiled: bool) -> Iterator[tuple[str, float]]:
+    """Yield the largest error of each check as a share of its bound; 0 or inf for a check without one."""
+    scope = runpy.run_path(path)
+    if path.endswith("_array.py"):
+        from array_api_compat import torch as namespace  # noqa: PLC0415
+
+        for (_, kind), share in scope["check"](namespace).items():
+            yield f"array {kind}", share
+        return
+    to = "torch" if path.endswith("_torch.py") else "jax"
+    if to == "jax":
+        import jax  # noqa: PLC0415
+
+        jax.config.update("jax_enable_x64", True)
+    for (_, kind), share in scope["check"]().items():
+        yield f"{to} {kind}", share
+    for good in scope.get("gradients", dict)().values():
+        yield "gradcheck", 0.0 if good else float("inf")
+    if "hessian" in scope["TRUE"]:
+        yield f"{to} gradient", of_hessian(scope, *(_torch if to == "torch" else _jax)())
+    if compiled and to == "torch":
+        yield "torch.compile", of_compiled(scope)
+
+
+def _torch() -> tuple[Callable[..., Any], Callable[..., Any]]:
+    import torch  # noqa: PLC0415
+
+    def tensor(x: Any) -> Any:
+        return torch.tensor(x, dtype=torch.float64)
+
+    return tensor, lambda function: torch.func.vmap(torch.func.jacrev(function))
+
+
+def _jax() -> tuple[Callable[..., Any], Callable[..., Any]]:
+    import jax  # noqa: PLC0415
+
+    return jax.numpy.array, lambda function: jax.vmap(jax.jacrev(function))
+
+
+def of_hessian(scope: dict[str, Any], array: Callable[..., Any], slopes: Callable[..., Any]) -> float:
+    """Return the largest error of the Jacobian's derivatives as a share of the Hessian's bound."""
+    q = array(scope["GIVEN"]["q"])
+    found = slopes(scope["jacobian"])(q).reshape(len(q), -1).tolist()
+    return worst(found, scope["TRUE"]["hessian"], scope["WITHIN"]["hessian"], 2.0**-52)
+
+
+def of_compiled(scope: dict[str, Any]) -> float:
+    """Return the largest error of the functions by `torch.compile`, as a share of their bounds."""
+    import torch  # noqa: PLC0415
+
+    found = 0.0
+    for name, letters in scope["INPUTS"].items():
+        if name == "hessian":  # its many numbers take minutes to compile
+            continue
+        compiled = torch.compile(scope[name], fullgraph=True)
+        inputs = [scope["GIVEN"][letter] for letter in letters]
+        for kind, eps, table in (("float64", 2.0**-52, "WITHIN"), ("float32", 2.0**-23, "SINGLE")):
+            values = scope["_values"](compiled, inputs, kind, "cpu")
+            share = worst(values, scope["TRUE"][name], scope[table][name], eps)
+            found = found if share <= found else share
+    return found
+
+
+def worst(found: Any, true: Any, within: Any, eps: float) -> float:
+    """Return the largest error of rows of numbers, as a share of its bound; NaN is the largest."""
+    largest = 0.0
+    for rows in zip(found, true, within, strict=True):
+        for x, y, k in zip(*rows, strict=True):
+            error, least = abs(x - float(y)), k * eps
+            share = error / least if least else (0.0 if error == 0.0 else float("inf"))
+            if not share <= largest:
+                largest = share
+    return largest
+
+
+def main(paths: list[str]) -> None:
+    """Print a line for each file: its name, and the largest share of each check."""
+    compiled = True
+    for path in paths:
+        found: dict[str, float] = {}
+        for name, share in shares(path, compiled):
+            found[name] = share if not share <= found.get(name, 0.0) else found.get(name, 0.0)
+        compiled = compiled and not path.endswith("_torch.py")
+        print(json.dumps({"file": Path(path).stem, **found}), flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,152 @@
+"""CUDA's kernels, run on the processor thread by thread; and compiled by CUDA's own compiler where it is."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+import urdfkin
+from tests.export.writing import ALL, code, file
+from tests.laws.subjects import robot_of
+from urdfkin.export import check as checking
+from urdfkin.export.check import check
+
+#: The folder with a `cuda_runtime.h` for the processor.
+_SHIM = Path(__file__).parent
+_NVCC = pytest.mark.skipif(shutil.which("nvcc") is None, reason="no nvcc")
+
+
+def ran(path: Path, *options: str) -> str:
+    """What a program says whose kernels run on the processor, with every warning and bad access an error."""
+    if shutil.which("g++") is None:
+        pytest.skip("no g++")
+    strict = ["-Wall", "-Wextra", "-Werror", "-Wno-unknown-pragmas", "-fno-sanitize-recover=all"]
+    built = path.with_suffix(".out")
+    language = ["-std=c++20", "-O1", "-g", "-D__CUDACC__", f"-I{_SHIM}"]
+    command = ["g++", *language, *strict, *options, "-x", "c++", str(path), "-o", str(built)]
+    subprocess.run(command, check=True)
+    done = subprocess.run([str(built)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("sanitizer", ["address,undefined", "thread"])
+@pytest.mark.parametrize("real", ["double", "float"])
+def test_the_kernels_compute_true_values_and_touch_only_their_own_memory(
+    real: str, sanitizer: str, tmp_path: Path
+) -> None:
+    path = file(
+        code(urdfkin.load("ur5"), quantities=("placement", "jacobian", "acceleration")), "cuda", tmp_path
+    )
+    name = path.stem.upper()
+    said = ran(path, f"-fsanitize={sanitizer}", f"-D{name}_MAIN", f"-D{name}_REAL={real}")
+    assert len(re.findall(r"^good \w+: 4 test vectors", said, re.MULTILINE)) == 3
+    assert len(re.findall(r"^good \w+ on the GPU: 4 test vectors", said, re.MULTILINE)) == 3
+    assert "WRONG" not in said
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("robot", "quantities"),
+    [
+        ("planar_two_link", ALL),
+        ("planar_and_floating_in_the_middle", ("placement", "jacobian", "acceleration")),
+        ("single_link", ("placement",)),
+    ],
+)
+def test_so_do_those_of_wide_rows_of_other_joints_and_of_no_joint(
+    robot: str, quantities: tuple[str, ...], tmp_path: Path
+) -> None:
+    subject = urdfkin.load(robot) if robot == "planar_two_link" else robot_of(robot)
+    path = file(code(subject, quantities=quantities), "cuda", tmp_path)
+    said = ran(path, "-fsanitize=address,undefined", f"-D{path.stem.upper()}_MAIN")
+    assert said.count("good ") == 2 * len(quantities)
+
+
+_SIZES = """
+#include "{file}"
+#include <cstdio>
+int main()
+{{
+    const size_t sizes[] = {{0, 1, 31, 32, 33, 127, 128, 129, 255, 256, 257, 600}};
+    for (size_t n : sizes) {{
+        std::vector<float> q(n * 6), out(n * 36);
+        for (size_t i = 0; i < q.size(); ++i) q[i] = 0.01f * static_cast<float>(i % 613);
+        if ({name}_jacobian_float(n, q.data(), out.data(), nullptr) != 0) return 1;
+        for (size_t k = 0; k < n; ++k) {{
+            float one[36];
+            {name}_kinematics::jacobian(q.data() + 6 * k, one);
+            for (int i = 0; i < 36; ++i)
+                if (!(one[i] == out[36 * k + i])) return std::printf("%zu %zu %d\\n", n, k, i), 1;
+        }}
+    }}
+}}
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("blocks", ["1u << 20", "2"])
+def test_a_batch_of_any_size_has_the_bits_of_single_configurations(blocks: str, tmp_path: Path) -> None:
+    path = file(code(urdfkin.load("ur5"), quantities=("jacobian",)), "cuda", tmp_path)
+    text = path.read_text("utf-8")
+    assert text.count("MOST_BLOCKS = 1u << 20;") == 1
+    # With two blocks, a thread of the larger batches has several configurations.
+    path.write_text(text.replace("MOST_BLOCKS = 1u << 20;", f"MOST_BLOCKS = {blocks};"), "utf-8")
+    program = tmp_path / "sizes.cpp"
+    program.write_text(_SIZES.format(file=path.name, name=path.stem), "utf-8")
+    ran(program, "-fsanitize=address,undefined", f"-D{path.stem.upper()}_ENTRY_POINTS", f"-I{tmp_path}")
+
+
+@_NVCC
+@pytest.mark.long
+@pytest.mark.parametrize("real", ["double", "float"])
+def test_cudas_compiler_compiles_it_without_a_warning(real: str, tmp_path: Path) -> None:
+    path = file(code(urdfkin.load("ur5"), quantities=("placement", "acceleration")), "cuda", tmp_path)
+    name, built = path.stem.upper(), tmp_path / "check"
+    macros = [f"-D{name}_MAIN", f"-D{name}_REAL={real}"]
+    strict = ["-Xcompiler", "-Wall,-Wextra,-Werror", "-Werror", "all-warnings"]
+    subprocess.run(["nvcc", *strict, *macros, "-x", "cu", str(path), "-o", str(built)], check=True)
+    said = subprocess.run([str(built)], capture_output=True, text=True, check=True).stdout
+    assert said.count("good ") >= 2  # without a GPU, only the functions of the host
+    assert "WRONG" not in said
+
+
+@_NVCC
+@pytest.mark.long
+def test_the_check_takes_cudas_compiler_where_there_is_a_gpu(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(checking, "_has_gpu", lambda: True)
+    found = check(file(code(urdfkin.load("ur5"), quantities=("placement",)), "cuda", tmp_path))
+    assert found.good
+    assert len(found.lines) >= 2
+
+
+@_NVCC
+@pytest.mark.long
+@pytest.mark.skipif(shutil.which("cmake") is None, reason="no cmake")
+def test_the_cmake_lines_of_the_file_build_its_library_for_a_program_in_c(tmp_path: Path) -> None:
+    path = file(code(urdfkin.load("ur5"), quantities=("jacobian",)), "cuda", tmp_path)
+    name = path.stem
+    lines = path.read_text("utf-8").partition(" * CMake:")[2].partition(" */")[0].splitlines()
+    example = "\n".join(line.lstrip(" *") for line in lines)
+    assert f"add_library({name}" in example
+    (tmp_path / "main.c").write_text(
+        f'#define {name.upper()}_DECLARATIONS\n#include "{path.name}"\n'
+        f"int main(void) {{ return {name}_jacobian_double(0, 0, 0, 0); }}\n",
+        "utf-8",
+    )
+    (tmp_path / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.18)\nproject(example LANGUAGES C CXX)\n"
+        f"{example}\nadd_executable(main main.c)\ntarget_link_libraries(main {name})\n",
+        "utf-8",
+    )
+    built = tmp_path / "built"
+    subprocess.run(["cmake", "-S", str(tmp_path), "-B", str(built)], check=True, capture_output=True)
+    subprocess.run(["cmake", "--build", str(built)], check=True, capture_output=True)
+    assert subprocess.run([str(built / "main")], check=False).returncode == 0

@@ -1,0 +1,229 @@
+"""The bound of an export in single precision holds, and does not hold without any of its error terms."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import urdfkin
+from tests.export.test_languages import module
+from tests.export.writing import code, file
+from tests.laws.subjects import robot_of, state
+from urdfkin.export import proof, single
+from urdfkin.export.expression import Graph, Node
+from urdfkin.export.function import Function
+from urdfkin.kinematics.roundings import SINGLE_EPS, SINGLE_OPERATION
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray
+from urdfkin.verify.quantities import JACOBIAN
+
+_N = 4000
+Made = Callable[[Graph, Node, Node, Node], Any]
+
+
+def function(made: Made) -> Function:
+    """A function of three inputs."""
+    graph = Graph()
+    x, y, z = (graph.input("q", k) for k in range(3))
+    robot = urdfkin.load("planar_two_link", verify=False)
+    plan = robot.plan([robot.tree.frame_link("tip")])
+    return Function(JACOBIAN, Reference.LOCAL, plan, (made(graph, x, y, z),))
+
+
+def inputs(scale: float = 1.0) -> FloatArray:
+    """Single-precision numbers: x of any size near 1, y near 0.75 x, z a thousandth."""
+    rng = np.random.default_rng(0)
+    x = rng.uniform(1.0, 2.0, _N)
+    y = 0.75 * x * (1.0 + rng.uniform(0.5, 1.5, _N) * 1e-3)
+    z = rng.uniform(0.5e-3, 1.5e-3, _N)
+    return (scale * np.stack([x, y, z], axis=1)).astype(np.float32).astype(np.float64)
+
+
+def in_single(of: Function, q: FloatArray) -> FloatArray:
+    """The result with every operation in single precision, as NumPy computes it."""
+    numbers: dict[Node, Any] = {}
+    plain: dict[str, Callable[..., Any]] = {"neg": np.negative, "sin": np.sin, "cos": np.cos, "sqrt": np.sqrt}
+    plain |= {"+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide}
+    for node in of.nodes:
+        if node.op == "q":
+            numbers[node] = q[:, node.of[0]].astype(np.float32)
+        else:
+            operands = (numbers[x] if isinstance(x, Node) else np.float32(x) for x in node.of)
+            numbers[node] = plain[node.op](*operands)
+    (result,) = of.results
+    return np.asarray(numbers[result], dtype=np.float64)
+
+
+def worst(made: Made, scale: float = 1.0) -> float:
+    """The largest error as a share of its bound; doubles are exact compared with it."""
+    of, q = function(made), inputs(scale)
+    true = of.values((q,))[of.results[0]]
+    with np.errstate(all="ignore"):
+        error, bound = np.abs(in_single(of, q) - true), SINGLE_EPS * single.single_bounds(of, (q,))[:, 0]
+        return float(np.where(error > 0.0, error / bound, 0.0).max())
+
+
+#: An expression whose only error is that of one operation. 0.75 is a number of single precision.
+OPERATIONS: dict[str, Made] = {
+    "+": lambda g, x, y, z: x + y,
+    "-": lambda g, x, y, z: x - z,
+    "*": lambda g, x, y, z: x * y,
+    "/": lambda g, x, y, z: x / y,
+    "sqrt": lambda g, x, y, z: g.root(x),
+    "sin": lambda g, x, y, z: g.sine_cosine(x)[0],
+    "cos": lambda g, x, y, z: g.sine_cosine(x)[1],
+}
+
+
+@pytest.mark.parametrize("op", OPERATIONS)
+def test_the_error_of_an_operation_is_within_the_bound_and_not_without_its_term(
+    op: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert 0.2 < worst(OPERATIONS[op]) <= 1.0
+    monkeypatch.setitem(SINGLE_OPERATION, op, 0.0)
+    monkeypatch.setattr(single, "SINGLE_POLYNOMIAL", 0.0)
+    assert worst(OPERATIONS[op]) > 1.0
+
+
+def inexact(x: Node, y: Node) -> Any:
+    """A difference with an error of a thousand eps of itself, by the product's rounding."""
+    return 0.75 * x - y
+
+
+#: Expressions whose last operation passes an error on, by the operation and the operand that has the error.
+PASSED: dict[tuple[str, int], Made] = {
+    ("+", 1): lambda g, x, y, z: z + inexact(x, y),  # the operand that was made first is first
+    ("-", 0): lambda g, x, y, z: inexact(x, y) - z,
+    ("-", 1): lambda g, x, y, z: z - inexact(x, y),
+    ("*", 1): lambda g, x, y, z: z * inexact(x, y),
+    ("/", 0): lambda g, x, y, z: inexact(x, y) / x,
+    ("/", 1): lambda g, x, y, z: x / inexact(x, y),
+    ("neg", 0): lambda g, x, y, z: g.made("neg", inexact(x, y)),
+    ("sin", 0): lambda g, x, y, z: g.sine_cosine(1024.0 * inexact(x, y))[0],
+    ("cos", 0): lambda g, x, y, z: g.sine_cosine(1024.0 * inexact(x, y))[1],
+    ("sqrt", 0): lambda g, x, y, z: g.root(y - 0.75 * x),
+}
+
+
+@pytest.mark.parametrize(("op", "operand"), PASSED)
+def test_an_error_that_an_operation_passes_on_is_in_the_bound(
+    op: str, operand: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made, right = PASSED[op, operand], single._SLOPES[op]
+    node = function(made).results[0]
+    assert node.op == op
+    assert node.of[operand].op != "q"
+    assert worst(made) <= 1.0
+
+    def without(*given: Any) -> tuple[Any, ...]:
+        return tuple(0.0 * s if k == operand else s for k, s in enumerate(right(*given)))
+
+    monkeypatch.setitem(single._SLOPES, op, without)
+    assert worst(made) > 1.0
+
+
+def test_a_product_passes_on_the_error_of_its_first_operand_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: Made = lambda g, x, y, z: inexact(x, y) * (z * z)  # noqa: E731
+    assert worst(made) <= 1.0
+    monkeypatch.setitem(single._SLOPES, "*", lambda value, x, y: (0.0 * y, x))
+    assert worst(made) > 1.0
+
+
+def test_numbers_near_zero_have_an_error_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: Made = lambda g, x, y, z: x * y  # noqa: E731
+    assert 0.0 < worst(made, 2.0**-68) <= 1.0
+    monkeypatch.setattr(single, "SINGLE_SMALLEST", 0.0)
+    assert worst(made, 2.0**-68) > 1.0
+
+
+def test_a_number_beyond_the_largest_has_no_bound() -> None:
+    of = function(lambda g, x, y, z: x * y)
+    assert np.all(np.isinf(single.single_bounds(of, (inputs(2.0**65),))))
+    assert np.all(np.isfinite(single.single_bounds(of, (inputs(2.0**60),))))
+
+
+# -- in files -----------------------------------------------------------------------------------------------
+
+_FIXED = """<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="fixed"><parent link="a"/>
+<child link="b"/><origin xyz="{}" rpy="{}"/></joint></robot>"""
+
+
+def loaded(text: str) -> urdfkin.Robot:
+    """A robot whose lengths may be unusual."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        return urdfkin.load(text)
+
+
+def shares(text: str, folder: Path) -> dict[tuple[str, str], float]:
+    """What a file finds itself, in both precisions."""
+    written = code(loaded(text), "b", ("placement",))
+    found: dict[tuple[str, str], float] = module(file(written, "array", folder)).check()
+    return found
+
+
+def test_a_file_needs_the_rounding_of_its_constants(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = _FIXED.format("0.1 0 0", "0 0 0")
+    assert shares(text, tmp_path)["placement", "float32"] <= 1.0
+    monkeypatch.setattr(single, "_constant", lambda x: 0.0)
+    assert shares(text, tmp_path)["placement", "float32"] > 1.0
+    assert shares(text, tmp_path)["placement", "float64"] <= 1.0
+
+
+def test_a_file_needs_the_errors_of_its_double_constants(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = _FIXED.format("0 0 0", "1.5707963267948966 0 0")  # its cosine, 6e-17, is 0 in the code
+    assert shares(text, tmp_path)["placement", "float32"] <= 1.0
+    monkeypatch.setattr(proof, "EPS", 0.0)
+    assert shares(text, tmp_path)["placement", "float32"] > 1.0
+
+
+@given(st.floats(1e-300, 1e300))
+def test_a_bound_is_written_rounded_up_and_by_less_than_two_millionths(x: float) -> None:
+    assert x <= float(proof._rounded_up(x)) <= x * (1.0 + 2e-6)
+    assert proof._rounded_up(np.inf) == "0.0"
+
+
+def test_a_file_states_its_bounds_and_what_single_precision_cannot_represent(tmp_path: Path) -> None:
+    text = code(urdfkin.load("ur5"), quantities=("placement", "jacobian")).head
+    assert (
+        "Bounds in single precision, in eps*scale with eps = 2^-23, the constants' rounding included:" in text
+    )
+    (line,) = (x for x in text if x.startswith("  placement ") and ", jacobian " in x)
+    assert 1.0 < float(line.split()[1].rstrip(",")) < 24.0 * 7
+    large = _FIXED.format("1e39 0 0", "0 0 0")
+    head = code(loaded(large), "b", ("placement",)).head
+    assert "Single precision cannot represent a number of placement" in head
+    with np.errstate(over="ignore"):
+        found = shares(large, tmp_path)
+    assert found["placement", "float64"] <= 1.0
+    assert not found["placement", "float32"] <= 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name", ["panda", "sizes", "mimic_hand_40_sliding", "planar_and_floating_in_the_middle", "floating_root"]
+)
+def test_the_bound_holds_in_many_configurations_and_is_not_much_larger_than_the_error(
+    name: str, tmp_path: Path
+) -> None:
+    robot = robot_of(name)
+    written = code(robot, quantities=("placement", "jacobian", "jacobian_rate", "acceleration"))
+    own = module(file(written, "array", tmp_path))
+    given = [x.astype(np.float32).astype(np.float64) for x in state(robot, 200, 3)]
+    for of in written.functions:
+        used = given[: len(of.inputs)]
+        found = getattr(own, of.name)(*(x.astype(np.float32) for x in used))
+        assert found.dtype == np.float32
+        error = np.abs(found - of.evaluated(used)).reshape(200, -1)
+        bound = SINGLE_EPS * single.single_bounds(of, used)
+        assert np.all(error <= bound)
+        assert float((error[bound > 0.0] / bound[bound > 0.0]).max()) > 0.05

@@ -1,0 +1,109 @@
+"""Bound the rounding errors of an exported function in single precision, for each number of its result.
+
+The code in a file is a list of operations. To first order in eps, the error of a result is the sum of the
+errors that the operations and the constants cause, each multiplied by the derivative of the result with
+respect to that operation or constant. The bound is the sum of the absolute values: the error if all roundings
+add up. One backward pass over the operations computes the derivatives of all results.
+`urdfkin.kinematics.roundings` derives the error of one operation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from urdfkin.export.expression import Node, Number
+from urdfkin.export.function import INPUTS, Function
+from urdfkin.kinematics.roundings import (
+    SINGLE_EPS,
+    SINGLE_LARGEST,
+    SINGLE_OPERATION,
+    SINGLE_POLYNOMIAL,
+    SINGLE_SMALLEST,
+)
+from urdfkin.model.tree import FloatArray
+
+#: Number of results whose derivatives are computed in one backward pass; it limits the memory.
+_TOGETHER = 512
+#: For each operation, the derivatives of its value with respect to its operands.
+_SLOPES: dict[str, Callable[..., tuple[FloatArray | float, ...]]] = {
+    "+": lambda value, x, y: (1.0, 1.0),
+    "-": lambda value, x, y: (1.0, -1.0),
+    "*": lambda value, x, y: (y, x),
+    "/": lambda value, x, y: (1.0 / y, -value / y),
+    "neg": lambda value, x: (-1.0,),
+    "sin": lambda value, x: (np.cos(x),),
+    "cos": lambda value, x: (-np.sin(x),),
+    "sqrt": lambda value, x: (0.5 / value,),
+}
+
+
+@np.errstate(all="ignore")
+def single_bounds(function: Function, inputs: Sequence[FloatArray]) -> FloatArray:
+    """Return the bounds (n, results) on the errors in single precision, in eps = 2^-23.
+
+    They do not contain the errors of the code's double constants. A bound is inf if a number of the code is
+    beyond the range of single precision.
+
+    Args:
+        function: The function.
+        inputs: q (n, nq), v and a (n, nv), which are single-precision numbers.
+    """
+    value = function.values(inputs)
+    found = np.zeros((len(inputs[0]), len(function.results)))
+    for first in range(0, found.shape[1], _TOGETHER):
+        part = slice(first, first + _TOGETHER)
+        found[:, part] = _part(function, value, function.results[part], len(found))
+    return found
+
+
+def _part(function: Function, value: dict[Node, FloatArray], results: Sequence[Number], n: int) -> FloatArray:
+    """Return the bounds (n, len(results)) of some results of a function."""
+    bound, slopes = np.zeros((n, len(results))), dict[Node, FloatArray]()
+
+    def reach(x: Number, slope: FloatArray, columns: slice | int) -> None:
+        """Add the derivatives of some results with respect to a node, or the errors of a constant."""
+        if not isinstance(x, Node):
+            bound[:, columns] += np.abs(slope) * _constant(x)
+        elif x in slopes:
+            slopes[x][:, columns] += slope
+        else:
+            slopes[x] = np.zeros_like(bound)
+            slopes[x][:, columns] = slope
+
+    for k, x in enumerate(results):
+        reach(x, np.ones(n), k)
+    for node in reversed(function.nodes):
+        if (slope := slopes.pop(node, None)) is None:
+            continue
+        bound += np.abs(slope) * _own(node, value[node])[:, np.newaxis]
+        if node.op not in INPUTS:
+            of = [value[x] if isinstance(x, Node) else x for x in node.of]
+            for x, factor in zip(node.of, _SLOPES[node.op](value[node], *of), strict=True):
+                reach(x, slope * np.reshape(factor, (-1, 1)), slice(None))
+    return np.where(np.isnan(bound), np.inf, bound)
+
+
+def _own(node: Node, x: FloatArray) -> FloatArray:
+    """Return the error of an operation itself, in eps, for its values (n,)."""
+    size = np.abs(x)
+    if node.op in INPUTS:
+        error = np.zeros_like(size)
+    elif node.op in ("sin", "cos"):
+        error = np.maximum(SINGLE_OPERATION[node.op] * size, SINGLE_POLYNOMIAL)
+    else:
+        error = SINGLE_OPERATION[node.op] * size
+    return _in_range(error, size)
+
+
+def _constant(x: float) -> float:
+    """Return the error of a constant, in eps: its rounding to single precision."""
+    size = np.abs(x)
+    return float(_in_range(np.abs(float(np.float32(x)) - x) / SINGLE_EPS, size))
+
+
+def _in_range(error: FloatArray, size: FloatArray) -> FloatArray:
+    """Return the errors with those of numbers near zero; inf for numbers beyond the largest."""
+    small = np.where((size > 0.0) & (size < 2.0 * SINGLE_SMALLEST), SINGLE_SMALLEST / SINGLE_EPS, 0.0)
+    return np.where(size <= SINGLE_LARGEST, error + small, np.inf)
