@@ -52,10 +52,10 @@ _LAYERS = 1_000
 #: Largest number in single precision. Files write it, or infinity, for a missing limit.
 _LARGEST = float(np.finfo(np.float32).max)
 #: Largest cosine between two axes of a frame without shear, for each prim on the path, in roundings to
-#: single precision. A rotation matrix of rounded numbers has entries that are off by one rounding, and the product of
-#: two such matrices in single precision adds three roundings to each entry. An entry of the columns' products
-#: is then off by at most 2 sqrt(3) times as much, 14. A rounded quaternion changes its length by one
-#: rounding, and the cosine by four.
+#: single precision. A rotation matrix of rounded numbers has entries that are off by one rounding. The
+#: product of two such matrices in single precision adds three roundings to each entry. An entry of the
+#: columns' products is then off by at most 2 sqrt(3) times as much, 14. A rounded quaternion changes its
+#: length by one rounding, and the cosine by four.
 _SHEAR = 14.0
 _NONE = (-math.inf, math.inf)
 _MIMICS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
