@@ -224,6 +224,30 @@ def test_the_action_tells_what_is_new_and_runs_no_input(runner: Repository) -> N
     assert not mark.exists()
 
 
+def test_the_action_fails_where_two_files_of_a_robot_differ(tmp_path: Path) -> None:
+    (tmp_path / "urdfkin-same").mkdir()
+    (tmp_path / "urdfkin-same" / "bin").symlink_to(Path(sys.executable).parent)
+    text = (ROOT / "robots/planar_two_link.urdf").read_text()
+    (tmp_path / "a.urdf").write_text(text)
+    (tmp_path / "b c.urdf").write_text(text.replace('"0.5 0 0"', '"0.501 0 0"'))
+    (tmp_path / "click.py").write_text("raise SystemExit('run')\n")
+    summary = tmp_path / "summary.md"
+
+    def compare(files: str, within: str = "") -> int:
+        given = {"SAME": files, "WITHIN": within, "RUNNER_TEMP": ".", "GITHUB_STEP_SUMMARY": str(summary)}
+        command = ["bash", "-eo", "pipefail", "-c", steps()[3]["run"]]
+        return subprocess.run(command, cwd=tmp_path, env=os.environ | given, check=False).returncode
+
+    assert compare("a.urdf\n\na.urdf\n") == 0
+    assert compare("a.urdf\nb c.urdf\n$(touch RUN)") == 2
+    assert compare("a.urdf\nb c.urdf") == 1
+    assert "SAME" in summary.read_text()
+    assert "DIFFERS" in summary.read_text()
+    assert compare("a.urdf\nb c.urdf", "0.01") == 0
+    assert compare("a.urdf\nb c.urdf", "1; touch RUN") == 2
+    assert not (tmp_path / "RUN").exists()
+
+
 def test_every_input_of_the_action_reaches_a_script_as_a_variable() -> None:
     action = yaml.safe_load((ROOT / "action.yml").read_text("utf-8"))
     used = " ".join(str(step["env"]) for step in steps())
