@@ -60,7 +60,8 @@ class Answer:
     Attributes:
         document: Returns the document that a person reads, for the formats of `TEXTS`.
         data: For each other format, a function that returns its data: a mapping for JSON, rows for CSV, an
-            array for npy, text for all others. An entry for a format of `TEXTS` replaces the document.
+            array for npy, text for all others. If it has a function for a format of
+            `TEXTS`, this function is called instead of `document`.
         check: The last line of the output, which states the result of the check. It is empty if the command
             has nothing to check.
         code: The exit code.

@@ -38,7 +38,10 @@ if TYPE_CHECKING:
 def _path_command(
     name: str, example: str, *options: Any, answers: Any
 ) -> Callable[[Callable[..., Answer]], click.Command]:
-    """Make a command with the options of a path. `answers` is a decorator that `answering` returns."""
+    """Return a decorator that makes a command whose options name two links and the path between them.
+
+    `answers` is a decorator that `answering` returns.
+    """
 
     def decorate(function: Callable[..., Answer]) -> click.Command:
         own = together(robot_argument, path_options, *options, verify_option, answers)

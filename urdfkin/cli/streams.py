@@ -35,7 +35,7 @@ def prepare() -> None:
     sys.stdout = _with_errors(sys.stdout, 1)
     sys.stderr = _with_errors(sys.stderr, 2)
     warnings.showwarning = _warn
-    # Commands print a line about limits and degrees themselves.
+    # Commands print their own line if joint values look like degrees, so the library's warning is hidden.
     warnings.filterwarnings("ignore", category=DegreesWarning)
 
 

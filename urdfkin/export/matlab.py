@@ -39,7 +39,7 @@ def write(code: Code, to: str = "matlab") -> str:
     head = [
         *code.head,
         "",
-        f"f = {name}();  J = f.jacobian(q);  f.check() runs the test vectors. q, v and a count from 1.",
+        f"f = {name}();  J = f.jacobian(q);  f.check() runs the test vectors. Indices begin at 1.",
     ]
     lines = [*(f"% {line}".rstrip() for line in head), f"function f = {name}()"]
     lines += [f"f.{function.name} = @{function.name};" for function in code.functions]

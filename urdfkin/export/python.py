@@ -268,7 +268,7 @@ DIALECTS = {
         '        print("good" if good else "WRONG", f"{name}: derivatives by gradcheck (float64)")\n',
     ),
     "casadi": Dialect(
-        about="Columns SX, MX or DM: q ({nq}), v and a ({nv}); a Hessian is ({nv} times 6, {nv}).",
+        about="Columns SX, MX or DM: q ({nq}), v and a ({nv}); a Hessian has {nv} times 6 rows.",
         imports="import casadi\nfrom casadi import {}",
         result=_nested("casadi.vertcat(", ")", "casadi.horzcat({})"),
         values=_ONE_BY_ONE.format(
@@ -276,8 +276,8 @@ DIALECTS = {
         ),
     ),
     "sympy": Dialect(
-        about="Lists of symbols or numbers: q ({nq}), v and a ({nv}); a result is a Matrix, a Hessian"
-        " ({nv} times 6, {nv}).",
+        about="Lists of symbols or numbers: q ({nq}), v and a ({nv}). Each result is a Matrix. A Hessian has"
+        " {nv} times 6 rows and {nv} columns.",
         imports="import sympy\nfrom sympy import {}",
         result=_nested("sympy.Matrix([", "])"),
         values=_ONE_BY_ONE.format("[float(x) for x in function(*one)]"),

@@ -1,4 +1,6 @@
-"""The steps of the recursion on lengths: upper bounds on the state of a link, from those of its parent.
+"""Compute upper bounds on the lengths of a link's position, velocities and accelerations.
+
+The bounds of a link follow from the bounds of its parent link.
 
 A state is (p, w, vel, alpha, acc): upper bounds on the terms of a point's position, angular velocity,
 velocity, angular acceleration and acceleration. `urdfkin.verify.bounds` runs the steps on NumPy's arrays and

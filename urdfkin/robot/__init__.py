@@ -1683,7 +1683,7 @@ def _indented(items: Sequence[str]) -> str:
 
 
 def _complete_docstrings() -> None:
-    """Complete the docstrings of the methods that compute from the docstring of `Robot`."""
+    """Add the shared arguments and errors, which the docstring of `Robot` describes, to its methods."""
     arguments, _, errors = cleandoc(Robot.__doc__ or "").partition("They share these errors:")
     shared = dict(_SHARED_ITEM.findall(arguments)), dict(_SHARED_ITEM.findall(errors))
     for method in vars(Robot).values():

@@ -252,7 +252,10 @@ class _ModelReader:
         return Modelled(tree, joints, {link: i for i, link in self.links.items() if link not in joints})
 
     def _attachment(self, frame: Any, joint: int, T: FloatArray) -> tuple[str, FloatArray]:
-        """Return the parent link of a frame with pose T on a joint, and its pose relative to this link."""
+        """Return the parent link of a frame, and the frame's pose in this link.
+
+        T is the frame's pose in the frame of the joint that carries it.
+        """
         i = -1 if frame is None else int(frame.parentFrame)
         if i < 0 or i not in self.links or int(self.frames[i].parentJoint) != joint:
             return self.carriers[joint], T

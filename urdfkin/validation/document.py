@@ -90,7 +90,10 @@ class Joint(TypedDict):
         ),
     ]
     locked: NotRequired[
-        Annotated[float, says("Value, rad or m, of a joint that is locked; its kind is then fixed.")]
+        Annotated[
+            float,
+            says("Value at which the joint is locked, in rad or m. The `kind` of a locked joint is `fixed`."),
+        ]
     ]
 
 

@@ -757,8 +757,8 @@ def _best_alignment(
 
 #: Numbers of full turns by which the zero of a mimicked joint may be changed.
 TURNS = (0, 1, -1)
-#: Tolerance of a zero that axes determine, as a multiple of the angle tolerance. The tolerance is large,
-#: because two axes that are close together determine a joint zero inexactly.
+#: Tolerance of a joint zero that follows from the positions of axes, as a multiple of the angle tolerance.
+#: It is large because two axes that are close together determine a joint zero inexactly.
 LEVER = 1e4
 
 
@@ -857,9 +857,10 @@ def _as_rule(joint: Joint) -> tuple[str, float, float]:
 
 
 def _is_determined(found: Alignment, i: int) -> tuple[bool, bool]:
-    """Return whether axes or common links determine a joint's zero, and whether other links coincide.
+    """Return two facts about the zero of a joint.
 
-    The other links are links of A and B without common names, on the body after the joint.
+    The first is whether axes or links with common names determine the zero. The second is whether links
+    without common names, on the bodies after the joint in A and in B, coincide.
     """
     names = set(found.a.labels) & set(found.b.labels)
     behind = {i}
