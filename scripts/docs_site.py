@@ -61,7 +61,7 @@ LIBRARY: dict[str, tuple[str, str, str]] = {
         "Fast evaluation",
         "Evaluators of one frame for a control loop, and kinematics as source code.",
         "prepare urdfkin.compiled.prepared.PreparedFrame compiled "
-        "urdfkin.export.compiled_frame.CompiledFrame export",
+        "urdfkin.export.compiled_frame.CompiledFrame export torch",
     ),
     "api/tables.md": (
         "Chains and tables",

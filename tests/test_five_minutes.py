@@ -71,6 +71,6 @@ def test_minute_five_why_pinocchios_numbers_differ(mine: Path) -> None:
         "classical one",
         "[linear; angular]",
         "from_pinocchio",
-        "not the file's order",
+        "not the order of the file",
     ):
         assert answer in page

@@ -424,7 +424,7 @@ def test_arguments_of_a_xacro_file_go_to_the_one_that_is_one(tmp_path: Path) -> 
         (["panda", "pandaa"], "did you mean"),
         (["panda", "panda", "--map", "x"], "a pair of joints is JOINT_OF_A=JOINT_OF_B"),
         (["panda", "panda", "--map", "x=y"], "unknown joint 'x'"),
-        (["-", "-"], "only one of the two robots can come from standard input"),
+        (["-", "-"], "only one of the robots can come from standard input"),
         (["panda", "panda", "--recheck", "/dev/null"], "not a JSON file"),
     ],
 )

@@ -744,7 +744,9 @@ def test_each_slip_of_a_converter_is_found_and_named(write: Write, name: str) ->
             assert any(one.what == "limits" for one in found.remarks)
 
 
-def test_three_formats_are_compared_in_pairs(write: Write, tmp_path: Path) -> None:
+def test_three_formats_are_compared_in_pairs(
+    write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     mujoco = pytest.importorskip("mujoco")
     robot = loaded_name("planar_two_link")
     urdf = tmp_path / "arm.urdf"
@@ -762,11 +764,14 @@ def test_three_formats_are_compared_in_pairs(write: Write, tmp_path: Path) -> No
         f'<joint name="joint_2" axis="0 0 1"/><site name="tip" pos="{tip[0]!r} {tip[1]!r} {tip[2]!r}"/>'
         "</body></body></worldbody></mujoco>"
     )
-    done = command("same", str(urdf), str(mjcf), str(stage_file), "--boxes", "0")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")  # a narrow terminal breaks rows into lines
+    files = [str(file.relative_to(tmp_path)) for file in (urdf, mjcf, stage_file)]
+    done = command("same", *files, "--boxes", "0")
     assert done.code == 0, done.text + done.err
     assert done.text.count("same up to single precision") == 2
     assert done.text.count("arm.urdf") == 2
-    done = command("same", str(urdf), str(mjcf), str(stage_file), "--map", "a=b")
+    done = command("same", *files, "--map", "a=b")
     assert done.code == 2
     assert "more than two robots" in done.err
 

@@ -118,6 +118,10 @@ def load(  # noqa: PLR0911  a line for each kind of source
         "lock": lock,
         "joints": joints,
     }
+    if not isinstance(variant, Mapping):
+        raise InputError(
+            "`variant` must be a mapping from variant sets to variants", found=safe_repr(variant)
+        )
     if is_usd(source):
         return _load_usd(source, xacro_args, variant, articulation, **how)
     if variant or articulation is not None:
@@ -231,10 +235,6 @@ def _load_usd(
     from urdfkin.verify.usd_check import check_usd_source, read_usd, single_precision  # noqa: PLC0415
 
     _refuse_arguments(xacro_args, "USD")
-    if not isinstance(variant, Mapping):
-        raise InputError(
-            "`variant` must be a mapping from variant sets to variants", found=safe_repr(variant)
-        )
     variants = tuple((as_str(name, "variant"), as_str(one, "variant")) for name, one in variant.items())
     if articulation is not None:
         as_str(articulation, "articulation")

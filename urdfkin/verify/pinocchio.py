@@ -325,7 +325,7 @@ class PinocchioOracle(Oracle):
 
     def jacobian_blocks(self, x: QueryBatch) -> Iterator[FloatArray]:
         """Yield the same as `jacobians` returns, of one frame in blocks that fit into the cache."""
-        if len(x.frames) > 1 or x.joints or x.divided or not self._model.nv:
+        if len(x.frames) != 1 or x.joints or x.divided or not self._model.nv:
             yield self.jacobians(x)
             return
         memory = np.empty((min(len(x.q), _block(6, self._model.nv)), 1, 6, self._model.nv))

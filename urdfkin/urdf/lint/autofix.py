@@ -222,7 +222,7 @@ def _lines(text: str) -> list[str]:
 
 
 def _quote(name: str) -> str:
-    """Return a file name as git writes it: in quotes if it has a quote, a control or a non-ASCII character."""
+    """Return a file name as git writes it: in quotes if it contains a quote or a special character."""
     if name.isascii() and name.isprintable() and not set(name) & {'"', "\\"}:
         return name
     return '"' + "".join(
