@@ -24,7 +24,7 @@ from xml.etree import ElementTree
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 
 import urdfkin
-from urdfkin.comparison.result import length
+from urdfkin.comparison.result import Verdict, length
 from urdfkin.urdf.catalogue import catalogue
 
 _CONVERT = """
@@ -64,14 +64,15 @@ def row_of(python: str, name: str) -> tuple[str, str, str, str, str]:
         try:
             found = urdfkin.same(robot, _loaded(stage))
         except urdfkin.UrdfkinError as error:
-            return name, joints, f"not compared: {error}", "", ""
+            return name, joints, f"not compared: {error.what}", "", ""
     worst = found.worst
     off = length(0.0 if worst is None else worst.upper)
     if found.single is None:
         return name, joints, "the stage has no rounded number", off, ""
     single = length(found.single[0])
     if found:
-        return name, joints, found.verdict.value, off, single
+        words = "same" if found.verdict is Verdict.SAME else "equivalent"
+        return name, joints, words, off, single
     words = "same up to single precision" if found.up_to_single else found.differences[0].words
     return name, joints, words, off, single
 
