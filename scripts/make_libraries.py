@@ -261,7 +261,9 @@ def _joined(lines: list[str]) -> str:
 def main() -> None:
     """Install and run the libraries, and write the page and the JSON file."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("libraries", nargs="*", choices=[*LIBRARIES, []], help="libraries; by default all")
+    parser.add_argument(
+        "libraries", nargs="*", choices=[*DATA["versions"], []], help="libraries; by default all"
+    )
     parser.add_argument(
         "--environments", type=Path, default=platformdirs.user_cache_path("urdfkin-libraries")
     )
@@ -269,7 +271,7 @@ def main() -> None:
     given = parser.parse_args()
     before = json.loads(FIGURES.read_text("utf-8")) if FIGURES.exists() else {}
     if not given.page:
-        before = measure(given.environments, given.libraries or list(LIBRARIES), before)
+        before = measure(given.environments, given.libraries or list(DATA["versions"]), before)
         FIGURES.write_text(json.dumps(before, indent=1) + "\n", "utf-8")
     PAGE.write_text(page(before), "utf-8")
 

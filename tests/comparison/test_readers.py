@@ -89,7 +89,57 @@ def test_an_mjcf_file_is_read_by_mujoco_and_by_no_reader_of_urdf(tmp_path: Path)
     mujoco, yourdfpy = compare_readers(urdfkin.load(str(path)), ["mujoco", "yourdfpy"])
     assert mujoco.agrees, mujoco
     assert mujoco.joints == ("j", "k")
-    assert yourdfpy.refused == "the library has no reader of MJCF"
+    assert yourdfpy.refused == "the adapter of the library does not read MJCF"
+    assert {one.library for one in compare_readers(urdfkin.load(str(path)))} <= {"Pinocchio", "MuJoCo"}
+
+
+USD = """#usda 1.0
+( metersPerUnit = 1
+  upAxis = "Z" )
+def Xform "arm" (prepend apiSchemas = ["PhysicsArticulationRootAPI"]) {
+  def Xform "base" (prepend apiSchemas = ["PhysicsRigidBodyAPI"]) {}
+  def Xform "upper" (prepend apiSchemas = ["PhysicsRigidBodyAPI"]) {
+    double3 xformOp:translate = (0, 0, 0.5)
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+  }
+  def PhysicsFixedJoint "mount" {
+    rel physics:body1 = </arm/base>
+  }
+  def PhysicsRevoluteJoint "shoulder" {
+    uniform token physics:axis = "Y"
+    rel physics:body0 = </arm/base>
+    rel physics:body1 = </arm/upper>
+    point3f physics:localPos0 = (0, 0, 0.5)
+    float physics:lowerLimit = -90
+    float physics:upperLimit = 90
+  }
+}
+"""
+
+
+def test_a_usd_file_is_read_by_newton_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pxr")
+    path = tmp_path / "arm.usda"
+    path.write_text(USD)
+    robot = urdfkin.load(str(path))
+    monkeypatch.setattr(readers, "version", lambda name: None if name == "newton" else "1.0")
+    with pytest.raises(urdfkin.InputError, match=r"no installed library reads USD.*pip install newton"):
+        compare_readers(robot)
+    assert compare_readers(robot, ["yourdfpy"])[0].refused == "the adapter of the library does not read USD"
+
+
+def test_newton_reads_a_usd_file_like_urdfkin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("newton")
+    path = tmp_path / "arm.usda"
+    path.write_text(USD)
+    robot = urdfkin.load(str(path))
+    (found,) = compare_readers(robot)
+    assert (found.agrees, found.joints, found.missing) == (True, ("shoulder",), ())
+    path.write_text(USD.replace("(0, 0, 0.5)\n    float", "(0, 0, 0.501)\n    float"))
+    monkeypatch.setattr(readers, "_source", lambda _: (str(path), "usd"))
+    (found,) = compare_readers(robot)
+    assert [one.joint for one in found.differences] == ["shoulder"]
+    assert found.worst == pytest.approx(1e-3, rel=1e-2)
 
 
 def test_a_library_that_hangs_or_dies_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -34,9 +34,9 @@ def command(robot: str, libraries: str | None, samples: int, seed: int) -> Answe
     """Compare how other libraries read ROBOT: joints, their order, and the poses of all links.
 
     Each library of this Python environment reads the file in a process of its own: Pinocchio, MuJoCo, Drake,
-    iDynTree, yourdfpy, urchin, kinpy, ikpy, the Robotics Toolbox, scikit-robot. The poses of all links are
-    compared with urdfkin's. For each joint that a library reads differently, the command names the element
-    of the file that explains the difference. MJCF files are read by Pinocchio and MuJoCo.
+    iDynTree, yourdfpy, urchin, kinpy, ikpy, the Robotics Toolbox, scikit-robot. Pinocchio and MuJoCo read
+    MJCF files, and Newton reads USD files. The poses of all links are compared with urdfkin's. For each joint
+    that a library reads differently, the command names the element of the file that explains the difference.
 
     Exit 0: all libraries agree. 1: a library differs or refuses the file. 2: bad input.
     """

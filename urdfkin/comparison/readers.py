@@ -21,6 +21,7 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind
 from urdfkin.system.plain_xml import plain_xml
 from urdfkin.system.processes import ask_python, own_python
 from urdfkin.urdf.mjcf import is_mjcf, is_text
+from urdfkin.urdf.sources import is_usd
 from urdfkin.verify.adapters import LIBRARIES, version
 
 if TYPE_CHECKING:
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 #: positions, a multiple of this number. Libraries that compute in double precision differ by less than 1e-13.
 #: A misread element causes a larger difference.
 _EQUAL = 1e-9
+#: The same for libraries that compute in single precision.
+_EQUAL_SINGLE = 1e-5
 #: Time limit of a library, in seconds.
 _PATIENCE = 60.0
 #: Largest answer of a library, in bytes.
@@ -90,9 +93,9 @@ class LibraryReading:
         return asdict(self)
 
 
-def installed() -> tuple[str, ...]:
-    """Return the names of the libraries of this environment that have an adapter."""
-    return tuple(name for name in LIBRARIES if version(name) is not None)
+def installed(form: str = "urdf") -> tuple[str, ...]:
+    """Return the names of the libraries of this environment that have an adapter for a format."""
+    return tuple(name for name, one in LIBRARIES.items() if form in one.forms and version(name) is not None)
 
 
 def compare_readers(
@@ -102,13 +105,14 @@ def compare_readers(
 
     Args:
         robot: The robot. All its links are compared at q = 0 and at random configurations.
-        libraries: Names of libraries (`installed`); by default all installed libraries.
+        libraries: Names of libraries (`installed`); by default all installed libraries that read the format.
         samples: Number of random configurations.
         seed: Seed of the configurations.
 
     Raises:
         UnknownNameError: a library has no adapter.
-        InputError: a library is not installed, a joint is locked, or the robot is MJCF text without a file.
+        InputError: a library is not installed, none reads the format, a joint is locked, the robot is MJCF
+            text without a file, or a variant or an articulation of a USD stage was selected.
 
     >>> import urdfkin
     >>> from urdfkin.comparison.readers import compare_readers
@@ -116,7 +120,13 @@ def compare_readers(
     >>> reading.agrees, reading.joints
     (True, ('joint_1', 'joint_2'))
     """
-    names = installed() if libraries is None else tuple(libraries)
+    source, form = _source(robot)
+    names = installed(form) if libraries is None else tuple(libraries)
+    if not names:
+        could = [one.package for one in LIBRARIES.values() if form in one.forms]
+        raise InputError(
+            f"no installed library reads {form.upper()}", remedy=f"pip install {' '.join(could)}"
+        )
     for name in names:
         if name not in LIBRARIES:
             raise UnknownNameError("library", name, LIBRARIES)
@@ -131,7 +141,7 @@ def compare_readers(
         )
     q = np.concatenate((np.asarray(robot.neutral())[None], robot.sample(samples, seed=seed)))
     ours = np.asarray(robot.placement(q, list(robot.link_names)))
-    return tuple(_reading(robot, name, q, ours) for name in names)
+    return tuple(_reading(robot, name, source, form, q, ours) for name in names)
 
 
 def values_of(robot: Robot, q: FloatArray) -> dict[str, Any]:
@@ -145,12 +155,13 @@ def values_of(robot: Robot, q: FloatArray) -> dict[str, Any]:
     return values
 
 
-def _reading(robot: Robot, name: str, q: FloatArray, ours: FloatArray) -> LibraryReading:
+def _reading(
+    robot: Robot, name: str, source: str, form: str, q: FloatArray, ours: FloatArray
+) -> LibraryReading:
     """Run one library in a separate process, and return how the library reads the robot."""
     title, number = LIBRARIES[name].title, version(name) or ""
-    source, form = _source(robot)
     if form not in LIBRARIES[name].forms:
-        return LibraryReading(title, number, "the library has no reader of MJCF")
+        return LibraryReading(title, number, f"the adapter of the library does not read {form.upper()}")
     values = [values_of(robot, one) for one in q]
     command = own_python("from urdfkin.verify.adapters import main; main()")
     case = {"name": robot.name, "text": source, "configurations": values}
@@ -163,7 +174,7 @@ def _reading(robot: Robot, name: str, q: FloatArray, ours: FloatArray) -> Librar
         return LibraryReading(title, number, printable(answer["error"])[:_QUOTED])
     theirs = [{link: np.array(T) for link, T in one.items()} for one in answer["poses"]]
     links = robot.link_names
-    equal = _EQUAL * max(1.0, float(np.abs(ours).max()))
+    equal = (_EQUAL_SINGLE if LIBRARIES[name].single else _EQUAL) * max(1.0, float(np.abs(ours).max()))
     shared = [i for i, link in enumerate(links) if all(link in one for one in theirs)]
     if not shared:
         return LibraryReading(title, number, "its model has none of the links", tuple(answer["joints"]))
@@ -183,15 +194,25 @@ def _reading(robot: Robot, name: str, q: FloatArray, ours: FloatArray) -> Librar
         number,
         joints=tuple(answer["joints"]),
         same_order=answer["joints"] == [name for name in values[0] if name != added],
-        missing=tuple(link for i, link in enumerate(links) if i not in shared and (i or not added)),
+        missing=tuple(
+            link
+            for i, link in enumerate(links)
+            if i not in shared and (i or not added) and (link, form) != ("world", "usd")
+        ),
         worst=0.0 if worst <= equal else worst,
         differences=tuple(_differences(robot, title, ours, poses, elements, own, equal)),
     )
 
 
 def _source(robot: Robot) -> tuple[str, str]:
-    """Return a library's input (URDF text without shapes, or the path of an MJCF file), and the format."""
+    """Return a library's input and its format: a URDF text without shapes, or the path of another file."""
     source = robot.origin.source
+    if is_usd(source):
+        if robot.origin.variants or robot.origin.articulation is not None:
+            raise InputError(
+                "other libraries read the whole USD stage", remedy="load it without variants and articulation"
+            )
+        return str(source), "usd"
     if is_mjcf(source):
         if is_text(source):
             raise InputError("a text of MJCF cannot be given to other libraries", remedy="write it to a file")

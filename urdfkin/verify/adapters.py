@@ -62,7 +62,7 @@ class Reading:
 
 
 def _is_path(source: str) -> bool:
-    """Return whether a source is the path of an MJCF file; other sources are URDF texts."""
+    """Return whether a source is the path of an MJCF or USD file; other sources are URDF texts."""
     return not source.lstrip().startswith("<")
 
 
@@ -292,13 +292,17 @@ def _urchins(joint: Any, value: Value) -> Value:
     """
     if joint.joint_type != "floating":
         return value
-    x, y, z, w = value[3:]
-    R = [
+    return _rigid(_rotation(value[3:]), value[:3])
+
+
+def _rotation(quaternion: Value) -> Value:
+    """Return the rotation matrix of a unit quaternion x, y, z, w."""
+    x, y, z, w = quaternion
+    return [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
-    return _rigid(R, value[:3])
 
 
 def read_kinpy(text: str) -> Reading:
@@ -368,6 +372,41 @@ def read_skrobot(text: str) -> Reading:
     return Reading(list(joints), poses)
 
 
+def read_newton(path: str) -> Reading:
+    """Read a USD stage with Newton, which computes in single precision."""
+    import newton  # noqa: PLC0415
+
+    builder = newton.ModelBuilder()
+    builder.add_usd(path)
+    model = builder.finalize(device="cpu")
+    state, starts = model.state(), model.joint_q_start.numpy()
+    counts = np.diff(np.append(starts[: len(builder.joint_label)], model.joint_coord_count))
+    # Newton adds a free joint to a body without a joint, so such a joint is not in the file.
+    places = {
+        str(label).rpartition("/")[2]: (int(start), int(count))
+        for label, kind, start, count in zip(
+            builder.joint_label, builder.joint_type, starts, counts, strict=False
+        )
+        if count and int(kind) != int(newton.JointType.FREE)
+    }
+    bodies = [str(label).rpartition("/")[2] for label in builder.body_label]
+
+    def poses(values: Mapping[str, Value]) -> Poses:
+        q = model.joint_q.numpy()
+        for name in places.keys() & values.keys():
+            start, count = places[name]
+            q[start : start + count] = values[name]
+        state.joint_q.assign(q)
+        newton.eval_fk(model, state.joint_q, state.joint_qd, state)
+        rotations = (quaternion / np.linalg.norm(quaternion) for quaternion in state.body_q.numpy()[:, 3:])
+        return {
+            name: _rigid(_rotation(rotation), p)
+            for name, rotation, p in zip(bodies, rotations, state.body_q.numpy()[:, :3], strict=True)
+        }
+
+    return Reading(list(places), poses)
+
+
 @dataclass(frozen=True)
 class Library:
     """A library that reads robot files.
@@ -377,7 +416,8 @@ class Library:
         package: The name that pip installs.
         module: The module that is imported.
         read: Its adapter.
-        forms: The file formats that the library reads.
+        forms: The file formats that the adapter reads with the library.
+        single: Whether the library computes in single precision.
     """
 
     title: str
@@ -385,6 +425,7 @@ class Library:
     module: str
     read: Callable[[str], Reading]
     forms: tuple[str, ...] = ("urdf",)
+    single: bool = False
 
 
 #: The libraries, by their names on the command line.
@@ -401,6 +442,7 @@ LIBRARIES: dict[str, Library] = {
         "Robotics Toolbox", "roboticstoolbox-python", "roboticstoolbox", read_roboticstoolbox
     ),
     "skrobot": Library("scikit-robot", "scikit-robot", "skrobot", read_skrobot),
+    "newton": Library("Newton", "newton", "newton", read_newton, ("usd",), single=True),
 }
 
 
