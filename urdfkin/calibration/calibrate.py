@@ -469,7 +469,10 @@ def _parse_noise(noise: tuple[float, float]) -> Noise:
 def _weak(
     robot: Robot, model: Model, measured: Measured, kept: Sequence[int], at: FloatArray
 ) -> dict[int, float]:
-    """Return the parameters that random configurations of the same number would determine much better."""
+    """Return the parameters that the same number of random configurations would determine much better.
+
+    The number for each parameter is its uncertainty, divided by its uncertainty at random configurations.
+    """
     general = _values(model, robot, robot.sample(len(measured), seed=_OTHERS))
     sizes = []
     for values in (measured.values, general):

@@ -317,13 +317,13 @@ v_option = click.option(
     "--v",
     metavar="VALUES",
     default="neutral",
-    help="Joint velocities, in the forms of --q; `neutral` is zero.",
+    help="Joint velocities, written like --q; `neutral` is zero.",
 )
 a_option = click.option(
     "--a",
     metavar="VALUES",
     default="neutral",
-    help="Joint accelerations, in the forms of --q; `neutral` is zero.",
+    help="Joint accelerations, written like --q; `neutral` is zero.",
 )
 
 convention_option = click.option(

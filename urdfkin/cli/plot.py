@@ -49,9 +49,9 @@ EXAMPLE = "urdfkin plot ur5 --to 1,-1,1.2,0.3,0.5,0 --duration 2 --output ur5.sv
     "start",
     default="neutral",
     show_default=True,
-    help="With --to: start of a line in joint space, in the forms of --q of other commands.",
+    help="With --to: first configuration of a line in joint space, written like --q in other commands.",
 )
-@click.option("--to", "end", help="End of a line in joint space, in the forms of --q of other commands.")
+@click.option("--to", "end", help="Last configuration of a line in joint space, written like --q.")
 @click.option(
     "--duration",
     type=Number(),

@@ -1,4 +1,4 @@
-"""Make the proof in an exported file: a comparison with Pinocchio, and test vectors at fifty digits.
+"""Compare exported expressions with Pinocchio, and make the test vectors of an exported file.
 
 The expressions are evaluated exactly as they are printed, and the results are compared with Pinocchio's.
 Wherever the file is used, the test vectors then check the file together with the language, the compiler and
