@@ -177,7 +177,7 @@ def _history(folder: Path) -> str:
 
 
 def fleet_pages(folder: Path, document: Document) -> Iterator[Page]:
-    """Yield the pages of a report of many robots: as the command writes it, each robot, and all in one text.
+    """Yield the pages of a report of many robots: the overview, each robot's page, and one page with all.
 
     The command writes a file for each robot beside the page. `to_html` returns one text.
     """

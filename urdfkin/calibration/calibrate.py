@@ -63,7 +63,8 @@ _UNLIKELY = 4.0
 #: A warning is given if the uncertainty of a parameter is more than this factor times the uncertainty that
 #: random configurations would give.
 _WEAK = 10.0
-#: Seed of the random configurations for `_WEAK`. The configurations for `general` have another seed.
+#: Seed of the random configurations to which `_WEAK` refers. The random configurations for
+#: `Calibration.general` have another seed.
 _OTHERS = 1
 #: If a column's diagonal entry of R is below this fraction of the largest entry, the column depends on the
 #: columns before it.

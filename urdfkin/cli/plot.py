@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.robot.trajectory import Trajectory
 
-#: A copy of the names in `urdfkin.view.plot`: importing it would slow --help down.
+#: These names are copied from `urdfkin.view.plot`, because importing that module would slow --help down.
 PANELS = (
     *("q", "v", "a", "position", "orientation", "velocity", "angular-velocity", "acceleration"),
     *("angular-acceleration", "parts", "singular-values", "angular-singular-values", "manipulability"),
@@ -102,7 +102,8 @@ def command(
     The panels show q, v and a with their limits, the frame's position, velocity, acceleration and its parts,
     the singular values and the check. Each axis has one unit. The trajectory is a CSV or .npz file, or a line
     in joint space from rest to rest, with --to. A floating base moves along a screw. With --convention, the
-    file and --from, --to have a tool's names and numbers; the panels have those of the URDF, in rad and m.
+    file and the values of --from and --to are in that convention. The panels show the numbers of the URDF, in
+    rad and m.
 
     Exit 0: verified. 1: a disagreement. 3: Pinocchio could not check it.
     """

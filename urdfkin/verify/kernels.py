@@ -83,7 +83,7 @@ def _is_in_threes(scale, k):
 
 @helper()
 def _divide_threes(ours, theirs, unit, width, units):
-    """Write the largest difference of each three numbers that share a scale; NaN or inf if not finite."""
+    """Write the largest difference of each three numbers with a common scale; it may be NaN or inf."""
     for j in range(width):
         x = abs(ours[j] - theirs[j])
         y = abs(ours[j + width] - theirs[j + width])

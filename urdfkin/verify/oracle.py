@@ -174,7 +174,7 @@ class Layout:
         self._same_v &= bool((self._index == np.arange(model.nv)).all())
 
     def _of_sizes(self, sizes: tuple[int, int]) -> tuple[Places, Places, FloatArray, FloatArray]:
-        """Return, for joints of equal size, their indices in Pinocchio's and urdfkin's q, and mimic rules."""
+        """Return, for joints with one size, the indices in Pinocchio's and urdfkin's q, and mimic rules."""
         own = [place for place in self._places if place.sizes == sizes]
         return (
             np.array([place.full_q for place in own], dtype=np.int64),

@@ -49,7 +49,7 @@ _DEGREES, _RADIANS, _STEPS = 1.0, 0.01, 50.0
 _DIGITS, _DIGITS_OF_DEGREES = 4, 2
 #: Default ranges: joint velocity in rad/s or m/s, and joint acceleration in rad/s^2 or m/s^2.
 _RATE, _SECOND_RATE = 3.0, 5.0
-#: Most missing meshes that are named.
+#: Largest number of missing meshes that a message names.
 _MOST_MISSING = 5
 
 
