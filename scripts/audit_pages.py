@@ -66,7 +66,8 @@ UNFOLD = "document.querySelectorAll('details').forEach((part) => { part.open = t
 _PRESSES, _PAGES = 60, 12
 #: Errors of the HTML checker that the site's theme causes.
 FOREIGN = ("Attribute “autocomplete” is only allowed when the input type is",)
-#: A mouse for the browser, because without a mouse the site's theme omits elements that keyboard users need.
+#: Options with which Chromium reports a mouse. Without a mouse, the site's theme omits elements that keyboard
+#: users need, and the audit tests these elements.
 _MOUSE = (
     "--blink-settings=primaryHoverType=2,availableHoverTypes=2,primaryPointerType=4,availablePointerTypes=4"
 )
@@ -176,7 +177,7 @@ def _history(folder: Path) -> str:
 
 
 def fleet_pages(folder: Path, document: Document) -> Iterator[Page]:
-    """Yield the pages of a report of many robots: as the command writes it, each robot, and all in one text.
+    """Yield the pages of a report of many robots: the overview, each robot's page, and one page with all.
 
     The command writes a file for each robot beside the page. `to_html` returns one text.
     """
@@ -245,7 +246,7 @@ def site(folder: Path) -> Iterator[Page]:
 
 @contextmanager
 def viewer(plays: bool = False) -> Iterator[Page]:
-    """Serve the viewer with a robot without meshes, with a trajectory to play if `plays`."""
+    """Serve the viewer of a robot without meshes; if `plays` is True, add a trajectory to play."""
     from urdfkin.view.server import new_server  # noqa: PLC0415  of the extra `view`
     from urdfkin.view.viewer import Viewer  # noqa: PLC0415
 

@@ -43,7 +43,8 @@ from urdfkin.verify.sampling import draw_base
 from urdfkin.verify.verifier import bound_of
 
 #: Numbers of configurations of the tested batches.
-#: They are less than a block of eight, one block, a little more, and many blocks with a remainder.
+#: The numbers are: fewer than a block of eight, one block, a little more than a block, and many blocks with a
+#: remainder.
 LENGTHS = (1, 2, 7, 8, 9, 100)
 #: Numbers of threads of a batch; None: urdfkin's default.
 THREADS = (None, 1, 2, 3)

@@ -50,7 +50,7 @@ _COMPILED = (
     ("cuda", ".cpp", ("g++",), ("-std=c++11", *_STRICT[1:])),
 )
 _WAYS = ("c", "cuda", "numpy", "array")
-#: Largest nv of a robot whose Hessian is exported, to compare derivatives with.
+#: Largest nv of a robot whose Hessian is exported. The Hessian is compared with derivatives of the Jacobian.
 _HESSIANS = 16
 _SHARE = re.compile(r"worst error (\S+) of the bound")
 
@@ -86,7 +86,7 @@ def shares(written: Code, folder: Path, ways: Collection[str]) -> Iterator[tuple
 
 
 def _largest(found: Sequence[float], count: int) -> float:
-    """Return the largest share; NaN if one is NaN or their number is wrong."""
+    """Return the largest share; NaN if a share is NaN or if the number of shares is wrong."""
     return max(found) if len(found) == count and not any(map(math.isnan, found)) else float("nan")
 
 
@@ -166,7 +166,7 @@ def check_library(library: str, environment: Path, package: str | None, keep: Pa
 
 
 def _files(library: str, folder: Path) -> Iterator[Path]:
-    """Write the files of all tips in a library's language, and for PyTorch also in that of any array."""
+    """Write the files of all tips in a library's language, and for PyTorch also as `array`."""
     for number, (_, robot, frame) in enumerate(subjects(tips=True)):
         wanted = ("placement", "jacobian", "velocity", "acceleration") if robot.nv else ("placement",)
         if 0 < robot.nv <= _HESSIANS and all(joint.nv <= 1 for joint in robot.tree.joints):

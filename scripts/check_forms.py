@@ -115,7 +115,7 @@ def main(words: Sequence[str] | None = None) -> int:
 
 
 def _checked(form: str, found: Sequence[Subject], folder: Path) -> int:
-    """Print the line of a format; return the number of wrong tables."""
+    """Print the results of an export format as one row; return the number of wrong exported tables."""
     begin = time.perf_counter()
     if form == "latex":
         return _compiled(found, folder)

@@ -89,7 +89,7 @@ LIBRARY: dict[str, tuple[str, str, str]] = {
 }
 _FORMULA = re.compile(r"(?:<p>)?\$<code>(.*?)</code>\$(?:</p>)?", re.DOTALL)
 _DISPLAYED = re.compile(r"^```math\n(.*?)\n```$", re.DOTALL | re.MULTILINE)
-#: A picture for each theme of the system: GitHub's form.
+#: Pattern of a picture with a light and a dark version, in GitHub's notation.
 _PICTURE = re.compile(
     r'<picture><source media="[^"]*dark[^"]*" srcset="([^"]+)"><img src="([^"]+)"(.*?)></picture>'
 )

@@ -49,8 +49,9 @@ The textbook's equations (`urdfkin/kinematics/equations.py`) are evaluated with 
 inputs are exact: the decimals in the URDF text, multipliers of mimic joints and lengths of axes included, and
 the doubles of q, v, a and a moving base. Each sum, product and quotient is widened by its rounding error, so
 the interval always contains the true value. At the end the interval is rounded outward to doubles. With
-enough digits its two ends are neighbouring doubles. A double inside is then one of the two doubles around the
-true value. Some results of urdfkin and Pinocchio lie outside, because they round at each step.
+enough digits the two ends of the interval are neighbouring doubles, and the true value lies between them. A
+computed result that lies in this interval is therefore one of the two doubles nearest to the true value. Some
+results of urdfkin and Pinocchio lie outside the interval, because both libraries round at each step.
 
 The proof does *not* cover the equations themselves; the agreement with Pinocchio supports those. The
 intervals are balls of [Arb](https://flintlib.org/doc/arb.html): a midpoint and a radius. Arb proves the

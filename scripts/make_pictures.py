@@ -60,9 +60,9 @@ def reference_frames() -> Any:
     points = arm.placement(q, ["base", "link_2", "tip"])[:, :2, 3]
     R_tip, tip, world = arm.placement(q, "tip")[:2, :2], points[-1], np.eye(2)
     told = (
-        ("local_world_aligned", tip, world, "(-0.8, 0.5): the tip, along the world's axes"),
-        ("local", tip, R_tip, "(0.5, 0.8): the tip, along its own axes"),
-        ("world", np.zeros(2), world, "(0, -0.5): the point at the world's origin"),
+        ("local_world_aligned", tip, world, "(-0.8, 0.5): tip velocity in world axes"),
+        ("local", tip, R_tip, "(0.5, 0.8): tip velocity in tip axes"),
+        ("world", np.zeros(2), world, "(0, -0.5): velocity of the point at the origin"),
     )
     for axes, (reference, at, R, title) in zip(panels, told, strict=True):
         axes.plot(

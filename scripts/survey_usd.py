@@ -53,7 +53,11 @@ def stage_of(python: str, urdf: str, folder: Path) -> Path | str:
 
 
 def row_of(python: str, name: str) -> tuple[str, str, str, str, str]:
-    """Return the row of a robot: name, joints, verdict, largest distance, that of single precision."""
+    """Return the row of a robot: name, joints, verdict, and two distances.
+
+    The first is the largest distance between the models, the second is the one that single precision can
+    cause.
+    """
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         robot = urdfkin.load(name)

@@ -107,7 +107,7 @@ def test_every_mutator_is_used_and_nearly_all_change_something() -> None:
                 more='<link name="end"/>'
                 + fixed("e", "tool", "end").replace("</j", '<origin xyz="1 0 0"/></j'),
             ),
-            "too large to compute, with a finding",
+            "too large to compute, with a finding that states the reason",
         ),
     ],
 )

@@ -48,7 +48,7 @@ class Calls:
     remark: str = ""
 
     def batch(self, subject: Subject, quantity: str) -> Work:
-        """Return the work of a batch: a loop over all configurations, which writes into a reused array."""
+        """Return the timed task for a batch: a loop over all configurations that fills a reused array."""
         inputs = [self._ordered(x) for x in subject.inputs(quantity, subject.loop)]
         out = np.empty((subject.loop, *(self.shape or subject.width(quantity))))
         loop = self.loop()
@@ -69,7 +69,7 @@ class Calls:
         return _function(self.names, "out, *inputs", "for k, (q, v, a) in enumerate(rows(inputs)):", body)
 
     def single(self, subject: Subject, quantity: str) -> Work:
-        """Return the work of single calls.
+        """Return the timed task for single calls.
 
         The results of these calls are not stored, and the rows of the inputs are prepared beforehand.
         """

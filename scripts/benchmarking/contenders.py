@@ -82,7 +82,7 @@ class Contender:
 
 
 def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
-    """Yield batches with one thread, all threads and new memory, and a batch that only writes the output."""
+    """Yield the timed tasks for a batch, with different threads and memory; one only writes the output."""
     method = getattr(subject.robot, quantity)
     inputs = subject.inputs(quantity, subject.n)
     out = np.empty((subject.n, *subject.width(quantity)))
@@ -187,7 +187,7 @@ _here: dict[str, Any] = {}
 
 
 def _in_processes(subject: Subject, quantity: str) -> Work:
-    """Return the work of a batch in several running processes with shared memory."""
+    """Return the timed task in which several running processes with shared memory compute a batch."""
     spawn: Any = multiprocessing.get_context("spawn")
     buffers, arrays = [], []
     for x in (*subject.inputs(quantity, subject.n), np.zeros((subject.n, *subject.width(quantity)))):

@@ -108,7 +108,7 @@ def _pose(row: FloatArray) -> tuple[list[list[float]], list[float]]:
 
 
 def batches(subject: Subject, quantity: str) -> Iterator[Work]:
-    """Yield the work of a whole batch in one call."""
+    """Yield the timed task in which generated C code computes a whole batch in one call."""
     compute = compiled(subject, quantity)
     inputs = subject.inputs(quantity, subject.n)
     out = np.empty((subject.n, *subject.width(quantity)))

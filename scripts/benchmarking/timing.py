@@ -34,7 +34,7 @@ class Work:
         n: Number of configurations that `compute` computes; they are the first configurations of the subject.
         compute: The timed function.
         result: Returns the results in urdfkin's conventions, for the first configurations; not timed. None if
-            there are no results to compare, as for the work that only writes the output.
+            there are no results to compare, as for the task that only writes the output.
         tolerance: Allowed difference from Pinocchio.
         remark: A remark on the measurement.
     """

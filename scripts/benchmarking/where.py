@@ -65,7 +65,7 @@ def cut(program: Program, parts: int) -> Program:
 
 
 def _core(subject: Subject, quantity: str, program: Program, who: str) -> Work:
-    """Return the work of a kernel on a whole batch."""
+    """Return the timed task in which a kernel computes a whole batch."""
     inputs = [STILL_STATE, *subject.inputs(quantity, subject.n)]
     out = np.empty((subject.n, *subject.width(quantity)))
     staged = who == "writing results" and is_staged(out)

@@ -9,7 +9,7 @@ GOOD = (
     "refused",
     "verified",
     "not verified, with a finding that states the reason",
-    "too large to compute, with a finding",
+    "too large to compute, with a finding that states the reason",
     COMPARED,
 )
 

@@ -73,7 +73,11 @@ def _judge_mjcf(case: Case) -> Outcome:
 def _computed(robot: Robot, findings: list[Finding], warned: list[warnings.WarningMessage]) -> Outcome | None:
     """Compute all quantities and return the outcome; None if some results are not verified."""
     big = bool(_SIZES & {finding.code for finding in findings})
-    too_large = "too large to compute, with a finding" if big else "a result is not a finite number"
+    too_large = (
+        "too large to compute, with a finding that states the reason"
+        if big
+        else "a result is not a finite number"
+    )
     try:
         for what, result in ask(robot, seed=0):
             if not np.isfinite(result).all():

@@ -50,7 +50,7 @@ def test_a_wrong_d1_that_the_base_takes_up_is_told_with_its_millimetres() -> Non
     assert "very cell" not in text
     assert "after a fit of base, tool and joint offsets" in text
     assert "changed the base by 10 mm" in text
-    assert "can replace them: d1" in text
+    assert "has the same effect: d1" in text
     assert [(one.row, one.cell) for one in found.instead] == [(0, "d")]
     assert found.instead[0].difference == pytest.approx(-0.01, rel=1e-6)
 

@@ -48,7 +48,7 @@ def test_more_configurations_than_memory_holds_are_refused_in_one_line() -> None
     with pytest.raises(InputError) as caught:
         robot.sample(10**15)
     assert str(caught.value) == (
-        "ur5: so many configurations do not fit into memory: found n = 1000000000000000, which are "
+        "ur5: this number of configurations does not fit into memory: found n = 1000000000000000, which are "
         "48000000 GB; draw them in parts, each with a seed of its own"
     )
     assert caught.value.__cause__ is None

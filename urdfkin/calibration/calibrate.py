@@ -63,7 +63,8 @@ _UNLIKELY = 4.0
 #: A warning is given if the uncertainty of a parameter is more than this factor times the uncertainty that
 #: random configurations would give.
 _WEAK = 10.0
-#: Seed of the random configurations for `_WEAK`. The configurations for `general` have another seed.
+#: Seed of the random configurations to which `_WEAK` refers. The random configurations for
+#: `Calibration.general` have another seed.
 _OTHERS = 1
 #: If a column's diagonal entry of R is below this fraction of the largest entry, the column depends on the
 #: columns before it.
@@ -469,7 +470,10 @@ def _parse_noise(noise: tuple[float, float]) -> Noise:
 def _weak(
     robot: Robot, model: Model, measured: Measured, kept: Sequence[int], at: FloatArray
 ) -> dict[int, float]:
-    """Return the parameters that random configurations of the same number would determine much better."""
+    """Return the parameters that the same number of random configurations would determine much better.
+
+    The number for each parameter is its uncertainty, divided by its uncertainty at random configurations.
+    """
     general = _values(model, robot, robot.sample(len(measured), seed=_OTHERS))
     sizes = []
     for values in (measured.values, general):

@@ -140,7 +140,7 @@ class ParametricChain:
         return factors * numbers, factors
 
     def rounding(self, values: FloatArray) -> float:
-        """Bound the rounding error (metres) of a number of `columns`.
+        """Bound the rounding error (metres) of each number that `columns` returns.
 
         Divide the bound by `size` for radians.
         """

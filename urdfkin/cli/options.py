@@ -317,13 +317,13 @@ v_option = click.option(
     "--v",
     metavar="VALUES",
     default="neutral",
-    help="Joint velocities, in the forms of --q; `neutral` is zero.",
+    help="Joint velocities, written like --q; `neutral` is zero.",
 )
 a_option = click.option(
     "--a",
     metavar="VALUES",
     default="neutral",
-    help="Joint accelerations, in the forms of --q; `neutral` is zero.",
+    help="Joint accelerations, written like --q; `neutral` is zero.",
 )
 
 convention_option = click.option(
@@ -553,7 +553,8 @@ def read_batch(
 ) -> tuple[FloatArray, Sequence[str]]:
     """Read a CSV file with one sample a line.
 
-    A first line of names may put the columns in any order, and state the units of those in `units`.
+    If the first line contains names, the columns may be in any order. The names of the columns in `units` may
+    also state a unit.
 
     Returns:
         The (n, width) numbers, and the layout with as many columns as the file.

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.robot.trajectory import Trajectory
 
-#: A copy of the names in `urdfkin.view.plot`: importing it would slow --help down.
+#: These names are copied from `urdfkin.view.plot`, because importing that module would slow --help down.
 PANELS = (
     *("q", "v", "a", "position", "orientation", "velocity", "angular-velocity", "acceleration"),
     *("angular-acceleration", "parts", "singular-values", "angular-singular-values", "manipulability"),
@@ -49,9 +49,9 @@ EXAMPLE = "urdfkin plot ur5 --to 1,-1,1.2,0.3,0.5,0 --duration 2 --output ur5.sv
     "start",
     default="neutral",
     show_default=True,
-    help="With --to: start of a line in joint space, in the forms of --q of other commands.",
+    help="With --to: first configuration of a line in joint space, written like --q in other commands.",
 )
-@click.option("--to", "end", help="End of a line in joint space, in the forms of --q of other commands.")
+@click.option("--to", "end", help="Last configuration of a line in joint space, written like --q.")
 @click.option(
     "--duration",
     type=Number(),
@@ -102,7 +102,8 @@ def command(
     The panels show q, v and a with their limits, the frame's position, velocity, acceleration and its parts,
     the singular values and the check. Each axis has one unit. The trajectory is a CSV or .npz file, or a line
     in joint space from rest to rest, with --to. A floating base moves along a screw. With --convention, the
-    file and --from, --to have a tool's names and numbers; the panels have those of the URDF, in rad and m.
+    file and the values of --from and --to are in that convention. The panels show the numbers of the URDF, in
+    rad and m.
 
     Exit 0: verified. 1: a disagreement. 3: Pinocchio could not check it.
     """

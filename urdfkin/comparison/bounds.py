@@ -65,8 +65,8 @@ from urdfkin.robot import Robot
 from urdfkin.verify.oracle import QueryBatch
 from urdfkin.verify.sampling import sample
 
-#: Number of random configurations at the start of a search.
-#: Number of further configurations, in which each variable is at an end of its range.
+#: The first number is the number of random configurations at the start of a search. The second number is the
+#: number of further configurations, in which each variable is at an end of its range.
 SAMPLES, CORNERS = 512, 128
 #: The search starts from the `STARTS` worst random configurations.
 #: Along each coordinate, it tries `ALONG` values.
@@ -350,7 +350,7 @@ def _second_derivatives(
 def _pass_to_front(
     vectors: _Vectors, steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables
 ) -> float:
-    """Return the largest length of d in front of all steps, from the vectors after the last step's L."""
+    """Return the largest length of d at the base, from d and y after the last step's rigid motion L."""
     vectors = before_it(steps[-1], *vectors)
     for step, pair in zip(reversed(steps[:-1]), reversed(pairs[: len(steps) - 1]), strict=True):
         slides = step.kind != "turns"

@@ -498,7 +498,7 @@ def _interval_errors(
     if _within(proven[1], radians, rounding[1]):
         if problems or not sharply:
             return
-        # An upper bound below a distance that occurs at some configuration cannot be proven.
+        # If the models reach a larger distance than the claimed upper bound, the claim is wrong.
         attained = max(claim["lower"], float(search.seen([frame])[0].max()))
         if metres < attained - 2.0 * rounding[0]:
             yield f"{place}: its upper bound is wrong: {attained:.6g} m is attained"

@@ -777,7 +777,7 @@ def remarks(
         found: The alignment of the models.
         variables: Their common variables.
         tolerance: The tolerance within which numbers are equal.
-        single: The share of itself by which rounding to single precision changes a number, or 0.
+        single: The relative error of rounding a number to single precision; 0 if no model is rounded so.
     """
     some = list[Difference]()
     for step in found.steps:

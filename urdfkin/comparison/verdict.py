@@ -247,7 +247,7 @@ class Comparator:
     def single(self, found: Alignment, variables: Variables) -> tuple[float, float] | None:
         """Return the distance and angle (m, rad) between frames that single precision can cause, or None.
 
-        The errors of both files add up, and those of double precision.
+        The bound is the sum of the errors of both files and of the rounding errors of double precision.
         """
         if all(robot.single is None for robot in self.robots):
             return None
@@ -277,7 +277,7 @@ class Comparator:
         return written
 
     def _compared_links(self, found: Alignment) -> list[tuple[int, int]]:
-        """Return the pairs of matching links that are compared in the models as they are written."""
+        """Return the pairs of matching links whose poses in the two unchanged models are compared."""
         tables = any(robot.origin.table for robot in self.robots)
         links = self.trees[0].links, self.trees[1].links
         pairs = ((frame.a, frame.b) for frame in found.frames)
@@ -492,10 +492,11 @@ def _with_idle_joints_fixed(
 def _spelled_alike(
     robots: tuple[Robot, Robot],
 ) -> tuple[tuple[Sequence[str], Sequence[str]], dict[str, str]]:
-    """Return a label for each link of two models, and pairs of joints that USD spells otherwise.
+    """Return a label for each link of two models, and pairs of joints with another spelling in USD.
 
-    A name that USD does not allow is written in one of several ways. If the USD file has the result, and only
-    one name of the other model gives it, the two are the same name.
+    A USD file contains another spelling of each name that USD does not allow, and several spellings are
+    possible. A name in the USD file counts as a spelling of a name in the other model if no second name of
+    that model has the same spelling.
     """
     labels, joints = [list(robot.tree.links) for robot in robots], dict[str, str]()
     for k, own in enumerate(robots):
@@ -511,7 +512,7 @@ def _spelled_alike(
 
 
 def _originals(names: Sequence[str], spelt: Sequence[str]) -> dict[str, str]:
-    """Return for each name in USD the name that it stands for, if that is not in the USD file itself."""
+    """For each name in the USD file that is another spelling of a name in `names`, return the latter."""
     known, found = set(spelt), dict[str, set[str]]()
     for name in names:
         if name not in known:

@@ -36,7 +36,7 @@ _PLACES = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
 #: From this output size (bytes) on, results are written directly to memory and not to the caches, which are
 #: too small for them.
 _STREAMED = 2 << 20
-#: Number of values in a block of results; so many values fit into half of the first-level cache.
+#: Number of values in a block of results. A block fits into half of the processor's first-level cache.
 _MOST_STAGED = 3072
 
 _STRIDES = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V, KernelArgs.STRIDE_A

@@ -25,8 +25,8 @@ from urdfkin.system.locks import importing
 if TYPE_CHECKING:
     import subprocess
 
-#: Computing time (s) that a kernel must save before Numba is imported for it.
-#: Computing time (s) that a kernel must save before this process compiles it.
+#: The first number is the computing time (s) that a kernel must save before Numba is imported for the kernel.
+#: The second number is the computing time (s) that a kernel must save before this process compiles it.
 LOADING, COMPILING = 0.3, 3.0
 #: When computing without a kernel has taken this many seconds, a second process compiles the kernel.
 BESIDE = 1.0

@@ -1,4 +1,4 @@
-"""Make the proof in an exported file: a comparison with Pinocchio, and test vectors at fifty digits.
+"""Compare exported expressions with Pinocchio, and make the test vectors of an exported file.
 
 The expressions are evaluated exactly as they are printed, and the results are compared with Pinocchio's.
 Wherever the file is used, the test vectors then check the file together with the language, the compiler and
@@ -46,7 +46,8 @@ class Vector:
         inputs: q, v and a.
         results: For each quantity, the true values as decimal numbers, row by row.
         within: For each quantity, the error bound of each number, in eps.
-        single: The same in single precision, in eps = 2^-23; 0.0 if a number is beyond its range.
+        single: For each quantity, the error bound of each number in single precision, in eps = 2^-23. The
+            bound is 0.0 if a number is beyond the range of single precision.
     """
 
     inputs: tuple[list[float], ...]
@@ -210,9 +211,10 @@ def _rounded_down(x: float) -> str:
 
 
 def _rounded_up(x: float) -> str:
-    """Return x with seven digits, rounded up; 0.0, which accepts only equal numbers, if it is not finite.
+    """Return x with seven digits, rounded up; for an x that is not finite, return 0.0.
 
-    A bound in single precision is reached: a constant has exactly the error that its bound counts.
+    With the bound 0.0, only equal numbers are accepted. The bound must not be rounded down, because the error
+    of a constant in single precision can be equal to its bound.
     """
     if not np.isfinite(x):
         return "0.0"

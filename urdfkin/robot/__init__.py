@@ -504,7 +504,7 @@ class Robot(Displayable):
             return sample(self.tree, n, np.random.default_rng(seed))
         except MemoryError:
             raise InputError(
-                "so many configurations do not fit into memory",
+                "this number of configurations does not fit into memory",
                 where=self.name,
                 found=f"n = {n}, which are {8 * n * self.nq // 10**9} GB",
                 remedy="draw them in parts, each with a seed of its own",
@@ -1221,8 +1221,8 @@ class Robot(Displayable):
             reference: Reference frame of velocities, accelerations and Jacobians.
             base: Motion of the root link; None: fixed at the world origin.
             digits: Decimal digits of the interval arithmetic, at least 15. None: 30, plus one for each joint
-                before the frame. With so many digits, the ends are nearly always neighbouring doubles. With
-                15 digits, the intervals are about as wide as the rounding errors of doubles.
+                before the frame. With this number of digits, the ends are nearly always neighbouring doubles.
+                With 15 digits, the intervals are about as wide as the rounding errors of doubles.
             hessian: Also enclose the Hessian, less than 0.1 ms for each pair of joints.
 
         Raises:

@@ -36,8 +36,8 @@ SPECIAL = 3
 #: Minimum number of chunks of a robot, so that several workers can share the robot. A robot with fewer draws
 #: has fewer chunks.
 _CHUNKS = 8
-#: Maximum number of draws in a chunk. For a typical robot, so many draws take one second and give a few
-#: kilobytes of results.
+#: Maximum number of draws in a chunk. For a typical robot, 40 draws take one second and give a few kilobytes
+#: of results.
 _DRAWS = 40
 
 

@@ -59,7 +59,8 @@ SAMPLES = 3
 #: Joint velocities, accelerations, and positions of planar and floating joints lie between -_RANGE and
 #: _RANGE.
 _RANGE = 2.0
-#: Inputs are multiples of 1 / _GRID where limits allow it, so that their few decimals are exactly doubles.
+#: If the limits allow it, inputs are multiples of 1 / _GRID. Such an input has few decimals, and a double
+#: represents it exactly.
 _GRID = 1024.0
 #: Number of digits of a written tolerance, which is rounded up.
 #: Before that, the tolerance is rounded to `_SAME` digits.
@@ -442,7 +443,7 @@ def _write(place: Path, robot: Robot, head: _Head, frames: Sequence[str], sample
 
 
 def _result(one: Mapping[str, Any]) -> str:
-    """Return a result as JSON, with its decimals as they are."""
+    """Return a result as JSON; its decimals are not converted to doubles."""
     lists = {name: f"[{', '.join(one[name])}]" for name in ("value", "tolerance")}
     texts = {name: json_text(x) if name not in lists else lists[name] for name, x in one.items()}
     return f"{{{', '.join(f'{json_text(name)}: {text}' for name, text in texts.items())}}}"

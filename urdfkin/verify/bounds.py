@@ -61,8 +61,8 @@ from urdfkin.verify.comparison import KERNELS
 _UNTURNED = np.eye(3).ravel()
 #: Indices of the position, the velocities and the accelerations in the state of a moving base.
 _OF_BASE = 9, 12, 15, 18, 21
-#: Number of configurations that the kernel of the recursion on lengths computes at a time. Their states fit
-#: into the nearest cache.
+#: Number of configurations that the compiled kernel `lengths` computes at a time. The intermediate results
+#: for this number of configurations fit into the processor's first-level cache.
 _BLOCK = 64
 
 
@@ -226,7 +226,7 @@ def _carried_place(state: State, d: Length) -> State:
     return eq.point_position(state[0], None, d), *state[1:]
 
 
-#: Numbers of the displacements and of the rotations of a joint with several coordinates.
+#: For a joint with several coordinates: the number of its displacements, and the number of its rotations.
 _FREE_PARTS = {int(Motion.PLANAR): (2, 1), int(Motion.FLOATING): (3, 3)}
 
 
@@ -333,16 +333,17 @@ def against_true_values(size: Magnitudes, angles: float, rules: int) -> Magnitud
 
     - Roll, pitch and yaw have an error of half an eps of their size, so all vectors after the joint turn by
       at most (|roll| + |pitch| + |yaw|) / 2 eps.
-    - A mimic joint's value is m x + c. Reading m, the product and the sum round (3 |m x| + |c|) / 2 eps,
-      reading c rounds |c| / 2 eps, and the error of x is multiplied by |m|. A revolute joint turns all
-      vectors after it by that. Relative to the terms, a displacement or a rate has 3/2 eps for each rule.
+    - A mimic joint's value is m x + c. The roundings of m, of the product and of the sum have an error of at
+      most (3 |m x| + |c|) / 2 eps. The rounding of c has an error of at most |c| / 2 eps, and the error of x
+      is multiplied by |m|. A revolute mimic joint rotates all vectors after the joint by the sum of these
+      errors. For each mimic rule, the relative error of a displacement or of a rate is 3/2 eps.
 
     An error of 1 eps rad changes each factor by at most 1 eps of its length.
 
     Args:
         size: Magnitudes for two programs.
-        angles: Sum over the path of these errors of angles, in eps.
-        rules: Number of mimic rules on the path, with those of each chain.
+        angles: Sum of these errors of angles over the joints of the path, in eps.
+        rules: Number of mimic rules on the path; each rule in a chain of rules counts.
     """
     return replace(size, roundings=size.roundings + angles + 1.5 * rules)
 

@@ -153,7 +153,7 @@ class Call:
     def in_shape(self, result: FloatArray) -> FloatArray:
         """Return a result (n, frames, ...) in the caller's batch shape.
 
-        A single frame gets no axis of its own.
+        The result for a single frame has no axis for frames.
         """
         return result.reshape(*self.shape, *result.shape[1 if self.several else 2 :])
 

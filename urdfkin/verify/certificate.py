@@ -134,7 +134,7 @@ def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> Co
 
 
 def comparison_of(units: FloatArray, bound: Bound) -> Comparison:
-    """Return the comparison of results with the differences `units`, in multiples of eps * scale."""
+    """Return the summary of the differences `units`, which are in multiples of eps * scale."""
     if not units.size:
         return Comparison.of_nothing()
     share = units / result_k(bound, units.shape)

@@ -83,7 +83,7 @@ def _is_in_threes(scale, k):
 
 @helper()
 def _divide_threes(ours, theirs, unit, width, units):
-    """Write the largest difference of each three numbers that share a scale; NaN or inf if not finite."""
+    """Write the largest difference of each three numbers with a common scale; it may be NaN or inf."""
     for j in range(width):
         x = abs(ours[j] - theirs[j])
         y = abs(ours[j + width] - theirs[j + width])
@@ -96,9 +96,10 @@ def _divide_threes(ours, theirs, unit, width, units):
 
 @helper()
 def _most(x, count):
-    """Return the bits of the largest of several numbers >= 0, inf or NaN, which have the order of their bits.
+    """Return the bits of the largest of several numbers, each of which is at least 0, inf or NaN.
 
-    Processors set the sign of NaN, so the sign is removed.
+    The bits of such numbers, as whole numbers, have the same order as the numbers. Some processors set the
+    sign of NaN, so the sign is removed.
     """
     most = 0
     for j in range(count):
@@ -163,7 +164,7 @@ def coupling(full, columns, index, factor, out):
 # -- the recursion on lengths --------------------------------------------------------------------------------
 
 _TURN, _SLIDE = int(Motion.TURN), int(Motion.SLIDE)
-#: Numbers of a state, and lengths of a planar or floating joint.
+#: Number of values in a link's state, and number of lengths of a planar or floating joint.
 _STATE = _FREE = 5
 
 
@@ -174,7 +175,7 @@ def _sum(x, y):
 
 @helper()
 def _product(x, y):
-    """Return `urdfkin.kinematics.number_kinds.product`."""
+    """Return the product of two lengths, as `urdfkin.kinematics.number_kinds.product` computes it."""
     return SMALLEST if x * y < SMALLEST and x != 0.0 and y != 0.0 else x * y
 
 
@@ -212,7 +213,7 @@ def _of_row(x, row, at):
 
 @helper()
 def _read(x, first, m, at, factor, to):
-    """Write the products of a factor and the lengths of a column; a single row is that of all."""
+    """Write the product of a factor and a length for m configurations, which may share one row of `x`."""
     step = 1 if len(x) > 1 else 0
     for i in range(m):
         to[i] = _product(factor, abs(x[(first + i) * step, at]))
@@ -248,12 +249,12 @@ def lengths(links, sizes, ends, tips, q, v, a, free, base, s, out):
         sizes: Length, multiplier and constant of each step.
         ends: Step and index in the output of each frame.
         tips: Length from the step to the frame.
-        q: Coordinates; an array of one row counts for all configurations, as also in v, a, free and base.
+        q: Coordinates. In q, v, a, free and base, an array with one row is used for all configurations.
         v: Joint velocities.
         a: Joint accelerations.
         free: Displacement, velocities and accelerations of each planar and floating joint.
         base: State of the base.
-        s: Scratch memory of two states more than steps, for a block of configurations.
+        s: Scratch memory for a block of configurations, with one state for each step and two more states.
         out: p, w, vel, alpha, acc.
     """
     frames, block, rates = len(ends), s.shape[2], s[len(links) + 1]

@@ -174,7 +174,7 @@ class Layout:
         self._same_v &= bool((self._index == np.arange(model.nv)).all())
 
     def _of_sizes(self, sizes: tuple[int, int]) -> tuple[Places, Places, FloatArray, FloatArray]:
-        """Return the indices in Pinocchio's q and urdfkin's q, and the rules, of joints with given sizes."""
+        """Return, for joints with one size, the indices in Pinocchio's and urdfkin's q, and mimic rules."""
         own = [place for place in self._places if place.sizes == sizes]
         return (
             np.array([place.full_q for place in own], dtype=np.int64),
@@ -225,7 +225,7 @@ class Layout:
         return full
 
     def couple(self, full: FloatArray) -> FloatArray:
-        """Return J_full G without the base's columns; mimic joints' columns are added to those they mimic."""
+        """Return J_full G without the base's columns; G adds columns of mimic joints to other columns."""
         if self._same_v:
             return full
         return coupled(full, self._columns, self._index, self._factor, self.nv)
@@ -244,8 +244,8 @@ class Frames:
         robot: Name of the robot, for errors.
         bodies: Index of the frame of each link.
         joints: Index of the frame of each joint.
-        carriers: For the frame of each link that a joint carries: the index of the joint's frame. A frame
-            that is missing here is the frame of the link and of the joint.
+        carriers: For the frame of each link that a joint carries: the index of the joint's frame. A link's
+            frame that is missing here is also the frame of the joint.
     """
 
     def __init__(
@@ -461,8 +461,9 @@ class QueryBatch(NamedTuple):
         reference: The reference frame, as the user gave it. Placements ignore it.
         base: Motion of the base; None: fixed at the world origin.
         joints: True: use the library's functions for joints, if it has them. Each frame is a `JointFrame`.
-        divided: True: the frames are a part of a longer list. The library's functions for many frames are
-            then used, so that no number depends on the division of the list.
+        divided: True: `frames` is one part of a longer list, which is computed in parts. Even for one frame,
+            the functions for several frames are then used, so that the results are the same as for the whole
+            list.
 
     >>> x = QueryBatch(["tool0"], (np.zeros((1, 6)), np.ones((1, 6))))
     >>> x.q.shape, x.v.shape, x.reference.name
@@ -685,9 +686,9 @@ class Oracle:
         raise NotImplementedError
 
     def jacobian_blocks(self, x: QueryBatch) -> Iterator[FloatArray]:
-        """Yield the same as `jacobians` returns, in blocks of configurations that fit into the cache.
+        """Yield the Jacobians in blocks of configurations that fit into the cache.
 
-        A block is valid until the next one is requested, which may overwrite it.
+        A block is valid until the next block is requested, because the next block may overwrite it.
         """
         yield self.jacobians(x)
 

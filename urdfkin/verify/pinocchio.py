@@ -118,8 +118,8 @@ _SHALLOW = 100
 #: below 2 GB.
 MOST_RATES = 315
 
-#: Number of Pinocchio's result values that are collected and then copied together. The processor's cache is
-#: large enough for so many values.
+#: Number of Pinocchio's result values that are collected and then copied together. This number of values fits
+#: into the processor's cache.
 _AT_A_TIME = 16384
 #: Function that returns the results for the next configurations; the argument is their number.
 _Next = Callable[[int], list[FloatArray]]
@@ -324,7 +324,7 @@ class PinocchioOracle(Oracle):
         return self._columns(x, 1, pin.computeJointJacobians, get)
 
     def jacobian_blocks(self, x: QueryBatch) -> Iterator[FloatArray]:
-        """Yield the same as `jacobians` returns, of one frame in blocks that fit into the cache."""
+        """Yield the Jacobians; for one frame, in blocks of configurations that fit into the cache."""
         if len(x.frames) != 1 or x.joints or x.divided or not self._model.nv:
             yield self.jacobians(x)
             return
@@ -427,14 +427,14 @@ def _stacked(compute: _Next, *shape: int) -> FloatArray:
 def _blocks(compute: _Next, n: int, memory: FloatArray) -> Iterator[FloatArray]:
     """Write the results of n configurations to an array, and yield each written part of it.
 
-    Without numbers none is computed. Pinocchio 4.1 crashes the process for a Jacobian without columns, and
-    returns a vector for one column.
+    If the results contain no numbers, nothing is computed. Pinocchio 4.1 crashes the process for a Jacobian
+    without columns, and returns a vector for one column.
 
     Args:
         compute: Returns the results of all frames for the next configurations.
         n: Number of configurations.
         memory: (n or one block, frames, ...) array that is written. With n rows, the blocks follow each
-            other. With fewer rows, each overwrites the block before it.
+            other. With fewer rows, each block overwrites the block before it.
     """
     if 0 in memory.shape:
         yield memory

@@ -66,7 +66,8 @@ class Quantity:
         compute: Function (plan, *inputs, reference, base=, out=, threads=) that returns (n, frames, ...). If
             `recursive` is False, a method of `Robot` calls it in another way.
         ask: Function (oracle, query) that returns the oracle's (n, frames, ...).
-        blocks: Function (oracle, query) that yields the same in blocks of configurations, for large results.
+        blocks: Function (oracle, query) that yields the oracle's results in blocks of configurations, for
+            large results.
         scale: Function (plan, magnitudes, reference) that returns the size of the terms of the quantity
             (`urdfkin.verify.bounds`).
         factors: Number of rotated vectors in each term of [linear; angular], in LOCAL_WORLD_ALIGNED.

@@ -5,11 +5,11 @@ the conversion from the stage to the tree. Therefore `load` makes two comparison
 
 - with OpenUSD's own parser of UsdPhysics: the bodies, frames, free directions and limits of each joint. A
   difference is an error.
-- with the transforms of the prims, by UsdGeom: the stage shows the robot in one configuration. The placement
-  of each link in this configuration must be that of its prim. The file states these transforms separately
+- with the transforms of the prims, by UsdGeom: the stage shows the robot in one configuration. In this
+  configuration, each link must have the placement of its prim. The file states these transforms separately
   from the joint frames, so a difference is a warning about the file.
 
-Both are exact up to the single precision of the numbers in a stage.
+Both comparisons allow only for the single precision of the numbers in a stage.
 """
 
 from __future__ import annotations
@@ -51,13 +51,16 @@ from urdfkin.verify.verifier import Verifier
 PATIENCE = 60.0
 #: Largest accepted size of the process's output, bytes.
 _MOST = 400_000_000
-#: Roundings to single precision of a joint's rotation in OpenUSD's parser: the angle of a quaternion with
-#: four rounded numbers is off by at most 2 of them; a product of two quaternions adds 4 to each number, whose
-#: vector of four is 8 and whose angle 16.
+#: Bound on the angle error of a joint's rotation in OpenUSD's parser, in roundings to single precision. If
+#: the four numbers of a quaternion are rounded, the error of its angle is at most 2 roundings. The product of
+#: two quaternions adds 4 roundings to each of the four numbers. The error vector of the four numbers then has
+#: length 8, which is an error of 16 in the angle.
 _ROTATION = 18.0
-#: Roundings of a joint's origin: the scale, the product with the scale, the transformed origin.
+#: Number of roundings of a joint's origin: one of the scale, one of the product with the scale, and one of
+#: the transformed origin.
 _ORIGIN = 3.0
-#: Roundings of a prim's rotation: three angles of at most a turn, 2 pi each.
+#: Bound on the angle error of a prim's rotation, in roundings to single precision. The rotation has three
+#: angles, and each angle is at most one turn (2 pi).
 _TRANSFORM = 6.0 * np.pi
 
 
@@ -143,7 +146,7 @@ def check_usd_source(verifier: Verifier, read: UsdReading) -> tuple[str, tuple[R
         read: The result of `read_usd`.
 
     Returns:
-        A line of text about the result, for the certificate; and remarks about prims that are elsewhere.
+        A line of text about the result, for the certificate; and remarks about prims whose placements differ.
 
     Raises:
         OracleError: OpenUSD's parser reads another joint.
@@ -159,7 +162,7 @@ def check_usd_source(verifier: Verifier, read: UsdReading) -> tuple[str, tuple[R
 
 
 def _demand(name: str, path: str, ours: list[Any], theirs: list[Any] | None) -> float:
-    """Demand that both readings of a joint agree; return the largest share of a bound."""
+    """Compare both readings of a joint; return the largest ratio of a difference to its bound."""
     if theirs is None:
         raise _error(f"{name}, joint {path}", "the parser does not find this joint")
     if ours[:3] != theirs[:3]:
@@ -190,23 +193,25 @@ def _error(where: str, found: str) -> OracleError:
 
 
 def _angle(R: FloatArray) -> float:
-    """Return the angle (rad) of a rotation; also small angles are accurate."""
+    """Return the angle (rad) of a rotation; small angles are accurate too."""
     sine = np.linalg.norm([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2.0
     return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
 
 
-#: For each joint by name, as in `urdfkin.urdf.usd.Usd.single`.
+#: For each joint name: four bounds on errors of single precision, in the order of
+#: `urdfkin.urdf.usd.Usd.single`.
 Single = Mapping[str, tuple[float, float, float, float]]
 
 
 def single_precision(tree: KinematicTree, single: Single) -> FloatArray:
     """Return how far single precision can move and turn each link, (links, 2): metres and radians.
 
-    A stored number is off by at most half of the distance to the next number in single precision; a zero is
-    exact. The origins of a joint's two frames are off by the length of the errors of their numbers. A unit
-    quaternion turns by twice the length of the errors of its numbers. An angle moves everything behind it by
-    the angle times the distance, at most the length of the path behind it. A mimic rule m q + c is off by
-    2^-24 (|m q| + |c|), at the largest |q| within the limits.
+    The error of a stored number is at most half of the distance to the next number in single precision; a
+    zero is exact. The three errors of an origin's numbers form a vector, whose length is the error of the
+    origin. The four errors of a unit quaternion form a vector, and the angle error is twice the length of
+    this vector. An angle error moves each later link by at most the angle times the length of the path to
+    this link. The error of a mimic rule m q + c is 2^-24 (|m q| + |c|), for the largest |q| within the
+    limits.
 
     Args:
         tree: The robot.
@@ -272,7 +277,7 @@ def _at_rest(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple
     if remarks:
         words = f"by UsdGeom's transforms {len(remarks)} of the {len(prims)} prims are elsewhere, by up to"
         words = f"{words} {worst[0]:.3g} m"
-        # of bodies in one chain, the first is the cause
+        # if several bodies of a chain differ, the first of these bodies is the cause
         return words, tuple(remarks[:1])
     return (
         f"UsdGeom's transforms of {len(prims)} prims agree {where}"

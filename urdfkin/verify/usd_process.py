@@ -5,7 +5,8 @@ of time and memory. The caller's process receives only plain data. The request c
 answer is a line of JSON on standard output.
 
 OpenUSD contains a second reader of the joints: the parser of its package UsdPhysics. It resolves bodies,
-joint frames and limits with other code than `urdfkin.urdf.usd`. Its numbers are returned besides urdfkin's.
+joint frames and limits with other code than `urdfkin.urdf.usd`. The answer contains the numbers of both
+readers.
 """
 
 from __future__ import annotations

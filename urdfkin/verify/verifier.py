@@ -69,8 +69,8 @@ class Verifier:
         policy: Default of `verify` in calls.
         mimic: True: mimic joints are coupled. False: every mimic joint moves freely.
         unverifiable: Known reason why Pinocchio cannot check the robot; None if there is none.
-        oracle: Oracle for quantities, "pinocchio" or "mujoco". Checks of tables, the accuracy study and
-            enclosures always use Pinocchio.
+        oracle: The oracle that checks the results of methods, "pinocchio" or "mujoco". Pinocchio alone checks
+            tables, and Pinocchio alone is used for the accuracy study and for enclosures.
 
     Attributes:
         ledger: Record of checked and unchecked results.
@@ -461,7 +461,7 @@ def oracle_results(quantity: Quantity, oracle: Oracle, query: QueryBatch) -> Flo
 
 
 def oracle_blocks(quantity: Quantity, oracle: Oracle, query: QueryBatch) -> Iterator[FloatArray]:
-    """Yield the same in blocks of configurations; the next block may overwrite a block."""
+    """Yield an oracle's results in blocks of configurations; each block may overwrite the one before."""
     assert quantity.blocks is not None
     return quantity.blocks(oracle, query)
 

@@ -43,12 +43,13 @@ from urdfkin.view.stage import (
 
 #: A joint with a larger range than this counts as unlimited, like a wheel.
 _FAR = 100.0
-#: Step of a slider, and of an arrow key: in degrees, and in radians. A length moves by a 50th of its range.
+#: A slider or an arrow key changes an angle by `_DEGREES` if the viewer shows degrees, and by `_RADIANS` if
+#: it shows radians. It changes a length by the length's range divided by `_STEPS`.
 _DEGREES, _RADIANS, _STEPS = 1.0, 0.01, 50.0
 _DIGITS, _DIGITS_OF_DEGREES = 4, 2
 #: Default ranges: joint velocity in rad/s or m/s, and joint acceleration in rad/s^2 or m/s^2.
 _RATE, _SECOND_RATE = 3.0, 5.0
-#: Most missing meshes that are named.
+#: Largest number of missing meshes that a message names.
 _MOST_MISSING = 5
 
 

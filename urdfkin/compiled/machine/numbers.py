@@ -38,7 +38,7 @@ class Lanes(types.Type):
         super().__init__(name=f"Lanes({width})")
 
     def can_convert_from(self, context: Any, other: Any) -> Any:
-        """Return whether another type can be converted to this type: a product can be."""
+        """Return the conversion from another type to this type, if any; a product can be converted."""
         return Conversion.safe if isinstance(other, Product) and other.width == self.width else None
 
     def unify(self, context: Any, other: Any) -> Any:

@@ -242,7 +242,7 @@ def _cells_of(reference: DHTable) -> FloatArray:
 
 
 def _hidden(reference: DHTable, fitted: Model, judged: TargetPoses) -> tuple[tuple[int, str], ...]:
-    """Return the cells that a change of base, tool and joint offsets can replace; a beta of 0 is left out."""
+    """Return the cells that have the same effect as base, tool or joint offsets; a beta of 0 is left out."""
     found = [
         (_cell_at(reference, i, CELLS[k]), CELLS[k])
         for i, k in hidden_cells(fitted, judged)

@@ -249,7 +249,7 @@ def _span(freedoms: FloatArray) -> FloatArray:
 
 
 def hidden_cells(model: Model, wanted: TargetPoses) -> list[tuple[int, int]]:
-    """Return (row, cell index) of the cells that free parameters can replace.
+    """Return (row, cell index) of the cells whose change has the same effect as a change of free parameters.
 
     At most 1e-6 of the effect of such a cell remains.
     """

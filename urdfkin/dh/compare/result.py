@@ -165,8 +165,8 @@ class Comparison:
         instead: The cells that would have to change if base, tool, senses and offsets were not fitted. The
             list is empty if such changes do not explain the difference, or if too many cells would have to
             change.
-        hidden: (row, cell) of each cell that base, tool and offsets can replace. The value of such a cell
-            cannot be determined from the tip's poses.
+        hidden: (row, cell) of each cell whose change has the same effect as a change of base, tool or joint
+            offsets. The value of such a cell cannot be determined from the tip's poses.
         mistakes: Single changes of the table after which the fewest parameters must be fitted.
         residual: Tip error (metres) that remains if the differing cells take the URDF's values. If these
             cells explain the whole difference, only rounding errors remain.
@@ -380,10 +380,13 @@ def _cells(found: Comparison, units: Units) -> Parts:
     elif found.as_written:
         parts.append("Every cell agrees with the URDF.")
     elif found.exact:
-        parts.append("No cell differs, except cells that the fit of base, tool and offsets can replace.")
+        parts.append(
+            "After the fit of base, tool and joint offsets, every compared cell agrees with the URDF."
+        )
     if found.hidden and not found.as_written:
         cells = ", ".join(f"{cell}{row + 1}" for row, cell in found.hidden)
-        parts.append(f"Not compared, because base, tool and offsets can replace them: {cells}.")
+        same = "a change of base, tool or joint offsets has the same effect"
+        parts.append(f"These cells are not compared, because {same}: {cells}.")
     if {(one.row, one.cell) for one in found.instead} - {(one.row, one.cell) for one in found.differences}:
         parts += ["", f"Without fitting, these cells would have to change {unit}:"]
         parts.append(_table(found.instead, units))

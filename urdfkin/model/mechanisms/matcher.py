@@ -608,8 +608,8 @@ def _normals_apart(at: FloatArray, seen: FloatArray) -> tuple[FloatArray, float,
 #: Largest number of orders that are tried for commuting joints. This number is the number of orders of five
 #: prismatic joints.
 MOST_ORDERS = 120
-#: Total number of look-ahead steps of one search; so many steps take some seconds. Without names, TALOS needs
-#: 500 steps and Baxter 1,000.
+#: Total number of look-ahead steps of one search; this number of steps takes some seconds. Without names,
+#: TALOS needs 500 steps and Baxter 1,000.
 MOST_AHEAD = 2000
 #: Larger tolerances that are tried when the exact match fails: an angle in rad, and a distance as a fraction
 #: of the robot's size.

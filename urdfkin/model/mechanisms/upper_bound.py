@@ -304,7 +304,7 @@ def at_the_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
 def passed(
     step: Step, pair: Pair | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
-    """Return the support functions of d and y in front of a step, from those after the step."""
+    """Return the support functions of d and y before a step, computed from those after the step."""
     # A planar or floating joint has no limits, so it may rotate d into any direction.
     # The largest value of d's support function therefore holds for all directions.
     if pair is None:
@@ -318,7 +318,7 @@ def passed(
 
 
 def before_it(step: Step, d: Support, y: Support) -> tuple[Support, Support]:
-    """Return the support functions of d and y in front of the rigid motion L of a step."""
+    """Apply the constant rigid motion L of a step to the support functions of the vectors d and y."""
     if step.before is IDENTITY:
         return d, y
     G, L = d.grid.points, step.before

@@ -34,8 +34,8 @@ _TWO_DOUBLES = 30
 #: Bits for each decimal digit, and additional bits. Fifteen digits get 55 bits, two more than a double has,
 #: because a ball with 53 bits is up to four times as wide as an interval whose ends have 53 bits.
 _BITS, _MORE_BITS = math.log2(10.0), 5
-#: Number of significant digits of a written decimal. Every double is determined by so many digits.
-#: Number of digits of the decimal while it is computed.
+#: The first number is the number of significant digits of a written decimal; 17 digits determine every
+#: double. The second number is the number of digits while the decimal is computed.
 _SIGNIFICANT, _ALL_DIGITS = 17, 200
 #: Additional bits of precision during iterations.
 _SPARE = 30
@@ -85,9 +85,9 @@ def _outward(end: arb, towards: float) -> float:
 def decimal(x: Number, negligible: float) -> str | None:
     """Return a ball as a decimal of 17 significant digits; None if the ball is too large for that.
 
-    The radius is below 1e-20 of the number, so the decimal differs from the true value by at most half a unit
-    of its last digit, and a thousandth of that. A ball that contains 0 is 0 if its radius is below 1e-10 of
-    `negligible`.
+    The radius of the ball is below 1e-20 times the number, and the midpoint is rounded to 17 digits. The
+    decimal therefore differs from the true value by at most 0.501 units of its last digit. A ball that
+    contains 0 is 0 if its radius is below 1e-10 of `negligible`.
 
     >>> with precision(50):
     ...     decimal(exact(1) / 3, 1e-15), decimal(exact(2), 1e-15), decimal(arb(0.0, 1e-40), 1e-15)

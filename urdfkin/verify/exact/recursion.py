@@ -148,8 +148,8 @@ def acceleration_values(motion: Motion, link: int, reference: Reference) -> NDAr
 def spatial_acceleration_values(motion: Motion, link: int, reference: Reference) -> NDArray[np.object_]:
     """Return the spatial acceleration (6,) of a link, [linear; angular].
 
-    At the frame's origin, its linear part is the classical one minus w x vel. In WORLD, it is that of the
-    point of the body at the world origin: minus alpha x p.
+    The linear part at the frame's origin is the classical acceleration minus w x vel. In WORLD, the linear
+    part belongs to the body's point at the world origin, so alpha x p is subtracted too.
     """
     s = motion.states[link]
     linear = equations.minus(s.acc, equations.cross(s.w, s.vel))
