@@ -131,7 +131,7 @@ def odd_range(rng: random.Random, turns: bool) -> tuple[float, float]:
 
 
 def odd_limit(rng: random.Random) -> str:
-    """Return a limit of effort or jerk that is mostly positive; urdfdom rejects some of the other values."""
+    """Return a text for a limit of effort or jerk; urdfdom rejects some of the texts."""
     refused = ("-1.0", "-5e-324", "inf", "nan", "", "1e400", "0x10", "1.0 ")
     fine = ("0", "-0.0", "1e300", "5e-324", "1e-400")
     return rng.choice(refused) if rng.random() < 0.03 else rng.choice((*fine, written(rng, rng.random())))

@@ -512,7 +512,7 @@ def _is_other(file: str) -> bool:
         return True
     if Path(file).suffix.lower() not in (".xml", ".mjcf"):
         return False
-    from urdfkin.urdf.mjcf import is_mjcf  # noqa: PLC0415  a URDF needs none of its imports
+    from urdfkin.urdf.mjcf import is_mjcf  # noqa: PLC0415  a URDF needs none of that module's imports
 
     return is_mjcf(file)
 

@@ -202,7 +202,7 @@ class Comparator:
     def said(self, found: Alignment, variables: Variables) -> Sameness:
         """Return the result that follows from the alignment, without intervals and without confirmation.
 
-        The method also corrects the tools in `found`. Tools are frames without children that differ.
+        The method also corrects the tools in `found`. A tool is a frame without children that differs between A and B.
         """
         names = tuple([joint.name for joint in tree.joints] for tree in self.trees)
         links = self.trees[0].links, self.trees[1].links
@@ -383,7 +383,7 @@ class Comparator:
                 break
 
     def _farthest(self, found: Alignment, variables: Variables) -> Interval | None:
-        """Return the interval for the frame with the largest distance that the search finds."""
+        """Search for the frame that is farthest apart in A and B, and return the interval of its distance."""
         if not found.frames:
             return None
         metres, radians = self.rounding(found, variables)

@@ -395,8 +395,8 @@ def _last_like(
 ) -> tuple[float, float, Step, FloatArray]:
     """Return the numbers of the last row, and the tool.
 
-    If neither of the two tables has a tool, and theta agrees with the other table's last row, the last row
-    keeps its numbers. Otherwise the last row gets the numbers of the other table, and the tool gets the
+    If neither the new table nor `like` has a tool, and theta equals that in the last row of `like`, the new
+    row keeps its own numbers. Otherwise the new row gets the numbers of `like`, and the tool gets the
     difference.
     """
     row = like.rows[-1]

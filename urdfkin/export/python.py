@@ -181,7 +181,7 @@ def gradients(device="cpu"):
 
 def _torch_module(code: Code) -> str:
     """Return code of a `torch.nn.Module` with the functions, and of their check by `gradcheck`."""
-    # A module's forward has the inputs q if there is a function of q alone.
+    # The module's method `forward` has the input q only, if the code has a function of q only.
     first = min(code.functions, key=lambda function: len(function.inputs))
     return _MODULE.format(
         first=first.name,

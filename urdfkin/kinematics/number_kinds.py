@@ -41,7 +41,7 @@ array_equations = bound(
 FloatArray = NDArray[np.float64]
 
 
-#: A length: an array with a number for each configuration, or Python's number for one configuration.
+#: The type of lengths: an array with a number for each configuration, or a float for a single configuration.
 Length = Any
 
 

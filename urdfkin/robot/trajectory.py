@@ -662,8 +662,8 @@ def _check_columns(
         )
 
 
-#: Largest span of the angles in a column that counts as wrapped: one turn, plus a margin for angles rounded
-#: to two digits.
+#: Largest difference (rad) between the angles of a column that was wrapped to one turn. It includes a margin
+#: for angles with two digits.
 _ONE_TURN = math.tau + 0.02
 #: Smallest step of an angle (rad) that is ambiguous. For larger steps, the step in the other direction is
 #: less than twice as long.

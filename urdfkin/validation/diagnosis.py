@@ -433,7 +433,7 @@ class Mistakes:
 
 
 def _columns(mistakes: Mistakes, case: Diagnosis) -> Iterator[tuple[float, str]]:
-    """Yield mistakes that explain single columns of a Jacobian.
+    """Yield mistakes that affect only some columns of a Jacobian.
 
     The other columns may be right, or wrong for another reason.
     """

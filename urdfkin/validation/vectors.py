@@ -144,7 +144,10 @@ class Vectors(TypedDict):
     robot: Annotated[str, says("Name of the feature or robot.")]
     file: Annotated[str, says("Path of the URDF, in this folder or in example-robot-data.")]
     sha256: Annotated[Sha256, says("SHA-256 of the URDF file.")]
-    rule: Annotated[str | None, says("The rule of the URDF standard that the robot shows, if there is one.")]
+    rule: Annotated[
+        str | None,
+        says("The rule of the URDF standard that this robot tests, or null."),
+    ]
     note: Annotated[str | None, says("How libraries differ, or how the file was read.")]
     joints: list[JointEntry]
     samples: list[Sample]

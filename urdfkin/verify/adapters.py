@@ -475,7 +475,7 @@ def _lines(name: str, cases: Iterable[Mapping[str, Any]]) -> Iterable[str]:
 
 
 def main() -> None:
-    """Answer the cases on standard input with the library of the first argument."""
+    """Read cases from standard input, and print the answers of the library that the first argument names."""
     logging.disable(logging.CRITICAL)
     warnings.simplefilter("ignore")
     own = os.dup(1)  # libraries may print their own text to standard output

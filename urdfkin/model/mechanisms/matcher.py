@@ -758,7 +758,7 @@ def _best_alignment(
 #: Numbers of full turns by which the zero of a mimicked joint may be changed.
 TURNS = (0, 1, -1)
 #: Tolerance of a joint zero that follows from the positions of axes, as a multiple of the angle tolerance.
-#: It is large because two axes that are close together determine a joint zero inexactly.
+#: It is large because two axes that are close together give an inexact joint zero.
 LEVER = 1e4
 
 

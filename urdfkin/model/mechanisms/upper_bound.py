@@ -419,7 +419,7 @@ def _common_difference(step: Step, pair: Pair, z: FloatArray, y: Support, d: Sup
 
 
 def _independent_difference(step: Step, pair: Pair, variables: Variables, y: Support) -> Support:
-    """Return the support function of (e(S' t') - e(S t)) y for a joint without a common bounded variable.
+    """Return the support function of (e(S' t') - e(S t)) y for a joint whose variables are independent.
 
     The joint has different variables in A and B, or its variable has no limits.
 

@@ -320,7 +320,7 @@ class Choice:
         return is_reported
 
     def again(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
-        """Return the same function as the method `of`, but with copies of the baselines.
+        """Return a function like that of the method `of`, with its own copies of the baselines.
 
         Checking a file a second time then changes no count of matches.
         """
