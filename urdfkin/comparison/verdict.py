@@ -202,7 +202,8 @@ class Comparator:
     def said(self, found: Alignment, variables: Variables) -> Sameness:
         """Return the result that follows from the alignment, without intervals and without confirmation.
 
-        The method also corrects the tools in `found`. A tool is a frame without children that differs between A and B.
+        The method also corrects the tools in `found`. A tool is a frame without children that differs
+        between A and B.
         """
         names = tuple([joint.name for joint in tree.joints] for tree in self.trees)
         links = self.trees[0].links, self.trees[1].links
