@@ -395,6 +395,23 @@ def test_a_changed_constant_in_the_code_of_a_table_is_noticed(tmp_path: Path) ->
     assert not found.verified
 
 
+@pytest.mark.parametrize(
+    ("to", "right", "wrong"),
+    [
+        ("numpy", "out[..., 0, 0] = R6_00", 'out[..., 0, 0] = float("nan") * R6_00'),
+        ("c", "out[0 * L] = R6_00;", "out[0 * L] = R6_00 * (R(0.0) / R(0.0));"),
+    ],
+)
+def test_a_result_that_is_nan_is_noticed_although_right_ones_follow(
+    to: str, right: str, wrong: str, tmp_path: Path
+) -> None:
+    text = urdfkin.load("ur5").export(to, "tool0", ["placement"])
+    assert right in text
+    path = tmp_path / f"arm.{'py' if to == 'numpy' else to}"
+    path.write_text(text.replace(right, wrong), encoding="utf-8")
+    assert not check(path).good
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("to", ["numpy", "c", "casadi", "matlab"])
 def test_a_table_in_a_language_is_the_same_file_as_the_robot_in_the_form_dh(to: str) -> None:

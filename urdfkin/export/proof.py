@@ -205,7 +205,9 @@ def decimal(x: Number) -> str:
 
 
 def _rounded_down(x: float) -> str:
-    """Return x with six digits, rounded down."""
+    """Return x with six digits, rounded down; for an x that is not finite, return 0.0."""
+    if not np.isfinite(x):
+        return "0.0"
     text = f"{x:.6g}"
     return text if float(text) <= x else f"{x * (1.0 - 1e-6):.6g}"
 

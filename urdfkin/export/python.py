@@ -344,12 +344,13 @@ def check({given}):
             name, worst = function.__name__, 0.0
             inputs = [GIVEN[letter] for letter in INPUTS[name]]
             numbers = _values(function, inputs, kind{more})
-            for found, true, within in zip(numbers, TRUE[name], tolerance[name]):
-                for x, y, k in zip(found, true, within):
+            for found, true, within in zip(numbers, TRUE[name], tolerance[name], strict=True):
+                for x, y, k in zip(found, true, within, strict=True):
                     error, least = abs(x - float(y)), k * eps
                     share = error / least if least else (0.0 if error == 0.0 else float("inf"))
-                    if not share <= worst:  # NaN is the worst
-                        worst = share
+                    if share != share:  # NaN counts as larger than any number
+                        share = float("inf")
+                    worst = max(worst, share)
             shares[name, kind] = worst
     return shares
 

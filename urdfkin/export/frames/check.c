@@ -2,8 +2,8 @@
 /* The tolerances of a function's test vectors in the precision of this program. */
 #define BOUND(name) (sizeof(real) == sizeof(float) ? single_##name : within_##name)
 
-/* NaN counts as larger than any number. */
-static double larger(double x, double y) { return y <= x ? x : y; }
+/* NaN counts as larger than any number, also if a number follows it. */
+static double larger(double x, double y) { return x != x || y <= x ? x : y; }
 
 /* The largest error as a share of its bound. */
 static double share(int n, const real *found, const double *right, const double *within)
