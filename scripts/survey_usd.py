@@ -77,7 +77,7 @@ def row_of(python: str, name: str) -> tuple[str, str, str, str, str]:
     if found:
         words = "same" if found.verdict is Verdict.SAME else "equivalent"
         return name, joints, words, off, single
-    words = "same up to single precision" if found.up_to_single else found.differences[0].words
+    words = "differs within single precision" if found.up_to_single else found.differences[0].words
     return name, joints, words, off, single
 
 

@@ -25,7 +25,7 @@ from urdfkin.cli.options import (
     together,
 )
 from urdfkin.cli.streams import command_lines, harmless, say, say_file, say_styled
-from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
+from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
 from urdfkin.system.files import demand_regular, write_file
 from urdfkin.system.git import Version, version_before
 from urdfkin.system.lazy_import import installed_version
@@ -48,7 +48,6 @@ from urdfkin.urdf.lint.settings import (
     read_settings,
 )
 from urdfkin.urdf.sources import Text, is_usd, is_xacro, read_source
-from urdfkin.urdf.xacro import XacroError
 
 STYLES = ("terminal", "concise", "json", "sarif", "github")
 _COLOURS = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.NOTE: "blue"}
@@ -429,7 +428,7 @@ class Run:
                     ):  # the file was found in a folder that the user named
                         demand_regular(Path(file))
                     self._check(file)
-                except (InputError, SourceError, UnknownNameError, XacroError) as error:
+                except UrdfkinError as error:
                     self.outcome.unreadable.append(error)
 
     def _check(self, file: str) -> None:
@@ -512,6 +511,9 @@ def _is_other(file: str) -> bool:
         return True
     if Path(file).suffix.lower() not in (".xml", ".mjcf"):
         return False
+    with contextlib.suppress(OSError), Path(file).open("rb") as stream:
+        if b"<mujoco" not in stream.read(1 << 16):
+            return False  # without NumPy, which `check` of a URDF does not need
     from urdfkin.urdf.mjcf import is_mjcf  # noqa: PLC0415  a URDF needs none of that module's imports
 
     return is_mjcf(file)

@@ -87,10 +87,10 @@ def same_command(
     all joints and the zero-configuration poses of all links agree. A different base pose, joint zeros and
     senses, fixed links, names and order are allowed. If they differ, the command prints an interval for the
     largest distance of each frame over all configurations within limits. Its lower bound is attained at a
-    printed configuration; its upper bound is proven. The numbers of a USD file have single precision. If
-    rounding them explains all differences, the models are the same up to single precision.
+    printed configuration; its upper bound is proven. The numbers of a USD file have single precision. The
+    command prints how far this rounding can move a frame; models that differ by less count as different too.
 
-    Exit 0: same, also up to single precision, or equivalent up to the printed changes. 1: different; with
+    Exit 0: same, or equivalent up to the printed changes. 1: different; with
     --strict also if only equivalent. With --within: 0 if all frames stay within the distance as written, else
     1. 2: bad input.
     """

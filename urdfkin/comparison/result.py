@@ -359,13 +359,15 @@ class Sameness(Displayable):
 
     @property
     def up_to_single(self) -> bool:
-        """Whether rounding to single precision explains all differences of the models as they are written.
+        """Whether the models differ, but no frame by more than single precision can move any frame.
+
+        The models are compared as they are written.
 
         >>> import urdfkin
         >>> urdfkin.same("ur5", "ur10").up_to_single
         False
         """
-        if self.single is None or self.verdict is Verdict.SAME or "senses" in self.up_to:
+        if self.single is None or self.verdict is not Verdict.DIFFERS:
             return False
         explained = {one.what for one in self.differences} <= BOUNDED
         return explained and self.written[0] <= self.single[0] and self.written[1] <= self.single[1]
@@ -392,8 +394,7 @@ class Sameness(Displayable):
         >>> found.holds(Question(within=1.0))
         True
         """
-        equal = bool(self) or (self.up_to_single and not question.strict)
-        if not (equal if question.within is None else self.within(question.within)):
+        if not (bool(self) if question.within is None else self.within(question.within)):
             return False
         return not (question.strict and (self.verdict is Verdict.SAME_AFTER or self.remarks))
 

@@ -48,7 +48,8 @@ def headline(found: Sameness, question: Question = EQUIVALENT) -> str:
         return _within(found, question.within) + besides
     if found.up_to_single and found.single is not None:
         off = f"in every configuration no frame is off by more than {_both(*found.written)}"
-        return f"SAME UP TO SINGLE PRECISION: {off}; it explains up to {_both(*found.single)}{besides}"
+        single = f"rounding to single precision can move a frame by up to {_both(*found.single)}"
+        return f"DIFFERS WITHIN SINGLE PRECISION: {off}; {single}{besides}"
     if found.verdict is Verdict.DIFFERS:
         by = _by(found.frames, found.rounding)
         if found.frames and not by:
@@ -202,7 +203,7 @@ def _pair_rows(found: Sequence[Sameness], question: Question) -> list[tuple[str,
     for one in found:
         words = "differs" if not one else "same" if one.verdict is Verdict.SAME else "equivalent"
         if one.up_to_single:
-            words = "same up to single precision"
+            words = "differs within single precision"
         if question.within is not None:
             words = f"{'' if one.within(question.within) else 'not '}within {question.within:g}"
         metres, radians = one.written

@@ -201,6 +201,7 @@ def files_of(pxr: Any, path: str) -> tuple[str, ...]:
         layer = pxr.Sdf.Layer.FindOrOpen(identifier)
         if layer is None:
             raise InputError("OpenUSD does not accept this file", where=identifier)
+        _refuse_clips(pxr, layer, identifier)
         for asset in layer.GetCompositionAssetDependencies():
             address = _address(pxr, layer, asset, ground, identifier)
             if address is None or address in known:
@@ -210,6 +211,21 @@ def files_of(pxr: Any, path: str) -> tuple[str, ...]:
                 raise InputError("this stage has too many layers", where=path, found=f"over {_LAYERS}")
             open_.append((address, identifier))
     return tuple(files)
+
+
+def _refuse_clips(pxr: Any, layer: Any, where: str) -> None:
+    """Refuse value clips: they name files that no list of dependencies contains."""
+    found: list[str] = []
+
+    def look(path: Any) -> None:
+        if path.IsPrimPath() or path.IsPrimVariantSelectionPath():
+            spec = layer.GetObjectAtPath(path)
+            if spec is not None and any(spec.HasInfo(key) for key in ("clips", "clipSets")):
+                found.append(str(path))
+
+    layer.Traverse(pxr.Sdf.Path.absoluteRootPath, look)
+    if found:
+        raise _refused("a prim has value clips, which urdfkin does not read", where, found[0])
 
 
 def _address(pxr: Any, layer: Any, asset: str, ground: Ground, where: str) -> str | None:
@@ -564,6 +580,11 @@ class _Reader:
             )
         return self._six(prim, path)
 
+    def _unlimited(self, path: str, limits: Mapping[str, tuple[float, float]]) -> None:
+        """Report limits of a planar or floating joint, for which a tree has no place."""
+        if any(math.isfinite(end) for ends in limits.values() for end in ends):
+            self._say("unused-in-usd", path, "the limits of this planar or floating joint are not read")
+
     def _six(self, prim: Any, path: str) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
         """Return a joint of any degrees of freedom as one of ours, as `_motion` does."""
         free, limits = [], {}
@@ -579,8 +600,10 @@ class _Reader:
         if len(free) == 1:
             return self._bounded(path, free[0], iter(limits[free[0]]))
         if free == ["transX", "transY", "rotZ"]:
+            self._unlimited(path, limits)
             return JointKind.PLANAR, _unit(0), _NONE, " ".join(free)
         if len(free) == len(_FREEDOMS):
+            self._unlimited(path, limits)
             return JointKind.FLOATING, _unit(0), _NONE, " ".join(free)
         raise InputError(
             "urdfkin does not support a joint with these degrees of freedom",
@@ -959,7 +982,7 @@ class _Reader:
             leader = _target(prim, "newton:mimicJoint")
             c0, c1 = _value(prim, "newton:mimicCoef0"), _value(prim, "newton:mimicCoef1")
             multiplier, offset = 1.0 if c1 is None else float(c1), 0.0 if c0 is None else float(c0)
-            yield leader, multiplier * own / self._factor_of(leader, own), offset * own
+            yield leader, multiplier * self._ratio(edge, leader), offset * own
             return
         for schema in schemas:
             base, _, freedom = schema.partition(":")
@@ -970,14 +993,23 @@ class _Reader:
                 _value(prim, f"physxMimicJoint:{freedom}:{word}") for word in ("gearing", "offset")
             )
             multiplier = -1.0 if gearing is None else -float(gearing)
-            yield leader, multiplier * own / self._factor_of(leader, own), -float(offset or 0.0) * own
+            yield leader, multiplier * self._ratio(edge, leader), -float(offset or 0.0) * own
 
     def _factor(self, kind: JointKind) -> float:
         return self._unit if kind is JointKind.PRISMATIC else math.pi / 180.0
 
-    def _factor_of(self, leader: str, otherwise: float) -> float:
+    def _ratio(self, edge: _Edge, leader: str) -> float:
+        """Return the factor 1 of a multiplier; report a rule between an angle and a length."""
         kinds = {edge.path: edge.kind for edge in self._edges}
-        return self._factor(kinds[leader]) if leader in kinds else otherwise
+        slides = {kind is JointKind.PRISMATIC for kind in (edge.kind, kinds.get(leader, edge.kind))}
+        if len(slides) > 1:
+            self._say(
+                "lost-mimic",
+                edge.path,
+                "the schema has no unit for a coefficient between angle and length; m and rad are used",
+                "compare the joint with the simulator",
+            )
+        return 1.0
 
     # -- the whole -----------------------------------------------------------------------------------
 
