@@ -26,7 +26,7 @@ from urdfkin.cli.options import (
 )
 from urdfkin.cli.streams import command_lines, harmless, say, say_file, say_styled
 from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
-from urdfkin.system.files import demand_regular, write_file
+from urdfkin.system.files import demand_regular, read_start, write_file
 from urdfkin.system.git import Version, version_before
 from urdfkin.system.lazy_import import installed_version
 from urdfkin.urdf.findings import Excerpts, UrdfError, UrdfWarning
@@ -511,8 +511,8 @@ def _is_other(file: str) -> bool:
         return True
     if Path(file).suffix.lower() not in (".xml", ".mjcf"):
         return False
-    with contextlib.suppress(OSError), Path(file).open("rb") as stream:
-        if b"<mujoco" not in stream.read(1 << 16):
+    with contextlib.suppress(OSError):
+        if b"<mujoco" not in read_start(Path(file), 1 << 16):
             return False  # without NumPy, which `check` of a URDF does not need
     from urdfkin.urdf.mjcf import is_mjcf  # noqa: PLC0415  a URDF needs none of that module's imports
 
