@@ -24,8 +24,9 @@ import numpy as np
 import psutil
 import pytest
 import yaml
-from distributed import Client, LocalCluster
+from distributed import LocalCluster
 from distributed.comm.core import CommClosedError
+from distributed.core import Status
 
 from tests.validation.test_store import numbers
 from urdfkin.errors import InputError
@@ -62,11 +63,15 @@ def two() -> Iterator[Cluster]:
 
 
 @pytest.fixture(scope="module")
-def processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
-    """Two of Dask's worker processes, which can be killed."""
+def processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Cluster, LocalCluster]]:
+    """Two of Dask's worker processes, which can be killed, and the cluster that replaces them."""
+    import dask  # noqa: PLC0415
+
     folder = str(tmp_path_factory.mktemp("dask"))
     with (
         pytest.MonkeyPatch.context() as patch,
+        # Dask never replaces a worker whose successor takes longer than this; its own value is 15 s.
+        dask.config.set({"distributed.deploy.lost-worker-timeout": "600s"}),
         LocalCluster(
             n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0", local_directory=folder
         ) as there,
@@ -74,7 +79,7 @@ def processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
         # Dask's own workers import the main module again, which would run these tests where it has no guard.
         patch.delattr(sys.modules["__main__"], "__file__", raising=False)
         with connected(there.scheduler_address) as found:
-            yield found
+            yield found, there
 
 
 def test_workers_of_a_local_cluster_open_no_port_that_anybody_could_reach(two: Cluster) -> None:
@@ -184,9 +189,7 @@ def test_a_cluster_with_the_settings_of_the_page_serves_who_has_its_key_and_nobo
             str(tmp_path),
         )
         start("worker", "--no-nanny", *words)
-        while not place.exists():
-            time.sleep(0.1)
-        address = json.loads(place.read_text())["address"]
+        address = _address(place)
         assert address.startswith("tls://127.0.0.1:")
         with dask.config.set({"distributed.comm.timeouts.connect": "2s"}):
             for other in (address, address.replace("tls", "tcp")):
@@ -287,35 +290,46 @@ def _deadly(deaths: str, module: str) -> None:
 
 
 @pytest.mark.parametrize("seed", range(SEEDS))
-def test_workers_killed_at_random_times_cost_time_and_nothing_else(processes: Cluster, seed: int) -> None:
+def test_workers_killed_at_random_times_cost_time_and_nothing_else(
+    processes: tuple[Cluster, LocalCluster], seed: int
+) -> None:
     """Dask starts another; `test_workers` has twenty seeds of the processes that compute."""
     rng, killed = np.random.default_rng(seed), list[int]()
     times = rng.choice(np.arange(1, 12), 2, replace=False)
+    engine, there = processes
 
     def kill(standing: CampaignProgress) -> None:
         if standing.chunks_done in times:
             time.sleep(rng.uniform(0.0, 0.2))
-            while not (workers := _workers()):
-                time.sleep(0.05)  # the last one killed has no successor yet
+            deadline = time.monotonic() + 60
+            while not (workers := _running(there)):
+                assert time.monotonic() < deadline, "Dask replaced no worker"
+                time.sleep(0.05)
             killed.append(int(rng.choice(workers)))
             os.kill(killed[-1], signal.SIGKILL)
 
-    assert numbers(validate(KILLED, samples=400, executor=processes, progress=kill)) == _serial()
+    assert numbers(validate(KILLED, samples=400, executor=engine, progress=kill)) == _serial()
     assert len(set(killed)) == 2
+
+
+def _running(there: LocalCluster) -> list[int]:
+    """Return the workers that Dask replaces when they end; it replaces none that ends while it starts."""
+    return [nanny.pid for nanny in there.workers.values() if nanny.status == Status.running]
+
+
+def _address(place: Path) -> str:
+    """Return the address of the scheduler that writes this file; it exists for a moment without content."""
+    deadline = time.monotonic() + 60
+    while True:
+        with contextlib.suppress(FileNotFoundError, json.JSONDecodeError):
+            return str(json.loads(place.read_text())["address"])
+        assert time.monotonic() < deadline, "the scheduler wrote no address"
+        time.sleep(0.1)
 
 
 @cache
 def _serial() -> str:
     return numbers(validate(KILLED, samples=400))
-
-
-def _workers() -> list[int]:
-    """Dask's, beside a process that keeps the books of multiprocessing."""
-    found = []
-    for process in psutil.Process().children():
-        with contextlib.suppress(psutil.Error):
-            found += [process.pid] if "spawn_main" in " ".join(process.cmdline()) else []
-    return found
 
 
 def test_workers_may_come_and_go(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -388,17 +402,14 @@ def test_a_lost_scheduler_loses_nothing_that_the_store_holds(undisturbed: str, t
     start("scheduler", "--port", "0", "--host", "127.0.0.1", *how)
     start("worker", "--nthreads", "1", "--no-nanny", "--local-directory", str(tmp_path), *how)
     try:
-        while not place.exists():
-            time.sleep(0.1)
-        with Client(scheduler_file=str(place), set_as_default=False) as client:
-            address = client.scheduler.address if client.scheduler else ""
+        address = _address(place)
 
         def killed(standing: CampaignProgress) -> None:
             if standing.chunks_done >= 3:
                 started[0].kill()
 
         with contextlib.suppress(Exception), connected(address) as there:
-            there._client.wait_for_workers(1)
+            there._client.wait_for_workers(1, timeout=60)
             report = validate(ROBOTS, samples=SAMPLES, executor=there, store=tmp_path / "s", progress=killed)
     finally:
         for process in started:
