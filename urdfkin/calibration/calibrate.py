@@ -57,19 +57,16 @@ from urdfkin.verify.certificate import Certificate
 
 #: Number of random configurations from which the parameters that are identifiable in principle are found.
 _GENERAL = 40
-#: If the residual noise differs from the stated noise by more than this number of standard deviations, a
-#: warning is given.
+#: A warning is given if residual and stated noise differ by more than this number of standard deviations.
 _UNLIKELY = 4.0
-#: A warning is given if the uncertainty of a parameter is more than this factor times the uncertainty that
-#: random configurations would give.
+#: A parameter is poorly observable if its ratio of uncertainties (`Calibration.weak`) exceeds this number.
 _WEAK = 10.0
-#: Seed of the random configurations to which `_WEAK` refers. The random configurations for
-#: `Calibration.general` have another seed.
+#: Seed of the random configurations for `Calibration.weak`.
+#: The random configurations for `Calibration.general` have another seed.
 _OTHERS = 1
-#: If a column's diagonal entry of R is below this fraction of the largest entry, the column depends on the
-#: columns before it.
+#: A column with a smaller diagonal entry of R, relative to the largest entry, depends on earlier columns.
 _DEPENDENT = 1e-12
-#: The robot's size divided by these numbers gives x, y and z of a target in general position.
+#: x, y and z of a target that is on no joint axis: the robot's size divided by these numbers.
 _ASIDE = {"x": 5.0, "y": 6.0, "z": 7.0}
 #: `ParametricChain.rounding` is multiplied by this factor.
 #: Pinocchio computes the poses of base and tip separately, and it computes them from rewritten origins.
@@ -95,8 +92,9 @@ class Calibration:
         before: The fit of base and tool alone, with the robot's original parameters.
         odd: Indices of those poses that are outliers.
         without_odd: The fit without the outliers.
-        weak: Poorly observable parameters. For each parameter: its uncertainty, divided by the uncertainty
-            that the same number of random configurations would give.
+        weak: Indices of poorly observable parameters, each with a ratio of uncertainties. The ratio divides
+            the uncertainty at the measured configurations by the uncertainty at as many random
+            configurations.
         certificate: Pinocchio's check of the written model.
         stated: Whether the user stated the noise.
         written_fit: The fit of only those parameters that are written; `fitted` if all parameters are
@@ -341,7 +339,7 @@ def fitted_model(
 
 
 def _general_target(model: Model) -> FloatArray:
-    """Return the model's parameters (p,); a fitted target gets a general position, which is on no axis."""
+    """Return the model's parameters (p,), and place a fitted target on no joint axis."""
     at = model.way.start.copy()
     for k, parameter in enumerate(model.way.parameters):
         if parameter.end and parameter.where == "tool" and parameter.unit == "m":
@@ -356,7 +354,7 @@ def _values(model: Model, robot: Robot, q: FloatArray) -> FloatArray:
 def _check_measured(
     robot: Robot, model: Model, q: ArrayLike, poses: ArrayLike
 ) -> tuple[FloatArray, Measured]:
-    """Return the coordinates (s, c) of the path at all configurations, and the measurements."""
+    """Return the path's coordinates (s, c) of all samples, and the measurements."""
     T = checked_poses(poses)
     if isinstance(model.source, DHTable):
         path_q = model.coupling.checked(q, "q")
@@ -470,9 +468,9 @@ def _parse_noise(noise: tuple[float, float]) -> Noise:
 def _weak(
     robot: Robot, model: Model, measured: Measured, kept: Sequence[int], at: FloatArray
 ) -> dict[int, float]:
-    """Return the parameters that the same number of random configurations would determine much better.
+    """Return the parameters that as many random configurations would determine much better.
 
-    The number for each parameter is its uncertainty, divided by its uncertainty at random configurations.
+    Each parameter has a ratio: its uncertainty, divided by its uncertainty at random configurations.
     """
     general = _values(model, robot, robot.sample(len(measured), seed=_OTHERS))
     sizes = []
@@ -498,7 +496,7 @@ def _verify_written(found: Calibration, measured: Measured, q: ArrayLike) -> Cer
     at = fitted.at.copy()
     at[[p.end or p.what == "gain" for p in found.parameters]] = 0.0
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the same warnings were given when the robot was first loaded
+        warnings.simplefilter("ignore")  # `load` already gave these warnings
         if (table := found.table) is not None:
             made = load(table)
             made.placement(made.neutral(), made.tip_frame)
@@ -575,8 +573,7 @@ def _list(names: Iterable[str]) -> str:
     return ", ".join(every[:_NAMED]) + (f" and {len(every) - _NAMED} more" if len(every) > _NAMED else "")
 
 
-#: Largest deviation of a matrix from a rotation, or of a quaternion's length from 1, that counts as rounding
-#: of digits.
+#: Largest error of a rotation matrix, or of a quaternion's length, that counts as rounding of digits.
 _WRITTEN = 1e-3
 _POSITION, _QUATERNION = ("x", "y", "z"), ("qx", "qy", "qz", "qw")
 _MATRIX = tuple(f"T{i}{j}" for i in range(3) for j in range(4))

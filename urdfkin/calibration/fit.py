@@ -13,11 +13,11 @@ each prismatic joint, and all 6 parameters of the tip (Everett, Driels and Moori
 are measured, 3 fewer parameters are identifiable, because the tool's orientation is unknown.
 
 The parameters that are not fitted are fixed. Orthogonal elimination chooses the fixed parameters joint by
-joint, from base to tip. Each parameter has a column in the Jacobian. The elimination finds the column that
-depends least on the columns already kept. Other columns may be nearly as independent as this column. Of all
-these columns, the elimination keeps the column that comes first in the model's order of preference. As a
-result, no fitted parameter becomes large to compensate for a fixed parameter. Without this choice, four
-parameters of nearly parallel axes would become hundreds of metres long and cancel each other.
+joint, from base to tip. Each parameter has a column in the Jacobian. In each step, the elimination finds the
+column that depends least on the kept columns. It then finds all columns that are nearly as independent. Of
+these columns, it keeps the first one in the model's order of preference. As a result, no fitted parameter
+becomes large to compensate for a fixed parameter. Without this choice, four parameters of nearly parallel
+axes would become hundreds of metres long and cancel each other.
 
 **Fit.** Damped Gauss-Newton (`urdfkin.kinematics.least_squares`) minimizes the errors of the tip's poses.
 Each error is divided by the standard deviation of its noise. At the minimum, let J be the weighted Jacobian
@@ -63,12 +63,10 @@ from urdfkin.kinematics.roundings import NOT_ZERO
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singular_values import singular_values
 
-#: If the remaining length of a column of the Jacobian is at least this fraction of the largest remaining
-#: length, the column counts as nearly as independent as the most independent column.
+#: A column counts as independent enough if its remaining length is at least this fraction of the largest.
 _AS_GOOD = 0.5
-#: The reason why a parameter is fixed names other parameters that have the same effect. `_NAMED` is the
-#: largest number of these names. A parameter is named only if it produces at least the fraction `_SHARE` of
-#: the fixed parameter's effect.
+#: Largest number of parameters with the same effect that the reason for a fixed parameter names.
+#: Each named parameter produces at least the fraction `_SHARE` of the fixed parameter's effect.
 _NAMED, _SHARE = 3, 1e-6
 
 
@@ -77,7 +75,7 @@ class Identification:
     """The parameters that the measurements identify, and the parameters that stay fixed.
 
     Attributes:
-        kept: Indices of the fitted parameters; no fitted parameter can be left out.
+        kept: Indices of the fitted parameters. The effects of these parameters are linearly independent.
         still: Indices of the fixed parameters, each with the reason.
         numbers: Total number of measured coordinates; a position has 3 coordinates, and a full pose has 6.
     """
@@ -169,11 +167,10 @@ def _reason(model: Model, J: FloatArray, error: FloatArray, kept: Sequence[int],
 
 #: A total redundancy below this number counts as no redundancy.
 _ONE_OR_MORE = 0.5
-#: A pose has several redundancies, one for each direction of its error. If the redundancy in a direction is
-#: less than this fraction of the pose's largest redundancy, the fit fully absorbs an error in this direction.
+#: Smallest redundancy in one direction of a pose's error, relative to the pose's largest redundancy.
+#: The fit fully absorbs an error in a direction with a smaller redundancy.
 _FOLLOWED = 1e-9
-#: Largest number of repetitions of the noise estimate, and the relative change of the noise at which the
-#: repetitions end.
+#: Largest number of noise estimates. The repetitions end at this relative change of the noise.
 _ESTIMATES, _STAYS = 20, 1e-3
 #: Probability that an outlier is reported for a data set that has no outliers.
 WRONGLY = 0.01
@@ -262,7 +259,7 @@ class Fit:
     def ratio(self) -> float:
         """The ratio of the noise in the residuals to the stated noise.
 
-        For correct noise, the ratio is about 1, within 1/sqrt(2 freedom).
+        If the stated noise is correct, the ratio is about 1, with the standard deviation 1/sqrt(2 `freedom`).
         """
         if not self.is_judged:
             return math.nan
@@ -418,10 +415,10 @@ def odd_poses(
 def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]) -> NDArray[np.bool_]:
     """Select the parameters that moved by more than `SIGMAS` standard deviations, by backward elimination.
 
-    The function resets the least significant parameter to its old value. Then the function changes the other
-    parameters according to their covariance with the reset parameter. The elimination ends when all remaining
-    parameters are significant. If the measurements determine only a combination of two parameters, one of
-    these two parameters remains selected.
+    Each step resets the least significant parameter to its old value. It also adjusts the other parameters by
+    their covariance with the reset parameter. The elimination ends when all remaining parameters are
+    significant. If the measurements determine only a combination of two parameters, one of these two
+    parameters remains selected.
 
     Args:
         moved: (k,) change of each parameter.
@@ -436,9 +433,8 @@ def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]
         return ~free
     x, C = moved.copy(), covariance.copy()
     while (rest := np.flatnonzero(stays & free)).size:
-        # The variances in C are differences of larger numbers, so rounding may make a small variance 0 or
-        # negative. A parameter with such a variance is known very precisely, and its change counts as
-        # significant.
+        # Rounding may make a small variance 0 or negative, because C contains differences of larger numbers.
+        # Such a parameter is known very precisely, and its change counts as significant.
         sizes = np.abs(x[rest]) / np.sqrt(np.maximum(C[rest, rest], NOT_ZERO))
         k = rest[int(np.argmin(sizes))]
         if sizes.min() > SIGMAS:
@@ -459,11 +455,10 @@ def quantile(share: float, freedom: int) -> float:
     return freedom * (1.0 - step + NormalDist().inv_cdf(share) * math.sqrt(step)) ** 3
 
 
-#: Largest number of times that base and target are computed alternately, and the relative change of the
-#: target at which this computation ends.
+#: Largest number of alternate solutions for base and target. They end at this relative change of the target.
 _TURNS, _FIXED_END = 200, 1e-9
-#: Largest allowed ratio of the spread of the measured positions to the spread of the robot's tip positions.
-#: If the measured positions are in millimetres by mistake, this ratio is about 1000.
+#: Largest allowed spread of the measured positions, relative to the spread of the robot's tip positions.
+#: With positions in millimetres by mistake, this ratio is about 1000.
 _FARTHER = 100.0
 
 

@@ -11,12 +11,13 @@ joint's column times the joint's value.
 to the joint's axis. The new origin is  T . A . Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry) Rz(rz) . A^-1. Therefore z
 shifts the origin along the joint's axis, and rz is the joint's zero, for every axis in the file. The other
 four parameters move the axis. The gain is a seventh parameter, which a URDF cannot store. `base` and `tool`
-have six parameters each. The parameters of `base` are before the first constant of the path and give the pose
-of the instrument. The parameters of `tool` are after the last constant and give the pose of the target.
+have six parameters each. The path begins with the motions of `base`, which give the pose of the robot's base
+in the instrument's frame. The path ends with the motions of `tool`, which give the pose of the target in the
+tip's frame.
 
 **Table.** The parameters of a row are its cells. If the row's axis is parallel to the next axis within
-`PARALLEL`, the row also has beta, Hayati's fifth parameter. In such a row d has no separate effect, and alpha
-alone cannot tilt the axis in both directions.
+`PARALLEL`, the row also has beta, Hayati's fifth parameter. In such a row, d has the same effect as the
+parameters of other rows. A tilt of the axis in any direction needs both alpha and beta.
 """
 
 from __future__ import annotations
@@ -45,9 +46,9 @@ class Parameter:
 
     Attributes:
         where: "base", "tool", or the name of a joint.
-        what: "x", "rx" and so on of an origin, "gain", or a cell of a table: "theta", "d", ...
+        what: Parameter of an origin ("x", "rx", ...), "gain", or a cell of a table ("theta", "d", ...).
         unit: "m", "rad", or "" for a gain.
-        end: Whether `where` is the base or the tool, not a joint of that name.
+        end: True if `where` means the base or the tool; False if it names a joint.
     """
 
     where: str
@@ -66,7 +67,8 @@ class Drive(Motion):
     Attributes:
         parameter: Index of the parameter or of the joint's gain; None if the motion has neither.
         joint: Index of the joint; None for a parameter.
-        sense: -1 if the path passes the joint backwards, or if the table's row has the opposite sense.
+        sense: -1 if the path leads from the joint's child to its parent, or if the table's row has the
+            opposite sense.
     """
 
     parameter: int | None
@@ -79,7 +81,7 @@ class ParametricChain:
     """The pose of a tip as a function of parameters and joint values.
 
     Attributes:
-        path: Constants and drives, from base to tip.
+        path: Constant transforms and elementary motions (`Drive`), from base to tip.
         parameters: The parameters; each occurs once in the path.
         start: (p,) values of the parameters in the original model.
     """
@@ -130,7 +132,7 @@ class ParametricChain:
         return T, columns
 
     def _amounts(self, values: FloatArray, at: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the amount of each drive (s, drives), and its derivative by the drive's parameter."""
+        """Return the amounts (s, motions) of all motions, and the derivative of each by its parameter."""
         factors = np.empty((len(values), len(self._drives)))
         numbers = np.ones(len(self._drives))
         for k, drive in enumerate(self._drives):
@@ -142,27 +144,25 @@ class ParametricChain:
     def rounding(self, values: FloatArray) -> float:
         """Bound the rounding error (metres) of each number that `columns` returns.
 
-        Divide the bound by `size` for radians.
+        For angles in radians, the bound is this bound divided by `size`.
         """
         slides = [drive.joint for drive in self._drives if drive.joint is not None and not drive.turns]
         slid = max((float(np.abs(values[:, j]).max(initial=0.0)) for j in slides), default=0.0)
         return 2.0 * ROUNDINGS * (len(self.path.steps) + 1) * EPS * (self.size + slid * len(slides))
 
 
-#: Angle (rad) within which two axes of a table count as parallel. Parallel axes of a real arm deviate by some
-#: milliradians. The distance to the foot of the common normal is about a link's length divided by the angle
-#: between the axes.
+#: Largest angle (rad) between two axes of a table that count as parallel.
+#: Parallel axes of a real arm deviate by some milliradians.
+#: The foot of their common normal is then far away: about a link's length divided by the angle.
 PARALLEL = math.radians(5.0)
 
 #: Names of the sets of parameters.
 FITTED = ("base", "tool", "offsets", "origins", "gains")
-#: The six parameters of an origin, in the order of multiplication. Each has a name, whether it is a rotation,
-#: and the index of its axis.
+#: The parameters of an origin, in the order of multiplication: name, True for a rotation, index of the axis.
 SIX = (("x", False, 0), ("y", False, 1), ("z", False, 2), ("rx", True, 0), ("ry", True, 1), ("rz", True, 2))
 _ALL = tuple(what for what, *_ in SIX)
-#: Order of preference among parameters with the same effect, for a revolute or fixed joint (True) and for a
-#: prismatic joint (False). The joint's zero comes first, then parameters that move the joint's axis, then
-#: parameters that only move the joint's frame.
+#: Order of preference among parameters with the same effect; False: for a prismatic joint.
+#: The joint's zero comes first, then motions of the joint's axis, then motions of the joint's frame alone.
 _KEPT = {True: ("rz", "x", "y", "rx", "ry", "z", "gain"), False: ("z", "rx", "ry", "x", "y", "rz", "gain")}
 _ROW = (("theta", True, 2), ("d", False, 2), ("a", False, 0), ("alpha", True, 0), ("beta", True, 1))
 _KEPT_CELLS = ("theta", "a", "alpha", "beta", "d", "gain")
@@ -170,7 +170,7 @@ _KEPT_CELLS = ("theta", "a", "alpha", "beta", "d", "gain")
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A parametric chain with the groups of its parameters.
+    """A parametric chain, with its parameters grouped by joint.
 
     Attributes:
         way: The chain from base to tip.
@@ -195,7 +195,10 @@ class Model:
         return self._push(which, at, end=True)
 
     def origins(self, at: FloatArray) -> dict[str, FloatArray]:
-        """Return the new origins (4, 4) of the URDF's joints that moved, by joint name; locks are ignored."""
+        """Return the new origins (4, 4) of the URDF's joints that moved, by joint name.
+
+        The origin of a locked joint does not include the value at which the joint is locked.
+        """
         found: dict[str, FloatArray] = {}
         if not isinstance(self.source, KinematicTree):
             return found
@@ -278,7 +281,7 @@ class _Maker:
         ends: tuple[str, str],
         kept: Mapping[str, tuple[str, ...]],
     ) -> Model:
-        """Return the model; `kept` is the order of preference of the parameters, by joint."""
+        """Return the model; `kept` lists the parameters of each joint in order of preference."""
         at = {(p.where, p.end, p.what): k for k, p in enumerate(self.parameters)}
         # Base and tool are first, because they are unknown, while the values of the joints are nearly known.
         places = dict.fromkeys((p.where, p.end) for p in self.parameters)

@@ -30,31 +30,31 @@ from urdfkin.calibration.parameters import Model, Parameter
 from urdfkin.comparison.result import angle, length
 from urdfkin.model.tree import LARGEST_ANGLE, FloatArray, JointKind, KinematicTree, far_outside
 
-#: Limits of the rms position error as fractions of the reach. Above the first limit, a fit is refused. The
-#: second and third limits apply together with `_UNEXPLAINED` and `_HARDLY_BELOW`. Above the last limit,
-#: corrections of mistakes are tried.
+#: Limits of the rms position error as fractions of the reach. Above the first limit, a fit is refused.
+#: The second limit applies together with `_UNEXPLAINED`, the third limit together with `_HARDLY_BELOW`.
+#: Above the last limit, corrections of mistakes are tried.
 _MISSED, _CLOSE_BY, _NO_BETTER, _SUSPECT = 0.05, 0.01, 0.03, 0.002
-#: A fit is refused if its error exceeds this fraction of the spread of measured positions, and also
-#: `_CLOSE_BY` times the reach.
+#: Largest error of a fit, as a fraction of the spread of measured positions.
+#: A fit with a larger error is refused if the error also exceeds `_CLOSE_BY` times the reach.
 _UNEXPLAINED = 0.25
-#: A fit is refused if its error exceeds this fraction of the error before the fit, and also `_NO_BETTER`
-#: times the reach.
+#: Largest error of a fit, as a fraction of the error before the fit.
+#: A fit with a larger error is refused if the error also exceeds `_NO_BETTER` times the reach.
 _HARDLY_BELOW = 0.7
-#: Limits of the rms orientation error, radians. Above the first limit, a fit is refused. Above the second
-#: limit, corrections of mistakes are tried.
+#: Limits of the rms orientation error, radians. Above the first limit, a fit is refused.
+#: Above the second limit, corrections of mistakes are tried.
 _MISTURNED, _SUSPECT_TURN = 0.2, 0.005
 #: Largest plausible tilt of a joint's axis, radians, and largest plausible gain.
 _TILTED, _GAINED = 0.5, 0.5
 #: Two configurations count as one if their joint values (rad, m) differ by less than this number.
 _ONE_CONFIGURATION = 1e-6
-#: Number of standard deviations that are subtracted from a change, because the tilt of an axis near the
-#: target is poorly observable.
+#: Number of standard deviations that are subtracted from a change before it is judged.
+#: The reason is that the tilt of an axis near the target is poorly observable.
 _UNCERTAIN = 5.0
-#: A correction must make the error smaller than `_BETTER` times the error of the fit if the fit is accepted.
-#: For a refused fit, `_NOT_WORSE` replaces `_BETTER`.
+#: Largest error after a correction, as a fraction of the error before the correction.
+#: `_BETTER` is the limit if the fit is accepted, `_NOT_WORSE` if the fit is refused.
 _BETTER, _NOT_WORSE = 0.25, 1.5
 #: Number of corrections that are fitted, beginning with the most promising corrections.
-#: Numbers of rows by which q is shifted in these trials.
+#: The corrections also shift q by these numbers of rows, relative to the poses.
 _FITTED, _SHIFTS = 4, (1, -1, 2, -2)
 #: Number of joints that an objection names.
 _NAMED = 4
@@ -190,7 +190,10 @@ def _extreme_parameters(model: Model, ended: Ended) -> Iterator[str]:
 
 
 def _turned_zeros(model: Model, ended: Ended) -> list[str]:
-    """Return the joints whose zero changed by half a turn, as if the sign of the next joint were reversed."""
+    """Return the joints whose zero changed by about half a turn.
+
+    A reversed sign of the next joint causes such a change.
+    """
     return [
         f"{parameter.where!r} by {angle(abs(moved))}"
         for parameter, moved, surely in _changes(model, ended)
@@ -199,9 +202,10 @@ def _turned_zeros(model: Model, ended: Ended) -> list[str]:
 
 
 def _changes(model: Model, ended: Ended) -> Iterator[tuple[Parameter, float, float]]:
-    """Yield each fitted parameter of a moving joint with its change, and this change minus its uncertainty.
+    """Yield each fitted parameter of a moving joint, its change, and a lower bound of the change's size.
 
-    If only positions were measured, joints with an axis near the tip of the original model are skipped.
+    The lower bound is the size minus `_UNCERTAIN` standard deviations. If only positions were measured,
+    joints with an axis near the tip of the original model are skipped.
     """
     kept, fitted = ended.identification.kept, ended.fitted
     near = set[str]()
@@ -222,7 +226,7 @@ def _changes(model: Model, ended: Ended) -> Iterator[tuple[Parameter, float, flo
 def _out_of_range(model: Model, q: FloatArray) -> tuple[list[str], list[str]]:
     """Return the joints with values that look like degrees, and other joints with values far outside limits.
 
-    Joints about which `configuration.warn_of_degrees` warns belong to the first group.
+    The first list contains the joints about which `configuration.warn_of_degrees` warns.
     """
     largest = dict(zip(model.coupling.names, np.abs(q).max(axis=0, initial=0.0).tolist(), strict=True))
     turned, outside = dict[str, str](), dict[str, str]()
@@ -300,7 +304,7 @@ def _sign(names: Sequence[str]) -> str:
 
 
 def _likeliest(model: Model, ended: Ended, limit: float, reach: float) -> _Trial | None:
-    """Return the correction with a plausible fit and an error below the limit, or None."""
+    """Return the first correction that gives a plausible fit with an error below the limit; else None."""
     trials = [_Trial(model, ended, correction, reach) for correction in _corrections(model, ended.q)]
     trials.sort(key=lambda trial: trial.left_before)
     for trial in trials[:_FITTED]:
@@ -344,7 +348,7 @@ class _Trial:
         )
         self.weights = Noise(1.0, 1.0 / reach)
         self.start = starting(model, self.measured)
-        #: Error of a measured number (m) after a fit of base and tool alone.
+        #: Error (m) per pose when only base and tool are fitted.
         self.left_before = _size(errors(model, self.measured, self.start), reach) / math.sqrt(
             len(self.measured)
         )

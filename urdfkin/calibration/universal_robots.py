@@ -45,16 +45,16 @@ LINKS = {
     "wrist_2": "wrist_2_joint",
     "wrist_3": "wrist_3_joint",
 }
-#: SciPy's names of the two orders; lowercase letters stand for rotations about fixed axes, uppercase letters
-#: for rotations about moving axes.
+#: SciPy's names of the two orders.
+#: Lowercase letters are rotations about fixed axes, uppercase letters are rotations about moving axes.
 ORDERS = {"driver": "XYZ", "urdf": "xyz"}
 _SIX = ("x", "y", "z", "roll", "pitch", "yaw")
-#: Number of configurations for the fit of the origins. The check of the fit uses the same number.
+#: Number of configurations for the fit of the origins; the check of the fit uses as many.
 _FITTED = 40
 #: Seeds of the random configurations for the fit of the origins, and for the check of this fit.
 _FITTED_SEED, _CHECKED_SEED = 2, 3
-#: Largest allowed residual of the fit, in metres and in radians. The rounding of numbers with nine digits in
-#: the file causes residuals of this size.
+#: Largest allowed residual of the fit, in metres and in radians.
+#: The numbers in the file have nine digits, and their rounding causes residuals of this size.
 _LEFT = 1e-8
 #: Number of configurations on which two calibrations are compared.
 _COMPARED = 1000
@@ -96,8 +96,8 @@ def _origin(kinematics: Mapping[Any, Any], link: str, sequence: str, where: str)
         raise InputError("the calibration file lacks a link", where=where, found=f"no {link}")
     six = []
     for name in _SIX:
-        # The driver writes 0.00001 as 1e-05, and YAML 1.1 reads 1e-05 as a string. The error message never
-        # prints a list, because with YAML references a short file may contain a very long list.
+        # The driver writes 0.00001 as 1e-05, which YAML 1.1 reads as a string.
+        # The message never prints a list: with YAML references, a short file can contain a very long list.
         value = entry.get(name)
         number = parse_float(str(value)) if isinstance(value, int | float | str) else None
         if number is None:
@@ -121,8 +121,8 @@ def universal_robots(robot: Robot | Source, path: Path, order: str = "driver") -
     """Apply a calibration file to the URDF of a Universal Robots arm.
 
     In the current ROS description all six joints turn about z. The joint origins are then replaced by the
-    origins in the calibration file. In another URDF, such as the older description, the joint origins are
-    fitted. The fitted arm then has the same poses of `tool0` in `base` as the calibrated arm.
+    origins in the calibration file. In other URDFs, for example of the older ROS description, the joint
+    origins are fitted. The fitted arm then has the same poses of `tool0` in `base` as the calibrated arm.
 
     Args:
         robot: The arm.

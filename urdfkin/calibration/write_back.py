@@ -28,8 +28,7 @@ from urdfkin.urdf.records import JointRecord, Vector
 from urdfkin.urdf.writer import before, numbers, with_attributes
 from urdfkin.verify.certificate import Certificate
 
-#: Number of decimals of written metres and radians. This is the precision of a double for lengths of a
-#: robot's size.
+#: Number of decimals of written metres and radians: the precision of a double near 1 m or 1 rad.
 _DECIMALS = 15
 _SAME = 10.0**-_DECIMALS
 
@@ -44,7 +43,7 @@ def with_origins(data: bytes, origins: Mapping[str, FloatArray]) -> bytes:
         InputError: the text has errors, or a joint does not exist.
     """
     report = Reporter("<text>", data)
-    urdf = read_urdf(report, mimic=False)  # origins do not depend on mimic rules
+    urdf = read_urdf(report, mimic=False)  # mimic rules do not affect origins
     if urdf is None or report.failed:
         errors = [one for one in report.findings() if one.severity is Severity.ERROR]
         raise InputError("a URDF with errors is not edited", found=str(errors[0]))
@@ -135,7 +134,7 @@ class Rewritten:
 
     @cached_property
     def moved(self) -> dict[str, tuple[float, float]]:
-        """The distance and angle (m, rad) by which each joint's origin moved."""
+        """The translation (m) and the rotation (rad) of each joint's origin."""
         tree = self.robot.tree
         old = {name: tree.joints[tree.joint_index(name)].unlocked.T_parent_joint for name in self.origins}
         return {

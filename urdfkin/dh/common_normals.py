@@ -4,22 +4,24 @@
 
     A = Rz(phi) Tz(delta) . Tx(a) Rx(alpha) Ry(beta) . Rz(phi_next) Tz(delta_next)
 
-The first pair of factors commutes with the motion of the first joint, and the last pair with the motion of
-the second joint. Each pair therefore becomes part of its joint's row. The three factors in the middle are the
-step. With beta = 0 and skew axes, the seven numbers are unique up to a half turn of the x axis (Denavit and
-Hartenberg). Then a is the distance between the two joint axes. delta and delta_next lead along these axes to
-the feet of their common normal. If the axes are parallel, the feet are undetermined. If the axes are nearly
-parallel, the feet are far away. docs/dh.md explains the choices for these two cases.
+Rz(phi) Tz(delta) commutes with the motion of the first joint, so it becomes part of that joint's row.
+Rz(phi_next) Tz(delta_next) commutes with the motion of the second joint, so it becomes part of the second
+row. With beta = 0 and skew axes, the seven numbers are unique up to a half turn of the x axis (Denavit and
+Hartenberg). Then a is the distance between the two joint axes. The offset delta leads along the first axis,
+from the origin of its joint frame to the foot of the common normal. The offset delta_next leads along the
+second axis, from the other foot to the origin of that joint frame. Parallel axes have many common normals, so
+the feet are not unique. If the axes are nearly parallel, the feet are far away. docs/dh.md explains the
+choices for these two cases.
 
-`steps_like` takes all free choices from another table. These are the feet, the directions of x and the
-offsets. The pose of the tip fixes only the sum of d along a run of parallel axes, and only the sum of theta
-about a run of coinciding axes. Each row of such a run takes its d or theta from the other table, except one
-row. The d or theta of that row only defines the zero of a joint, or is a part of the first row that the base
-absorbs. The URDF defines the zeros of joints. That row therefore takes the remaining offset.
+`steps_like` makes all free choices as in another table: the feet that are not unique, the directions of x,
+and the offsets. Along several parallel axes, the pose of the tip determines only the sum of d. About several
+coinciding axes, it determines only the sum of theta. All rows of such axes get d or theta from the other
+table, except one row, which gets the remaining offset. Its d or theta only defines the zero of a joint, which
+the URDF defines, or is absorbed by the base.
 
-A Hayati row passes an offset on to the next row, like a row between parallel axes. The plane in which a
-Hayati row ends depends on the offset that this row receives. The zero of a row's joint is therefore computed
-before the following rows.
+A row between parallel axes adds its remaining offset to the next row; a Hayati row does the same. A Hayati
+row ends in a plane, and the offset from the row before it shifts this plane. Therefore, the zero of a row's
+joint is computed before the rows that follow.
 
 **Noise.** Two correct programs read the same URDF and compute slightly different constant poses between two
 joint axes. The program that wrote the file may also have rounded each angle to fifteen digits.
@@ -30,8 +32,8 @@ digits differs by 900 eps or more and is not treated as round. The option `snap`
 nearest multiple of 15 degrees and reports the effect.
 
 If the tilt between two axes is below the noise, the table contains zero instead of the tilt. The two axes
-then count as parallel, so that no foot is far away. `left_out` returns the sum of these tilts. The
-orientations of a table and of the URDF may differ by this sum.
+then count as parallel, so that no foot is far away. `left_out` returns the sum of these tilts. This sum is a
+bound of the orientation error that they cause.
 """
 
 from __future__ import annotations
@@ -49,12 +51,11 @@ from urdfkin.kinematics.roundings import ANGLE, AXES, CONSTANT, DIGITS, EPS, SUM
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, Joint
 
-#: Two axes with a smaller tilt (rad) are nearly parallel. With such a small tilt, errors of the URDF would be
-#: magnified more than 100 times in the positions of the feet.
+#: Two axes with a smaller tilt (rad) are nearly parallel.
+#: The feet of their common normal have more than 100 times the errors of the URDF.
 NEARLY_PARALLEL = 1e-2
 
-#: Two axes with a tilt (rad) up to this number count as nearly parallel if a foot of their common normal lies
-#: beyond the reach.
+#: Largest tilt (rad) of nearly parallel axes whose common normal has a foot beyond the reach.
 FAR_FEET = 0.35
 
 
@@ -100,7 +101,7 @@ class Step:
 
 
 def lifted(A: FloatArray, carry: float) -> FloatArray:
-    """Return Tz(carry) A, which is the pose A relative to the DH frame instead of the joint's frame."""
+    """Return Tz(carry) A: convert a pose in the joint's frame to a pose in the DH frame."""
     raised = A.copy()
     raised[2, 3] += carry
     return raised
@@ -118,11 +119,11 @@ def step_between(
 
     Args:
         A: (4, 4) pose of the next joint's frame in this joint's frame.
-        reach: Length in metres. A foot of the common normal that is farther away than `reach` counts as far.
+        reach: Length in metres. If a foot of the common normal is farther away than `reach`, the axes may get
+            a Hayati row.
         near_parallel: Kind of row for nearly parallel axes.
-        phi_free: Value of phi if the axes coincide, so that every phi is correct.
-        delta_each: Whether the offset between parallel axes becomes `delta` of this step instead of
-            `delta_next`.
+        phi_free: Value of phi for coinciding axes, for which every phi is correct.
+        delta_each: For parallel axes: True if `delta` contains the offset, False if `delta_next` contains it.
         noise: Tilts and lengths below this noise become zero. None: the noise of the constant pose of one
             joint.
 
@@ -162,9 +163,8 @@ def _skew(A: FloatArray, sine: float, reach: float, noise: Noise) -> Step:
 def _parallel(A: FloatArray, reach: float, noise: Noise, phi_free: float, delta_each: bool) -> Step:
     """Return the step between two parallel axes.
 
-    The step follows the perpendicular through the origin of this joint's frame.
-
-    If the axes coincide, every phi is correct, and the step takes `phi_free`.
+    The x axis is along the perpendicular through the origin of this joint's frame. If the axes coincide,
+    every phi is correct, and phi is `phi_free`.
     """
     sign = math.copysign(1.0, A[2, 2])
     alpha = 0.0 if sign > 0.0 else math.pi
@@ -194,7 +194,10 @@ def hayati_step(A: FloatArray, reach: float, noise: Noise, phi_free: float) -> S
 
 
 def _remaining_rotation(A: FloatArray, phi: float, alpha: float, beta: float) -> float:
-    """Return phi_next, the remaining rotation about the next axis; the formula is accurate for every tilt."""
+    """Return phi_next, the rotation about the next axis that remains after phi, alpha and beta.
+
+    The formula is accurate for every tilt.
+    """
     turn_phi = np.array([[math.cos(phi), -math.sin(phi), 0], [math.sin(phi), math.cos(phi), 0], [0, 0, 1.0]])
     M = (turn_phi @ between_axes(0.0, alpha, beta)[:3, :3]).T @ A[:3, :3]
     return math.atan2(M[1, 0] - M[0, 1], M[0, 0] + M[1, 1])
@@ -257,9 +260,9 @@ class PairLike:
 
     @property
     def passes_on(self) -> bool:
-        """Whether the row determines no foot of a common normal.
+        """Whether the offset along the axis is a free choice, because the common normal has no unique foot.
 
-        The next row then takes the rest of the offset.
+        The next row then gets the remaining offset.
         """
         return tilt_of(self.A) <= self.noise.radians or self._gets_hayati_row
 
@@ -286,10 +289,11 @@ class PairLike:
 
         This plane is normal to the first axis. The Hayati row of the other table lies in the same plane.
 
-        The result is None if no such plane is within reach. The next axis intersects this plane at a distance
-        from the first axis that equals the other row's a. The component of a along the direction of the tilt
-        determines the plane. The error is then the rounding error divided by the tilt. For a slight tilt, the
-        component of a across that direction determines the plane more accurately.
+        The next axis intersects the plane in a point, whose distance from the first axis is the a of the
+        other row. The component of this distance in the direction of the tilt determines the plane. The error
+        of the plane is then the rounding error divided by the tilt. For a slight tilt, the component normal
+        to that direction gives a more accurate plane. The result is None if the plane is farther away than
+        `reach`.
         """
         across, along = -math.sin(self.row.alpha) * math.cos(self.row.beta), math.sin(self.row.beta)
         sine, lean = tilt_of(self.A), math.hypot(along, across)
@@ -306,9 +310,8 @@ class PairLike:
     def step(self, carry: float, d: float, phi_free: float = 0.0) -> Step:
         """Return the step between the two axes.
 
-        The first row begins at the offset `carry` before the first joint.
-
-        If the row does not determine d, the step uses the argument `d`.
+        The DH frame is at the offset `carry` before the joint's frame. If the row's offset is a free choice,
+        it is `d`.
         """
         if not self.passes_on:
             return step_between(
@@ -322,7 +325,7 @@ class PairLike:
         return replace(step, delta=step.delta + d) if d else step
 
     def passed_back(self, carry: float) -> float:
-        """Return the offset (metres) with which a row with d = 0 passes `carry` on to the next row."""
+        """Return the offset (metres) before a row with d = 0 that gives the next row the offset `carry`."""
         return float(carry * self.A[2, 2] - self.A[2, 3])
 
 
@@ -335,8 +338,8 @@ def steps_like(
         pairs: All pairs of consecutive axes.
         phi_in: Angle about the first axis from frame 0 to the first joint's frame (rad).
         carry: Offset along the first axis from frame 0 to the first joint's frame (metres).
-        tip: Offset that the last row must receive so that its d equals the d in the other table (metres).
-            None if the tool or the last row takes the remaining offset.
+        tip: Offset (metres) before the last row with which its d equals the d in the other table. None if the
+            tool or the last row gets the remaining offset.
 
     Returns:
         The steps between consecutive axes, and theta of each row.
@@ -358,10 +361,10 @@ def steps_like(
 
 
 def _offset_without_foot(pairs: Sequence[PairLike], i: int, carry: float, tip: float | None) -> float:
-    """Return d of a row that determines no foot of a common normal.
+    """Return d of a row whose common normal has no unique foot.
 
-    The result is the d in the other table, or the d with which the later rows have the same d as in the other
-    table.
+    The result is either the d of this row in the other table, or the d that gives the later rows their d in
+    the other table.
     """
     pair = pairs[i]
     if not pair.passes_on or not (pair.slides or (i == 0 and pair.row.d)):
@@ -373,8 +376,8 @@ def _offset_without_foot(pairs: Sequence[PairLike], i: int, carry: float, tip: f
     if end < len(pairs):
         target = None if pairs[end].slides else pairs[end].row.d - pairs[end].foot
     if target is None:
-        # A later prismatic joint or the tool takes the remaining offset. A Hayati row before this joint or
-        # tool may define d.
+        # A later prismatic joint or the tool gets the remaining offset.
+        # A Hayati row before this joint or tool may determine d.
         end = max(range(i, end), key=lambda k: tilt_of(pairs[k].A))
         cut = pairs[end].cut
         if cut is None:
@@ -390,8 +393,7 @@ def _offset_without_foot(pairs: Sequence[PairLike], i: int, carry: float, tip: f
 def _phi_of_coinciding(pairs: Sequence[PairLike], steps: Sequence[Step], i: int, phi_in: float) -> float:
     """Return phi for two coinciding axes, for which any value of phi is correct.
 
-    With the returned phi, this row, or the prismatic rows after this row, have the same theta as in the other
-    table.
+    The result gives either this row, or the prismatic rows after it, the theta of the other table.
     """
     own = pairs[i].row.theta - phi_in
     if i > 0 and pairs[i].slides:
@@ -425,13 +427,13 @@ def _closer_direction(step: Step, pair: PairLike, phi_in: float = 0.0) -> Step:
 
 
 def near(theta: float, there: float) -> float:
-    """Return `theta` in (-pi, pi], or return `there` if `theta` and `there` are equal within rounding."""
+    """Return `theta` in (-pi, pi], or the angle `there` if the two angles are equal within rounding."""
     off = math.remainder(theta - there, 2.0 * math.pi)
     return there if abs(off) <= ANGLE * EPS else cleaned_angle(theta)
 
 
-#: Largest allowed length (metres). With longer lengths, squares of sums of lengths overflow in the
-#: computation of common normals and bounds.
+#: Largest allowed length (metres).
+#: Longer lengths cause an overflow, because common normals and bounds contain squares of sums of lengths.
 LONGEST = 1e150
 
 
@@ -505,8 +507,8 @@ def noises(chain: FrameChain, reach: float) -> list[Noise]:
 def left_out(chain: FrameChain) -> float:
     """Return the sum of all tilts of a chain that count as rounding (rad).
 
-    The sum includes the tilts between consecutive z axes, and the tilts of x axes, for example of the tip's x
-    axis.
+    The sum contains the tilt between each two consecutive z axes. It also contains tilts of x axes, such as
+    that of the tip.
     """
     found = 0.0
     for A, noise in zip(chain.constants, noises(chain, 0.0), strict=True):
