@@ -1,15 +1,14 @@
 """Convert a table to the other convention, to a kinematic tree, or to a URDF.
 
-The standard and the modified convention group the same factors differently (`urdfkin.dh.table` defines S and
-X):
+The standard and the modified convention group the same factors S and X of `urdfkin.dh.table` differently:
 
     standard   base . (S_1 X_1) (S_2 X_2) ... (S_n X_n) . tool
     modified   base' . (X_0 S_1) (X_1 S_2) ... (X_{n-1} S_n) . tool'
 
 The conversion to the modified convention moves X_n into the tool. The conversion to the standard convention
-moves X_0 into the base. A base of the form Tx(a) Rx(alpha) moves into the free cells of the first modified
-row. A tool of this form moves into the free cells of the last standard row. Therefore, conversion to the
-other convention and back gives the original table.
+moves X_0 into the base. In the first modified row, a and alpha are not yet used. If the base has the form
+Tx(a) Rx(alpha), it moves into these two cells. In the same way, a tool of this form moves into the last
+standard row. Therefore, conversion to the other convention and back gives the original table.
 
 In a tree, each joint's frame is a Denavit-Hartenberg frame. In a standard table z_{i-1} is the axis of joint
 i, so the frame of joint i is frame i - 1. S_i X_i with the joint at zero leads to frame i: d_{i-1,i} = d_i

@@ -5,8 +5,7 @@ The derivation makes these choices; docs/dh.md gives the reasons:
 - Frame 0 is at the foot of the perpendicular from the base's origin to the first axis. x_0 is the projection
   of the base's x axis.
 - x_i is along the common normal. The direction of x_i is reversed if theta would exceed a right angle.
-- Between parallel axes d = 0. The first row after a run of parallel axes takes the whole offset along these
-  axes.
+- Between parallel axes d = 0. The first row after these axes gets the whole offset along them.
 - The last row reaches the tip if four parameters suffice.
 - A prismatic axis is on the line through the joint's origin in the URDF, except for the first and the last
   joint.
@@ -49,7 +48,7 @@ RIGHT_ANGLE_SLACK = 1e-3
 
 
 class Last(StrEnum):
-    """Part of the table that leads to the tip: the last row if that row can reach it exactly, or the tool."""
+    """End of the last row: the tip, if four parameters suffice, or the flange, where the tool begins."""
 
     TIP = "tip"
     FLANGE = "flange"
@@ -78,7 +77,7 @@ class Slide(StrEnum):
 
 
 class ParallelOffset(StrEnum):
-    """Row that takes the offset along a run of parallel axes."""
+    """Row that contains the offset along consecutive parallel axes."""
 
     LAST = "last"
     FIRST = "first"
@@ -147,8 +146,8 @@ def derive(chain: FrameChain, choices: Choices, like: DHTable | None = None) -> 
     Args:
         chain: The path.
         choices: The options.
-        like: A standard table of the same joints. The result takes from it the directions of x, the zeros of
-            the first and the last joint, and the offsets along parallel axes. These take priority over
+        like: A standard table of the same joints. The result has the same directions of x, the same zeros of
+            the first and the last joint, and the same offsets along parallel axes. These have priority over
             `choices`.
     """
     constants = _reversed_axes(chain, choices.flip)
@@ -191,7 +190,7 @@ def _table(
     steps: list[Step],
     ends: tuple[FloatArray, FloatArray],
 ) -> DHTable:
-    """Group the factors S_1 X_1 S_2 X_2 ... S_n X_n into the rows of the chosen convention."""
+    """Make the rows of the chosen convention from the factors S_1 X_1 S_2 X_2 ... S_n X_n."""
     if choices.convention is Convention.MODIFIED and turns:
         first = as_step(ends[0])
         a, alpha = first or (0.0, 0.0)
@@ -241,9 +240,9 @@ def _use_freedom_of_prismatic_axes(
 
     A prismatic motion commutes with every translation, so a shift of the joint's line changes no placement.
     The first joint's line passes through the base's origin, so that the base can be the identity. The last
-    joint's line passes through the tip if the last row can then reach the tip. In strict tables, the line may
-    be nearly parallel to the axis of a neighbouring joint. The line then passes through the origin of that
-    joint, so that no foot of a common normal is far away.
+    joint's line passes through the tip if the last row can then reach the tip. If a table may not have Hayati
+    rows, and the line is nearly parallel to the axis of a neighbouring joint, it passes through the origin of
+    that joint. Otherwise, the feet of the common normal would be far away.
     """
     slides = [not joint.kind.turns for joint in chain.joints]
     noise = noises(chain, reach)
@@ -271,7 +270,7 @@ def _use_freedom_of_prismatic_axes(
 def _onto_neighbour(constants: list[FloatArray], k: int, slides: list[bool]) -> bool:
     """Move joint k's line through the origin of a neighbouring revolute joint, so that a = 0.
 
-    The next joint has priority over the previous one.
+    If both neighbouring joints are revolute, the line passes through the origin of the next joint.
     """
     if k + 1 < len(slides) and not slides[k + 1]:
         _shift_before(constants, k, constants[k + 1][:3, 3].copy())
@@ -283,7 +282,7 @@ def _onto_neighbour(constants: list[FloatArray], k: int, slides: list[bool]) -> 
 
 
 def _meets_neighbour(constants: list[FloatArray], k: int, noise: list[Noise]) -> bool:
-    """Move joint k's line through the origin of a neighbouring joint, if their axes are nearly parallel."""
+    """Move joint k's line to the origin of a neighbouring joint if the two axes are nearly parallel."""
     before, after = constants[k], constants[k + 1]
     if k > 0 and noise[k].radians < tilt_of(before) < NEARLY_PARALLEL:
         _shift_after(constants, k, before[:3, :3].T @ before[:3, 3])
@@ -322,7 +321,7 @@ def _frame_zero(A: FloatArray, reach: float, noise: Noise) -> tuple[FloatArray, 
         z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
     # This is (1, 0, 0) - z_0 z for a unit vector z, in a form that avoids cancellation for z close to x.
     x = np.array([z[1] ** 2 + z[2] ** 2, -z[0] * z[1], -z[0] * z[2]])
-    if np.linalg.norm(x) < NEARLY_PARALLEL:  # the axis is along the base's x axis: project the base's y axis
+    if np.linalg.norm(x) < NEARLY_PARALLEL:  # z_0 is along the base's x axis: x_0 is the projection of y
         x = np.array([0.0, 1.0, 0.0]) - z[1] * z
     x /= np.linalg.norm(x)
     base[:3, :3] = np.column_stack([x, np.cross(z, x), z])
@@ -361,9 +360,9 @@ def _steps(
 
 
 def _offset_for_last_row(like: DHTable, A: FloatArray, choices: Choices, noise: Noise) -> float | None:
-    """Return the offset that gives the last row the d of the other table.
+    """Return the offset before the last row with which this row gets the d of the other table.
 
-    The result is None if d of the last row is free, or if the other table has a tool.
+    The result is None if the row gets another d, for example because the other table has a tool.
     """
     row = like.rows[-1]
     if not row.kind.turns or not _has_no_tool(like) or not _representable(A, choices, noise):
@@ -380,7 +379,7 @@ def _first_like(
 ) -> tuple[FloatArray, tuple[float, float]]:
     """Set theta of the first row to theta in another table; set d to 0 if the other table has d = 0.
 
-    The base contains the remaining rotation and the remaining offset.
+    The base gets the rotation and the offset that remain.
     """
     theta, d = first
     rest = (math.remainder(theta - row.theta, 2.0 * math.pi), 0.0 if row.d else d)
@@ -395,9 +394,8 @@ def _last_like(
 ) -> tuple[float, float, Step, FloatArray]:
     """Return the numbers of the last row, and the tool.
 
-    If neither the new table nor `like` has a tool, and theta equals that in the last row of `like`, the new
-    row keeps its own numbers. Otherwise the new row gets the numbers of `like`, and the tool gets the
-    difference.
+    The row keeps its own numbers if neither table has a tool, and if theta is the same in the last rows of
+    both tables. Otherwise, the row gets the numbers of `like`, and the tool contains the difference.
     """
     row = like.rows[-1]
     as_there = _has_no_tool(like) and np.array_equal(tool, np.eye(4))
@@ -416,7 +414,7 @@ def _last_like(
 def _needs_reversal(step: Step, theta: float, sign: Sign) -> bool:
     """Whether x must be reversed by the rule `sign`.
 
-    With the rule "a", alpha decides if a is 0. With the rule "alpha", a decides if alpha is 0 or pi.
+    The rule "a" uses the sign of alpha if a is 0. The rule "alpha" uses the sign of a if alpha is 0 or pi.
     """
     by_alpha = 0.0 if step.alpha == math.pi else step.alpha
     if sign is Sign.THETA or (not step.a and not by_alpha):
@@ -438,7 +436,10 @@ def _representable(A: FloatArray, choices: Choices, noise: Noise) -> bool:
 def _last(
     A: FloatArray, phi_in: float, carry: float, reach: float, choices: Choices, noise: Noise
 ) -> tuple[float, float, Step, FloatArray]:
-    """Return theta, d and the step of the last row, and the tool; `A` is the tip's pose from O_{n-1}."""
+    """Return theta, d and the step of the last row, and the tool.
+
+    `A` is the tip's pose in the last joint's frame, after a shift of this frame along z to the origin O_{n-1}.
+    """
     if _representable(A, choices, noise):
         phi = math.atan2(A[1, 0], A[0, 0])
         a = cleaned_length(A[0, 0] * A[0, 3] + A[1, 0] * A[1, 3], reach, noise.metres)
@@ -458,10 +459,10 @@ def _last(
 
 
 def _offsets_first(rows: list[tuple[float, float]], steps: list[Step]) -> list[tuple[float, float]]:
-    """Move the offsets along each run of parallel axes into the first row of the run.
+    """Move the offsets along consecutive parallel axes into the first row of these axes.
 
-    An offset along z that moves past Tx(a) Rx(0) keeps its sign. An offset that moves past Tx(a) Rx(pi)
-    changes its sign.
+    An offset along z keeps its sign between axes of the same direction (alpha = 0). It changes its sign
+    between axes of opposite directions (alpha = pi).
     """
     moved = list(rows)
     for i in range(len(steps) - 1, -1, -1):

@@ -1,10 +1,11 @@
 """Make the Denavit-Hartenberg table of the path between two frames of a robot.
 
 You can request a table with the same frames as a published table. The author of a table chooses the sense of
-each joint and the direction of each x axis. `reversed_like` derives a table for every pattern of senses that
-fits the published table approximately. The function selects the pattern whose table is closest to the
-published table. It first compares the cells of the two tables, then the zeros, then base and tool. In the
-table of a Kinova arm, for example, the first joint has sense -1, and frame 0 is upright as in the data sheet.
+each joint and the direction of each x axis. `reversed_like` finds all patterns of senses that fit the
+published table approximately. It derives a table for each of these patterns, and selects the table that is
+closest to the published table. The cells of the tables have priority, followed by the zeros, and then base
+and tool. In the table of a Kinova arm, for example, the first joint has sense -1, and frame 0 is upright as
+in the data sheet.
 """
 
 from __future__ import annotations
@@ -26,8 +27,9 @@ from urdfkin.errors import InputError, Question
 from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.tree import KinematicTree
 
-#: Limits of differences, relative to the reach, or in rad. If cells differ by more than `_ANOTHER`, the table
-#: describes another robot. Joint zeros that differ by more than `_OTHER` count as different.
+#: Limits of differences, relative to the reach, or in rad.
+#: A table whose cells differ by more than `_ANOTHER` describes another robot.
+#: Joint zeros that differ by more than `_OTHER` count as different.
 _ANOTHER, _OTHER = 0.1, 1e-2
 #: Two cells with a smaller difference (relative to the reach, or in rad) count as equal.
 _ROUNDING = 1e-12
@@ -80,10 +82,14 @@ def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tu
 def _difference_key(found: DHTable, there: DHTable, reach: float) -> tuple[float, int, int, float, int]:
     """Return a key that ranks tables by their difference from another table; the smallest key is the best.
 
-    The key has these entries, in this order: the largest difference of the cells, the power of ten of this
-    difference, the number of different zeros and signs of d, the number of different ends (base and tool),
-    and the number of reversed senses. The axis line of a prismatic joint can be chosen freely, so cells that
-    depend on this line only affect the power of ten.
+    The entries of the key are, in this order:
+
+    - the largest difference of the cells,
+    - the power of ten of the largest difference, here with the cells next to a prismatic axis, which can be
+      shifted,
+    - the number of different zeros and signs of d,
+    - the number of different ends (base and tool),
+    - the number of reversed senses.
     """
     n, cells, lines, zeros = len(found.rows), 0.0, 0.0, 0
     for i, (row, other) in enumerate(zip(found.rows, there.rows, strict=True)):
@@ -140,19 +146,20 @@ def dh_table(
             angle as it is in the file.
         last: "tip": the last row reaches the tip if four parameters suffice. "flange": the tool contains the
             transform from the last axis to the tip.
-        parallel_offset: Row that takes the offset along a run of parallel axes. "last": the first row after
-            the run. "first": the first row of the run. "each": every row takes the offset of its own link.
+        parallel_offset: Row that contains the offset along consecutive parallel axes. "last": the first row
+            after these axes. "first": the row of the first of these axes. "each": every row contains the
+            offset of its own link.
         flip: Names of joints to reverse; the rows of these joints have sense -1.
         first: "base": if possible, d_1 and theta_1 contain the transform from the base to the first axis.
             "joint": the base contains this transform, so that d_1 and theta_1 are zero (Craig's frame 0).
         sign: Direction of x: "theta" keeps theta within a right angle; "a" and "alpha" make the cell of that
             name not negative.
-        slide: Line of a prismatic joint, because a prismatic joint defines only a direction. "drawn": the
-            line through the joint's origin in the URDF. "minimal": the line through the origin of the next
-            revolute joint, so that a is 0.
-        like: A published table. The result takes from it the senses, directions of x, zeros of the first and
-            last joint, and offsets along parallel axes. The lengths, the angles, the base and the tool come
-            from the URDF. `flip`, `first`, `last`, `sign` and `parallel_offset` are then ignored.
+        slide: Line of a prismatic joint, because a prismatic joint defines only a direction. The line "drawn"
+            passes through the joint's origin in the URDF. The line "minimal" passes through the origin of the
+            next revolute joint, so that a is 0.
+        like: A published table. The result has the same senses, directions of x, zeros of the first and last
+            joint, and offsets along parallel axes. The lengths, the angles, the base and the tool come from
+            the URDF. `flip`, `first`, `last`, `sign` and `parallel_offset` are then ignored.
 
     Raises:
         UnknownNameError: a frame or a joint does not exist.

@@ -38,27 +38,24 @@ from urdfkin.model.mechanisms.mechanism import AS_WRITTEN, Mechanism, tolerance_
 from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree, is_bounded
 
-#: Default tolerance for the tip's position (metres). The tolerance is 1.5 times the error of a table in which
-#: one or two cells are rounded to 0.1 mm.
+#: Default tolerance for the tip's position (metres).
+#: A table with one or two cells that are rounded to 0.1 mm has an error of about two thirds of it.
 TOLERANCE = 2e-4
-#: Number of configurations for a fit, and for the check of the fit. The fit and the check use different
-#: seeds, so their configurations differ.
+#: Number of configurations for a fit, and number of other configurations for the check of the fit.
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
-#: If more than this fraction of the tip error remains after a change of cells, these cells do not explain the
-#: error.
+#: Changes of cells explain the tip error if at most this fraction of the error remains.
 _EXPLAINS = 0.5
 #: Largest fraction of the tip error that may remain after the correction of a single mistake.
 _LEFT = 0.05
 #: Smallest change of a cell that is reported, relative to the reach. It is a tenth of `EXPLAINED`.
 _MOVED = 1e-10
-#: If the tip moves by less than this fraction of the path length, it counts as fixed, and its motion does not
-#: determine the reach.
+#: A tip that moves by less than this fraction of the path length counts as fixed.
+#: The motion of a fixed tip does not determine the reach.
 _FIXED_TIP = 1e-6
 #: Range in which a prismatic joint without limits is sampled (metres).
 _SLIDE = (-0.5, 0.5)
-#: For each row of a table, the precision of each cell: half a unit of the cell's last digit in the table's
-#: file (metres and radians).
+#: For each row of a table: half a unit of each cell's last digit in the file (metres and radians).
 Digits = Sequence[Mapping[str, float]]
 
 
@@ -73,8 +70,8 @@ def compare(
     """Compare a reference table with a path of a URDF.
 
     Args:
-        chain: The path, from base to tip. The base and tip frames of the table may differ from the base and
-            tip frames of the path, if they are fixed to the same links.
+        chain: The path, from base to tip. The table may have other base and tip frames than the path, if they
+            are fixed to the same links.
         reference: The table in either convention, with a row for each moving joint in the path's order.
         tolerance: Tolerance at the tip (metres).
         fit: Whether to fit base, tool, and the zeros and senses of the joints. If False, the table is
@@ -131,8 +128,8 @@ def compare(
 def best_fit(chain: FrameChain, reference: DHTable, enough: float) -> tuple[float, float]:
     """Return the largest tip error on samples (metres, radians) after a fast fit of base, tool and offsets.
 
-    To be fast, the fit tries only a few patterns of joint senses and x directions. The fast fit also tries no
-    opposite rotations about nearly coinciding axes.
+    To be fast, the fit tries only a few patterns of joint senses and x directions. It does not try opposite
+    rotations about nearly coinciding axes.
 
     Args:
         chain: The path.
@@ -287,9 +284,9 @@ def _instead(
     wanted: tuple[TargetPoses, TargetPoses],
     digits: Digits,
 ) -> tuple[CellDifference, ...]:
-    """Return the cells that must change if base, tool and offsets stay as written.
+    """Return the cells that must change if base, tool and offsets are not fitted.
 
-    The result is empty if these changes of cells do not explain the difference.
+    The result is empty if these changes do not explain the difference between table and URDF.
     """
     tried, judged = wanted
     complete = fit_cells(written, tried, _cells_of(reference), free=False)
@@ -328,8 +325,8 @@ def max_tip_error_bound(
 
     Args:
         path: The path; its mimic rules are ignored.
-        table: The table. The variables of the table are the path's joint values, and its rows contain the
-            joint senses and zeros.
+        table: The table, with the path's joint values as variables. Senses and zeros of the joints are in its
+            rows.
         slides: Ranges of the prismatic joints (metres).
     """
     mechanisms = Mechanism(_free(path, table, slides)), Mechanism(free_tree(table))

@@ -9,16 +9,16 @@ solution then changes as few cells as possible.
 
 **Free parameters.** `fit_freedoms` fits base, tool and joint offsets, with the cells unchanged. The method is
 damped least squares (`urdfkin.kinematics.least_squares`) on the tip's twists. Two joints with nearly
-coinciding axes have nearly the same effect. If one offset increases and the other decreases by the same
-angle, the tip moves by at most the angle times the distance of the axes. Such changes therefore change the
-error only slowly. To make long steps possible, the damping decreases while steps succeed. At the end of a
-descent, the fit starts again with opposite rotations of such pairs of offsets.
+coinciding axes have nearly the same effect. Let one offset increase by an angle, and let the other decrease
+by this angle. The tip then moves by at most the angle times the distance of the two axes. Such changes
+therefore change the error only slowly. To make long steps possible, the damping decreases while steps
+succeed. At the end of a descent, the fit starts again with opposite rotations of such pairs of offsets.
 
 **Signs.** `align` finds the senses and the directions of x with which a reference table fits the URDF. The
 author of a table has three choices that do not change the robot: the sense of a joint, the direction of x
-along a common normal, and the zero of theta. The first two choices are signs, and they determine the zeros of
-theta. A beam search extends sign patterns joint by joint. The search keeps the patterns whose cells are
-closest to the cells of the reference table.
+along a common normal, and the zero of theta. Each sense and each direction of x is a sign. These signs
+determine the zeros of theta. A beam search extends sign patterns joint by joint. The search keeps the
+patterns whose cells are closest to the cells of the reference table.
 """
 
 from __future__ import annotations
@@ -45,22 +45,21 @@ CELLS = ("theta", "d", "a", "alpha", "beta")
 _ROW = (Motion(2, True), Motion(2, False), Motion(0, False), Motion(0, True), Motion(1, True))
 #: Largest step of the fit, in radians for angles, and in metres per metre of reach for lengths.
 LONGEST_STEP = 0.5
-#: Limits for the fit of cells: largest number of steps, smallest relative improvement to continue, and mean
-#: error that counts as zero.
+#: Limits of the fit of cells: number of steps, smallest relative improvement, and mean error that is zero.
 _ROUNDS, _BETTER, _SOLVED = 40, 1e-9, 1e-14
-#: A singular value counts as zero if it is below this fraction of the largest singular value: `_FREE` for
-#: free parameters, `_CELLS` for cells.
+#: A singular value counts as zero below this fraction of the largest singular value.
+#: `_FREE` applies to free parameters, `_CELLS` to cells.
 _FREE, _CELLS = 1e-8, 1e-9
-#: Number of iterations of the sparse solution, and the smallest weight of a cell relative to the reach.
+#: Number of iterations that reweight the cells, and the smallest weight of a cell relative to the reach.
 _SPARSER, _STAYS = 25, 1e-9
-#: Weight of the last cell relative to the first cell. Because the weights differ, the solution changes only
-#: one of two cells that have the same effect.
+#: Weight of the last cell relative to the first cell.
+#: With different weights, the solution changes only one of two cells that have the same effect.
 _LAST_WINS = 1.2
-#: Initial weight of beta, and the factor by which each iteration multiplies this weight. Small weights make
-#: changes of beta expensive, so beta changes only if a change of alpha is not enough.
+#: Initial weight of beta, and the factor by which each iteration multiplies this weight.
+#: With a small weight, beta changes only if a change of alpha is not enough.
 _BETA, _BETA_AGAIN = 0.3, 0.5
-#: Free parameters can compensate for a change of some cells. If at most this fraction of the cell's effect
-#: remains, the free parameters can replace the cell.
+#: Free parameters can compensate for changes of some cells.
+#: They replace a cell if at most this fraction of the cell's effect remains.
 _HIDDEN = 1e-6
 
 
@@ -163,8 +162,7 @@ def columns(
     scale = wanted.scale
     path, amounts = model.path_at(wanted.values)
     poses, twists = path.columns_at(path.frames(amounts) if frames is None else frames)
-    # Changes of angles are multiplied by `scale` and are then in metres. The same is true of the angular part
-    # of a twist.
+    # Changes of angles, and the angular parts of twists, are multiplied by `scale` and are then in metres.
     n, turning = len(model.cells), np.tile([motion.turns for motion in _ROW], len(model.cells))
     twists = twists * np.where(turning, 1.0 / scale, 1.0)
     twists[:, 3:] *= scale
@@ -228,8 +226,8 @@ def _sparse(
     cells_left = cells - Q @ (Q.T @ cells)
     in_metres = np.array([scale, 1.0, 1.0, scale, scale])
     so_far = ((model.cells - start.cells) * in_metres).ravel()
-    # The free parameters include the joint offset of each row. The change of a cell with the same effect
-    # therefore stays zero.
+    # The free parameters include the joint offset of each row.
+    # A cell with the same effect as a joint offset therefore does not change.
     target = error - Q @ (Q.T @ error) + cells_left @ so_far
     total = np.zeros(cells.shape[1])
     weights = np.linspace(1.0, _LAST_WINS, cells.shape[1])
@@ -244,7 +242,7 @@ def _sparse(
 
 
 def _span(freedoms: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of the free parameters' twists; without twists it has no columns."""
+    """Return an orthonormal basis of the free parameters' twists; no columns if all twists are zero."""
     return np.linalg.qr(freedoms)[0] if freedoms.any() else np.zeros((len(freedoms), 0))
 
 
@@ -270,9 +268,9 @@ def moved(model: Model, free: FloatArray, scale: float, change: FloatArray | Non
     for i, own in enumerate(free[12:]):
         k = model.own(i)
         cells[i, k] += own * per_cell[k]
-    # The base is changed in the frame of the first revolute joint, and the tool in the frame of the last
-    # revolute joint. A rotation of the base or the tool may have the same effect as a joint offset. The two
-    # are then exactly equal, not only to first order.
+    # The change of the base is a motion in the frame of the first revolute joint.
+    # The change of the tool is a motion in the frame of the last revolute joint.
+    # A rotation of base or tool about this joint's axis then exactly equals a change of the joint's offset.
     base = _apply_twist(model.base @ model.first, free[:6], scale) @ np.linalg.inv(model.first)
     tool = np.linalg.inv(model.last) @ _apply_twist(np.eye(4), free[6:12], scale) @ model.last
     return replace(model, cells=cells, base=np.asarray(base), tool=np.asarray(model.tool @ tool))
@@ -287,15 +285,13 @@ def _apply_twist(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:
 _PATIENCE = 4
 #: A fit ends at this mean error, relative to the reach.
 _ROUNDING = 1e-13
-#: Number of sign patterns that a fast fit tries, and number of patterns that its search keeps at each joint.
+#: For a fast fit: number of sign patterns that are fitted, and number of patterns kept at each joint.
 HASTY = (3, 16)
 #: Tip error that counts as rounding, relative to the reach. The search ends when the error is this small.
 _AT_ROUNDING = 1e-12
-#: The fit uses another sign pattern than the written one only if the tip error is then less than this
-#: fraction of the error with the written pattern.
+#: Another sign pattern replaces the written one only if the tip error decreases to less than this fraction.
 _TWICE_AS_GOOD = 0.5
-#: Rotations (rad) that are tried for two consecutive joint offsets. Each rotation is added to the first
-#: offset and subtracted from the second offset.
+#: Angles (rad) that are tried as opposite changes of two consecutive joint offsets.
 _TURNS = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
 
 
@@ -332,8 +328,8 @@ def fitted_model(
         return written
     best, best_size = written, size(written)
     for start in starts(chain, standard, written, *(HASTY if hasty else ())):
-        # Least squares minimize the sum over all samples, but models are compared by their worst sample. By
-        # the worst sample, the start may be better than the fit.
+        # Least squares minimize the sum over all samples, but models are compared by their worst sample.
+        # Therefore, the start may be better than the fit.
         model = min(fit_freedoms(start, wanted, turns=not hasty), start, key=size)
         needed = 1.0 if start is written else _TWICE_AS_GOOD
         if (its_size := size(model)) < needed * best_size:
@@ -344,7 +340,7 @@ def fitted_model(
 
 
 def ends_gathered(model: Model, written: Model) -> Model:
-    """Move the first joint's fitted offset into the base, and the last joint's into the tool."""
+    """Move the fitted offset of the first joint into the base, and that of the last joint into the tool."""
     cells, n = model.cells.copy(), len(model.cells)
     _, _, a, alpha, beta = cells[-1]
     step = between_axes(a, alpha, beta)
@@ -369,7 +365,7 @@ def starts(chain: FrameChain, standard: DHTable, written: Model, *effort: int) -
 
 
 def _start(standard: DHTable, aligned: Alignment) -> Model:
-    """Return the reference with the senses, base, tool and offsets of an alignment."""
+    """Return the reference table with the senses, offsets, base and tool of an alignment."""
     start = replace(
         as_written(standard),
         senses=np.array(aligned.senses, dtype=np.float64),
@@ -442,16 +438,15 @@ def _opposite_rotations(model: Model) -> list[Model]:
 
 #: Number of sign patterns that `align` returns, and number of patterns that it keeps at each joint.
 PATTERNS, BEAM = 12, 128
-#: A pattern costs this much (metres) more for each joint that it reverses.
-#: Among equally good patterns, the search therefore selects the joint signs of the URDF.
+#: Cost (metres) of each joint sense that differs from the URDF's sense.
+#: Among equally good patterns, the search therefore selects the joint senses of the URDF.
 REVERSAL = 1e-9
-#: Weight of a difference in a cell next to a prismatic axis. The line of this axis is free, so such a
-#: difference decides only between otherwise equal patterns.
+#: Weight of a cell's difference next to a prismatic axis, which can be shifted freely.
+#: Such a difference decides only between otherwise equal patterns.
 _SLIDING = 1e-3
 #: Parallel axes with a smaller distance (metres) count as coinciding. The direction of x is then free.
 _NO_OFFSET = 1e-5
-#: Patterns count as equal if their numbers (metres and radians) agree after rounding to this number of
-#: decimals.
+#: Patterns are equal if their numbers (metres, radians) agree after rounding to this number of decimals.
 _ALIKE = 6
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -483,14 +478,14 @@ class _Partial:
     """An alignment of the first part of the chain, up to one joint.
 
     Attributes:
-        cost: Sum of the differences so far (metres).
+        cost: Sum of the differences of the cells up to this joint (metres).
         senses: Senses of all joints up to this joint.
         offsets: Offsets of all joints before this joint.
         phi_in: Rotation from this joint's DH frame to its URDF frame (rad).
         carry: Offset from this joint's DH frame to its URDF frame (metres).
         base: (4, 4) part of the base that comes from the first row's offset.
-        absorber: The row with a free offset, and the sign of this offset's effect on x. There is such a row
-            if the axes before the joint coincide. Then only the sum of the joint angles is defined. The
+        absorber: A row with a free offset, and the sign with which this offset rotates x. There is such a row
+            if the axes before the joint coincide, because only the sum of their joint angles is defined. The
             offset of row 0 is in the base.
     """
 
@@ -541,7 +536,7 @@ def _without_equivalents(partials: list[_Partial]) -> list[_Partial]:
     """
     found: dict[tuple[object, ...], _Partial] = {}
     for one in partials:
-        # If a row before the joint has a free offset, the two directions of x are equivalent.
+        # A free offset before the joint can rotate x by half a turn, so the two directions are equivalent.
         circle = math.pi if one.absorber else 2.0 * math.pi
         ahead = round(one.phi_in % circle, _ALIKE), round(one.carry, _ALIKE)
         found.setdefault((one.senses, one.absorber, *ahead), one)
@@ -549,7 +544,8 @@ def _without_equivalents(partials: list[_Partial]) -> list[_Partial]:
 
 
 def _pose(chain: FrameChain, k: int, before: int, after: int) -> FloatArray:
-    """Return the constant pose A_k; for each neighbouring joint with sense -1, its z axis is reversed."""
+    """Return the constant pose A_k, with the z axis of each neighbouring joint reversed if its sense is
+    -1."""
     A = chain.constants[k]
     A = _HALF_TURN @ A if before < 0 else A
     return np.array(A @ _HALF_TURN if after < 0 else A)
@@ -592,7 +588,7 @@ def _extend(
 
 
 def _absorber(partial: _Partial, step: Step, i: int, turns: bool) -> tuple[int, float] | None:
-    """Return the row before joint i + 1 with a free offset, and the sign of this offset's effect on x."""
+    """Return the row before joint i + 1 with a free offset, and the sign with which this offset rotates x."""
     if not step.free:
         return None
     sign = math.copysign(1.0, math.cos(step.alpha))
@@ -623,11 +619,11 @@ def _steps(
 ) -> Iterator[Step]:
     """Yield the possible steps between two axes, each step with each of the two directions of x.
 
-    If the axes are nearly parallel in the URDF and in the reference table, a Hayati step at the d of the
-    reference table is also tried. In this step the direction of x is free if the distance of the axes is
-    nearly zero. The direction of x is also free if a joint is prismatic, because its axis has no fixed line;
-    `placed` is then False. For prismatic axes, a step along the common normal is also tried, because the
-    direction of the normal does not depend on the line.
+    If the axes are nearly parallel in the URDF and in the reference table, a Hayati step is also tried. It
+    begins at the offset d of the reference table. In this step the direction of x is free if the distance of
+    the axes is nearly zero. It is also free if a joint is prismatic, because its axis can be shifted;
+    `placed` is then False. For prismatic axes, a step along the common normal is also tried, because a shift
+    does not change the direction of the normal.
     """
     steps = []
     sine = math.hypot(A[0, 2], A[1, 2])
@@ -639,8 +635,7 @@ def _steps(
         lifted[2, 3] -= delta
         if math.hypot(lifted[0, 3], lifted[1, 3]) < _NO_OFFSET or not placed:
             lifted[:2, 3] = 0.0
-        # With reach 0 every foot counts as far away, so each pair that is not exactly parallel gets a Hayati
-        # step.
+        # With reach 0, each pair of axes that are not exactly parallel gets a Hayati step.
         cut = step_between(lifted, reach if sine < NEARLY_PARALLEL else 0.0, NearParallel.HAYATI, phi_free)
         steps.append(replace(cut, delta=cut.delta + delta))
     for step in steps:

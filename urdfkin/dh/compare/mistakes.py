@@ -27,8 +27,8 @@ from urdfkin.model.tree import FloatArray, pose
 
 #: Two angles with a smaller difference (rad) count as equal.
 _SAME_ANGLE = 1e-9
-#: Largest number of possible changes for which zeros and senses are fitted after each change. A table of nine
-#: rows has about this number of possible changes.
+#: Zeros and senses are fitted after each possible change, if there are at most this number of changes.
+#: A table of nine rows has about this number of possible changes.
 _MOST_FITS = 100
 
 
@@ -64,8 +64,8 @@ class Search:
         The result is empty if no change reduces the number of these parameters.
 
         A table that agrees only after a fit of base, tool and zeros has other frames than the URDF, or it has
-        a mistake. The fit cannot distinguish these two cases. A change of such a table is a likely mistake
-        only if the changed table needs no fit, or only a fit of the base, or only a fit of the tool.
+        a mistake. The fit cannot distinguish these two cases. For such a table, a change is reported only if
+        the changed table agrees without a fit, or after a fit of the base alone or of the tool alone.
 
         Args:
             reference: The table.
@@ -113,7 +113,7 @@ class Search:
     def _with_one_end(self, table: DHTable) -> Model | None:
         """Fit only the tool; if the table does not agree after this fit, fit only the base instead.
 
-        The result is None if the table agrees after neither of these fits.
+        The result is None if the table disagrees after each of the two fits.
         """
         model = _model(table)
         poses, wanted = model.poses(self.tried.values), self.tried.poses
@@ -185,7 +185,7 @@ def _changes(reference: DHTable) -> Iterator[_Change]:
                 yield _Change(MistakeKind.SIGN, (i,), cell, _with_cell(reference, i, cell, -value))
         for turn in (-0.5 * math.pi, 0.5 * math.pi):
             value = math.remainder(row.alpha + turn, 2.0 * math.pi)
-            # otherwise the change is a change of sign, which was tried above
+            # a change to the opposite sign was already tried above
             if abs(math.remainder(value + row.alpha, 2.0 * math.pi)) > _SAME_ANGLE:
                 table = _with_cell(reference, i, "alpha", value)
                 yield _Change(MistakeKind.RIGHT_ANGLE, (i,), "alpha", table)

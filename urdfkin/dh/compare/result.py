@@ -21,15 +21,13 @@ from urdfkin.kinematics.roundings import EPS, of_a_fit
 
 Parts = list[str | Table | Matrix]
 
-#: If the error that remains after changes of cells is at most this number, these cells explain the whole
-#: difference. The unit is rad for angles, and metres per metre of reach for positions. The limit is far above
-#: the rounding of a fit and far below the last digit of any data sheet.
+#: Changes of cells explain the whole difference if at most this error remains.
+#: The unit is rad for angles, and metres per metre of reach for positions.
+#: A fit has a far smaller rounding error, and data sheets have a far larger last digit.
 EXPLAINED = 1e-9
-#: Finest resolution at which fitted numbers are printed, in rad for angles, and relative to the reach for
-#: lengths.
+#: Finest resolution of printed fitted numbers: rad for angles, metres per metre of reach for lengths.
 _FINEST = 1e-12
-#: Half a unit of the last digit is multiplied by this factor, to allow for the rounding of decimal numbers to
-#: doubles.
+#: Factor on half a unit of the last digit. It allows for the rounding of decimal numbers to doubles.
 _HALF = 1.0 + 1e-6
 
 
@@ -115,7 +113,7 @@ class Fitted:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mistake:
-    """A likely mistake: a change of the table after which fewer parameters must be fitted.
+    """A likely mistake: if it is corrected, fewer parameters must be fitted.
 
     Attributes:
         kind: Kind of the mistake.
@@ -165,8 +163,8 @@ class Comparison:
         instead: The cells that would have to change if base, tool, senses and offsets were not fitted. The
             list is empty if such changes do not explain the difference, or if too many cells would have to
             change.
-        hidden: (row, cell) of each cell whose change has the same effect as a change of base, tool or joint
-            offsets. The value of such a cell cannot be determined from the tip's poses.
+        hidden: (row, cell) of each cell that has the same effect on the tip as base, tool or joint offsets.
+            The value of such a cell cannot be determined from the tip's poses.
         mistakes: Single changes of the table after which the fewest parameters must be fitted.
         residual: Tip error (metres) that remains if the differing cells take the URDF's values. If these
             cells explain the whole difference, only rounding errors remain.
@@ -228,7 +226,7 @@ class Comparison:
 def resolution(share: float, radians: float) -> float:
     """Return the resolution of printed fitted numbers.
 
-    The resolution is a power of ten and at least twice the tip error.
+    The resolution is the smallest power of ten that is at least twice the tip error.
 
     Args:
         share: Position error of the tip, metres per metre of reach.

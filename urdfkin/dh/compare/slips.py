@@ -1,13 +1,13 @@
 """Find another convention, other units or other column names with which a table agrees with a URDF.
 
-A *reading* is a way to interpret the numbers of a table: a convention, units and column names. The *shape* of
-a reading consists of the distance and the angle of each pair of consecutive axes, and of the offset along
-each axis between the feet of two common normals. The shape does not depend on signs, zeros, base and tool,
-and is fast to compute. Only the few readings with a shape that is closest to the URDF's shape are fitted.
+An *interpretation* of a table consists of a convention, units and column names. With each interpretation, the
+table has a *shape*: the distances and angles of consecutive axes, and the offsets along the axes between
+common normals. The shape does not depend on signs, zeros, base and tool, and is fast to compute. Only the few
+interpretations whose shape is closest to the URDF's shape are fitted.
 
-`other_readings` changes the convention, units or column names of the plain data (in the form of
-`urdfkin.dh.rows`), and parses the data again. A reading with an impossible value, such as an angle of eighty
-turns, is rejected by the parser.
+`other_readings` changes the convention, units or column names of the table's plain data (`urdfkin.dh.rows`).
+It then parses the data again. The parser rejects an interpretation with an impossible value, such as an angle
+of eighty turns.
 
 `doubts` needs no URDF. The function finds units that look wrong, and two columns that may be exchanged. The
 function uses two facts. First, most angles in the table of an arm are multiples of 30 degrees, and lengths
@@ -36,21 +36,21 @@ from urdfkin.errors import InputError, Question, RangeError
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
 
-#: Number of readings that are fitted.
+#: Number of interpretations that are fitted.
 #: Axes with a smaller tilt (rad) count as parallel.
-#: The relative cost of each difference between a reading and the reading that the file states.
+#: Relative cost of each difference between an interpretation and the file's own interpretation.
 _TRIED, _PARALLEL, _WORTH = 3, 2e-2, 0.1
-#: Another reading explains a disagreement if at most this fraction of the tip error remains.
+#: An interpretation explains a disagreement if it leaves at most this fraction of the tip error.
 _EXPLAINS = 0.05
 
 
 @dataclass(frozen=True, slots=True)
 class CommonMistake:
-    """A reading that a table's file does not state, and with which the table agrees with the URDF.
+    """Another interpretation of a table, with which the table agrees with the URDF.
 
     Attributes:
-        reading: The way to read the table with which it agrees with the URDF.
-        said: The way to read the table that its file states.
+        reading: The interpretation with which the table agrees with the URDF.
+        said: The interpretation that the table's file states.
         metres: Position error of the tip at the worst sample, after a fit of base, tool and offsets.
         radians: Orientation error of the tip at the worst sample.
     """
@@ -82,14 +82,14 @@ class CommonMistake:
 def diagnose(
     chain: FrameChain, data: Mapping[str, Any], tolerance: float, off: float = math.inf
 ) -> CommonMistake | None:
-    """Return the reading with which a table agrees with a URDF; None if there is none.
+    """Return the interpretation with which a table agrees with a URDF; None if there is none.
 
     Args:
         chain: The path of the URDF.
         data: The table's plain data from `urdfkin.dh.parse_table.mapping_from_text`.
         tolerance: Tolerance at the tip (metres).
-        off: Tip error of the table as its file states it (metres). With the returned reading, at most 5 % of
-            this error remains.
+        off: Tip error of the table as its file states it (metres). The returned interpretation leaves at most
+            5 % of this error.
     """
     kinds = [joint.kind.turns for joint in chain.joints]
     own = shape(derive(chain, Choices(last=Last.FLANGE)), chain.reach)
@@ -111,7 +111,7 @@ def diagnose(
     for _, slips, reading, table in close[:_TRIED]:
         try:
             metres, radians = best_fit(chain, table, tolerance)
-        except RangeError:  # this reading makes a length too large
+        except RangeError:  # a length is too large in this interpretation
             continue
         off_here = metres + radians * chain.reach
         if off_here <= max(tolerance, min(_EXPLAINS * off, _EXPLAINS * chain.reach)):
@@ -191,22 +191,22 @@ def shape(table: DHTable, scale: float) -> FloatArray:
     return np.array(numbers)
 
 
-#: `_CELLS` are the keys of a row that a reading uses. `_ENDS` are the keys of a table that a reading ignores,
-#: because base and tool are fitted.
+#: Keys of a row that an interpretation uses, and keys of a table that are ignored.
+#: The keys `_ENDS` are ignored because base and tool are fitted.
 _CELLS = ("joint", "kind", "sense", "beta", *ORDER)
 _ENDS = ("base", "tool", "coordinates")
 
 
 @dataclass(frozen=True, slots=True)
 class ConventionHypothesis:
-    """One way to read a table.
+    """One interpretation of a table.
 
     Attributes:
         convention: Standard or modified; None if the table names no convention.
         lengths: Metres or millimetres.
         angles: Radians or degrees.
-        columns: What the table's columns contain according to this reading. The columns have the names a,
-            alpha, d and theta, or are unnamed and in this order.
+        columns: Contents of the table's columns in this interpretation. The columns have the names a, alpha,
+            d and theta, or are unnamed and in this order.
     """
 
     convention: Convention | None
@@ -215,7 +215,7 @@ class ConventionHypothesis:
     columns: tuple[str, ...] = ORDER
 
     def of(self, data: Mapping[str, Any]) -> DHTable:
-        """Return the table in this reading, without base and tool; raise InputError for an invalid table."""
+        """Return the table in this interpretation, without base and tool; raise InputError if invalid."""
         said = {"convention": self.convention, "lengths": self.lengths, "angles": self.angles}
         rows = [self._row(row) for row in data["rows"]]
         return table_from_mapping({**_bare(data), **said, "rows": rows})
@@ -225,7 +225,7 @@ class ConventionHypothesis:
         return {meant.get(key, key): value for key, value in row.items()}
 
     def slips(self, other: ConventionHypothesis) -> int:
-        """Return the number of differences between two readings.
+        """Return the number of differences between two interpretations.
 
         Two exchanged columns count as one difference.
         """
@@ -233,7 +233,7 @@ class ConventionHypothesis:
         return len(self._differences(other)) + (moved + 1) // 2
 
     def words(self, other: ConventionHypothesis) -> str:
-        """Describe in words the differences from another reading, for example "modified" or "millimetres"."""
+        """Name the differences from another interpretation, for example "modified" or "millimetres"."""
         words = self._differences(other)
         if self.columns != other.columns:
             words.append(f"its columns {', '.join(ORDER)} as {', '.join(self.columns)}")
@@ -245,16 +245,16 @@ class ConventionHypothesis:
 
 
 def as_said(data: Mapping[str, Any]) -> ConventionHypothesis:
-    """Return the reading that the data state; raise InputError for an unknown convention or unit."""
+    """Return the interpretation that the data state; raise InputError for an unknown convention or unit."""
     units = units_of(data.get("angles", "radians"), data.get("lengths", "metres"))
     convention = convention_of(data["convention"]) if "convention" in data else None
     return ConventionHypothesis(convention, units.lengths, units.angles)
 
 
 def other_readings(data: Mapping[str, Any]) -> Iterator[tuple[ConventionHypothesis, DHTable]]:
-    """Yield every other reading with which the table is valid.
+    """Yield every other interpretation in which the table is valid.
 
-    Readings with the fewest differences come first.
+    Interpretations with the fewest differences from the file come first.
     """
     if not _has_rows(data):
         return

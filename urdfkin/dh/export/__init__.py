@@ -12,8 +12,8 @@ from urdfkin.system.lazy_import import hook
 if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
 
-#: For each format: the module with the function `write_NAME` ("" for a language of `urdfkin export`), and a
-#: summary in one line.
+#: For each format: the module with its function `write_NAME`, and a summary in one line.
+#: The module is "" if the format is a language of `urdfkin export`.
 FORMATS: dict[str, tuple[str, str]] = {
     "terminal": ("urdfkin.dh.export.text", "aligned text"),
     "markdown": ("urdfkin.dh.export.text", "a Markdown table"),
@@ -37,8 +37,8 @@ FORMATS: dict[str, tuple[str, str]] = {
 def export(table: DHTable, format: str, units: Units | None = None, *, verify: bool = True) -> str:
     """Return the table in a format.
 
-    Code for numbers computes the placement, the Jacobian and the acceleration of the tip. The code also
-    contains its proof, like the code that `urdfkin export --form dh` writes.
+    Code for numbers computes the placement, the Jacobian and the acceleration of the tip. Like the code from
+    `urdfkin export --form dh`, this code contains a self-test.
 
     Args:
         table: Any table.

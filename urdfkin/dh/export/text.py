@@ -2,8 +2,8 @@
 
 All formats contain the convention, the formula, base and tool. `document` makes one document, which is
 written as plain text, Markdown or HTML. The LaTeX table uses booktabs, names the convention in its caption,
-and is at most as wide as the text. The functions for headings, cells, formulas and poses do not depend on the
-format. Each format passes its own notation for pi, products and names to them.
+and is at most as wide as the text. All formats use the same functions for headings, cells, formulas and
+poses. The arguments of these functions are the format's notations of pi, products and names.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ HAYATI_FORMULA = {
     Convention.MODIFIED: "T(i-1, i) = Tx(a(i-1)) Rx(alpha(i-1)) Ry(beta(i-1)) Rz(theta) Tz(d)",
 }
 
-#: A number is multiplied by this factor before it is rounded up to some digits. Without this factor, a
-#: rounding error of 1e-12 would increase the last digit of a number that already has so few digits.
+#: A number is multiplied by this factor before it is rounded up to some digits.
+#: Without this factor, a rounding error of 1e-12 could increase the last digit of a short number.
 _ON_THE_DIGIT = 1.0 - 1e-12
 
 
@@ -55,7 +55,7 @@ def variable(
 
 
 def coordinate_names(table: DHTable) -> str:
-    """Return text that names the joint of each coordinate.
+    """Return a text with the joint of each coordinate, such as "with q1 = left, q2 = right".
 
     The text is empty if the coordinates are the rows' joints in order.
     """
@@ -159,7 +159,7 @@ def document(table: DHTable, units: Units, pi: str = "pi", *, wrapped: bool = Fa
         table: The table.
         units: Units, digits and order of the columns.
         pi: Notation of pi.
-        wrapped: Whether long sentences are on several lines.
+        wrapped: Whether to break long sentences into several lines.
     """
     rows = [(str(i), row.joint, *cells(table, row, units, pi)) for i, row in enumerate(table.rows, 1)]
     parts: list[str | Table | Matrix] = [Code(formula(table)), ""]
