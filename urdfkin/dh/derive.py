@@ -438,7 +438,7 @@ def _last(
 ) -> tuple[float, float, Step, FloatArray]:
     """Return theta, d and the step of the last row, and the tool.
 
-    `A` is the tip's pose in the last joint's frame, after a shift of this frame along z to the origin O_{n-1}.
+    `A` is the tip's pose in the last joint's frame, shifted along z to the origin O_{n-1}.
     """
     if _representable(A, choices, noise):
         phi = math.atan2(A[1, 0], A[0, 0])

@@ -38,11 +38,11 @@ from urdfkin.kinematics.rotation import ROUNDED, polar_factor
 from urdfkin.system.files import exists, read_text
 from urdfkin.system.resources import robots_dir
 
-#: Largest deviation of a matrix printed with six digits from a rotation matrix. A matrix with a larger
-#: deviation is not corrected.
+#: Largest deviation of a matrix printed with six digits from a rotation matrix.
+#: A matrix with a larger deviation is not corrected.
 _PRINTED = 1e-5
-#: Number of lines after the heading of a pose in which the three rows of the pose are searched. Some of these
-#: lines may be blank or Markdown fences.
+#: Number of lines after the heading of a pose in which the three rows of the pose are searched.
+#: Some of these lines may be blank or Markdown fences.
 _POSE_LINES = 6
 #: A setting on a separate line, such as `convention: modified`, with or without a comment mark.
 _SETTING = re.compile(r"^\W*(convention|angles|lengths|robot|base_frame|tip_frame)\s*[:=]\s*(.+)$")
@@ -86,7 +86,7 @@ def from_sheet(text: str) -> dict[str, Any]:
     else:
         raise _no_header(lines)
     around = [spelled(line) for line in grid.around]
-    # A title begins with the robot's name. This name may be "robot", which looks like a setting.
+    # A title is no setting, even if it begins with the name of a setting: a robot may have the name "robot".
     plain = [line for line in grid.around if not _TITLE.search(line)]
     data = _settings(plain, _KEY if form is _separated else _SETTING)
     if "convention" not in data and (convention := _convention(around, grid.columns)):
@@ -338,7 +338,7 @@ def _rigid(rows: list[list[float]], end: str) -> list[list[float]]:
 def _named_coordinates(lines: list[str]) -> list[str]:
     """Return the joint names in a text such as `with q1 = left, q2 = right`.
 
-    Such a text is printed if the coordinates are not the rows' joints in row order.
+    urdfkin prints such a text if the coordinates differ from the rows' joints or have another order.
     """
     line = next((line for line in lines if line.startswith("with q1 = ")), "")
     return [_unescaped(name).strip("`") for name in re.findall(r"q[0-9]+ = ([^,]+)", line)]

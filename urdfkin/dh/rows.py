@@ -13,8 +13,8 @@ All formats are converted to the same mapping:
 A row may also be a list [a, alpha, d, theta, "R" or "P"]. `theta` and `d` are the constant parts, without the
 joint's value. In a modified table a and alpha of row i are a_{i-1} and alpha_{i-1}. The entry `mimic` of a
 row is {leader, multiplier, offset}; the entry `limit` is {lower, upper, velocity, effort}. The units apply to
-cells, limits, offsets of mimic joints, and the positions of base and tool. A multiplier is a ratio of values
-in SI units; an effort is in N or N m.
+cells, limits, offsets of mimic joints, and the positions of base and tool. A multiplier is the ratio of two
+joint values in SI units. An effort is in N or N m.
 
 `last_digits` returns the precision of each number as it is written: half a unit of its last digit. For
 example, 311.1 mm in a data sheet is uncertain by 0.05 mm. A number without a decimal point (90 degrees, zero)
@@ -358,8 +358,8 @@ _TABLE_KEYS = (
     *("convention", "angles", "lengths", "robot", "base_frame", "tip_frame", "base", "tool"),
     *("coordinates", "rows"),
 )
-#: Keys that do not change the table. Such keys contain information, for example the source of the numbers and
-#: the URDF of the same robot.
+#: Keys that do not change the table.
+#: These keys contain information, for example the source of the numbers and the URDF of the same robot.
 NOTES = ("source", "source_kind", "note", "name", "urdf", "snap", "last", "fit_sign", "checked")
 
 

@@ -42,8 +42,7 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Tolerance of handwritten screws. The tolerance applies to the deviation of an axis' length from 1, and to
-#: the deviation of a pitch from 0 (m/rad).
+#: Tolerance of handwritten screws: the length of an axis must be 1, and the pitch must be 0 m/rad.
 _WRITTEN = 1e-4
 
 

@@ -8,12 +8,12 @@ snapped, from base to tip:
 3. the angle theta of each row, after the rows are computed.
 
 Positions stay as they are in the file, so each change only rotates the rest of the chain about a joint's
-origin. `urdfkin.dh.table` derives the bound of the effect from this fact.
+origin. `urdfkin.dh.table` uses this to derive a bound of the effect on the tip.
 
 `snap_hint` finds cells that look like angles rounded by the file (1.5708, 3.14159265359). For example, such
 an angle may cause a tilt of 5e-12 rad. This tilt is larger than rounding errors of the computation
 (`urdfkin.dh.common_normals`). The table therefore contains the tilt, and offsets of about 1e-12 m that the
-tilt causes. The hint explains that the tilt and the offsets come from the file.
+tilt causes. The hint says that the file caused the tilt and the offsets.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ from urdfkin.model.chain import FrameChain, chain, steps_between
 from urdfkin.model.configuration import axis_range, values_within
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, frozen
 
-#: Largest tolerance (rad): 5 degrees. With a tolerance of more than 7.5 degrees, an angle could be within the
-#: tolerance of two multiples of 15 degrees.
+#: Largest tolerance (rad): 5 degrees.
+#: With more than 7.5 degrees, an angle could be within the tolerance of two multiples of 15 degrees.
 LARGEST_TOLERANCE = math.pi / 36.0
 #: Number of configurations at which a snapped table is compared with the exact chain.
 SAMPLES = 500
@@ -55,7 +55,7 @@ def snap_chain(
 ) -> tuple[FrameChain, list[tuple[int, SnapChange]]]:
     """Return the chain with snapped angles, and the list of changes.
 
-    Each change comes with the index of the chain's constant pose that changed.
+    Each entry of the list contains the index of a constant pose of the chain, and its change.
     """
     exact = chain(tree, tip, base)
     rounder, moved = _snap_origins(tree, tolerance)
@@ -224,9 +224,9 @@ def _changes_of_origins(
 
 
 def _change(exact: FrameChain, k: int, what: str, angle: float) -> SnapChange:
-    """Return the record of a rotation about the origin of joint k.
+    """Return a change that rotates the rest of the chain about the origin of joint k.
 
-    The attribute `lever` of the record is the largest possible distance from this origin to the tip.
+    The attribute `lever` of the change is the largest possible distance from this origin to the tip.
 
     Joints are counted from 1; n + 1 is the tip.
     """
@@ -281,7 +281,7 @@ def noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
 def snap_hint(table: DHTable, snapped: Callable[[float], DHTable]) -> str | None:
     """Return a line of text with a cell that nearly equals a round value, and a tolerance for snapping.
 
-    No other tolerance in `TOLERANCES` snaps more of these cells.
+    The tolerance is the one in `TOLERANCES` that snaps the most cells of this kind.
 
     Args:
         table: An exact table.

@@ -14,16 +14,16 @@ al., 2014). An OPW arm is the standard table
 
 with cells in the order a, alpha, d, theta. `opw_of` derives the URDF's table in the frames, zeros and senses
 of this table (`urdfkin.dh.make`), and reads the parameters from it. OPW has no parameter for the small tilts
-of a calibrated arm, so `opw_of` ignores these tilts. `Opw.placement` computes the forward kinematics of the
-solver. The difference between this result and the arm's placement is the error of the OPW parameters.
+of a calibrated arm, so `opw_of` ignores these tilts. `Opw.placement` computes the solver's forward kinematics
+with the OPW parameters. The difference from the arm's placement is the error of the OPW parameters.
 
 `axes_and_steps` returns H and P, the input of solvers by subproblem decomposition (IK-Geo, EAIK):
 
     T(q) = P_0 + R(h_1, q_1) (P_1 + R(h_2, q_2) (P_2 + ... + P_n)),    R(q) = R(h_1, q_1) ... R(h_n, q_n) R_6T
 
-P_i is the step from a point on one axis to a point on the next axis. The formula is correct for any choice of
-these points. The solvers detect two intersecting axes by a zero step between their points. This module
-therefore uses the intersection as the point of each of the two axes.
+P_i is the vector from a point on axis i to a point on axis i + 1. The formula is correct for any choice of
+these points. If two axes intersect, this module chooses the intersection for both of them. The vector between
+the two points is then zero, and the solvers use a zero vector to detect the intersection.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ from urdfkin.model.configuration import axis_range, values_within
 from urdfkin.model.path import elementary
 from urdfkin.model.tree import FloatArray, JointKind
 
-#: A property such as parallel axes is reported if its deviation is at most `NEAR_ANGLE` (rad) and
-#: `NEAR_LENGTH` (metres). The property counts as exact if its deviation is at most `EXACT` (rad and metres).
+#: Largest deviations (rad, metres) of a property that is reported, for example parallel axes.
+#: The property counts as exact if its deviations are at most `EXACT` (rad and metres).
 NEAR_ANGLE, NEAR_LENGTH, EXACT = 0.02, 0.005, 1e-9
-#: Singular values of the Jacobian below this limit count as zero. The limit is far above rounding errors and
-#: far below the distances of real axes.
+#: Singular values of the Jacobian below this limit count as zero.
+#: Rounding errors are far smaller, and the distances of real axes are far larger.
 _RANK = 1e-6
 #: Number of random configurations within the limits for the estimate of the reach; mimic rules are ignored.
 _SAMPLES = 2000
@@ -105,8 +105,8 @@ class Structure:
         freedoms: Degrees of freedom of the tip: the Jacobian's rank at a random configuration.
         pairs: Angle and distance of each pair of consecutive axes.
         kinds: Properties that the path has exactly or approximately, in ascending order of the deviation.
-        reach: Upper bound of the tip's distance (metres) from the point of the first axis that is nearest to
-            the second axis.
+        reach: Upper bound of the tip's distance (metres) from a point of the first axis. The point is the one
+            nearest to the second axis.
         reached: Largest distance of the tip from the same point on samples (metres).
         solvers: Closed-form solutions, with libraries that implement them.
     """
@@ -264,7 +264,8 @@ def _solvers(letters: str, kinds: list[Kind], pairs: tuple[Pair, ...]) -> list[s
 def _origin(screws: ProductOfExponentials) -> FloatArray:
     """Return the point of the first axis nearest to the second axis, if the first two joints are revolute.
 
-    For other joints the result is the first point in `screws.points`.
+    If one of the two joints is prismatic, or if their axes are nearly parallel, the result is the first point
+    in `screws.points`.
     """
     if not screws.joints:
         return np.zeros(3)
@@ -303,8 +304,7 @@ def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]
     return screws.path.poses(values)[:, :3, 3], screws.path.columns(values[0])[1]
 
 
-#: Default tolerance of the tip error that OPW parameters cause (metres, rad), and the number of samples on
-#: which this error is computed.
+#: Default tolerance of the tip error that OPW parameters cause (metres, rad), and number of samples.
 TOLERANCE, SAMPLES = 1e-6, 200
 _H = math.pi / 2.0
 _ALPHA, _THETA = (-_H, 0.0, _H, -_H, _H, 0.0), (0.0, -_H, _H, 0.0, 0.0, 0.0)
@@ -333,7 +333,7 @@ class Opw:
     tool: FloatArray
 
     def placement(self, q: FloatArray) -> FloatArray:
-        """Return the (..., 4, 4) pose base . F(sign * q - offset) . tool; F is the solver's kinematics."""
+        """Return the (..., 4, 4) pose base . F(sign * q - offset) . tool, with the solver's kinematics F."""
         t = np.moveaxis(np.asarray(q) * self.signs - np.array(self.offsets), -1, 0)
         a1, a2, b, c1, c2, c3, c4 = self.lengths.values()
         x = c2 * np.sin(t[1]) + a2 * np.cos(t[1] + t[2]) + c3 * np.sin(t[1] + t[2]) + a1
@@ -405,7 +405,7 @@ def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
 
 
 def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
-    """Yield OPW tables with approximately the lengths of the arm, for each sign pattern of a1, a2 and b."""
+    """Yield an OPW table for each sign pattern of a1, a2 and b, with the approximate lengths of the arm."""
     rows = derive(path, Choices(last=Last.FLANGE)).rows
     tip = float(np.linalg.norm(path.T_last_tip[:3, 3])) or 1.0
     a1, c2, a2 = (abs(row.a) for row in rows[:3])

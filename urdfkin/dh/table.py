@@ -1,7 +1,7 @@
 """Define the Denavit-Hartenberg table: rows, base and tool, in the standard or the modified convention.
 
-Section 7.5 of the textbook describes these tables. A table stands for a product in which two kinds of factors
-alternate:
+Section 7.5 of the textbook describes these tables. A table represents a product of transforms. Two kinds of
+factors alternate in it:
 
     S = Rz(theta) Tz(d)              about and along a joint's axis
     X = Tx(a) Rx(alpha) Ry(beta)     from one axis to the next; beta = 0 except in a Hayati row
@@ -130,10 +130,11 @@ class DHRow:
     def foot(self) -> float:
         """Distance to the foot of the common normal, along the next axis (metres); 0 if `beta` is 0.
 
-        In a Hayati row, the x axis meets the next joint's axis at the distance `a`. At this point the next
-        joint's axis is tilted by `beta` along x and by `alpha` across x. A row of four parameters would use
-        the common normal of the two axes. The distance along the next joint's axis, from the point where x
-        meets this axis to the foot of the common normal, is |a sin(beta)| / sin^2(tilt).
+        In a Hayati row, the x axis intersects the next joint's axis at the distance `a`. The next joint's
+        axis has two tilts there: `beta` in the direction of x, and `alpha` normal to x. A row of four
+        parameters would use the common normal of the two axes. The distance is measured along the next
+        joint's axis, from its intersection with x to the foot of the common normal. It is |a sin(beta)| /
+        sin^2(tilt).
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -166,8 +167,8 @@ class DHRow:
         return along_axis(self.theta, self.d)
 
 
-#: Largest difference between a handwritten angle and a multiple of 15 degrees for which the angle looks like
-#: this multiple, as a fraction of 15 degrees.
+#: Largest difference between a handwritten angle and the multiple of 15 degrees that it looks like.
+#: The unit of the difference is 15 degrees.
 _WRITTEN = 1e-3
 
 
@@ -203,7 +204,7 @@ def as_step(T: FloatArray) -> tuple[float, float] | None:
         >>> as_step(between_axes(0.5, math.pi))
         (0.5, 3.141592653589793)
     """
-    tilt = max(abs(T[0, 1]), abs(T[0, 2]))  # tilt of the x axis; the first column contains the same tilt
+    tilt = max(abs(T[0, 1]), abs(T[0, 2]))  # tilt of the x axis
     if tilt > ANGLE * EPS or T[0, 0] < 0.0 or T[1, 3] or T[2, 3]:
         return None
     alpha = math.atan2(T[2, 1], T[2, 2])
@@ -244,7 +245,7 @@ class SnapChange:
         row: Index of the row that contains the angle, from 0; -1 for the base, the number of rows for the
             tool.
         what: The joint and the snapped quantity, as text.
-        angle: Rotation of the rest of the chain (rad).
+        angle: Angle (rad) by which the change rotates the rest of the chain.
         lever: Largest distance of the tip from the pivot of the rotation, with the prismatic joints at zero
             (metres).
         sliders: Names of the prismatic joints after the pivot; the travel of these joints increases the
@@ -305,8 +306,7 @@ class SnapReport:
         return np.asarray(at_zero + sum(travel, np.zeros(())), dtype=np.float64)
 
 
-#: Tolerance for the rotation matrix in a handwritten pose. Such a matrix often has numbers with only seven
-#: digits.
+#: Tolerance for the rotation matrix in a handwritten pose, which often has only seven digits.
 _TYPED = 1e-6
 
 

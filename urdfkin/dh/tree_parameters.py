@@ -117,10 +117,10 @@ class TreeParameters:
 
     @property
     def roundings(self) -> float:
-        """Rounding error of the rows on the longest path and of the last link's frame, in eps * reach.
+        """Estimate, in eps * reach, of the rounding error of the rows on the longest path and of the last link.
 
-        This number does not include Pinocchio's rounding errors. The number is smaller than the worst case,
-        and larger than every measured error.
+        The estimate is larger than every measured error, but an error can be larger in the worst case. It
+        does not include Pinocchio's rounding errors.
         """
         deepest = max((len(self._way(j)) for j in range(len(self.rows))), default=0)
         return of_rows(1 + deepest) + self.left_out / EPS
@@ -238,8 +238,8 @@ class _Link:
 def _links(tree: KinematicTree) -> list[_Link]:
     """Return the axis frame of each joint, with z along the axis; a fixed joint has its link's own frame."""
     links = list[_Link]()
-    # For each link: the nearest moving link towards the root, the pose of the link in the axis frame of that
-    # moving link, and the number of joints between the two links.
+    # Each entry belongs to a link. It contains the nearest moving link towards the root, the link's pose in
+    # the axis frame of that moving link, and the number of joints between the two links.
     carriers = [(-1, np.eye(4), 0)]
     for j, (joint, way) in enumerate(zip(tree.joints, _path_lengths(tree), strict=True)):
         antecedent, T, folded = carriers[joint.parent]
@@ -254,7 +254,7 @@ def _links(tree: KinematicTree) -> list[_Link]:
 
 
 def _steps(tree: KinematicTree, links: list[_Link]) -> tuple[list[Step], dict[int, tuple[float, float]]]:
-    """Return the step to each axis, and the rotation and the offset from each axis frame to the row's frame.
+    """Return the step to each axis, and the angle and the offset between each axis frame and its row's frame.
 
     The first moving child of a link defines the link's x axis. For a link without a moving child, x is chosen
     so that theta = 0.
@@ -358,7 +358,7 @@ def _headings(table: TreeParameters, units: Units) -> list[str]:
 def _cells(table: TreeParameters, j: int, units: Units) -> list[str]:
     row = table.rows[j]
     theta, r = units.angle(row.theta), units.length(row.r)
-    # The offset of a mimic joint is part of the constant of its cell, as in the other tables.
+    # The constant in a mimic joint's cell includes the offset of the mimic rule, as in all tables.
     own = f"q({row.leader})" if row.leader == row.joint else f"{row.multiplier:.10g} q({row.leader})"
     if row.sigma == 0:
         theta = added(own, units.angle(row.theta + row.offset))

@@ -3,9 +3,9 @@ r"""Convert a table's numbers from text and to text, with fractions of pi, degre
 A table itself is always in metres and radians. Other units are used only when a table is read or written.
 
 A cell is parsed from text such as `q1 + pi/2`, `90 deg`, `107 mm`, `-θ₂*`, `\frac{\pi}{2}` or `180°`. The
-text of a cell is a sum. At most one term of the sum is the joint's variable. The other terms are numbers or
-multiples of pi, with or without a unit. This module rejects invalid cells. `urdfkin.dh.rows` supplies a
-missing unit, and decides which cells may have a variable.
+text of a cell is a sum. Each term of the sum is a number, a multiple of pi, or the joint's variable, which
+may occur only once. A number and a multiple of pi may have a unit. This module rejects invalid cells.
+`urdfkin.dh.rows` supplies a missing unit, and decides which cells may have a variable.
 """
 
 from __future__ import annotations
