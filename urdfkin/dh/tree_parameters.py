@@ -117,7 +117,7 @@ class TreeParameters:
 
     @property
     def roundings(self) -> float:
-        """Estimate, in eps * reach, of the rounding error of the rows on the longest path and of the last link.
+        """Estimated rounding error of the rows on the longest path and of the last link, in eps * reach.
 
         The estimate is larger than every measured error, but an error can be larger in the worst case. It
         does not include Pinocchio's rounding errors.

@@ -85,7 +85,7 @@ _ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
 _GENERIC = 3
 #: Members for internal use, hidden from name completion.
 _INSIDE = {"plan", "verifier"}
-#: Largest number of float64 values that an array can address.
+#: Largest number of float64 values in an array, because its number of bytes must fit in 63 bits.
 _MOST_NUMBERS = (2**63 - 1) // 8
 
 
@@ -162,14 +162,14 @@ class Robot(Displayable):
             urdf, tree, origin, policy=verify, mimic=mimic, unverifiable=unverifiable, oracle=oracle
         )
         self.findings = Findings(findings)
-        #: (links, 2) how far rounding to single precision may have moved (m) and turned (rad) each link; None
-        #: if the file's numbers have double precision.
+        #: (links, 2) bounds of the translation (m) and rotation (rad) of each link by single precision.
+        #: None if the file's numbers have double precision.
         self.single: FloatArray | None = None
         self.base_frame = base_frame or tree.frame_name(0)
         self._tip_frame = tip_frame
         self._has_one_tip = tip_frame is not None or len(list(tree.leaves())) == 1
         self._plans: dict[tuple[int, ...], CompiledTree] = {}
-        #: For each frame: the evaluator of unchecked calls, and the evaluator of checked calls.
+        #: Evaluators by frame: `_prepared` for unchecked calls, `_checked` for checked calls.
         self._prepared: dict[object, PreparedFrame] = {}
         self._checked: dict[object, PreparedFrame] = {}
         self._compiled: dict[object, CompiledFrame] = {}
@@ -183,7 +183,7 @@ class Robot(Displayable):
         return log_line(f"<Robot {self.name}: nq {self.nq}, nv {self.nv}, {len(self.tree.links)} links>")
 
     def __dir__(self) -> list[str]:
-        # Name completion lists the members for users only.
+        # Name completion does not list members for internal use.
         return [name for name in super().__dir__() if name not in _INSIDE]
 
     def _sheet(self) -> TextDocument:
@@ -626,7 +626,7 @@ class Robot(Displayable):
 
         Args:
             q: (..., model.nq), a configuration of `pinocchio_model(mimic=mimic)`.
-            mimic: The value of `mimic` that the Pinocchio model was built with.
+            mimic: The argument `mimic` of `pinocchio_model` for this Pinocchio model.
 
         Raises:
             InputError: a wrong length, or a number that is not finite.
@@ -922,7 +922,7 @@ class Robot(Displayable):
         - Joint j before joint i: z_j rotates the column, z_j x (z_i x d_i).
         - Joint j after joint i: z_j moves the end of the lever arm, z_i x (z_j x d_j).
 
-        WORLD has only terms of the first kind, LOCAL only terms of the second.
+        WORLD has only terms of the first kind. LOCAL has only terms of the second kind.
 
         Symmetry in LOCAL_WORLD_ALIGNED: the linear rows are symmetric in i and j, except within one planar or
         floating joint. The angular rows at [i, j] and [j, i] differ by w_j x w_i, where w_i are the angular
@@ -1220,9 +1220,10 @@ class Robot(Displayable):
             frame: Name of a link or joint; None: the robot's only tip.
             reference: Reference frame of velocities, accelerations and Jacobians.
             base: Motion of the root link; None: fixed at the world origin.
-            digits: Decimal digits of the interval arithmetic, at least 15. None: 30, plus one for each joint
-                before the frame. With this number of digits, the ends are nearly always neighbouring doubles.
-                With 15 digits, the intervals are about as wide as the rounding errors of doubles.
+            digits: Decimal digits of the interval arithmetic, at least 15. If None, there are 30 digits plus
+                one for each joint before the frame. With this number of digits, the ends are nearly always
+                neighbouring doubles. With 15 digits, the intervals are about as wide as the rounding errors
+                of doubles.
             hessian: Also enclose the Hessian, less than 0.1 ms for each pair of joints.
 
         Raises:
@@ -1370,7 +1371,7 @@ class Robot(Displayable):
             verify: As in `export`.
 
         Raises:
-            InputError: PyTorch is not installed; or as in `export`.
+            InputError: PyTorch is not installed. Other reasons are as in `export`.
             UnknownNameError: as in `export`.
             VerificationError: Pinocchio's result differs by more than the bound.
 
@@ -1456,12 +1457,14 @@ class Robot(Displayable):
             snap: Tolerance in rad for rounding angles to multiples of 15 degrees; 0 for an exact table.
             last: "tip": the last row ends at the tip. "flange": the last row ends at the flange, and the tool
                 transform leads to the tip.
-            parallel_offset: Row that contains the offset along consecutive parallel axes: "last" (the first
-                row after these axes), "first", or "each" (each row contains the offset of its own link).
+            parallel_offset: Row that contains the offset along consecutive parallel axes. "last": the first
+                row after these axes. "first": the row of the first of these axes. "each": each row contains
+                the offset of its own link.
             flip: Names of joints to count in the opposite sense.
             first: "base": the first row includes the offset from the base. "joint": Craig's choice, d_1 = 0.
             sign: Rule for the direction of x: "theta" (smallest), "a" or "alpha" (not negative).
-            slide: Position of the axes of sliding joints: "drawn" (as in the URDF) or "minimal".
+            slide: Line of a prismatic joint. "drawn": the same line as in the URDF. "minimal": the line
+                through the next revolute joint's origin, so that a is 0.
             like: A published table. The new table gets the frames, signs and zero positions of this one;
                 `flip`, `first`, `last`, `sign` and `parallel_offset` are then ignored.
             verify: True: check the table with Pinocchio. None: as chosen in `load`.
@@ -1630,9 +1633,9 @@ class Robot(Displayable):
 
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
         """Return the fast evaluator of a frame; it is made once."""
-        # Hashing an enumeration member takes longer than the rest of this function, so a plain name is a key
-        # by itself. The types in the key distinguish a member from an equal number, and `LinkFrame("link:a")`
-        # from a link with the literal name "link:a".
+        # A plain name is a key by itself, because the hash of an enumeration member takes long to compute.
+        # Other keys contain types, because a member of an enumeration can be equal to a number.
+        # In the same way, `LinkFrame("link:a")` differs from a link with the literal name "link:a".
         plain = reference is _ALIGNED and type(frame) is str
         key = frame if plain else (type(frame), frame, type(reference), reference)
         known = self._checked if verify else self._prepared
@@ -1649,7 +1652,7 @@ class Robot(Displayable):
 
 # -- docstrings --------------------------------------------------------------------------------------
 
-#: An item of a list in the docstring of `Robot`, and of a section in that of a method.
+#: An item of a list in the docstring of `Robot`, and an item of a section in a method's docstring.
 _SHARED_ITEM = re.compile(r"^- `(\w+)`: (.*(?:\n  .*)*)", re.MULTILINE)
 _ITEM = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 

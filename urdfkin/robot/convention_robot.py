@@ -20,8 +20,8 @@ class ConventionRobot:
     """A robot in the convention of a target program; `robot.with_convention("mujoco")` returns it.
 
     The methods are those of `Robot` with the same arguments. q, v and a have the target program's order and
-    units. Jacobians have the target program's columns, and six-vectors the target program's order of rows.
-    The frame and `reference` mean the same as in `Robot`. Pinocchio checks each result as usual, before the
+    units. Jacobians have the target program's order of columns, and six-vectors have its order of rows. The
+    frame and `reference` mean the same as in `Robot`. Pinocchio checks each result as usual, before the
     result is converted.
 
     Attributes:

@@ -32,10 +32,10 @@ class Check:
     """Comparison of a quantity from urdfkin with the same quantity from Pinocchio, for each sample.
 
     Attributes:
-        units: (n,) the largest difference between urdfkin and Pinocchio in each sample, in units of eps *
-            scale. eps is the machine epsilon, and scale is the size of the quantity's numbers.
+        units: (n,) largest difference between urdfkin and Pinocchio in each sample, divided by eps * scale.
+            Here eps is the machine epsilon, and scale is the size of the quantity's numbers.
         share: (n,) `units` divided by `bound`; a value above 1 is a failure.
-        bound: (n,) the largest difference that rounding can cause, in units of eps * scale.
+        bound: (n,) largest difference that rounding can cause, divided by eps * scale.
     """
 
     units: FloatArray

@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
     from urdfkin.urdf.foreign import XmlElement, XmlTree
 
-#: Codes of findings that only help the author of a URDF file. They are not reported for a URDF that urdfkin
-#: generates.
+#: Codes of findings that only help the author of a URDF file.
+#: These findings are not reported for a URDF that urdfkin generates.
 _OF_A_TEXT = {NEWER_VERSION.id, MIMIC_CONTINUOUS.id}
 
 
@@ -48,7 +48,7 @@ class How(TypedDict):
     joints: Sequence[str] | None
 
 
-def load(  # noqa: PLR0911  a line for each kind of source
+def load(  # noqa: PLR0911  one branch per kind of source
     source: Source | DHTable | ProductOfExponentials | ModuleType | XmlElement | XmlTree,
     *,
     verify: Verify = True,
@@ -128,7 +128,7 @@ def load(  # noqa: PLR0911  a line for each kind of source
         raise InputError("`variant` and `articulation` need the path of a USD file", found=safe_repr(source))
     if is_urdf_path(source) or (isinstance(source, str) and entry_of(source)):
         return robot_of(read_source(source, xacro_args=xacro_args), **how)
-    from urdfkin.dh.parse_table import is_table_file  # noqa: PLC0415  a URDF needs none of these
+    from urdfkin.dh.parse_table import is_table_file  # noqa: PLC0415  not needed for a URDF
     from urdfkin.dh.screws import ProductOfExponentials  # noqa: PLC0415
     from urdfkin.dh.table import DHTable  # noqa: PLC0415
     from urdfkin.urdf.catalogue import described  # noqa: PLC0415
@@ -267,7 +267,7 @@ def _is_plain(robot: Robot) -> bool:
 
 
 def _bytes_of_mjcf(source: str | bytes | os.PathLike[str]) -> bytes:
-    """Return the bytes of an MJCF source, for its digest.
+    """Return the bytes of an MJCF source, from which its SHA-256 digest is computed.
 
     Raises:
         SourceError: the file cannot be read or is too large.

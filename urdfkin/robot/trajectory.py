@@ -48,8 +48,8 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
 
-#: Shape of each array, by the array's name. The shape does not contain the first axis, which is the sample
-#: index.
+#: Shape of each array, by the array's name.
+#: The shape does not include the first axis, which is the index of the sample.
 Shapes = Mapping[str, tuple[int, ...]]
 
 
@@ -123,7 +123,7 @@ def _check_names(path: Path, names: Sequence[str], shapes: Shapes, required: Seq
 _FEWEST = 3
 #: Names of the arrays in an .npz file that contain the fields of `BaseMotion`.
 _BASE = "base_placement", "base_velocity", "base_acceleration"
-#: Largest rounding error of a time for which the user gets no note, relative to the smallest time step.
+#: Largest rounding error of a time without a note to the user, relative to the smallest time step.
 _TIME_ROUNDING = 1e-6
 
 
@@ -339,8 +339,8 @@ def with_rates(tree: KinematicTree, x: Samples) -> Trajectory:
     if n >= 2 * _FEWEST - 1:
         half = slice(None, None, 2)
         coarse = _differences(tree, found.q[half], t[half], None if x.v is None else x.v[half])
-        # With half of the samples, the time step doubles. An error of second order is then four times as
-        # large, and an error of first order twice as large.
+        # With half of the samples, the time step doubles.
+        # An error of first order then doubles, and an error of second order is four times as large.
         order = 1 if x.v is None else 2
         errors = _error(v[half], coarse[0], 2), _error(a[half], coarse[1], order)
     words = "by central differences" if x.v is None else "v as given, a by central differences of v"
@@ -588,7 +588,7 @@ def _unit(text: str, where: str, expected: str) -> str:
 def _in_si(column: FloatArray, unit: str) -> FloatArray:
     """Return a column in SI units.
 
-    The column converts 30 in degrees to the same double as the text `30deg` anywhere else in urdfkin.
+    For example, 30 in a column of degrees becomes the same double as the text `30deg` elsewhere in urdfkin.
     """
     if unit == "deg":
         return np.fromiter(map(in_radians, column.tolist()), np.float64, len(column))
@@ -662,15 +662,15 @@ def _check_columns(
         )
 
 
-#: Largest difference (rad) between the angles of a column that was wrapped to one turn. It includes a margin
-#: for angles with two digits.
+#: Largest difference (rad) between the angles of a column that was wrapped to one turn.
+#: It includes a margin for angles with two digits.
 _ONE_TURN = math.tau + 0.02
-#: Smallest step of an angle (rad) that is ambiguous. For larger steps, the step in the other direction is
-#: less than twice as long.
+#: Angle (rad) between two samples from which the direction of the motion is ambiguous.
+#: From this angle on, the motion in the other direction is less than twice as long.
 _AMBIGUOUS = math.tau / 3.0
 
-#: If a mimicked joint makes a whole turn, its mimic joint moves. A motion of the mimic joint below this
-#: number (radians or metres) counts as rounding.
+#: A smaller motion (radians or metres) of a mimic joint counts as rounding.
+#: The motion is caused by a whole turn of the mimicked joint.
 _ROUNDING = 1e-9
 
 
