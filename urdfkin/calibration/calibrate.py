@@ -57,14 +57,14 @@ from urdfkin.verify.certificate import Certificate
 
 #: Number of random configurations from which the parameters that are identifiable in principle are found.
 _GENERAL = 40
-#: A warning is given if residual and stated noise differ by more than this number of standard deviations.
+#: Largest difference between residual and stated noise without a warning, in standard deviations.
 _UNLIKELY = 4.0
 #: A parameter is poorly observable if its ratio of uncertainties (`Calibration.weak`) exceeds this number.
 _WEAK = 10.0
 #: Seed of the random configurations for `Calibration.weak`.
 #: The random configurations for `Calibration.general` have another seed.
 _OTHERS = 1
-#: A column with a smaller diagonal entry of R, relative to the largest entry, depends on earlier columns.
+#: Smallest diagonal entry of R, relative to the largest entry, of a column that counts as independent.
 _DEPENDENT = 1e-12
 #: x, y and z of a target that is on no joint axis: the robot's size divided by these numbers.
 _ASIDE = {"x": 5.0, "y": 6.0, "z": 7.0}
@@ -92,8 +92,8 @@ class Calibration:
         before: The fit of base and tool alone, with the robot's original parameters.
         odd: Indices of those poses that are outliers.
         without_odd: The fit without the outliers.
-        weak: Indices of poorly observable parameters, each with a ratio of uncertainties. The ratio divides
-            the uncertainty at the measured configurations by the uncertainty at as many random
+        weak: Indices of poorly observable parameters, each with a ratio of uncertainties. The ratio is the
+            uncertainty at the measured configurations, divided by the uncertainty at as many random
             configurations.
         certificate: Pinocchio's check of the written model.
         stated: Whether the user stated the noise.
@@ -339,7 +339,7 @@ def fitted_model(
 
 
 def _general_target(model: Model) -> FloatArray:
-    """Return the model's parameters (p,), and place a fitted target on no joint axis."""
+    """Return the model's parameters (p,), with a fitted target in a position away from all joint axes."""
     at = model.way.start.copy()
     for k, parameter in enumerate(model.way.parameters):
         if parameter.end and parameter.where == "tool" and parameter.unit == "m":
@@ -468,9 +468,9 @@ def _parse_noise(noise: tuple[float, float]) -> Noise:
 def _weak(
     robot: Robot, model: Model, measured: Measured, kept: Sequence[int], at: FloatArray
 ) -> dict[int, float]:
-    """Return the parameters that as many random configurations would determine much better.
+    """Return the poorly observable parameters, each with a ratio of uncertainties.
 
-    Each parameter has a ratio: its uncertainty, divided by its uncertainty at random configurations.
+    The ratio is explained at `Calibration.weak`.
     """
     general = _values(model, robot, robot.sample(len(measured), seed=_OTHERS))
     sizes = []

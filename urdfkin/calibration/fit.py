@@ -455,7 +455,8 @@ def quantile(share: float, freedom: int) -> float:
     return freedom * (1.0 - step + NormalDist().inv_cdf(share) * math.sqrt(step)) ** 3
 
 
-#: Largest number of alternate solutions for base and target. They end at this relative change of the target.
+#: Largest number of repetitions in which base and target are computed alternately.
+#: The repetitions end at this relative change of the target.
 _TURNS, _FIXED_END = 200, 1e-9
 #: Largest allowed spread of the measured positions, relative to the spread of the robot's tip positions.
 #: With positions in millimetres by mistake, this ratio is about 1000.

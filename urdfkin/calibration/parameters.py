@@ -144,7 +144,7 @@ class ParametricChain:
     def rounding(self, values: FloatArray) -> float:
         """Bound the rounding error (metres) of each number that `columns` returns.
 
-        For angles in radians, the bound is this bound divided by `size`.
+        The bound of a number in radians is the result divided by `size`.
         """
         slides = [drive.joint for drive in self._drives if drive.joint is not None and not drive.turns]
         slid = max((float(np.abs(values[:, j]).max(initial=0.0)) for j in slides), default=0.0)
@@ -161,7 +161,7 @@ FITTED = ("base", "tool", "offsets", "origins", "gains")
 #: The parameters of an origin, in the order of multiplication: name, True for a rotation, index of the axis.
 SIX = (("x", False, 0), ("y", False, 1), ("z", False, 2), ("rx", True, 0), ("ry", True, 1), ("rz", True, 2))
 _ALL = tuple(what for what, *_ in SIX)
-#: Order of preference among parameters with the same effect; False: for a prismatic joint.
+#: Order of preference among parameters with the same effect. The key is False for a prismatic joint.
 #: The joint's zero comes first, then motions of the joint's axis, then motions of the joint's frame alone.
 _KEPT = {True: ("rz", "x", "y", "rx", "ry", "z", "gain"), False: ("z", "rx", "ry", "x", "y", "rz", "gain")}
 _ROW = (("theta", True, 2), ("d", False, 2), ("a", False, 0), ("alpha", True, 0), ("beta", True, 1))

@@ -15,13 +15,13 @@ choices for these two cases.
 
 `steps_like` makes all free choices as in another table: the feet that are not unique, the directions of x,
 and the offsets. Along several parallel axes, the pose of the tip determines only the sum of d. About several
-coinciding axes, it determines only the sum of theta. All rows of such axes get d or theta from the other
-table, except one row, which gets the remaining offset. Its d or theta only defines the zero of a joint, which
-the URDF defines, or is absorbed by the base.
+coinciding axes, it determines only the sum of theta. The rows of such axes get d or theta from the other
+table, except one row, which gets the remaining offset. In that row, the zero of the joint in the URDF
+determines d or theta; in the first row, the base can absorb it.
 
-A row between parallel axes adds its remaining offset to the next row; a Hayati row does the same. A Hayati
-row ends in a plane, and the offset from the row before it shifts this plane. Therefore, the zero of a row's
-joint is computed before the rows that follow.
+After a row between parallel axes, and after a Hayati row, the next row gets the remaining offset. A Hayati
+row ends in a plane normal to its axis, and the offset that the row gets shifts this plane. Therefore, the
+zero of a row's joint is computed before the rows that follow.
 
 **Noise.** Two correct programs read the same URDF and compute slightly different constant poses between two
 joint axes. The program that wrote the file may also have rounded each angle to fifteen digits.

@@ -6,7 +6,7 @@ The standard and the modified convention group the same factors S and X of `urdf
     modified   base' . (X_0 S_1) (X_1 S_2) ... (X_{n-1} S_n) . tool'
 
 The conversion to the modified convention moves X_n into the tool. The conversion to the standard convention
-moves X_0 into the base. In the first modified row, a and alpha are not yet used. If the base has the form
+moves X_0 into the base. In the first modified row, the cells a and alpha are free. If the base has the form
 Tx(a) Rx(alpha), it moves into these two cells. In the same way, a tool of this form moves into the last
 standard row. Therefore, conversion to the other convention and back gives the original table.
 

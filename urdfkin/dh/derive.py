@@ -42,13 +42,13 @@ from urdfkin.kinematics.roundings import ANGLE, ENTRY, EPS
 from urdfkin.model.chain import ChainJoint, FrameChain
 from urdfkin.model.tree import FloatArray
 
-#: x is reversed if |theta| exceeds a right angle by more than this (rad). The angles 1.5708 and 1.571 do not
-#: exceed this limit.
+#: x is reversed if |theta| exceeds a right angle by more than this (rad).
+#: The angles 1.5708 and 1.571 do not exceed this limit.
 RIGHT_ANGLE_SLACK = 1e-3
 
 
 class Last(StrEnum):
-    """End of the last row: the tip, if four parameters suffice, or the flange, where the tool begins."""
+    """End of the last row: the tip (if four parameters suffice) or the flange, where the tool begins."""
 
     TIP = "tip"
     FLANGE = "flange"
@@ -240,9 +240,9 @@ def _use_freedom_of_prismatic_axes(
 
     A prismatic motion commutes with every translation, so a shift of the joint's line changes no placement.
     The first joint's line passes through the base's origin, so that the base can be the identity. The last
-    joint's line passes through the tip if the last row can then reach the tip. If a table may not have Hayati
-    rows, and the line is nearly parallel to the axis of a neighbouring joint, it passes through the origin of
-    that joint. Otherwise, the feet of the common normal would be far away.
+    joint's line passes through the tip if the last row can then reach the tip. In a table without Hayati
+    rows, a line that is nearly parallel to a neighbouring joint's axis passes through that joint's origin.
+    Otherwise, the feet of the common normal would be far away.
     """
     slides = [not joint.kind.turns for joint in chain.joints]
     noise = noises(chain, reach)
@@ -321,7 +321,7 @@ def _frame_zero(A: FloatArray, reach: float, noise: Noise) -> tuple[FloatArray, 
         z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
     # This is (1, 0, 0) - z_0 z for a unit vector z, in a form that avoids cancellation for z close to x.
     x = np.array([z[1] ** 2 + z[2] ** 2, -z[0] * z[1], -z[0] * z[2]])
-    if np.linalg.norm(x) < NEARLY_PARALLEL:  # z_0 is along the base's x axis: x_0 is the projection of y
+    if np.linalg.norm(x) < NEARLY_PARALLEL:  # z_0 is along the base's x axis, so use the y axis
         x = np.array([0.0, 1.0, 0.0]) - z[1] * z
     x /= np.linalg.norm(x)
     base[:3, :3] = np.column_stack([x, np.cross(z, x), z])
@@ -379,7 +379,7 @@ def _first_like(
 ) -> tuple[FloatArray, tuple[float, float]]:
     """Set theta of the first row to theta in another table; set d to 0 if the other table has d = 0.
 
-    The base gets the rotation and the offset that remain.
+    The remaining rotation and the remaining offset become part of the base.
     """
     theta, d = first
     rest = (math.remainder(theta - row.theta, 2.0 * math.pi), 0.0 if row.d else d)

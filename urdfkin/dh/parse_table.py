@@ -86,7 +86,7 @@ def from_sheet(text: str) -> dict[str, Any]:
     else:
         raise _no_header(lines)
     around = [spelled(line) for line in grid.around]
-    # A title is no setting, even if it begins with the name of a setting: a robot may have the name "robot".
+    # A title is not a setting, even if the robot's name is "robot", which is also the name of a setting.
     plain = [line for line in grid.around if not _TITLE.search(line)]
     data = _settings(plain, _KEY if form is _separated else _SETTING)
     if "convention" not in data and (convention := _convention(around, grid.columns)):

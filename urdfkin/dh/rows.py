@@ -92,8 +92,8 @@ def half_a_digit(value: object, whole_is_rounded: bool = False) -> float:
     return 0.5 * 10.0 ** min(exponent, 0)
 
 
-#: Order of the cells in a row that is a list. The list may also have "R" or "P" at the end. A row with beta
-#: must be a mapping.
+#: Order of the cells in a row that is a list. The list may also have "R" or "P" at the end.
+#: A row with beta must be a mapping.
 ORDER = ("a", "alpha", "d", "theta")
 _KINDS = {
     "r": JointKind.REVOLUTE,

@@ -42,7 +42,7 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Tolerance of handwritten screws: the length of an axis must be 1, and the pitch must be 0 m/rad.
+#: Tolerance of handwritten screws, for the length 1 of each axis and for the pitch 0 m/rad.
 _WRITTEN = 1e-4
 
 

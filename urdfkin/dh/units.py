@@ -36,8 +36,8 @@ class Lengths(StrEnum):
     MILLIMETRES = "millimetres"
 
 
-#: Default order of the four columns. Craig's order is alpha, a, d, theta; the Robotics Toolbox's is theta, d,
-#: a, alpha.
+#: Default order of the four columns.
+#: Craig's order is alpha, a, d, theta; that of the Robotics Toolbox is theta, d, a, alpha.
 COLUMNS = ("a", "alpha", "d", "theta")
 
 

@@ -39,7 +39,7 @@ from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree, is_bounded
 
 #: Default tolerance for the tip's position (metres).
-#: A table with one or two cells that are rounded to 0.1 mm has an error of about two thirds of it.
+#: The error of a table with one or two cells rounded to 0.1 mm is two thirds of this tolerance.
 TOLERANCE = 2e-4
 #: Number of configurations for a fit, and number of other configurations for the check of the fit.
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200

@@ -16,9 +16,9 @@ succeed. At the end of a descent, the fit starts again with opposite rotations o
 
 **Signs.** `align` finds the senses and the directions of x with which a reference table fits the URDF. The
 author of a table has three choices that do not change the robot: the sense of a joint, the direction of x
-along a common normal, and the zero of theta. Each sense and each direction of x is a sign. These signs
-determine the zeros of theta. A beam search extends sign patterns joint by joint. The search keeps the
-patterns whose cells are closest to the cells of the reference table.
+along a common normal, and the zero of theta. Each sense and each direction of x is represented by a sign.
+These signs determine the zeros of theta. A beam search extends sign patterns joint by joint. The search keeps
+the patterns whose cells are closest to the cells of the reference table.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ CELLS = ("theta", "d", "a", "alpha", "beta")
 _ROW = (Motion(2, True), Motion(2, False), Motion(0, False), Motion(0, True), Motion(1, True))
 #: Largest step of the fit, in radians for angles, and in metres per metre of reach for lengths.
 LONGEST_STEP = 0.5
-#: Limits of the fit of cells: number of steps, smallest relative improvement, and mean error that is zero.
+#: Limits of the fit of cells: number of steps, relative improvement, and mean error that counts as zero.
 _ROUNDS, _BETTER, _SOLVED = 40, 1e-9, 1e-14
 #: A singular value counts as zero below this fraction of the largest singular value.
 #: `_FREE` applies to free parameters, `_CELLS` to cells.
@@ -59,7 +59,7 @@ _LAST_WINS = 1.2
 #: With a small weight, beta changes only if a change of alpha is not enough.
 _BETA, _BETA_AGAIN = 0.3, 0.5
 #: Free parameters can compensate for changes of some cells.
-#: They replace a cell if at most this fraction of the cell's effect remains.
+#: They can replace a cell if at most this fraction of the cell's effect then remains.
 _HIDDEN = 1e-6
 
 
@@ -207,8 +207,8 @@ def fit_cells(model: Model, wanted: TargetPoses, cells_of: FloatArray, *, free: 
         cells = cells * cells_of.ravel()
         freedoms = freedoms if free else np.zeros_like(freedoms)
         change = _sparse(model, start, freedoms, cells, error, scale)
-        # For two nearly coinciding axes, opposite changes of the two offsets have almost no effect. The
-        # argument rcond removes these changes.
+        # For two nearly coinciding axes, opposite changes of the two offsets have almost no effect.
+        # The argument rcond removes these changes.
         offsets = np.linalg.lstsq(freedoms, error - cells @ change, rcond=_FREE)[0]
         shorten = min(1.0, LONGEST_STEP * scale / max(float(np.abs(offsets).max()), NOT_ZERO))
         model = moved(model, np.asarray(offsets * shorten, np.float64), scale, change * shorten)
@@ -621,9 +621,9 @@ def _steps(
 
     If the axes are nearly parallel in the URDF and in the reference table, a Hayati step is also tried. It
     begins at the offset d of the reference table. In this step the direction of x is free if the distance of
-    the axes is nearly zero. It is also free if a joint is prismatic, because its axis can be shifted;
-    `placed` is then False. For prismatic axes, a step along the common normal is also tried, because a shift
-    does not change the direction of the normal.
+    the axes is nearly zero. The direction of x is also free if a joint is prismatic, because its axis can be
+    shifted; `placed` is then False. For prismatic axes, a step along the common normal is also tried, because
+    a shift does not change the direction of the normal.
     """
     steps = []
     sine = math.hypot(A[0, 2], A[1, 2])

@@ -27,7 +27,7 @@ Parts = list[str | Table | Matrix]
 EXPLAINED = 1e-9
 #: Finest resolution of printed fitted numbers: rad for angles, metres per metre of reach for lengths.
 _FINEST = 1e-12
-#: Factor on half a unit of the last digit. It allows for the rounding of decimal numbers to doubles.
+#: Half a unit of the last digit, with a margin for the rounding of decimal numbers to doubles.
 _HALF = 1.0 + 1e-6
 
 
@@ -113,7 +113,7 @@ class Fitted:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mistake:
-    """A likely mistake: if it is corrected, fewer parameters must be fitted.
+    """A likely mistake in a table. After its correction, fewer parameters must be fitted.
 
     Attributes:
         kind: Kind of the mistake.

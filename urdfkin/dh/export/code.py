@@ -83,8 +83,8 @@ def matrix(name: str, rows: list[list[float]] | FloatArray, columns: int) -> lis
     return [f"{name} = [", *(f"    {numbers(row)}" for row in rows), "];"]
 
 
-#: Largest denominator and largest integer of a number that is written as a fraction; other numbers are
-#: decimals.
+#: Largest denominator and largest integer of a number that is written as a fraction.
+#: Other numbers are written as decimals.
 _LONGEST = 10**9
 
 
