@@ -68,8 +68,8 @@ _OTHERS = 1
 _DEPENDENT = 1e-12
 #: x, y and z of a target that is on no joint axis: the robot's size divided by these numbers.
 _ASIDE = {"x": 5.0, "y": 6.0, "z": 7.0}
-#: `ParametricChain.rounding` is multiplied by this factor.
-#: Pinocchio computes the poses of base and tip separately, and it computes them from rewritten origins.
+#: `ParametricChain.rounding` is multiplied by this factor for the comparison with Pinocchio.
+#: Pinocchio has more rounding errors: it computes base and tip separately, and from rewritten origins.
 _READ_BACK = 4.0
 #: Number of parameters or poses that a warning names.
 _NAMED = 6

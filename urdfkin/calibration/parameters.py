@@ -121,7 +121,7 @@ class ParametricChain:
     ) -> tuple[FloatArray, FloatArray]:
         """Return poses (s, 4, 4), and their Jacobian (s, 6, p), [linear; angular], by the parameters.
 
-        `frames` are the poses that `frames` returned for the same arguments, if they are known.
+        `frames` is the result of the method `frames` for the same arguments; None: it is computed.
         """
         amounts, factors = self._amounts(values, self.start if at is None else at)
         T, twists = self.path.columns_at(self.path.frames(amounts) if frames is None else frames)

@@ -32,8 +32,8 @@ digits differs by 900 eps or more and is not treated as round. The option `snap`
 nearest multiple of 15 degrees and reports the effect.
 
 If the tilt between two axes is below the noise, the table contains zero instead of the tilt. The two axes
-then count as parallel, so that no foot is far away. `left_out` returns the sum of these tilts. This sum is a
-bound of the orientation error that they cause.
+then count as parallel, so that no foot is far away. `left_out` returns the sum of these tilts. The
+orientation error that these tilts cause is at most this sum.
 """
 
 from __future__ import annotations
@@ -211,7 +211,7 @@ def cleaned_length(length: float, reach: float, noise: float = 0.0) -> float:
 
     Args:
         length: Metres.
-        reach: Metres; the size of the numbers from which the length is computed.
+        reach: Size (metres) of the numbers from which the length is computed.
         noise: Metres; a length below `noise` becomes zero. `noise` has an effect only if it exceeds the
             rounding error of `reach`.
 
@@ -414,7 +414,7 @@ def _closer_direction(step: Step, pair: PairLike, phi_in: float = 0.0) -> Step:
     """Return the step; reverse the direction of x if the reversed step is closer to the other table.
 
     The function compares the cells a, alpha and beta with the same cells of the other table. If the two
-    directions of x are equally close, theta decides.
+    directions of x are equally close, the function compares theta.
     """
     row = pair.row
 

@@ -296,7 +296,7 @@ def _meets_neighbour(constants: list[FloatArray], k: int, noise: list[Noise]) ->
 def _shift_after(constants: list[FloatArray], k: int, offset: FloatArray) -> None:
     """Move the whole offset before joint k to the pose after the joint.
 
-    `offset` is this offset, expressed in the frame of joint k.
+    The components of `offset` are in the frame of joint k.
     """
     constants[k][:3, 3] = 0.0
     constants[k + 1][:3, 3] += offset

@@ -1,9 +1,9 @@
 """Compute velocity, Jacobian and acceleration of a table's tip by the textbook's recursion on its frames.
 
 The module uses equations 7.85 and 7.127 to 7.130, with d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64). The forward
-recursion of `urdfkin.compiled` runs on a tree whose joint frames are the table's frames. In this tree mimic
-joints move freely. The module applies the mimic rules outside the tree. The joint values are G q + g, so the
-Jacobian is J = J_rows G, where J_rows is the tree's Jacobian with one column for each row.
+recursion of `urdfkin.compiled` runs on a tree whose joint frames are the table's frames. In this tree every
+mimic joint has its own coordinate. The module applies the mimic rules separately: the joint values are G q +
+g, so the Jacobian is J = J_rows G, where J_rows is the tree's Jacobian with one column for each row.
 """
 
 from __future__ import annotations

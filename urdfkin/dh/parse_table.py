@@ -394,7 +394,7 @@ def _unescaped(name: str) -> str:
 
 
 def _nested(row: dict[str, Any]) -> dict[str, Any]:
-    """Collect the columns of a mimic rule and of limits in one mapping each.
+    """Replace the columns of a mimic rule by a mapping, and do the same for the columns of limits.
 
     If the row has no mimic rule, `offset` is added to theta or d.
     """

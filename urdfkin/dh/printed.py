@@ -114,7 +114,8 @@ def _pose(T: FloatArray, digits: int) -> FloatArray:
 def _bound(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, tool: FloatArray) -> float:
     """Return the sum of the tip errors (metres) that the rounding of each number can cause.
 
-    The rounding error of an angle is multiplied by the largest possible distance of the tip from the row.
+    The rounding error of an angle is multiplied by the largest possible distance from the row's frame to the
+    tip.
     """
     lever = float(np.linalg.norm(table.tool[:3, 3]))
     total = float(np.linalg.norm((tool - table.tool)[:3, 3]))

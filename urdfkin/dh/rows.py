@@ -139,8 +139,8 @@ def refuse_other_order(rows: Sequence[Any]) -> None:
     """Reject rows, given as lists, that seem to be in the Robotics Toolbox's order theta, d, a, alpha.
 
     Angles of a table are nearly always multiples of 15 degrees. Lengths hardly ever look like such angles.
-    Lists are rejected if all numbers in the first and fourth columns are such multiples and none in the
-    second column is.
+    Rows are rejected if all numbers in the first and fourth columns look like multiples of 15 degrees, and no
+    number in the second column does.
 
     Raises:
         InputError: the columns look like the other order; the message names the two orders.

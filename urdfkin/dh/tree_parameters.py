@@ -225,7 +225,7 @@ class _Link:
         T_antecedent_axis: (4, 4) pose of the axis frame in the antecedent's axis frame.
         T_link_axis: (4, 4) pose of the axis frame in the link's URDF frame.
         noise: Noise of `T_antecedent_axis`.
-        left_out: Sum of the tilts from the root to this link that count as rounding (rad).
+        left_out: Sum (rad) of the tilts from the root to this link that are replaced by zero, as rounding.
     """
 
     antecedent: int

@@ -548,7 +548,7 @@ class Robot(Displayable):
     def difference(self, start: Given, end: Given) -> FloatArray:
         """Return the joint velocities (..., nv) that lead from `start` to `end` in one second.
 
-        The definition is Pinocchio's `difference`, the shortest motion. `integrate(start, difference(start,
+        The result is the shortest motion, as in Pinocchio's `difference`. `integrate(start, difference(start,
         end))` gives the same pose of the robot as `end`.
 
         Args:
@@ -689,8 +689,9 @@ class Robot(Displayable):
 
         Args:
             lock: Value (rad or m) of each joint to lock: `{"finger": 0.04}` or `"finger=0.04, wrist=30deg"`.
-            joints: The joints that remain movable. All others are locked, at 0 unless `lock` has a value.
-                `lock` may then begin with a pose, such as "ready", for the other values.
+            joints: The joints that remain movable. All other joints are locked. The value of a locked joint
+                is 0 if `lock` contains no value for it. If `lock` begins with a pose, such as "ready", the
+                pose is used instead of 0.
 
         Raises:
             UnknownNameError: there is no such joint or pose.
@@ -1224,7 +1225,7 @@ class Robot(Displayable):
                 one for each joint before the frame. With this number of digits, the ends are nearly always
                 neighbouring doubles. With 15 digits, the intervals are about as wide as the rounding errors
                 of doubles.
-            hessian: Also enclose the Hessian, less than 0.1 ms for each pair of joints.
+            hessian: Whether to enclose the Hessian too. This takes less than 0.1 ms for each pair of joints.
 
         Raises:
             InputError: a batch, a wrong length, or fewer than 15 digits.
@@ -1658,7 +1659,7 @@ _ITEM = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 
 
 def _completed(method: FunctionType, shared: dict[str, str], errors: dict[str, str]) -> str:
-    """Return the docstring of a method that computes, with its shared arguments and errors.
+    """Return the docstring of a method of `Robot`, completed with the shared arguments and errors.
 
     The shape of the result, its units and its equations come from the table of quantities.
     """

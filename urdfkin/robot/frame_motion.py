@@ -146,7 +146,8 @@ def frame_motion(
 ) -> FrameMotion:
     """Compute the motion of a frame along a trajectory, and compare every sample with Pinocchio.
 
-    A disagreement does not raise an error. The attributes `agrees` and `checks` of the result report it.
+    A disagreement does not raise an error. The result reports the disagreement in its attributes `agrees` and
+    `checks`.
 
     Args:
         robot: The robot.

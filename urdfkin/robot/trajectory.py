@@ -292,7 +292,7 @@ def read_trajectory(
 
 
 def read_samples(robot: Robot, path: Path, conversion: Conversion | None = None) -> Samples:
-    """Read the samples of a file, and compute no missing velocities or accelerations.
+    """Read the samples of a file, without computing missing velocities or accelerations.
 
     `read_trajectory` describes the file and the errors.
     """
@@ -359,10 +359,10 @@ def _differences(
 
 
 def _error(fine: FloatArray, coarse: FloatArray, order: int) -> float:
-    """Estimate the largest error of differences from all samples, `fine`.
+    """Estimate the largest error of central differences.
 
-    The function compares `fine` with `coarse`, the differences from half of the samples. The error of the
-    differences is proportional to the time step to the power `order`.
+    `fine` contains the differences from all samples, and `coarse` those from half of the samples. The error
+    of the differences is proportional to the time step to the power `order`.
     """
     return float(np.abs(fine - coarse).max(initial=0.0)) / (2.0**order - 1.0)
 
@@ -663,7 +663,7 @@ def _check_columns(
 
 
 #: Largest difference (rad) between the angles of a column that was wrapped to one turn.
-#: It includes a margin for angles with two digits.
+#: It includes a margin for angles that are rounded to two decimals.
 _ONE_TURN = math.tau + 0.02
 #: Angle (rad) between two samples from which the direction of the motion is ambiguous.
 #: From this angle on, the motion in the other direction is less than twice as long.

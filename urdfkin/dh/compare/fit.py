@@ -156,8 +156,8 @@ def columns(
     A twist is the derivative of the tip's poses with respect to a parameter.
 
     The free parameters are six numbers of the base, six of the tool, and the variable of each row. The cells
-    are in the order of the array (n, 5). Angles are multiplied by the scale. `frames` are the poses along the
-    model's path at the samples, if they are known.
+    are in row order: five cells of row 1, five cells of row 2, and so on. Angles are multiplied by the scale.
+    `frames` contains the poses along the model's path at the samples; None: they are computed.
     """
     scale = wanted.scale
     path, amounts = model.path_at(wanted.values)
@@ -249,7 +249,7 @@ def _span(freedoms: FloatArray) -> FloatArray:
 def hidden_cells(model: Model, wanted: TargetPoses) -> list[tuple[int, int]]:
     """Return (row, cell index) of the cells whose change has the same effect as a change of free parameters.
 
-    At most 1e-6 of the effect of such a cell remains.
+    The free parameters compensate for all but 1e-6 of the effect of such a cell.
     """
     _, freedoms, cells = columns(model, wanted)
     Q = _span(freedoms)
@@ -544,8 +544,7 @@ def _without_equivalents(partials: list[_Partial]) -> list[_Partial]:
 
 
 def _pose(chain: FrameChain, k: int, before: int, after: int) -> FloatArray:
-    """Return the constant pose A_k, with the z axis of each neighbouring joint reversed if its sense is
-    -1."""
+    """Return the constant pose A_k, with the z axis reversed for each neighbouring joint of sense -1."""
     A = chain.constants[k]
     A = _HALF_TURN @ A if before < 0 else A
     return np.array(A @ _HALF_TURN if after < 0 else A)
@@ -617,7 +616,7 @@ def _absorb(partial: _Partial, step: Step, theta: float) -> _Partial:
 def _steps(
     A: FloatArray, row: DHRow, delta: float, reach: float, phi_free: float, placed: bool
 ) -> Iterator[Step]:
-    """Yield the possible steps between two axes, each step with each of the two directions of x.
+    """Yield the possible steps between two axes, with both directions of x.
 
     If the axes are nearly parallel in the URDF and in the reference table, a Hayati step is also tried. It
     begins at the offset d of the reference table. In this step the direction of x is free if the distance of
@@ -644,7 +643,7 @@ def _steps(
 
 
 def _close_chain(best: _Partial, chain: FrameChain, reference: DHTable) -> Alignment:
-    """Complete an alignment with its base and its tool, so that its chain leads from base to tip."""
+    """Return the alignment of the whole chain, with its base and its tool."""
     n = len(reference.rows)
     last = reference.rows[-1]
     start = _pose(chain, 0, 1, best.senses[0]) @ best.base

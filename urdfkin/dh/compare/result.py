@@ -366,7 +366,7 @@ def _change(mistake: Mistake, table: DHTable, units: Units) -> str:
 
 
 def _cells(found: Comparison, units: Units) -> Parts:
-    """Return the text about cells that differ, cells that are not compared, and the changes without a fit."""
+    """Return the text with the cells that differ, the cells not compared, and the changes without a fit."""
     unit = f"({units.length_name}, {units.angle_name})"
     parts: Parts = []
     if found.differences:
@@ -405,7 +405,7 @@ def _table(cells: Sequence[CellDifference], units: Units) -> Table:
 def shown_offset(offset: float, row: DHRow, fine: float, units: Units) -> str:
     """Format an offset at the resolution `fine`.
 
-    A fraction of pi is used if it equals the offset at this resolution.
+    The offset is written as a fraction of pi if the two are equal at this resolution.
     """
     if abs(offset) <= fine:
         return "0"
