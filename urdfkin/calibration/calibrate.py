@@ -7,8 +7,8 @@ the parameters to write are fitted again.
 `read_poses` reads measured poses. A CSV file has a column for each coordinate, with the coordinate's name.
 The columns x, y, z contain the position. The optional columns qx, qy, qz, qw contain the orientation. Instead
 of position and orientation, the columns T00 to T23, or T00 to T33, may contain the pose matrix, as `urdfkin
-placement --format csv` writes it. An .npz file has q (n, nq) and either T (n, 4, 4) or p (n, 3) and
-optionally quat (n, 4), scalar last.
+placement --format csv` writes it. An .npz file contains q (n, nq) and the poses: either T (n, 4, 4), or p (n,
+3) with an optional quat (n, 4), scalar last.
 """
 
 from __future__ import annotations

@@ -280,7 +280,8 @@ class Fit:
 def errors(model: Model, measured: Measured, at: FloatArray) -> FloatArray:
     """Return the residuals, measured minus computed: (s, 6) for poses or (s, 3) for positions.
 
-    Each row contains the position error and, for poses, then the rotation error, in the base, in m and rad.
+    Each row contains the position error (m) and, for full poses, the rotation error (rad). The axes of the
+    errors are those of the base.
     """
     return _apart(measured, model.way.poses(measured.values, at))
 

@@ -61,7 +61,7 @@ _COMPARED = 1000
 
 
 def read_calibration(path: Path, order: str = "driver") -> dict[str, FloatArray]:
-    """Read the (4, 4) origin of each joint, by the joint's name without a prefix.
+    """Read the (4, 4) origin of each joint; the keys are joint names without a prefix.
 
     Args:
         path: The driver's YAML, or a `default_kinematics.yaml` of its robot description.
@@ -209,7 +209,7 @@ def _verify_written(result: Rewritten, calibrated: FrameChain, prefix: str) -> C
 
 
 def distance(one: Mapping[str, FloatArray], other: Mapping[str, FloatArray]) -> tuple[float, float]:
-    """Return the largest distance (m) and angle (rad) on samples between `tool0` of two calibrations."""
+    """Return the largest distance (m) and angle (rad) on samples between the frames `tool0` of two robots."""
     paths = [chain(calibrated_tree(origins), "tool0", "base") for origins in (one, other)]
     q = values_within([(-np.pi, np.pi)] * len(LINKS), _COMPARED)
     T, S = (path.placement(q) for path in paths)

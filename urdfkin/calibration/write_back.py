@@ -129,7 +129,7 @@ class Rewritten:
 
     @cached_property
     def changes(self) -> Changes:
-        """The changes as `urdfkin.diff` lists them; for each joint, the frame that moves most is named."""
+        """The changes, as listed by `urdfkin.diff`; the list names the frame that each joint moves most."""
         return diff(self.robot, self.loaded)
 
     @cached_property

@@ -178,8 +178,8 @@ def _parallel(A: FloatArray, reach: float, noise: Noise, phi_free: float, delta_
 def hayati_step(A: FloatArray, reach: float, noise: Noise, phi_free: float) -> Step:
     """Return the step of a Hayati row (Hayati, 1983).
 
-    The plane that is normal to this joint's axis and contains the origin of this joint's frame intersects the
-    next axis in a point. The x axis points from the origin to this point.
+    Consider the plane through the origin of this joint's frame, normal to this joint's axis. The x axis
+    points from the origin to the intersection of this plane with the next axis.
     """
     z = A[:3, 2]
     delta_next = cleaned_length(A[2, 3] / z[2], reach, noise.metres)
@@ -206,8 +206,8 @@ def _remaining_rotation(A: FloatArray, phi: float, alpha: float, beta: float) ->
 def cleaned_length(length: float, reach: float, noise: float = 0.0) -> float:
     """Return a length without rounding noise.
 
-    The result is zero or the length rounded to twelve digits, if this changes the length by no more than
-    rounding. Otherwise the length is returned unchanged.
+    A length that differs from 0 only by rounding becomes 0. A length that differs from a number with twelve
+    digits only by rounding becomes this number. Any other length is returned unchanged.
 
     Args:
         length: Metres.

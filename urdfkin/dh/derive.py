@@ -319,7 +319,7 @@ def _frame_zero(A: FloatArray, reach: float, noise: Noise) -> tuple[FloatArray, 
     base[:3, 3] = [cleaned_length(component, reach, noise.metres) for component in p - offset * z]
     if tilt_of(A) <= noise.radians:  # z_0 is parallel or opposite to the base's z axis
         z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
-    # This is (1, 0, 0) - z_0 z for a unit vector z, in a form that avoids cancellation for z close to x.
+    # This is x - (x . z) z for unit vectors, in a form that avoids cancellation for z close to x.
     x = np.array([z[1] ** 2 + z[2] ** 2, -z[0] * z[1], -z[0] * z[2]])
     if np.linalg.norm(x) < NEARLY_PARALLEL:  # z_0 is along the base's x axis, so use the y axis
         x = np.array([0.0, 1.0, 0.0]) - z[1] * z

@@ -389,7 +389,7 @@ def table_from_rows(
         robot: The robot's name.
         base_frame: Name of the base frame.
         tip_frame: Name of the tip frame.
-        coordinates: Names of mimicked joints that have no row because they are elsewhere on the robot.
+        coordinates: Names of mimicked joints that have no row because they are in another part of the robot.
 
     Raises:
         InputError: the convention or a unit is unknown, a row is invalid, there are no rows, or one joint has

@@ -5,8 +5,8 @@
 M is the tip's pose in the zero configuration. A screw is (w, v), with the **angular part first**, as in that
 book and in its code. For a revolute joint through p, w is the unit axis and v = p x w. For a prismatic joint,
 w = 0 and v is the unit direction. Space screws S are in the base frame, body screws B = Ad(M^-1) S in the tip
-frame. The author of a Denavit-Hartenberg table can choose some of its frames. Screws leave no such choice:
-the base frame, the tip frame and the joint zeros define all numbers.
+frame. The author of a Denavit-Hartenberg table can choose some of its frames. Screws are unique: the base
+frame, the tip frame and the joint zeros define all numbers.
 """
 
 from __future__ import annotations

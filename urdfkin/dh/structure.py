@@ -12,10 +12,11 @@ al., 2014). An OPW arm is the standard table
 
     a1 -90 c1 q1    c2 0 0 q2-90    a2 90 b q3+90    0 -90 c3 q4    0 90 0 q5    0 0 c4 q6
 
-with cells in the order a, alpha, d, theta. `opw_of` derives the URDF's table in the frames, zeros and senses
-of this table (`urdfkin.dh.make`), and reads the parameters from it. OPW has no parameter for the small tilts
-of a calibrated arm, so `opw_of` ignores these tilts. `Opw.placement` computes the solver's forward kinematics
-with the OPW parameters. The difference from the arm's placement is the error of the OPW parameters.
+with cells in the order a, alpha, d, theta. `opw_of` derives a table of the URDF with the frames, zeros and
+senses of the OPW table (`urdfkin.dh.make`). The OPW parameters are read from the derived table. OPW has no
+parameter for the small tilts of a calibrated arm, so `opw_of` ignores these tilts. `Opw.placement` computes
+the solver's forward kinematics with the OPW parameters. The difference from the arm's placement is the error
+of the OPW parameters.
 
 `axes_and_steps` returns H and P, the input of solvers by subproblem decomposition (IK-Geo, EAIK):
 
@@ -178,7 +179,7 @@ def _pair(screws: ProductOfExponentials, i: int) -> Pair:
 
 
 def meeting(screws: ProductOfExponentials, at: tuple[int, ...]) -> tuple[FloatArray, float]:
-    """Return the point nearest to some axes, and the largest of its distances from these axes (metres).
+    """Return the point nearest to the given axes, and its largest distance from these axes (metres).
 
     The point minimizes the sum of the squared distances.
     """
@@ -227,7 +228,7 @@ def _arm_kinds(screws: ProductOfExponentials, letters: str, pairs: tuple[Pair, .
 def _solvers(letters: str, kinds: list[Kind], pairs: tuple[Pair, ...]) -> list[str]:
     """Return the known closed-form solutions.
 
-    If the arm has a property only with a small deviation, the solution has a small error.
+    If the arm has a property only approximately, the closed-form solution has a small error.
     """
     named = {kind.name for kind in kinds}
     spherical = [kind for kind in kinds if kind.name in ("spherical wrist", "spherical shoulder")]

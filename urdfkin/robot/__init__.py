@@ -108,7 +108,7 @@ class Robot(Displayable):
     Methods that compute share these arguments:
 
     - `q`: (..., nq) rad, m.
-    - `v`: (..., nv) rad/s, m/s; of planar and floating joints in the axes of the moving frame.
+    - `v`: (..., nv) rad/s, m/s; for planar and floating joints in the axes of the moving frame.
     - `a`: (..., nv) rad/s^2, m/s^2; in the same axes as `v`.
     - `frame`: Name of a link or joint; None: the robot's only tip. A list of names, such as `link_frames`, is
       computed in one pass and adds an axis after the batch axes.
@@ -481,9 +481,9 @@ class Robot(Displayable):
     def sample(self, n: int, seed: int = 0) -> FloatArray:
         """Draw random configurations (n, nq) within the limits, those of mimic joints included.
 
-        The same seed gives the same configurations. If no value of a mimicked joint satisfies both its own
-        limits and the mimic joint's, only its own limits apply; `limit_violations` then names the mimic
-        joint.
+        The same seed gives the same configurations. It is possible that no value of a mimicked joint
+        satisfies both its own limits and those of the mimic joint. Then only its own limits apply, and
+        `limit_violations` names the mimic joint.
 
         Args:
             n: Number of configurations.
@@ -528,7 +528,7 @@ class Robot(Displayable):
 
         Args:
             q: (..., nq) rad, m.
-            v: (..., nv) rad/s, m/s; of planar and floating joints in the axes of the moving frame.
+            v: (..., nv) rad/s, m/s; for planar and floating joints in the axes of the moving frame.
 
         Raises:
             InputError: a wrong length, or a number that is not finite.
@@ -556,7 +556,7 @@ class Robot(Displayable):
             end: (..., nq) rad, m.
 
         Returns:
-            (..., nv) rad/s, m/s; of planar and floating joints in the axes of the moving frame.
+            (..., nv) rad/s, m/s; for planar and floating joints in the axes of the moving frame.
 
         Raises:
             InputError: a wrong length, or a number that is not finite.
@@ -682,7 +682,7 @@ class Robot(Displayable):
     def locked(
         self, lock: str | Mapping[str, ArrayLike] = MappingProxyType({}), joints: Sequence[str] | None = None
     ) -> Robot:
-        """Return this robot with some joints fixed at a value; they have no numbers in q, v and a.
+        """Return this robot with some joints fixed at a value; q, v and a do not contain these joints.
 
         A mimic joint is locked together with its mimicked joint. All methods work on the result. Pinocchio
         checks them with the reduced model (`buildReducedModel`) of the whole URDF.
@@ -891,10 +891,10 @@ class Robot(Displayable):
     ) -> FloatArray:
         """Return J-dot (..., 6, nv), the time derivative of `jacobian` along the motion.
 
-        In LOCAL_WORLD_ALIGNED, J a + J-dot v equals the result of `acceleration`, the classical one. In LOCAL
-        and WORLD, J a + J-dot v is the *spatial* acceleration, because the axes or the point move. The linear
-        part of the spatial acceleration is that of the classical one minus w x vel. If the base moves, you
-        must add the acceleration that the base causes.
+        In LOCAL_WORLD_ALIGNED, J a + J-dot v equals the classical acceleration, which `acceleration` returns.
+        In LOCAL and WORLD, J a + J-dot v is the *spatial* acceleration, because the axes or the point move.
+        The linear part of the spatial acceleration is the linear part of the classical acceleration minus w x
+        vel. If the base moves, you must add the acceleration that the base causes.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -1277,7 +1277,7 @@ class Robot(Displayable):
         return prepared
 
     def compiled(self, frame: str | None = None, reference: Reference | str = _ALIGNED) -> CompiledFrame:
-        """Return an evaluator of one frame in machine code for this robot, the fastest form.
+        """Return the fastest evaluator of one frame: machine code for this robot.
 
         The system's C compiler compiles each quantity at its first use. The compilation takes a few seconds,
         once on each machine. The compiled code is compared with Pinocchio. Without a C compiler, Numba's

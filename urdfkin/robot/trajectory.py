@@ -165,7 +165,7 @@ class Trajectory:
         notes: Remarks for the user about the samples, for example about unwrapped angles. Each remark is one
             line.
         base: Motion of the root link for all n samples. None if the root link is fixed at the world's origin.
-        errors: Estimates of the largest error of v and of the largest error of a, if v and a were computed by
+        errors: Estimated largest error of v and estimated largest error of a, if v and a were computed by
             differences. None if v and a were given, or if there are too few samples.
 
     >>> import urdfkin
@@ -260,10 +260,10 @@ def read_trajectory(
     | motion of the root link | | base_placement (n, 4, 4), base_velocity (n, 6), base_acceleration (n, 6) |
 
     A heading may end with a unit: `elbow [deg]`, `elbow_deg`, `v:elbow [deg/s]`, `lift_mm`, `time [ms]`.
-    Without t, the samples are one second apart. Without a, a is computed by central differences of v.
-    Without v and a, the angles of continuous, planar and floating joints are unwrapped, and both are computed
-    by central differences. The attributes `rates`, `errors` and `notes` of the result report these
-    computations.
+    Without t, the samples are one second apart. Without a, a is computed by central differences of v. If the
+    file has no v and a, both are computed by central differences. The angles of continuous, planar and
+    floating joints are unwrapped first. The attributes `rates`, `errors` and `notes` of the result report
+    these computations.
 
     Args:
         robot: The robot.
@@ -521,7 +521,7 @@ def read_columns(
     }
 
 
-#: Allowed names of the time column, and the number of each time unit in one second.
+#: Allowed names of the time column, each with the number of its time units in one second.
 _TIMES = ("t", "time", "timestamp")
 _PER_SECOND = {
     **dict.fromkeys(("s", "sec", "second", "seconds"), 1.0),
@@ -630,7 +630,7 @@ def _rows(text: str, where: str) -> Iterator[tuple[int, list[str]]]:
 
 
 def _is_header(cells: Sequence[str], names: Sequence[str]) -> bool:
-    """Return whether a line contains the names of columns; a number can be a name too, as in a joint "1"."""
+    """Return whether a line contains the names of columns; a name can also be a number, such as "1"."""
     return sorted(cells) == sorted(names) or all(parse_float(cell) is None for cell in cells)
 
 
@@ -738,7 +738,7 @@ def _without_jumps(angle: FloatArray) -> FloatArray:
 
 
 def _floating(joint: Joint, own: FloatArray) -> tuple[FloatArray, list[str]]:
-    """Choose the sign of each floating joint's quaternion so that it is closer to the previous sample's."""
+    """Choose the sign of each floating joint's quaternion that is closer to the previous quaternion."""
     along = np.sum(own[1:, 3:] * own[:-1, 3:], axis=1)
     new = own.copy()
     new[1:, 3:] *= np.cumprod(np.where(along < 0.0, -1.0, 1.0))[:, np.newaxis]

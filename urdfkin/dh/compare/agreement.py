@@ -223,11 +223,10 @@ def _absorbed_offset(written: FloatArray, fitted: FloatArray) -> AbsorbedOffset:
 
 
 def _cell_at(reference: DHTable, i: int, cell: str) -> int:
-    """Return the index of the reference's row that contains a cell of row i of the standard table.
+    """Return the index of the row of the reference table with a cell of row i of the standard table.
 
-    The result is the number of rows if no row contains the cell.
-
-    In a modified table a, alpha and beta of standard row i are in the next row.
+    A modified table contains a, alpha and beta of row i in row i + 1. The result is the number of rows if no
+    row contains the cell.
     """
     return i + (reference.convention is Convention.MODIFIED and cell not in ("theta", "d"))
 

@@ -1,4 +1,4 @@
-"""Export a table as code that computes with exact symbols, and write names and numbers in code.
+"""Export a table as code for exact symbolic computation, and format names and numbers in code.
 
 `urdfkin.export` writes code that computes with doubles. This module writes the rows themselves, so that the
 algebra is exact: pi/2 stays pi/2, and 0.425 becomes 17/40. The languages are Python with SymPy, and MATLAB
@@ -39,7 +39,7 @@ def docstring(table: DHTable) -> list[str]:
 
 
 def header(table: DHTable) -> list[str]:
-    """Return the lines of the header without comment marks; no name in the header can end a comment."""
+    """Return the header's lines without comment marks and without characters that can end a comment."""
     lines = [
         f"{table.robot}: {table.base_frame} to {table.tip_frame}",
         f"{table.convention} Denavit-Hartenberg parameters, metres and radians",
