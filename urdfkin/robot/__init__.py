@@ -576,7 +576,7 @@ class Robot(Displayable):
 
         Args:
             q: (..., nq) rad, m.
-            mimic: The value of `mimic` that the Pinocchio model was built with.
+            mimic: The argument `mimic` of `pinocchio_model` for this Pinocchio model.
 
         Returns:
             (..., model.nq).
