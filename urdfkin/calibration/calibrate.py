@@ -593,7 +593,7 @@ def read_poses(
     """Read configurations (s, nq), and poses (s, 4, 4) or positions (s, 3) in metres, from a file.
 
     Args:
-        path: The file; .npz by its suffix, else CSV.
+        path: The file. It is read as .npz if it has this suffix, else as CSV.
         coordinates: Names of the coordinates of q.
         needed: Names of the required columns.
         unit: Unit of the positions: "m" or "mm".

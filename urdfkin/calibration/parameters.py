@@ -1,6 +1,6 @@
 """Model a path with a URDF's origins or a table's cells as parameters.
 
-Compute the Jacobian by the parameters.
+Compute the Jacobian with respect to the parameters.
 
 A model is a path (`urdfkin.model.path`), because a URDF's origins and the rows of a Denavit-Hartenberg table
 are products of constants and elementary motions. The amount of an elementary motion is a parameter or a
@@ -119,7 +119,7 @@ class ParametricChain:
     def columns(
         self, values: FloatArray, at: FloatArray | None = None, frames: FloatArray | None = None
     ) -> tuple[FloatArray, FloatArray]:
-        """Return poses (s, 4, 4), and their Jacobian (s, 6, p), [linear; angular], by the parameters.
+        """Return poses (s, 4, 4), and their Jacobian (s, 6, p) for the parameters, [linear; angular].
 
         `frames` is the result of the method `frames` for the same arguments; None: it is computed.
         """

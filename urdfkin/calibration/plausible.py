@@ -3,8 +3,8 @@
 A fit always has some result, even if joint angles are in degrees, rows of q belong to other poses, or the
 sign of a joint is reversed. A fit is refused if its residuals are a large fraction of the robot's reach, or
 if it hardly improves the original model. A fit that tilts a joint's axis by a large angle, or that has no
-redundancy, is refused too. The module then corrects each common mistake in the data and fits again. The
-mistake with a plausible fit after its correction is the likeliest one.
+redundancy, is refused too. The module then corrects each common mistake in the data and fits again. If the
+fit is plausible after a correction, the corrected mistake is the likeliest one.
 """
 
 from __future__ import annotations
@@ -382,7 +382,7 @@ def _size(left: FloatArray, reach: float) -> float:
 
 
 def _left(ended: Ended, reach: float) -> float:
-    """Return the standard deviation of the residuals of a measured number, metres."""
+    """Return the standard deviation (m) of the residuals."""
     return _size(ended.fitted.errors, reach) / math.sqrt(max(ended.fitted.freedom, 1.0))
 
 

@@ -1,6 +1,6 @@
 """Apply the factory calibration of a Universal Robots arm, from the YAML file of its ROS driver.
 
-The controller stores Denavit-Hartenberg parameters. Two axes of the arm are parallel except for about a
+The controller stores Denavit-Hartenberg parameters. Two axes of the arm deviate from parallel axes by about a
 milliradian. The d of one row is therefore hundreds of metres, and the d of the next row compensates it. The
 driver's program `ur_calibration` shifts the link frames along their axes, so that these large offsets
 disappear. The program writes the pose of each joint relative to the previous one: x, y, z, roll, pitch, yaw.

@@ -143,7 +143,7 @@ def refuse_other_order(rows: Sequence[Any]) -> None:
     number in the second column does.
 
     Raises:
-        InputError: the columns look like the other order; the message names the two orders.
+        InputError: the columns seem to be in the other order; the message names the two orders.
     """
     lists = [row for row in rows if isinstance(row, Sequence) and not isinstance(row, str)]
     if len(lists) < len(rows) or not all(_has_order(row) for row in lists):

@@ -105,7 +105,7 @@ class Robot(Displayable):
 
     A missing name is an error.
 
-    Methods that compute share these arguments:
+    Methods that compute a quantity share these arguments:
 
     - `q`: (..., nq) rad, m.
     - `v`: (..., nv) rad/s, m/s; for planar and floating joints in the axes of the moving frame.
@@ -120,7 +120,7 @@ class Robot(Displayable):
     - `verify`: True: check this call with Pinocchio. "sample": check 100 of its configurations. None: as
       chosen in `load`.
     - `threads`: Number of threads for a batch. None: all processors from 4,096 configurations on. The result
-      does not depend on it.
+      does not depend on the number of threads.
 
     They share these errors:
 
@@ -809,7 +809,7 @@ class Robot(Displayable):
             from urdfkin.kinematics.bodies import seen_from  # noqa: PLC0415  few calls need these imports
 
         name = as_str(relative_to, "relative_to")
-        # the line that repeats a failed call contains plain strings
+        # an error message contains a line that repeats the call, with plain strings
         name = name if isinstance(name, FrameName) else str(name)
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (q,), also=(name,), relative_to=name)
         to = call.flat(out, (4, 4))
@@ -1159,7 +1159,7 @@ class Robot(Displayable):
         """Return the contributions of each joint to a frame's classical acceleration (eq. 7.125, 7.130).
 
         A joint has four kinds of contribution: transverse, centripetal, Coriolis and sliding. The sum of all
-        contributions equals `acceleration` and is compared with Pinocchio's.
+        contributions equals `acceleration` and is compared with Pinocchio's acceleration.
 
         Args:
             frame: Name of a link or joint; None: the robot's only tip.
@@ -1211,8 +1211,8 @@ class Robot(Displayable):
         The true values are those of eq. 7.77, 7.85 and 7.126 to 7.130, without rounding. Their inputs are the
         decimals in the URDF and the exact doubles of `q`, `v`, `a` and `base`. Each end of an interval is a
         double, and the two ends are nearly always neighbouring doubles. The result also states whether
-        urdfkin's and Pinocchio's values lie in the intervals. The time is less than 1 ms for each joint
-        before the frame.
+        urdfkin's and Pinocchio's values lie in the intervals. The computation takes less than 1 ms for each
+        joint before the frame.
 
         Args:
             q: (nq,) rad, m.
@@ -1253,7 +1253,7 @@ class Robot(Displayable):
         *,
         verify: bool = False,
     ) -> PreparedFrame:
-        """Return a fast evaluator of one frame, one configuration per call.
+        """Return a fast evaluator of one frame, for one configuration per call.
 
         `PreparedFrame` lists its methods.
 
@@ -1361,13 +1361,14 @@ class Robot(Displayable):
     ) -> Any:
         """Return a `torch.nn.Module` with the kinematics of a frame, for PyTorch.
 
-        It is the class `Kinematics` of `export("torch", ...)`. `module(q)` is the placement (..., 4, 4), and
-        the quantities are its methods. Tensors have any leading shape, any floating type and any device;
-        derivatives are PyTorch's. PyTorch must be installed.
+        It is the class `Kinematics` of `export("torch", ...)`. `module(q)` returns the placement (..., 4, 4),
+        and each quantity is a method of the module. Tensors may have any leading shape, any floating type and
+        any device. PyTorch computes derivatives. PyTorch must be installed.
 
         Args:
             frame: As in `export`.
-            quantities: As in `export`. `module(q)` is the first quantity that depends on q alone.
+            quantities: As in `export`. `module(q)` returns the first of these quantities that depends on q
+                alone.
             reference: As in `export`.
             verify: As in `export`.
 
@@ -1461,7 +1462,7 @@ class Robot(Displayable):
             parallel_offset: Row that contains the offset along consecutive parallel axes. "last": the first
                 row after these axes. "first": the row of the first of these axes. "each": each row contains
                 the offset of its own link.
-            flip: Names of joints to count in the opposite sense.
+            flip: Names of joints with the opposite sense in the table.
             first: "base": the first row includes the offset from the base. "joint": Craig's choice, d_1 = 0.
             sign: Rule for the direction of x: "theta" (smallest), "a" or "alpha" (not negative).
             slide: Line of a prismatic joint. "drawn": the same line as in the URDF. "minimal": the line
@@ -1577,7 +1578,7 @@ class Robot(Displayable):
     # -- internal ------------------------------------------------------------------------------------
 
     def plan(self, links: Sequence[int]) -> CompiledTree:
-        """Return the compiled tree of the joints that move the given links. It is built at the first call."""
+        """Return the tree of the joints that move the given links, which is compiled at the first call."""
         key = tuple(links)
         if (plan := self._plans.get(key)) is None:
             plan = self._plans[key] = compile_tree(self.tree, key)
@@ -1633,7 +1634,7 @@ class Robot(Displayable):
         return self._prepare(frame, reference, verify=wanted)
 
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
-        """Return the fast evaluator of a frame; it is made once."""
+        """Return the fast evaluator of a frame, which is made at the first call."""
         # A plain name is a key by itself, because the hash of an enumeration member takes long to compute.
         # Other keys contain types, because a member of an enumeration can be equal to a number.
         # In the same way, `LinkFrame("link:a")` differs from a link with the literal name "link:a".

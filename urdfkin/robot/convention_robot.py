@@ -21,8 +21,8 @@ class ConventionRobot:
 
     The methods are those of `Robot` with the same arguments. q, v and a have the target program's order and
     units. Jacobians have the target program's order of columns, and six-vectors have its order of rows. The
-    frame and `reference` mean the same as in `Robot`. Pinocchio checks each result as usual, before the
-    result is converted.
+    arguments `frame` and `reference` mean the same as in `Robot`. Pinocchio checks each result as usual,
+    before the result is converted.
 
     Attributes:
         robot: The robot itself.

@@ -85,8 +85,8 @@ def load(  # noqa: PLR0911  one branch per kind of source
         oracle: Oracle that checks quantities, "pinocchio" or "mujoco" (needs the extra `mujoco`).
         lock: Value (rad or m) of each joint to lock, such as `{"finger": 0.04}`; see `Robot.locked`.
         joints: The joints that remain movable; see `Robot.locked`.
-        variant: Variant to select of each variant set of a USD stage, such as `{"Gripper": "Robotiq"}`.
-        articulation: Path or name of the articulation of a USD stage with several.
+        variant: Variant to select in each variant set of a USD stage, such as `{"Gripper": "Robotiq"}`.
+        articulation: Path or name of the articulation, for a USD stage with several articulations.
 
     Returns:
         The robot. Each warning about the file is issued as an `UrdfWarning`, except for catalogue robots.

@@ -154,8 +154,9 @@ def _off(fitted: Model, written: Model, judged: TargetPoses) -> dict[str, float]
 def _reach(chain: FrameChain, wanted: FloatArray) -> float:
     """Return the robot's reach, which converts radians to metres.
 
-    A URDF made from a strict table may have offsets of kilometres that cancel. The path length along the
-    links is then far larger than the reach. The reach is therefore the spread of the tip's positions.
+    A URDF made from a table without Hayati rows may have offsets of kilometres that cancel. The path length
+    along the links is then far larger than the reach. The reach is therefore the spread of the tip's
+    positions.
     """
     tips = wanted[:, :3, 3]
     across = 2.0 * float(np.linalg.norm(tips - tips.mean(axis=0), axis=-1).max())

@@ -143,7 +143,7 @@ class Search:
         return min(agreeing, key=lambda model: self._fitted(written, model).count, default=None)
 
     def _fitted(self, written: Model, model: Model) -> Fitted:
-        """Return which free parameters the fit changed by more than its resolution."""
+        """Return the free parameters whose change is larger than the resolution of the fit."""
         metres, radians = self.judged.apart(model)
         fine = resolution(metres / self.judged.scale, radians)
         own = [model.own(i) for i in range(len(model.cells))]

@@ -169,9 +169,9 @@ def shape(table: DHTable, scale: float) -> FloatArray:
 
     Lengths are in metres, and angles are in radians times `scale`. For each pair of consecutive axes, the
     result contains the distance and the angle of the two axes. For each axis that is parallel to neither of
-    its neighbours, the result also contains the offset along the axis. Offsets along a run of parallel axes
-    are summed. A prismatic joint has no fixed axis line. Therefore, distances from its axis and offsets next
-    to it are set to zero. Offsets along the first axis are also left out, because the base absorbs them.
+    its neighbours, the result also contains the offset along the axis. Offsets along consecutive parallel
+    axes are summed. A prismatic joint has no fixed axis line. Therefore, distances from its axis and offsets
+    next to it are set to zero. Offsets along the first axis are also left out, because the base absorbs them.
     """
     rows = to_convention(table, Convention.STANDARD).rows
     numbers, offset, known = list[float](), 0.0, False

@@ -37,7 +37,7 @@ FORMATS: dict[str, tuple[str, str]] = {
 def export(table: DHTable, format: str, units: Units | None = None, *, verify: bool = True) -> str:
     """Return the table in a format.
 
-    Code for numbers computes the placement, the Jacobian and the acceleration of the tip. Like the code from
+    Numeric code computes the placement, the Jacobian and the acceleration of the tip. Like the code from
     `urdfkin export --form dh`, this code contains a self-test.
 
     Args:
