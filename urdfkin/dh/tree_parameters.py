@@ -238,8 +238,8 @@ class _Link:
 def _links(tree: KinematicTree) -> list[_Link]:
     """Return the axis frame of each joint, with z along the axis; a fixed joint has its link's own frame."""
     links = list[_Link]()
-    # For each link: the row of the nearest moving link towards the root, -1 for the root itself,
-    # the pose of the link in that moving link's axis frame, and the number of joints between the two.
+    # For each link, the row of the nearest moving link towards the root (-1: the root itself).
+    # Then the pose of the link in that moving link's axis frame, and the number of joints between them.
     carriers = [(-1, np.eye(4), 0)]
     for j, (joint, way) in enumerate(zip(tree.joints, _path_lengths(tree), strict=True)):
         antecedent, T, folded = carriers[joint.parent]
