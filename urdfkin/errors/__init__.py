@@ -120,7 +120,8 @@ class UrdfkinError(Exception):
         where: The location: file and line, frame or sample. None without a location.
         found: The wrong value, as the user wrote it.
         remedy: Instruction for the user.
-        question: A related section of docs/questions.md. The message ends with the command that prints it.
+        question: A related section of docs/questions.md. The message ends with the command that prints this
+            section.
         is_disagreement: True if urdfkin and Pinocchio disagree; False if the input is wrong.
 
     >>> error = UrdfkinError("a length is negative", where="arm.urdf:3", found="-1", remedy="remove the sign")
@@ -251,12 +252,12 @@ class SourceError(UrdfkinError, OSError):
 class RepresentationSingularityError(InputError):
     """Euler angles are at their representational singularity, where their derivatives do not exist (7.56).
 
-    The motion itself is regular. Only its description by these angles fails.
+    The motion itself is regular. Only its description by Euler angles is singular.
 
     Attributes:
         sequence: The Euler sequence.
         distance: Distance of the middle angle from the singularity, radians.
-        sample: Index of the worst sample in the batch; () for a single one.
+        sample: Index of the worst sample in the batch; () for a single sample.
     """
 
     def __init__(self, sequence: str, distance: float, sample: tuple[int, ...]) -> None:

@@ -18,7 +18,7 @@ _WHOLE = re.compile(r"[+-]?[0-9]+")
 #: Longest accepted number, in characters: Python converts long integers in quadratic time.
 _LONGEST = 2000
 
-#: For each pattern of a rejected text: the remedy. The first pattern that matches counts.
+#: Pairs of a pattern for rejected text and a remedy. The first pattern that matches gives the remedy.
 _REMEDIES = (
     (r"", "the text is empty: write a number"),
     (r"[+-]?(nan|inf|infinity)", "write a finite number"),

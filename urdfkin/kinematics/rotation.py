@@ -462,8 +462,8 @@ def angular_velocity_from_quaternion_rates(
 ) -> FloatArray:
     """Return the angular velocity w = 4 E^T (q-dot, q0-dot), the inverse of 7.57.
 
-    The component of the rates along the quaternion changes only the quaternion's length. No rotation causes
-    this component, so the function ignores it.
+    The component of the rates along the quaternion changes only the quaternion's length, so it is no part of
+    a rotation. The function ignores this component.
 
     Args:
         quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
@@ -720,12 +720,13 @@ class Sequence:
 
     Attributes:
         name: SciPy's name.
-        first: Index of the first turning axis: 0 is x, 1 is y, 2 is z.
-        second: Index of the second turning axis.
-        third: Index of the third turning axis; in a proper Euler sequence it is equal to `first`.
+        first: Index of the first body-fixed axis: 0 is x, 1 is y, 2 is z.
+        second: Index of the second body-fixed axis.
+        third: Index of the third body-fixed axis; in a proper Euler sequence it is equal to `first`.
         other: The index that is neither the first nor the second.
         sign: +1 if (first, second, other) is right-handed, else -1.
-        fixed: Whether the axes are fixed. The angles are then in the reverse order of the turning axes.
+        fixed: Whether the sequence is given with axes that are fixed in space. Then the angles are in the
+            reverse order of the body-fixed axes.
     """
 
     name: str
@@ -742,7 +743,7 @@ class Sequence:
         return self.first == self.third
 
     def turning(self, values: FloatArray) -> FloatArray:
-        """Return angles or their rates in the order of the turning axes.
+        """Return angles or their rates in the order of the body-fixed axes.
 
         A second call with the result returns the original order.
         """
@@ -840,12 +841,12 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     else:
         first = np.arctan2(-sign * R[..., j, m], R[..., m, m])
         second = np.arctan2(sign * R[..., i, m], np.hypot(R[..., j, m], R[..., m, m]))
-    # R_first^T R = R_second R_third. In this product, the row of the second axis depends on the third angle
-    # only.
+    # R_first^T R = R_second R_third. The row of this product that belongs to the second axis depends only on
+    # the third angle.
     cosine, sine = np.cos(first), np.sin(first)
     row = cosine[..., np.newaxis] * R[..., j, :] + (sign * sine)[..., np.newaxis] * R[..., m, :]
-    # R_third rotates about the third axis, in the plane of the second axis and a remaining one. In a proper
-    # sequence the remaining axis is `other`, else it is the first axis.
+    # R_third rotates about the third axis, so it rotates the plane of the two other axes. One of them is the
+    # second axis. The other one is `other` in a proper sequence, else the first axis.
     rest, sense = (m, sign) if axes.proper else (i, -sign)
     third = np.arctan2(-sense * row[..., rest], row[..., j])
     return axes.turning(np.stack((first, second, third), axis=-1)).copy()

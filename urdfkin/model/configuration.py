@@ -107,7 +107,7 @@ def own_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
 def coordinate_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
     """Return the ranges of `own_ranges`, narrowed so that the mimic joints are within their limits.
 
-    A range is not narrowed if no part of it keeps the mimic joints within their limits.
+    If no value of a range keeps the mimic joints within their limits, this range is not narrowed.
     """
     ranges = own_ranges(tree)
     narrowed = {one.joint: one.kept for one in narrowed_ranges(tree)}
@@ -268,7 +268,7 @@ def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
 
 
 def _other_lengths(tree: KinematicTree, what: str) -> dict[int, Hint]:
-    """Return lengths of q or v in Pinocchio that differ from urdfkin's, each with a hint for a message."""
+    """Return a hint for each length of q or v that is correct in Pinocchio but not in urdfkin."""
     follow = any(joint.mimic for joint in tree.joints)
     free = Hint(
         "leave out the mimic joints, which have no coordinate, or load with mimic=False (--no-mimic)",

@@ -53,7 +53,8 @@ class CoordinateLayout:
         what: "q", "v" or "a".
         names: The name of each number.
         units: "rad", "m", "" for a number without a unit (such as a quaternion's), or None if unknown.
-        spans: For each joint with several numbers: the index of the first number, and the count of numbers.
+        spans: For each joint with several numbers: the index of its first number, and how many numbers it
+            has.
         poses: Returns the named poses. `poses`, `otherwise` and `lengths` are called only when needed.
         otherwise: Returns a hint for each name that is not a coordinate, such as a fixed joint.
         lengths: Returns a hint for each wrong length that users often pass, such as the length of q in
@@ -244,7 +245,9 @@ keeps: 'neutral, elbow=...'
 
 
 def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
-    """Return a text or mapping unchanged, a table with labels as a mapping, and None for numbers in order.
+    """Return values that are given by name: a text or mapping unchanged, a table with labels as a mapping.
+
+    The result is None if the values are numbers in order.
 
     Raises:
         InputError: a label occurs twice, or `value` is a list of tables with labels.

@@ -7,8 +7,8 @@ A change is a regression in these cases:
 - More results lie outside their bound.
 - A quantity or a table is no longer compared, or there are fewer samples or results.
 - A bound is wider for the same joints.
-- The worst disagreement grew by more than a factor, and is above the error of a single rounding. The same
-  applies to its ratio to the bound, above a tenth.
+- The worst disagreement grew by more than a factor, and is above the error of a single rounding.
+- The ratio of the worst disagreement to the bound grew by more than this factor, and is above a tenth.
 
 A changed model is not a regression: its joints are listed with their axes, placements, limits and mimic
 rules. A new file name is not a regression either: robots are matched by the name in their text.
@@ -170,7 +170,8 @@ def _cell(value: Units | str) -> str:
 
 #: A worst disagreement may grow by this factor without a regression: the maximum of random samples varies.
 FACTOR = 2.0
-#: A worst disagreement up to this many eps * scale is no regression. A single rounding can be as large.
+#: A worst disagreement up to this many eps * scale is no regression, because a single rounding error can have
+#: this size.
 FLOOR = 2.0
 #: A ratio to the bound up to this value is no regression.
 _SHARE_FLOOR = 0.1
@@ -245,7 +246,7 @@ class ChangeEntry(TypedDict):
 
 
 class ComparisonDocument(Header):
-    """The output of `urdfkin report compare --format json`; `sha256` belongs to the new report's robots."""
+    """The output of `urdfkin report compare --format json`; `sha256` lists the robots of the new report."""
 
     changes: Annotated[list[ChangeEntry], says("All changes between the two reports.")]
 
@@ -413,7 +414,10 @@ def _grew(old: Units, new: Units, factor: float, floor: float = FLOOR) -> bool:
 
 
 def _findings(source: str, old: Robot, new: Robot) -> Iterator[Change]:
-    """Yield changed numbers of errors and warnings by code. The verdict shows whether an error matters."""
+    """Yield a change for each code whose number of errors or warnings changed.
+
+    The verdict shows whether an error matters.
+    """
     counts: list[dict[str, int]] = [{}, {}]
     for count, robot in zip(counts, (old, new), strict=True):
         for finding in robot["findings"]:

@@ -2,8 +2,8 @@
 
 The plot has one row for each quantity, with all reference frames together. The x axis of the histogram is
 logarithmic and shows the disagreement in eps * scale. The histogram shows the results, and the triangle shows
-the worst result. The bar shows the bound, from the frame with the fewest joints before it to the frame with
-the most. A quantity is verified if its histogram lies left of its bar.
+the worst result. The bar shows the range of the bound over all frames. The bound is smallest for the frame
+with the fewest joints before it. A quantity is verified if its histogram lies left of its bar.
 
 The data of the 3D view is compact: links, joints and chains with their tables. The numbers of the 3D view
 have seven digits for display; the JSON document has the full numbers.
@@ -54,7 +54,7 @@ def distributions(robot: Robot, edges: Sequence[float], prefix: str) -> str:
 
 
 def _right(checks: Sequence[Check], edges: Sequence[float]) -> float:
-    """Return the right end of the axis, beyond every bound and every finite disagreement."""
+    """Return the right end of the axis, which is larger than every bound and every finite disagreement."""
     ends = [check["bound"][1] or 1.0 for check in checks] + [check["worst"] or 1.0 for check in checks]
     return float(min(max(ends) * 2.0, edges[-1] * 10.0))
 

@@ -23,7 +23,7 @@ from urdfkin.errors import InputError, SourceError
 
 @dataclass(frozen=True, slots=True)
 class Edit:
-    """Replacement of the bytes from `start` up to, but without, `end` by `text`.
+    """A replacement of some bytes by `text`. The first byte is `start`; the byte `end` is not replaced.
 
     If `start` equals `end`, the edit is an insertion.
     """
@@ -70,7 +70,7 @@ def read_bytes(path: Path, most: int = MOST, *, pipes: bool = False) -> bytes:
     Args:
         path: A regular file, or a link to one.
         most: Largest size in bytes.
-        pipes: Whether to read pipes and devices too. Set it only for a path that the user named.
+        pipes: Whether to read pipes and devices too. Use True only for a path that the user named.
 
     Raises:
         SourceError: the file cannot be read, is not a regular file, or is larger than `most`.

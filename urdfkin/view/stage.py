@@ -132,7 +132,7 @@ def scalar_first(R: FloatArray) -> FloatArray:
     return np.asarray(np.roll(quaternion_of(R), 1, axis=-1), dtype=np.float64)
 
 
-#: Maximum seconds until a page that opens has its final layout.
+#: Maximum time (s) between the opening of a page and its final layout.
 _OPENING = 15.0
 #: Direction from the robot to the camera, fraction of the view that the robot fills, and viser's vertical
 #: field of view in rad.
@@ -304,7 +304,7 @@ class Stage:
     def _welcome(self, client: Any) -> None:
         """Set the camera of a new client.
 
-        Set it once more when the page's panel has reduced the width of the view.
+        The camera is set again when the panel of the page has reduced the width of the view.
         """
         begin, aspects = time.monotonic(), [0.0]
 

@@ -60,7 +60,7 @@ class Row:
     Attributes:
         at: Index in the vector.
         name: Name of the number.
-        turns: Whether it is an angle or a derivative of an angle.
+        turns: Whether the number is an angle or a derivative of an angle.
         lower, upper: Range of the slider.
     """
 
@@ -294,13 +294,14 @@ class Viewer:
         robot: The robot to show.
         q: (nq,) start configuration; None: the neutral configuration, moved to within the limits.
         trajectory: A trajectory to play; it starts at its first sample.
-        conversion: The convention of the field of q, to copy or type; None: urdfkin's.
+        conversion: The convention of q in the text field, where q can be copied or typed. None means
+            urdfkin's convention.
 
     Attributes:
         q: (nq,) configuration of the sliders, rad and m.
         v: (nv,) joint velocities.
         a: (nv,) joint accelerations.
-        motion: The chosen frame's motion in the chosen reference, checked.
+        motion: The motion of the chosen frame in the chosen reference frame, with its check.
         player: The controls of the trajectory; None without one.
     """
 

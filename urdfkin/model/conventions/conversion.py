@@ -178,7 +178,7 @@ class Conversion:
         tag = "link" if order.endswith("link") else "joint"
         written = {e.get("name", ""): k for k, e in enumerate(plain_xml(self._urdf).iterfind(tag))}
         names = tree.links[1:] if tag == "link" else [joint.name for joint in tree.joints]
-        place = [written.get(name, -1) for name in names]  # the file has no root joint, which comes first
+        place = [written.get(name, -1) for name in names]  # -1 puts the root joint, which is not in the file, first
         if order == "name":
             return sorted(every, key=lambda i: (place[i] >= 0, tree.joints[i].name))
         if order == "file":
@@ -819,7 +819,7 @@ class Reordering:
 
 
 def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | None:
-    """Return the formula that computes "q" or "v" of convention `end` from "q" or "v" of `start`, or None.
+    """Return the formula that converts "q" or "v" from convention `start` to convention `end`, or None.
 
     There is no formula if one of the two conventions stores the cosine and the sine of an angle, or if the
     two conventions express a base velocity in different frames.
