@@ -74,7 +74,7 @@ class Recursion:
     own: bool = False
 
     def seen(self, s: State, x: Vector) -> Vector:
-        """Return a vector x, given in the link's own axes, in the axes that `own` selects.
+        """Convert a vector x from the link's own axes to the axes that `own` selects.
 
         The selected axes are the link's own axes or the world axes.
         """

@@ -316,7 +316,7 @@ def _robots(old: Document, new: Document, factor: float) -> Iterator[Change]:
 
 
 def by_source(document: Document) -> dict[str, Robot]:
-    """Return robots by their source. If a source occurs several times, a number is added to it."""
+    """Return robots by their source. If a source occurs several times, a number is added to its name."""
     named: dict[str, Robot] = {}
     for robot in document["robots"]:
         source, count = robot["source"], 1
@@ -431,7 +431,7 @@ def _findings(source: str, old: Robot, new: Robot) -> Iterator[Change]:
 
 
 def figures(old: Document, new: Document) -> list[tuple[str, Units | str, Units | str]]:
-    """Return each quantity with its worst disagreement in the old and new report; empty if not compared."""
+    """Return each quantity with its worst disagreement in both reports; empty if it was not compared."""
     names = dict.fromkeys(c["quantity"] for d in (old, new) for r in d["robots"] for c in r["checks"])
     return [(name, _worst(old, name), _worst(new, name)) for name in names]
 

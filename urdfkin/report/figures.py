@@ -156,11 +156,14 @@ def scene(model: Model, chains: list[Chain]) -> dict[str, Any]:
     """Return a robot as data for the script of the page, `assets/view3d.js`.
 
     Returns:
-        `links`: names. `joints`: one list for each joint: name, index of its kind, parent link, child link,
-            pose in
-        the parent (three rows of four), axis or 0, index in q or -1, lower and upper limit (None: no limit),
-        mimic rule (the mimicked joint's index in q, multiplier, offset) or 0. `chains`: base link, tip link,
-        two tables.
+        A dict with these entries, among others.
+
+        * `links`: the names.
+        * `joints`: one list for each joint. It contains the name, the index of the kind, the parent link, the
+          child link, the pose in the parent (three rows of four), the axis or 0, the index in q or -1, the
+          lower and the upper limit (None: no limit), and the mimic rule or 0. A mimic rule is the mimicked
+          joint's index in q, the multiplier and the offset.
+        * `chains`: the base link, the tip link and two tables for each chain.
     """
     links = {name: i for i, name in enumerate(model["links"])}
     joints = {joint["name"]: i for i, joint in enumerate(model["joints"])}

@@ -268,9 +268,10 @@ def _robot(robot: Robot, index: int, document: Document) -> dict[str, Any]:
 
 
 def _plot(robot: Robot, index: int, document: Document) -> str:
-    """Return the plot of a robot; empty without matplotlib, or if it would take too long.
+    """Return the plot of a robot, or an empty text.
 
-    The tables contain the same numbers.
+    The text is empty if matplotlib is not installed, or if the plots of all robots would take too long. The
+    tables contain the same numbers.
     """
     if not installed() or (len(document["robots"]) > _DRAWN and robot["verdict"] == "verified"):
         return ""
@@ -278,7 +279,7 @@ def _plot(robot: Robot, index: int, document: Document) -> str:
 
 
 def when(started: str) -> str:
-    """Return the start time as text; the input itself if it is not an ISO date."""
+    """Return the start time as text. If the input is not an ISO date, return the input."""
     try:
         moment = datetime.fromisoformat(started)
     except ValueError:

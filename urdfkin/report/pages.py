@@ -167,7 +167,7 @@ def heat_map(robot: Robot, model: Model) -> tuple[list[str], list[tuple[str, lis
 
 
 def _columns(model: Model) -> dict[str, list[int]]:
-    """Return the columns of the full Jacobian that belong to each joint, mimic joints included."""
+    """For each joint, return the indices of its columns in the Jacobian with mimic joints."""
     own: dict[str, list[int]] = {}
     at = 0
     for joint in model["joints"]:
@@ -189,10 +189,11 @@ def _cell(checks: Sequence[Check], where: dict[str, list[int]]) -> Cell:
 
 
 def _share(check: Check, subject: int) -> float:
-    """Return an upper bound on the ratio of a subject's worst disagreement to its bound.
+    """Return an upper bound on the ratio of a worst disagreement to its bound.
 
-    The disagreement is divided by the tightest bound of all results. The ratio is therefore an upper bound.
-    The result is at most the largest ratio of the whole check, which is known exactly.
+    The disagreement is the worst one of a frame, a joint or a column. It is divided by the tightest bound of
+    all results. The ratio is therefore an upper bound. The result is at most the largest ratio of the whole
+    check, which is known exactly.
     """
     value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["share_of_bound"]
     if not value:  # a disagreement of 0 lies within every bound

@@ -50,7 +50,7 @@ def moving_names(model: Model) -> list[str]:
 
 
 def column_names(model: Model) -> list[str]:
-    """Return the name of the joint of each column of the full Jacobian, mimic joints included."""
+    """For each column of the Jacobian with mimic joints, return the name of its joint."""
     return [joint["name"] for joint in model["joints"] for _ in range(_size(joint)[1])]
 
 

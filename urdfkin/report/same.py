@@ -65,7 +65,7 @@ def headline(found: Sameness, question: Question = EQUIVALENT) -> str:
 
 
 def _within(found: Sameness, most: float) -> str:
-    """Return the answer to --within: do all frames stay within a distance? If not, which one leaves it?"""
+    """Return whether all frames stay within the distance `--within`, or which frame does not."""
     limit = f"WITHIN {most:g} m and rad without changes of B: "
     if found.within(most):
         return f"{limit}no frame is ever off by more than {_both(*found.written)}"
@@ -380,7 +380,7 @@ def pictures(
     Args:
         found: The result of `same`.
         robots: A and B.
-        worst: The worst frame with its configurations; None: draw the zero configuration.
+        worst: The worst frame with its configurations. If this is None, the zero configuration is drawn.
         written: Whether to draw B as written, not with the changes that make it equivalent to A.
 
     Returns:

@@ -207,7 +207,7 @@ class Stage:
         server.on_client_connect(self._welcome)
 
     def fill(self, Ts: FloatArray) -> None:
-        """Choose the view from n placements (n, links, 4, 4) of the links; the robot fills this view."""
+        """Set the view so that the robot fills it in n placements (n, links, 4, 4) of the links."""
         points = [Ts[:, :, :3, 3].reshape(-1, 3)]
         for link, box in self._corners:
             R, p = Ts[:, link, :3, :3], Ts[:, link, np.newaxis, :3, 3]
@@ -217,7 +217,7 @@ class Stage:
         initial.position, initial.look_at = camera(self._filling, aspect=1.2, fov=_FOV)
 
     def _add_shapes(self, tree: KinematicTree) -> bool:
-        """Add the shapes; return whether some are missing, so that the skeleton is needed."""
+        """Add the shapes. Return whether shapes are missing; then the skeleton is shown."""
         self.missing: list[Shape] = []
         for k, shape in enumerate(shapes(self.robot)):
             handle = self._add_shape(f"/robot/{tree.link_index(shape.link)}/shape{k}", shape)

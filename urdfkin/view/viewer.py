@@ -292,7 +292,7 @@ class Viewer:
     Args:
         server: The server from `urdfkin.view.server.new_server`.
         robot: The robot to show.
-        q: (nq,) start configuration; None: the neutral configuration, moved to within the limits.
+        q: (nq,) start configuration. None means the neutral configuration, moved to within the limits.
         trajectory: A trajectory to play; it starts at its first sample.
         conversion: The convention of q in the text field, where q can be copied or typed. None means
             urdfkin's convention.

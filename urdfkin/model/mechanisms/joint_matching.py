@@ -96,7 +96,7 @@ class Pairing:
     ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
         """Return the pairs of matched joints that follow two bodies, and the joints without a partner.
 
-        The joints of A without a partner and those of B without a partner are returned separately.
+        The joints without a partner are returned separately for A and for B.
 
         Args:
             bodies: The body of A and the body of B.
@@ -129,7 +129,7 @@ class Pairing:
     ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
         """Return the joint pairs found by name, and the joints that must be paired by geometry.
 
-        The joints of A and those of B that must be paired by geometry are returned separately.
+        The joints that must be paired by geometry are returned separately for A and for B.
         """
         if (known := self._by_names.get((bodies, via))) is None:
             known = self._by_names[bodies, via] = self._named_alike(bodies, via)
@@ -164,7 +164,7 @@ class Pairing:
         )
 
     def likeliest(self, bodies: tuple[int, int], e: Edge, edges: Sequence[Edge], X: FloatArray) -> list[Edge]:
-        """Return the joints of B whose partners the user did not name, sorted by similarity to a joint of A.
+        """Sort joints of B by similarity to a joint of A, without the joints whose partners the user named.
 
         The most similar joint comes first.
 
@@ -498,8 +498,8 @@ def _axis(mechanism: Mechanism, edge: Edge, seen: Screw | None = None) -> Axis:
 #: the bodies after the joints, the joints, and the pose of B's body before the joints.
 Poses = Callable[[tuple[int, int], Pair, FloatArray], Iterable[FloatArray]]
 
-#: Largest number of joints on a path for the recursive search. Robots with longer paths are matched joint by
-#: joint.
+#: Largest number of joints on a path for the recursive search. The matcher matches robots with longer paths
+#: joint by joint.
 DEEPEST = 200
 #: Largest number of attempts to find a partner at B's body for each joint at A's body.
 MOST_ASSIGNMENTS = 5000

@@ -74,7 +74,7 @@ Score = tuple[int, float]
 
 @dataclass(slots=True)
 class Ahead:
-    """The number of look-ahead steps that a search may still make; several matchers may share this object."""
+    """The number of look-ahead steps that are left to a search. Several matchers may share this object."""
 
     left: int
 
@@ -105,7 +105,8 @@ class MechanismMatcher:
         a: One mechanism.
         b: The other mechanism, which is aligned with `a`.
         pairing: Finds the joints of `a` and `b` that may be matched.
-        gauge: Prescribed free choices; None: the choices with which most joints and links agree.
+        gauge: Prescribed free choices. If this is None, the matcher makes the choices with which most joints
+            and links agree.
         ahead: The number of look-ahead steps that the matcher may make.
         tolerance: Tolerance for the comparison of poses and axes.
         base: A link of `a` and a link of `b`. The matcher begins at the bodies of these links. If this is
@@ -359,7 +360,7 @@ class MechanismMatcher:
     def _free(
         self, place: Place, there: Place, backwards: tuple[bool, bool], depth: int, kind: str
     ) -> tuple[Step, Place, Score]:
-        """Pass a planar or floating joint, whose frame and whose origin of coordinates are free choices."""
+        """Match a planar or floating joint. Its frame and the zero of its coordinates are free choices."""
         e, f = _both(there.via)
         homes = self.a.homes[e.joint + 1], self.b.homes[f.joint + 1]
         at, seen = place.G @ homes[0], place.XC @ homes[1]
@@ -403,7 +404,7 @@ class MechanismMatcher:
         plane: FloatArray | None,
         poses_behind: Iterable[FloatArray],
     ) -> Iterator[FloatArray]:
-        """Yield candidates for the rigid motion N between B's joint frame and the body after the joint.
+        """Yield candidates for the rigid motion N of a planar or floating joint (P_b = M P_a N).
 
         The candidates are the identity, N in the zero configuration, and motions that align a link or an
         axis.
@@ -428,7 +429,7 @@ class MechanismMatcher:
     def _like(
         self, place: Place, there: Place, backwards: tuple[bool, bool], depth: int, *, turns: bool
     ) -> tuple[Step, Place, Score]:
-        """Pass a joint that is revolute in A and B, or prismatic in A and B.
+        """Match a joint that is revolute in A and B, or prismatic in A and B.
 
         The method chooses the sense and the zero of B's joint, and decides whether the two axes differ.
         """
@@ -450,7 +451,8 @@ class MechanismMatcher:
                 zero = 0.0 if self.tolerance.holds(*apart(place.XC, exact)) else zero
             offset, there, score = self._best_zero(there, place.G, t, turns, zero, depth)
             return Step(a, b, kind, place.previous, sense, offset, IDENTITY, s, s, 0.0, 0.0), there, score
-        # Either the joint and all bodies after it are displaced in B, or only the joint's axis differs.
+        # There are two possibilities: the joint and all bodies after it are displaced in B, or only the
+        # joint's axis differs.
         with_it = self._best_zero(there, K @ place.G, t, turns, zero, depth)
         if depth == AHEAD:
             alone = self._best_zero(there, place.G, t, turns, zero, depth)
@@ -630,7 +632,8 @@ def align(a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | N
         a: One mechanism.
         b: The other mechanism.
         given: Names of joints of A, each with the name of the matched joint in B.
-        gauge: Prescribed free choices; None: the choices with which most joints and links agree.
+        gauge: Prescribed free choices. If this is None, the function makes the choices with which most joints
+            and links agree.
     """
     if gauge is not None:
         for taken in gauge.orders:
@@ -760,7 +763,7 @@ def _best_alignment(
     return best
 
 
-#: Numbers of full turns by which the zero of a mimicked joint may be changed.
+#: Numbers of full turns that may be added to the zero of a mimicked joint.
 TURNS = (0, 1, -1)
 #: Tolerance of a joint zero that follows from the positions of axes, as a multiple of the angle tolerance. It
 #: is large because a joint zero is inexact if it follows from two axes that are close together.
@@ -769,7 +772,7 @@ LEVER = 1e4
 
 @dataclass(frozen=True, slots=True)
 class _Rule:
-    """A joint that moves with a coordinate x of A and a coordinate y of B.
+    """A joint whose value depends on a coordinate x of A and a coordinate y of B.
 
     The joint's value is m x + c in A and n y + d in B. In the alignment, B's value is s times A's value plus
     o, with the sense s and the offset o.
@@ -797,15 +800,15 @@ class _Rule:
     meets: bool
 
     def beta(self, turn: int) -> float:
-        """Return beta in y = alpha x + beta, after the joint's zero is changed by some full turns."""
+        """Return beta in y = alpha x + beta, if some full turns are added to the joint's zero."""
         return (self.constant + self.offset + 2.0 * math.pi * turn - self.d) / self.n
 
     def wanted(self, beta: float) -> float:
-        """Return the joint's offset o that corresponds to the constant beta in y = alpha x + beta."""
+        """Return the offset o of the joint for which y = alpha x + beta has the given constant beta."""
         return self.n * beta + self.d - self.constant
 
     def allows(self, offset: float, tolerance: Tolerance) -> bool:
-        """Return whether the joint can have this offset, up to rounding."""
+        """Return whether this offset is possible for the joint, up to rounding."""
         off = offset - self.offset
         if self.turns:
             off = math.remainder(off, 2.0 * math.pi)

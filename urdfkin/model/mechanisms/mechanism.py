@@ -1,9 +1,9 @@
 """A robot as a mechanism of rigid bodies and joint screws in the zero configuration; two aligned mechanisms.
 
 By the product of exponentials, a link's pose is exp(S_1 t_1) ... exp(S_n t_n) H. The unit screws S_i and the
-pose H are those of the zero configuration, in one common frame. The links between the joints do not occur in
-this product, so links that are fixed to each other may be merged or split. Any body may serve as the root: a
-path from another body passes some joints backwards, with reversed screws.
+pose H are those of the zero configuration, in one common frame. This product does not contain the links
+between the joints, so links that are fixed to each other may be merged or split. Any body may be the root. A
+path from another body passes some joints backwards, and the screws of these joints are reversed.
 
 The coordinates of a planar or floating joint describe a pose P. The frame of B's joint, or the frame of the
 body after this joint, may differ from A's. In this case, the motions of A and B are equal if
@@ -73,8 +73,8 @@ def between(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArray, float
     """Return the smallest motion from one joint axis to another, its tilt (rad) and its shift (m).
 
     The motion tilts the axis about the first joint's origin and then shifts it perpendicular to itself. The
-    motion contains no rotation about the axis and no shift along the axis, because these belong to the
-    joint's zero or have no effect. The axis of a prismatic joint has no position, so its shift is 0.
+    motion contains no rotation about the axis and no shift along the axis. Such a motion changes only the
+    joint's zero, or has no effect. The axis of a prismatic joint has no position, so its shift is 0.
     """
     R, tilt = shortest_turn(start.direction, end.direction)
     across = np.zeros(3)
@@ -559,7 +559,7 @@ class Alignment:
 
     @property
     def inner_off(self) -> tuple[float, float]:
-        """Smallest and largest difference (m) of matched joint axes, and of matched links that carry joints.
+        """Smallest and largest difference (m) of matched joint axes and of matched links with child joints.
 
         Pairs that agree are not counted. If all pairs agree, the two results are 0.
         """
@@ -593,7 +593,7 @@ class Alignment:
         """Yield two joint pairs of the same body at a time, for an exchange of their partners in B.
 
         The user named no partner for the joints of A in these pairs, and B has no joints with the same names.
-        Each of the pairs is on the path to a joint or link that differs.
+        A joint or link that differs follows on the path after each of these pairs.
         """
         known_names = {joint.name for joint in self.b.tree.joints} | set(given)
         ends = [i for i, step in enumerate(self.steps) if step.differs]
@@ -651,7 +651,7 @@ class Gauge:
         base: A link of A and a link of B. The matcher begins at the bodies of these links. If this is None,
             it chooses the bodies by names.
         X: (4, 4) pose of B's root in A's root frame.
-        zeros: Sense and offset of each joint of A whose sense and offset differ from (1, 0.0).
+        zeros: Sense and offset of joints of A, by name. All other joints have the sense 1 and the offset 0.0.
         conversions: For each planar or floating joint whose coordinates in A and B differ: the conversion
             from A's coordinates to B's coordinates.
         orders: New orders of consecutive joints of B. Each entry lists some consecutive joints in their new
