@@ -214,5 +214,5 @@ def end_moved(z, linear):
 
 
 def motion_product(linear_1, angular_1, linear_2, angular_2):
-    """Return the spatial cross product of two columns: the derivative of the second along the first."""
+    """Return the spatial cross product of two columns: the rate of the second if the first joint moves."""
     return plus(cross(angular_1, linear_2), cross(linear_1, angular_2)), cross(angular_1, angular_2)

@@ -845,8 +845,8 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     # the third angle.
     cosine, sine = np.cos(first), np.sin(first)
     row = cosine[..., np.newaxis] * R[..., j, :] + (sign * sine)[..., np.newaxis] * R[..., m, :]
-    # R_third rotates about the third axis, so it rotates the plane of the two other axes. One of them is the
-    # second axis. The other one is `other` in a proper sequence, else the first axis.
+    # R_third rotates about the third axis, so it rotates the plane of two axes: the second axis and the axis
+    # `rest`.
     rest, sense = (m, sign) if axes.proper else (i, -sign)
     third = np.arctan2(-sense * row[..., rest], row[..., j])
     return axes.turning(np.stack((first, second, third), axis=-1)).copy()

@@ -74,8 +74,8 @@ Each omitted component of an offset causes an error of 0.5; two components cause
 offset's length. The omission also removes products with a row, or products of a cross product. These products
 would have an error of 1.5, which is larger. If nothing is fused, an export and Pinocchio differ by at most
 7.2 + 16.8 = 24.0 for each joint, plus the sums above. `ROUNDINGS` does not cover this worst case. The
-standard deviation is the same as for urdfkin. A comparison of an export with true values (test vectors) uses
-7.2 of `ROUNDINGS`.
+standard deviation is the same as for urdfkin. In a comparison of an export with true values (test vectors),
+the error is at most 7.2, which is within `ROUNDINGS`.
 
 **An export in single precision** has a bound of its own for each number of a test vector. The unit is eps =
 2^-23. `urdfkin.export.single` multiplies the error of each operation and of each constant by the derivative
@@ -141,8 +141,8 @@ satisfy it up to
 | MuJoCo's residual: x - x0, c1 times that, y - y0, two differences | 2.5 |
 | sum | 7.5 |
 
-The tolerance is this sum, multiplied by the size of all these terms and by a number of rules. This number is
-the number of rules up to the mimicked joint, plus one.
+The tolerance is this sum, multiplied by the size of all these terms and by k + 1. Here k is the number of
+mimic rules up to the mimicked joint.
 
 **Numbers near zero.** A product below the smallest normal number loses bits. Its error is 2^-1075, half the
 smallest subnormal number, which is (eps/2) times the smallest normal number. Every scale that is not zero is
@@ -216,35 +216,36 @@ SINGLE_POLYNOMIAL = 1.0
 #: The worst case is 18.9 (the table above without the rotation about the axis). The standard deviation is
 #: 2.4, so this count is nearly six standard deviations.
 CONSTANT = 13.7
-#: Roundings for the two axes. Dividing an axis by its length has 0.5; rotating an axis by Rodrigues' formula
-#: has 2.0.
+#: Roundings for the two axes. The division of an axis by its length contributes 0.5. The rotation of an axis
+#: by Rodrigues' formula contributes 2.0.
 AXES = 5.0
 #: Roundings for each joint by the program that wrote the file. A double that is written with fifteen digits
 #: (DBL_DIG) has an error of half a unit in the last digit. For an angle up to pi this is 5e-15 rad or 22.5
 #: eps. The error is counted for roll and for pitch, because both tilt an axis; yaw does not tilt an axis.
 WRITTEN = 45.0
 #: Roundings for a length along an axis. The unit is eps times the length of the path whose positions are
-#: summed. The dot product has 2.4, and each sum has 0.5. Only a few sums are as large as the whole path.
+#: summed. The dot product contributes 2.4, and each sum contributes 0.5. Only a few sums are as large as the
+#: whole path.
 SUMMED = 4.0
 
 # Tolerances for round numbers: a number within the tolerance of a round number becomes this round number.
 
-#: Roundings for an angle up to pi. A computed multiple of pi/12 has 1.2, the number in a file has 1.0 (half a
-#: unit in the last place), and arctan2 has 1.1.
+#: Roundings for an angle up to pi. A computed multiple of pi/12 contributes 1.2. The number in a file
+#: contributes 1.0 (half a unit in the last place). The function arctan2 contributes 1.1.
 ANGLE = 4.0
-#: Roundings for an entry of a rotation. The entry is a difference of two products, which has 0.75. One of the
-#: factors is such a difference too, which adds 0.75.
+#: Roundings for an entry of a rotation. The entry is a difference of two products, which contributes 0.75.
+#: One of the factors is such a difference too, which contributes 0.75 more.
 ENTRY = 2.0
 #: Roundings for a length that is rounded to twelve digits: half of `SUMMED`.
 DIGITS = SUMMED / 2.0
-#: Roundings for an angle between two rotations. One rotation is computed from roll, pitch and yaw, which has
-#: 3.1. The other rotation is the product of three rotations. Its sine and cosine have 0.5 each, and its two
-#: products have 1.4 and 1.8.
+#: Roundings for an angle between two rotations. One rotation is computed from roll, pitch and yaw, which
+#: contributes 3.1. The other rotation is the product of three rotations. The sine and the cosine contribute
+#: 0.5 each, and the two products contribute 1.4 and 1.8.
 TURN = 8.0
 
 #: Roundings for the limits of a mimic joint that are converted to limits of the mimicked joint. The
 #: conversion has a difference and a quotient, and the mimic rule has a product and a sum. Each of these four
-#: operations has 0.5. The total is doubled, so that a value at the limits is accepted.
+#: operations contributes 0.5. The total is doubled, so that a value at the limits is accepted.
 FOLLOWER = 4.0
 
 
@@ -275,8 +276,8 @@ def of_rows(rows: int) -> float:
 def of_rows_read_back(rows: int) -> float:
     """Return the number of roundings in a comparison of a table with the URDF that was written from it.
 
-    The count is 4 times `of_rows`. The computation with the table has one `of_rows`, and so has Pinocchio's
-    computation. The conversion to roll, pitch and yaw has two.
+    The count is 4 times `of_rows`. The computation with the table and the computation by Pinocchio contribute
+    one `of_rows` each. The conversion to roll, pitch and yaw contributes two.
     """
     return 4.0 * of_rows(rows)
 

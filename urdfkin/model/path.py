@@ -1,4 +1,4 @@
-"""A path: a product of constant poses and elementary motions. The module computes its poses and its Jacobian.
+"""The poses and the Jacobian of a path, which is a product of constant poses and elementary motions.
 
     T(x) = C_0 E_1(x_1) C_1 E_2(x_2) ...,      E_k = Rx, Ry, Rz, Tx, Ty or Tz of the amount x_k
 

@@ -223,7 +223,7 @@ class Comparison:
         return 1 if self.regressions else 0
 
     def as_dict(self, command: str | None = None) -> ComparisonDocument:
-        """Return plain data for JSON; `command` is the command that asked for it."""
+        """Return plain data for JSON; `command` is the command line that requested the data."""
         document = {
             "schema": COMPARISON.name,
             "versions": versions(),

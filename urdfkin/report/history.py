@@ -141,7 +141,7 @@ class History:
         return 2 if self.unusable else 0
 
     def as_dict(self, command: str | None = None) -> HistoryDocument:
-        """Return plain data for JSON; `command` is the command that asked for it."""
+        """Return plain data for JSON; `command` is the command line that requested the data."""
         last = len(self.runs) - 1
         latest = [points[-1]["sha256"] for points in self.robots.values() if points[-1]["run"] == last]
         document = {

@@ -335,7 +335,7 @@ def read_document(path: Path) -> Document:
 
 
 def stored_document(folder: Path) -> Document:
-    """Read the document of a campaign's store and check it like a file.
+    """Read the document in the folder of a validation campaign, and check it like a file.
 
     Raises:
         SourceError: The store cannot be read.

@@ -163,7 +163,10 @@ def _marks(lower: float, upper: float) -> tuple[tuple[float, str], tuple[float, 
 
 
 def coordinate_rows(robot: Robot) -> list[Row]:
-    """Return a row for each coordinate with a range, within its joint's limits; quaternions have none."""
+    """Return a row for each coordinate that can change, with the range of its joint's limits.
+
+    The components of a quaternion have no row.
+    """
     rows = []
     for joint, at in zip(robot.tree.joints, robot.tree.q_index, strict=True):
         for k in range(min(joint.nq, 3)):

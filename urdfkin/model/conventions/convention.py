@@ -71,7 +71,7 @@ class JointRule:
     Attributes:
         name: The joint's name in the target program. None means the name in the URDF.
         sign: 1 or -1.
-        zero: The target program's value where the URDF's joint is at 0.
+        zero: The joint value in the target program if the joint value of the URDF is 0.
         unit: "rad", "deg", "turn", "m", "mm", or the number of units in one turn. None means the convention's
             unit.
     """
@@ -344,9 +344,9 @@ def transcoded(name: str) -> str:
 
     The result begins with "tn__". The characters of the name that OpenUSD allows follow, and then "_". Then a
     number with digits of base 62 follows for each other character, in the order of code points. This number
-    encodes the character and its position in the name (Bootstring encoding). It is d n + p, with the
-    difference d of the code point from the previous code point, the number n of possible positions, and the
-    position p. Source: github.com/PixarAnimationStudios/OpenUSD-proposals,
+    encodes the character and its position in the name (Bootstring encoding). It is d n + p. Here d is the
+    difference of the code point from the previous code point, n is the number of possible positions, and p is
+    the position. Source: github.com/PixarAnimationStudios/OpenUSD-proposals,
     proposals/transcoding_invalid_identifiers.
 
     >>> transcoded("1"), transcoded("arm-2"), transcoded("arm_2")

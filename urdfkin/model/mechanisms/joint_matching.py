@@ -566,7 +566,7 @@ class Congruence:
             e: Joint of A.
             f: Joint of B.
             bodies: The bodies before the joints.
-            X: (4, 4) pose of B's body before the joint, as for `at`.
+            X: (4, 4) pose of B's body before the joint, as in the method `at`.
         """
         found = None if self._off else self._behind(e, f, bodies, X)
         return None if found is None else found.X
@@ -636,7 +636,7 @@ class Congruence:
         return found
 
     def _rate(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> Rates:
-        """Return which coordinate of A corresponds to which coordinate of B, for two matched joints.
+        """Return the corresponding coordinates of A and B for two matched joints.
 
         The result is empty if one of the two joints has no coordinate.
         """
@@ -654,7 +654,7 @@ class Congruence:
         return {x: (y, (1.0 if alike != back else -1.0) * m / n)}
 
     def _together(self, some: Rates, others: Rates) -> Rates | None:
-        """Return two sets of corresponding coordinates as one set.
+        """Merge two sets of corresponding coordinates.
 
         If the two sets contradict each other, the result is None.
         """

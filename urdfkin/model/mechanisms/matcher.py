@@ -74,7 +74,7 @@ Score = tuple[int, float]
 
 @dataclass(slots=True)
 class Ahead:
-    """The number of look-ahead steps that are left to a search. Several matchers may share this object."""
+    """The number of look-ahead steps that a search may still make. Several matchers may share this object."""
 
     left: int
 

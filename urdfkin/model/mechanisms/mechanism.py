@@ -590,10 +590,10 @@ class Alignment:
         )
 
     def exchangeable(self, given: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
-        """Yield two joint pairs of the same body at a time, for an exchange of their partners in B.
+        """Yield two joint pairs at a time whose partners in B could be exchanged.
 
-        The user named no partner for the joints of A in these pairs, and B has no joints with the same names.
-        A joint or link that differs follows on the path after each of these pairs.
+        Both pairs are at the same body. The user named no partner for their joints of A, and B has no joints
+        with the same names. A joint or link that differs follows on the path after each of these pairs.
         """
         known_names = {joint.name for joint in self.b.tree.joints} | set(given)
         ends = [i for i, step in enumerate(self.steps) if step.differs]

@@ -382,7 +382,7 @@ def _values(pair: Pair, variables: Variables, grid: Grid) -> FloatArray | None:
 
 
 def _common_difference(step: Step, pair: Pair, z: FloatArray, y: Support, d: Support) -> Support:
-    """Return the support function of a joint's difference if the same variable moves the joint in A and B.
+    """Return the support function of the difference of two matched joints that the same variable moves.
 
     Consider two neighbouring values of the variable, which differ by h. For all values between these two
     values, the bound is the sum of two terms. The first term is the larger of the two bounds at the
