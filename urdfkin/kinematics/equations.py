@@ -168,12 +168,12 @@ def moving_point_acceleration(acc, alpha, w, p, u, b):
 
 
 def free_angular_acceleration(alpha, w, o, b):
-    """7.129: rate of w + R o; the joint has angular velocity o with rate b, both in the moving frame."""
+    """7.129: rate of w + R o, if o is the joint's angular velocity and b its rate in the moving frame."""
     return plus(plus(alpha, b), cross(w, o))
 
 
 def free_acceleration(acc, w, o, u, b):
-    """7.130: acceleration for joint velocity u with rate b, both in a frame with angular velocity w + o."""
+    """7.130 for a joint's linear velocity u and its rate b, in a frame that rotates with w + o."""
     return plus(plus(acc, b), cross(plus(w, plus(w, o)), u))
 
 

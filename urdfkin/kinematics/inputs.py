@@ -30,7 +30,7 @@ _NOT_NUMBERS = "cSUmMV"
 def floats(value: ArrayLike, name: str) -> FloatArray:
     """Return `value` as float64 of any shape, where NaN and inf are allowed.
 
-    Raise InputError if it does not consist of real numbers.
+    Raise InputError if `value` does not consist of real numbers.
     """
     if _is_masked(value):
         raise InputError(f"{name} must be real numbers", found="a masked value")

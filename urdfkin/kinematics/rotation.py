@@ -32,8 +32,8 @@ integrates the rates of a quaternion and normalises the quaternion after each st
 integrate the angular velocity itself, because that integral is not an orientation (example 7.3).
 
 Euler angles have 24 sequences, with SciPy's names. Capital letters are axes that turn with the body: "ZYZ" is
-the textbook's R = Rz Ry Rz. Small letters are fixed axes: "xyz" is the URDF's rpy (roll, pitch, yaw). Their
-angular velocities are expressed in the fixed frame 0.
+the textbook's R = Rz Ry Rz. Small letters are fixed axes: "xyz" is the URDF's rpy (roll, pitch, yaw). The
+functions for Euler angles express angular velocities in the fixed frame 0.
 """
 
 from __future__ import annotations
@@ -462,8 +462,8 @@ def angular_velocity_from_quaternion_rates(
 ) -> FloatArray:
     """Return the angular velocity w = 4 E^T (q-dot, q0-dot), the inverse of 7.57.
 
-    The component of the rates along the quaternion changes only the quaternion's length, so it is no part of
-    a rotation. The function ignores this component.
+    The component of the rates along the quaternion changes only the quaternion's length, so it does not
+    belong to a rotation. The function ignores this component.
 
     Args:
         quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.

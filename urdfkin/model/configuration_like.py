@@ -98,7 +98,7 @@ keeps: 'neutral, elbow=...'
     def named(
         self, value: str | Mapping[str, ArrayLike], where: str
     ) -> tuple[dict[str, ArrayLike], FloatArray | None]:
-        """Return the values by name in a text or mapping, and the named pose that begins the text or None.
+        """Return the values by name from a text or mapping, and the named pose that begins the text or None.
 
         Raises:
             InputError: the text has numbers without names, or a name twice.
@@ -312,7 +312,7 @@ def listed(names: Sequence[str]) -> str:
 
 
 def _cells(text: str) -> list[str]:
-    """Split a text at commas; without commas, at blanks."""
+    """Split a text at commas, or at blanks if the text has no commas."""
     text = " ".join(text.split())
     if text[:1] + text[-1:] in ("[]", "()", "{}"):
         text = text[1:-1].strip()

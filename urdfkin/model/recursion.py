@@ -153,7 +153,7 @@ class Recursion:
         return self.eq.point_acceleration(s.acc, s.alpha, s.w, self.eq.minus(ZERO, s.p)), s.alpha
 
     def in_reference(self, s: State, reference: Reference, linear: Vector, angular: Vector) -> Six:
-        """Return two vectors, given in world axes, in the axes of the reference frame."""
+        """Convert two vectors from world axes to the axes of the reference frame."""
         if reference.own_axes:
             back = self.eq.transposed(s.R)
             linear, angular = self.eq.rotate(back, linear), self.eq.rotate(back, angular)

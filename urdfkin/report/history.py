@@ -125,7 +125,8 @@ class History:
 
     Attributes:
         runs: The runs, the oldest first.
-        robots: For each robot, under its latest source: the results in each run. Worse verdicts come first.
+        robots: For each robot, the results in each run. The key is the robot's latest source. Worse verdicts
+            come first.
         unusable: Files that cannot be used, with the reason.
         repeated: Files with a run that is already in another file, each with the name of the other file.
     """

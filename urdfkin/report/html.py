@@ -1,8 +1,8 @@
 """Report as an HTML page that works offline, uses no network and escapes every name.
 
 A large report is split: the page has the summary, and a file for each robot has its details. The page loads
-such a file when you unfold the robot. The files are scripts, because a browser lets a page from disk load no
-other files.
+such a file when you unfold the robot. The files are scripts, because a page that is opened from disk cannot
+load other types of files.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ MOST = 5_000_000
 
 @cache
 def environment() -> Environment:
-    """Return the template environment. Every name is escaped; a missing name is an error."""
+    """Return the template environment. It escapes every name and rejects undefined variables."""
     from jinja2 import Environment, PackageLoader, StrictUndefined  # noqa: PLC0415  keeps --help fast
 
     environment = Environment(

@@ -149,7 +149,7 @@ def _limits(limit: Limit | None, kind: str) -> dict[str, str]:
 def heat_map(robot: Robot, model: Model) -> tuple[list[str], list[tuple[str, list[Cell]]]]:
     """Return the column heads, and the name and cells of each moving joint.
 
-    A cell shows the worst of all reference frames.
+    A cell shows the worst disagreement of all reference frames.
     """
     quantities_of = columns([robot])
     frame = {name: i for i, name in enumerate(robot["frames"])}

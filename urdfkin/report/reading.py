@@ -1,8 +1,8 @@
 """Reader of report documents. This module checks the layout and the consistency of all entries.
 
-A report is evidence, and may have been edited or truncated. Entries that follow from other entries are
-computed again and compared: the outcome, verdicts, sums, ratios and percentiles. The links and joints of a
-robot must form a tree, and the indices of the joints in q and v must be consistent.
+A report is used as evidence, but it may have been edited or truncated. Entries that follow from other entries
+are computed again and compared: the outcome, verdicts, sums, ratios and percentiles. The links and joints of
+a robot must form a tree, and the indices of the joints in q and v must be consistent.
 """
 
 from __future__ import annotations

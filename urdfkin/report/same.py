@@ -253,7 +253,7 @@ def as_document(found: Sameness) -> TextDocument:
 
 
 def attained(frame: Interval) -> str:
-    """Return in words how far a frame of B is from A's frame at the worst configuration.
+    """Return in words the distance between a frame of A and a frame of B at the worst configuration.
 
     Return an empty text if the two frames coincide.
     """

@@ -28,7 +28,7 @@ def check_name(check: Check) -> str:
 
 
 def second_reader_words(robot: Robot) -> str:
-    """Return in words whether the tree of yourdfpy, the second reader, agrees with ours.
+    """Return in words whether yourdfpy, the second reader, reads the same tree as urdfkin.
 
     Return an empty text if there was no comparison.
     """
@@ -126,8 +126,8 @@ def nearer(line: Judged) -> Literal["urdfkin", "Pinocchio", "equal"]:
 def nearer_counts(lines: Sequence[Judged]) -> str:
     """Return text that compares the errors of urdfkin and Pinocchio in the accuracy study.
 
-    The text contains three numbers: the rows in which urdfkin's typical error is smaller than Pinocchio's,
-    equal to it, and larger.
+    The text contains the number of rows in which urdfkin's typical error is smaller than Pinocchio's. It also
+    contains the numbers of rows with equal errors and with a larger error.
     """
     counts = Counter(nearer(line) for line in lines)
     return (

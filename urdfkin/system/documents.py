@@ -218,7 +218,7 @@ def plain(value: Any) -> Any:
 
 
 def read_json(path: Path) -> object:
-    """Read a JSON file. Raise SourceError, or InputError if it is not JSON."""
+    """Read a JSON file. Raise SourceError if it cannot be read, and InputError if it is not JSON."""
     return parse_json(read_bytes(path, MOST_DATA, pipes=True), str(path))
 
 

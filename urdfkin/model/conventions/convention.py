@@ -83,14 +83,14 @@ class JointRule:
 
     @property
     def factor(self) -> float | None:
-        """The sign times the number of units in one rad or m; None for a joint in the convention's unit."""
+        """The sign times the number of units in one rad or m; None if `unit` is None."""
         if self.unit is None:
             return None
         return self.sign * (_UNITS[self.unit] if isinstance(self.unit, str) else self.unit / math.tau)
 
     @property
     def of(self) -> str:
-        """What the unit measures: "angle" or "length"; "" if the joint uses the convention's unit."""
+        """The kind of unit: "angle" or "length"; "" if the joint uses the convention's unit."""
         if self.unit is None:
             return ""
         return "length" if self.unit in _LENGTHS else "angle"

@@ -61,7 +61,7 @@ _FAMILIES = {
 
 
 class Pairing:
-    """The pairs of joints of mechanism A with joints of mechanism B, for each pair of bodies.
+    """For each pair of bodies, find the pairs of a joint of mechanism A and a joint of mechanism B.
 
     Args:
         a: One mechanism.

@@ -9,10 +9,10 @@ axes coincide with links and axes of A. `align` calls the matcher for several st
 orders, and returns the best result.
 
 Most joint zeros are determined by axes or link frames. If neither an axis nor a common link frame follows a
-joint, only a mimic rule determines the joint's zero. Let v = m w + c be a rule of A and v' = m' w' + c' a
-rule of B. The two rules are equivalent if the substitution v' = s v + o, w' = s' w + o' converts one rule to
-the other. If nothing is attached to the joint's link, its offset o is free, and the rules determine it. For a
-revolute joint, a multiple of a full turn may always be added to o.
+joint, only a mimic rule determines the joint's zero. Let v = m w + c be a mimic rule of A, and let v' = m' w'
++ c' be the corresponding rule of B. The two rules are equivalent if the substitution v' = s v + o, w' = s' w
++ o' converts one rule to the other. If nothing is attached to the joint's link, the joint's offset o is free,
+and the mimic rules determine o. For a revolute joint, a multiple of a full turn may always be added to o.
 """
 
 from __future__ import annotations
@@ -180,7 +180,7 @@ class MechanismMatcher:
     def _places(self, base: tuple[int, int]) -> Iterator[FloatArray]:
         """Yield candidate poses of B's root.
 
-        The first is the pose of A's root. Then come poses that align links of equal names, and poses that
+        The first is the pose of A's root. Poses that align links of equal names follow, and then poses that
         align axes.
         """
         yield from self._by_names(base)
@@ -203,9 +203,9 @@ class MechanismMatcher:
         common with it. If no body of B has a link name in common with A's root body, every body of B is tried
         as its partner.
 
-        If A's root body has no link names in common with B, B's root body is also yielded, with the body of A
-        that has most link names in common. A's root may have no counterpart in B, for example before a
-        floating joint.
+        If A's root body has no link names in common with B, the function also yields B's root body. The
+        partner of this body is the body of A that has most link names in common with it. A's root may have no
+        counterpart in B, for example before a floating joint.
         """
         if self.base is not None:
             yield self.a.body_of[self.base[0]], self.b.body_of[self.base[1]]
@@ -566,8 +566,9 @@ def _best_of(scored: Sequence[tuple[_Free, Place, Score]]) -> tuple[_Free, Place
 def better(score: Score, than: Score) -> bool:
     """Return whether `score` is better than the score `than`.
 
-    A score with more agreements is better. If two scores have equally many agreements, a score is better only
-    if its largest difference is less than half of the other score's largest difference.
+    A score with more agreements is better. If both scores have equally many agreements, the largest
+    differences decide. In this case a score is better only if its largest difference is less than half of the
+    other one.
     """
     return score[0] > than[0] or (score[0] == than[0] and score[1] < TWICE_AS_WELL * than[1])
 
@@ -681,7 +682,7 @@ def _orders_to_try(
 def _by_rules(best: Alignment) -> Alignment:
     """Return the alignment in which the mimic rules determine joint zeros.
 
-    If this alignment agrees less well than the given alignment, the given alignment is returned.
+    If this alignment is worse than the given alignment, the function returns the given alignment.
     """
     zeros = zeros_by_rules(best, tolerance_of(best.a, best.b))
     if not zeros:

@@ -411,7 +411,7 @@ def size_of(a: Mechanism, b: Mechanism) -> float:
 
 
 def between_lines(s: Screw, t: Screw, *, placed: bool) -> tuple[float, float]:
-    """Return the angle (rad) and the distance (m) of two axes; the distance is 0 if `placed` is false."""
+    """Return the angle (rad) and the distance (m) of two axes. If `placed` is false, the distance is 0."""
     ux, uy, uz = s.direction.tolist()  # called thousands of times; plain floats are faster
     vx, vy, vz = t.direction.tolist()
     sine = math.hypot(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx)
