@@ -211,7 +211,7 @@ def rate_names(tree: KinematicTree) -> tuple[str, ...]:
 def _names_and_units(
     tree: KinematicTree, of: Mapping[JointKind, Mapping[str, str]]
 ) -> Iterator[tuple[str, str]]:
-    """Yield a unique name and the unit of each number of q or v. A name with a suffix is not a joint's name."""
+    """Yield a unique name and the unit of each number of q or v. A name with a suffix is never a joint's."""
     taken = set[str]()
     for joint in tree.joints:
         if not joint.nv:
