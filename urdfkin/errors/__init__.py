@@ -1,6 +1,6 @@
 """The exceptions that urdfkin raises.
 
-Every message has four parts: what is wrong, where, what was found and what to do. The same four parts are
+Every message has four parts: the problem, the place, the value found and the remedy. The same four parts are
 attributes of the exception, so a program does not have to parse the message. A message may end with a
 `Question`: the command that prints a section of docs/questions.md. The function `nearest` suggests existing
 names for a misspelt name.
@@ -61,7 +61,7 @@ def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6, work: int =
 class Question(Enum):
     """A section of docs/questions.md, by the anchor of its heading.
 
-    As text it is the command that prints the section:
+    The text of a question is the command that prints the section:
 
     >>> print(Question.MIMIC_JOINTS)
     see `urdfkin explain mimic-joints`
@@ -120,7 +120,8 @@ class UrdfkinError(Exception):
         where: The location: file and line, frame or sample. None without a location.
         found: The wrong value, as the user wrote it.
         remedy: Instruction for the user.
-        question: A related section of docs/questions.md. The message ends with the command that prints it.
+        question: A related section of docs/questions.md. The message ends with the command that prints this
+            section.
         is_disagreement: True if urdfkin and Pinocchio disagree; False if the input is wrong.
 
     >>> error = UrdfkinError("a length is negative", where="arm.urdf:3", found="-1", remedy="remove the sign")
@@ -170,7 +171,7 @@ def _rebuild(cls: type[_E], state: dict[str, Any]) -> _E:
 
 
 class InputError(UrdfkinError, ValueError):
-    """An argument is invalid: for example a wrong length, a value that is not finite, or no rotation.
+    """An argument is invalid: for example a wrong length, an infinite value, or a non-orthogonal rotation.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
@@ -251,12 +252,12 @@ class SourceError(UrdfkinError, OSError):
 class RepresentationSingularityError(InputError):
     """Euler angles are at their representational singularity, where their derivatives do not exist (7.56).
 
-    The motion itself is regular. Only its description by these angles fails.
+    The motion itself is regular. Only its description by Euler angles is singular.
 
     Attributes:
         sequence: The Euler sequence.
         distance: Distance of the middle angle from the singularity, radians.
-        sample: Index of the worst sample in the batch; () for a single one.
+        sample: Index of the worst sample in the batch; () for a single sample.
     """
 
     def __init__(self, sequence: str, distance: float, sample: tuple[int, ...]) -> None:

@@ -28,8 +28,8 @@ class Table:
     Attributes:
         heads: Titles of the columns.
         rows: Cells of each row. Numbers are displayed with six digits.
-        left: The left-aligned columns. A number n stands for the first n columns; a list contains the indices
-            of the columns. Leading blanks in these columns are kept.
+        left: The left-aligned columns. A number n means the first n columns; a list contains the indices of
+            the columns. Leading blanks in these columns are kept.
         names: Indices of columns with names. Markdown displays names as code.
     """
 
@@ -50,7 +50,7 @@ class Table:
         ]
 
     def _split_cells(self) -> list[list[tuple[str, str]]]:
-        """Split each cell and heading into the line characters of a tree and the text after them."""
+        """Split each cell and heading into the line characters of a tree and the remaining text."""
         return [
             [(cell[: len(cell) - len(words)], words) for cell in row for words in (cell.lstrip(LINES),)]
             for row in (self.heads, *self.cells())
@@ -177,7 +177,7 @@ class TextDocument:
     """The displayed content of an object.
 
     Attributes:
-        title: The title; empty for a document without one.
+        title: The title; empty if the document has no title.
         parts: Sentences, tables and matrices, in order. An empty sentence is a blank line in plain text.
     """
 

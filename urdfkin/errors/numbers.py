@@ -18,7 +18,7 @@ _WHOLE = re.compile(r"[+-]?[0-9]+")
 #: Longest accepted number, in characters: Python converts long integers in quadratic time.
 _LONGEST = 2000
 
-#: For each pattern of a rejected text: the remedy. The first pattern that matches counts.
+#: Pairs of a pattern for rejected text and a remedy. The first pattern that matches gives the remedy.
 _REMEDIES = (
     (r"", "the text is empty: write a number"),
     (r"[+-]?(nan|inf|infinity)", "write a finite number"),
@@ -30,7 +30,7 @@ _REMEDIES = (
 
 
 def parse_float(text: str) -> float | None:
-    """Parse a finite number, with optional surrounding blanks; return None if the text is no such number.
+    """Parse a finite number, with optional surrounding blanks; return None for all other text.
 
     >>> [parse_float(text) for text in (" -1.5e-3", "1_0", "nan", "\u0661", "1e999")]
     [-0.0015, None, None, None, None]
@@ -43,7 +43,7 @@ def parse_float(text: str) -> float | None:
 
 
 def parse_int(text: str) -> int | None:
-    """Parse an integer, with optional surrounding blanks; return None if the text is no integer.
+    """Parse an integer, with optional surrounding blanks; return None if the text is not an integer.
 
     >>> parse_int("12"), parse_int("1_2"), parse_int("1.0"), parse_int("1e3")
     (12, None, None, None)
@@ -53,7 +53,7 @@ def parse_int(text: str) -> int | None:
 
 
 def remedy(text: str) -> str | None:
-    """Return the remedy for a text that is no number; None if the intended number is unclear."""
+    """Return the remedy for a text that is not a number; None if the intended number is unclear."""
     text = text.strip(" \t\r\n")
     found = (words for pattern, words in _REMEDIES if re.fullmatch(pattern, text, re.IGNORECASE | re.DOTALL))
     return next(found, None)

@@ -41,9 +41,9 @@ def rebound(
     A copy calls other copies instead of the original functions.
 
     Args:
-        modules: The modules. A module may use functions of the modules before it in this argument.
+        modules: The modules. A module may use functions of the modules that are listed before it.
         made: A decorator that is applied to each copied function, for example the decorator of a compiler.
-        others: Functions and modules that replace those which a module imports or defines, by name.
+        others: Replacements, by name, for functions and modules that a module imports or defines.
     """
     copies: dict[str, Any] = {}
     for module in modules:

@@ -117,8 +117,8 @@ def compose_all(frames: Iterable[MovingFrame]) -> MovingFrame:
     The equations are 7.50 and 7.61.
 
     Args:
-        frames: Motion of frame i + 1 relative to frame i, for i = 0, 1, ...; without frames the result is
-            frame 0 itself.
+        frames: Motion of frame i + 1 relative to frame i, for i = 0, 1, ... If there are no frames, the
+            result is the motion of frame 0 relative to itself.
 
     Returns:
         Motion of the last frame relative to frame 0.
@@ -514,8 +514,8 @@ def representation_matrix(representation: str, R: ArrayLike) -> FloatArray:
 def representation_inverse(representation: str, R: ArrayLike, nearest: float = NEAREST) -> FloatArray:
     """Return C^-1 with x-dot = C^-1 [d-dot; w] (7.122).
 
-    For a quaternion, C has several right inverses. The function returns the one for which x-dot does not
-    change the quaternion's length. It has no singularity.
+    For a quaternion, C has several right inverses. The function returns the right inverse with which x-dot
+    keeps the quaternion's length constant. This right inverse has no singularity.
 
     Args:
         representation: SciPy's name of an Euler sequence, or "quaternion".

@@ -1,16 +1,17 @@
 """The equations of motion of sections 7.3 to 7.7 of the textbook, each written once for every kind of number.
 
 A vector is a triple of numbers (x, y, z), and a rotation is a triple of rows. The module imports nothing: it
-uses the arithmetic of the numbers it is called with. For vectors that are not triples, the basic operations
-of the first part are replaced (`urdfkin.kinematics.number_kinds`). The same equations run on batches in
-vector registers, NumPy arrays, numbers with 50 digits, intervals, lengths of vectors and LaTeX expressions.
+uses the arithmetic of the numbers it is called with. If vectors have another type,
+`urdfkin.kinematics.number_kinds` replaces the basic operations of the section "vectors". The same equations
+run on batches in vector registers, NumPy arrays, numbers with 50 digits, intervals, lengths of vectors and
+LaTeX expressions.
 
-All vectors of an equation are expressed in the same axes. These are the world's, as in the textbook, or the
-link's own, in which z is (0, 0, 1) and d is constant.
+All vectors of an equation are expressed in the same axes: the world's axes, as in the textbook, or the link's
+own axes. In the link's own axes, z is (0, 0, 1) and d is constant.
 
 The textbook and a URDF number the frames differently. In the textbook d_{i-1,i} belongs to link i and follows
 the joint. The frame of a URDF joint lies on the joint's own axis, so d belongs to link i-1 and precedes the
-joint. The sums are the same.
+joint. Both numberings give the same sums.
 """
 
 # -- vectors ------------------------------------------------------------------------------------------
@@ -111,7 +112,7 @@ def tangential(w, d):
 
 
 def point_velocity(vel, w, d):
-    """7.59, 7.115, 7.128: velocity of the point at d from a point of the same link with velocity vel."""
+    """7.59, 7.115, 7.128: velocity of a point at d from another point of the link, which has velocity vel."""
     return plus(vel, tangential(w, d))
 
 
@@ -149,7 +150,7 @@ def angular_acceleration(alpha, w, z, v, a):
 
 
 def point_acceleration(acc, alpha, w, d):
-    """7.123, 7.130: acceleration of the point at d from a point of the same link with acceleration acc."""
+    """7.123, 7.130: acceleration of a point at d from another point of the link, with acceleration acc."""
     return plus(plus(acc, transverse(alpha, d)), centripetal(w, d))
 
 
@@ -167,12 +168,12 @@ def moving_point_acceleration(acc, alpha, w, p, u, b):
 
 
 def free_angular_acceleration(alpha, w, o, b):
-    """7.129 for a joint's angular velocity o and its rate b in the moved frame: rate of w + R o."""
+    """7.129: rate of w + R o, if o is the joint's angular velocity and b its rate in the moving frame."""
     return plus(plus(alpha, b), cross(w, o))
 
 
 def free_acceleration(acc, w, o, u, b):
-    """7.130 for a joint's linear velocity u and its rate b in the moved frame, which turns with w + o."""
+    """7.130 for a joint's linear velocity u and its rate b, in a frame that rotates with w + o."""
     return plus(plus(acc, b), cross(plus(w, plus(w, o)), u))
 
 
@@ -203,15 +204,15 @@ def rate_in_turning_axes(rate, w, x):
 
 
 def turned_along(w, linear, angular):
-    """Return the rate of a column of 7.85 when an earlier joint turns its axis and its arm with w."""
+    """Return the rate of a column of 7.85 if an earlier joint rotates its axis and its moment arm with w."""
     return cross(w, linear), cross(w, angular)
 
 
 def end_moved(z, linear):
-    """Return the rate of the rows z x d of a column when a later joint moves the end of d at `linear`."""
+    """Return the rate of a column's rows z x d if a later joint moves the end of d with velocity `linear`."""
     return cross(z, linear)
 
 
 def motion_product(linear_1, angular_1, linear_2, angular_2):
-    """Return the cross product of two columns as motion vectors: the rate of the second along the first."""
+    """Return the spatial cross product of two columns: the rate of the second if the first joint moves."""
     return plus(cross(angular_1, linear_2), cross(linear_1, angular_2)), cross(angular_1, angular_2)

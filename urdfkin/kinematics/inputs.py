@@ -19,8 +19,8 @@ FloatArray = NDArray[np.float64]
 #: would not be a rotation matrix.
 UNIT_TOLERANCE = 1e-12
 #: Largest deviation of R R^T from the identity for a rotation. If the entries of R are rounded to nine
-#: decimals, each has an error of 5e-10 at most. R R^T then deviates by 1e-9 times the sum of the absolute
-#: values of a row at most, and this sum is at most sqrt(3).
+#: decimals, each has an error of 5e-10 at most. Then R R^T deviates from the identity by at most 1e-9 times
+#: the sum of the absolute values of a row. This sum is at most sqrt(3).
 ROTATION_TOLERANCE = 2e-9
 #: Kinds of NumPy types that NumPy converts to floats without an error, although they are not real numbers:
 #: complex, bytes, text, timedelta, datetime, void.
@@ -30,7 +30,7 @@ _NOT_NUMBERS = "cSUmMV"
 def floats(value: ArrayLike, name: str) -> FloatArray:
     """Return `value` as float64 of any shape, where NaN and inf are allowed.
 
-    Raise InputError if it does not consist of real numbers.
+    Raise InputError if `value` does not consist of real numbers.
     """
     if _is_masked(value):
         raise InputError(f"{name} must be real numbers", found="a masked value")
@@ -110,8 +110,8 @@ def rotations(value: ArrayLike, name: str) -> FloatArray:
 def rotation_defect(R: FloatArray) -> FloatArray:
     """Return the largest absolute entry (...,) of R R^T - I for matrices (..., 3, 3); inf for a reflection.
 
-    The result is 0 for an exact rotation. Each caller compares it with a tolerance of its own, which depends
-    on the number of digits with which its matrix was written.
+    The result is 0 for an exact rotation. Each caller compares the result with its own tolerance, because
+    matrices are written with different numbers of digits.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # a matrix whose product overflows is not a rotation
         defect = np.abs(R @ R.swapaxes(-1, -2) - np.eye(3)).max(axis=(-2, -1))

@@ -118,7 +118,7 @@ def latex(name: str) -> str:
 
 
 def _latex_of(value: Any) -> str:
-    """Return the LaTeX text of a `Word`, of a column of them, or of a matrix of them."""
+    """Return the LaTeX text of a `Word`, or of a column or a matrix that consists of `Word` objects."""
     if isinstance(value, Word):
         return value.text
     rows = [" & ".join(map(_latex_of, row)) if isinstance(row, tuple) else _latex_of(row) for row in value]

@@ -39,10 +39,10 @@ def least_squares(
 
     Args:
         start: The state from which the iteration starts.
-        residuals: Returns the residuals (rows,) of a state, and what `derivatives` uses of their computation.
-        derivatives: Returns the negative derivatives (rows, parameters) of a state's residuals by the
-            parameters.
-        moved: Returns the new state for a state and a step (parameters,).
+        residuals: Returns the residuals (rows,) of a state, and intermediate results that `derivatives` uses.
+        derivatives: Returns the negative derivatives (rows, parameters) of a state's residuals with respect
+            to the parameters.
+        moved: Returns the state that results from a state and a step (parameters,).
         longest: Largest component of a step.
         patience: The iteration ends after this many slow steps; 0 means no limit.
     """

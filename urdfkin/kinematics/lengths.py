@@ -2,9 +2,10 @@
 
 The bounds of a link follow from the bounds of its parent link.
 
-A state is (p, w, vel, alpha, acc): upper bounds on the terms of a point's position, angular velocity,
-velocity, angular acceleration and acceleration. `urdfkin.verify.bounds` runs the steps on NumPy's arrays and
-on Python's numbers, and `urdfkin.verify.kernels` compiles them. All of them compute the same bits.
+A state is (p, w, vel, alpha, acc). These are upper bounds on the terms of a point's position, its angular and
+linear velocity, and its angular and linear acceleration. `urdfkin.verify.bounds` calls the functions of this
+module with NumPy arrays and with Python numbers. `urdfkin.verify.kernels` compiles the functions. All three
+variants give the same result to the last bit.
 """
 
 from urdfkin.kinematics.number_kinds import Length

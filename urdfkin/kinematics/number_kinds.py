@@ -9,10 +9,10 @@ sum, a cross product becomes the product of two lengths, and a rotation changes 
 sum and no result of the equation exceeds the scale. Rounding errors are proportional to the scale. Rounding
 errors are not proportional to the result, because the result is small where large terms cancel.
 
-A scale that is not zero is at least `SMALLEST`, the smallest normal number, for two reasons. A product
-smaller than `SMALLEST` has an error of half the smallest subnormal number, the same error as a product of the
-size `SMALLEST`. And a product of two small numbers may underflow to zero and later be multiplied by a large
-number.
+A scale that is not zero is at least `SMALLEST`, the smallest normal number. There are two reasons. First, a
+product smaller than `SMALLEST` has an error of half the smallest subnormal number. A product of the size
+`SMALLEST` has the same error. Second, a product of two small numbers may underflow to zero, and a later
+operation may multiply it by a large number.
 """
 
 from __future__ import annotations

@@ -14,9 +14,9 @@ Every function accepts any leading batch shape. `w_0_1` is the angular velocity 
 frame 0.
 
 A user's matrix often has only a few digits, so its columns are only approximately orthogonal. Such a matrix
-can be converted to a rotation by a quaternion, by angles or column by column. The results differ in the last
-digit of the given matrix. `nearest_rotation` and `polar_factor` return the rotation that is nearest to the
-matrix in the Frobenius norm. This rotation is unique: it is the orthogonal factor U of the polar
+can be converted to a rotation by a quaternion, by angles or column by column. The three results differ in the
+last digit of the given matrix. `nearest_rotation` and `polar_factor` return the rotation that is nearest to
+the matrix in the Frobenius norm. This rotation is unique: it is the orthogonal factor U of the polar
 decomposition M = U H.
 
 The textbook's joint i turns about the axis z_{i-1} of a frame. A URDF joint turns about any axis of its
@@ -25,15 +25,15 @@ frame. `axis_aligning` returns the rotation between the two frames.
 A *rotation vector* is the unit axis times the angle.
 
 A quaternion is (qx, qy, qz, qw), with the scalar last as in a configuration; qw is the textbook's q0. A
-quaternion and its negative are the same rotation. For its rates, the angular velocity is expressed in the
-fixed frame 0, as in the textbook (`frame="fixed"`), or in the frame of the turning body (`frame="body"`).
-Quaternion rates have no singularity. `integrate_orientation` integrates the rates of a quaternion and
-normalises the quaternion after each step. The module does not integrate the angular velocity itself, because
-that integral is not an orientation (example 7.3).
+quaternion and its negative are the same rotation. The functions for quaternion rates have the argument
+`frame`. The angular velocity is expressed in the fixed frame 0, as in the textbook (`frame="fixed"`), or in
+the body's own frame (`frame="body"`). Quaternion rates have no singularity. `integrate_orientation`
+integrates the rates of a quaternion and normalises the quaternion after each step. The module does not
+integrate the angular velocity itself, because that integral is not an orientation (example 7.3).
 
 Euler angles have 24 sequences, with SciPy's names. Capital letters are axes that turn with the body: "ZYZ" is
-the textbook's R = Rz Ry Rz. Small letters are fixed axes: "xyz" is the URDF's rpy (roll, pitch, yaw). Their
-angular velocities are expressed in the fixed frame 0.
+the textbook's R = Rz Ry Rz. Small letters are fixed axes: "xyz" is the URDF's rpy (roll, pitch, yaw). The
+functions for Euler angles express angular velocities in the fixed frame 0.
 """
 
 from __future__ import annotations
@@ -442,7 +442,7 @@ def quaternion_rates(quat: ArrayLike, w: ArrayLike, frame: ExpressedIn = "fixed"
     Args:
         quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
         w: (..., 3) angular velocity of the body, rad/s.
-        frame: Frame of `w`: "fixed" is frame 0, "body" the body's own.
+        frame: Frame of `w`: "fixed" means frame 0, "body" means the body's own frame.
 
     Returns:
         (..., 4) rates, 1/s, scalar last.
@@ -462,13 +462,13 @@ def angular_velocity_from_quaternion_rates(
 ) -> FloatArray:
     """Return the angular velocity w = 4 E^T (q-dot, q0-dot), the inverse of 7.57.
 
-    The component of the rates along the quaternion changes only the quaternion's length. No rotation causes
-    this component, so the function ignores it.
+    The component of the rates along the quaternion changes only the quaternion's length, so it does not
+    belong to a rotation. The function ignores this component.
 
     Args:
         quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
         rates: (..., 4) rates of `quat`, 1/s, scalar last.
-        frame: Frame of the result: "fixed" is frame 0, "body" the body's own.
+        frame: Frame of the result: "fixed" means frame 0, "body" means the body's own frame.
 
     Returns:
         (..., 3) angular velocity of the body, rad/s.
@@ -494,11 +494,11 @@ def integrate_orientation(
 
     Args:
         w: Function of the time in s that returns the angular velocity, (..., 3) rad/s. This function must be
-            smooth within a step, so add a time to `times` at each jump. At the two ends of a step, w is
-            evaluated just inside the step.
+            smooth within a step, so add a time to `times` at each jump. At the start and the end of a step, w
+            is evaluated slightly inside the step.
         quat: (..., 4) orientation at `times[0]`, unit quaternion, scalar last.
         times: (n,) increasing times in s; the method makes one step from each time to the next.
-        frame: Frame of w: "fixed" is frame 0, "body" the body's own.
+        frame: Frame of w: "fixed" means frame 0, "body" means the body's own frame.
 
     Returns:
         (n, ..., 4) unit quaternions, scalar last.
@@ -720,12 +720,13 @@ class Sequence:
 
     Attributes:
         name: SciPy's name.
-        first: Index of the first turning axis: 0 is x, 1 is y, 2 is z.
-        second: Index of the second turning axis.
-        third: Index of the third turning axis; in a proper Euler sequence it is equal to `first`.
+        first: Index of the first body-fixed axis: 0 is x, 1 is y, 2 is z.
+        second: Index of the second body-fixed axis.
+        third: Index of the third body-fixed axis; in a proper Euler sequence it is equal to `first`.
         other: The index that is neither the first nor the second.
         sign: +1 if (first, second, other) is right-handed, else -1.
-        fixed: Whether the axes are fixed. The angles are then in the reverse order of the turning axes.
+        fixed: Whether the sequence is given with axes that are fixed in space. Then the angles are in the
+            reverse order of the body-fixed axes.
     """
 
     name: str
@@ -742,7 +743,7 @@ class Sequence:
         return self.first == self.third
 
     def turning(self, values: FloatArray) -> FloatArray:
-        """Return angles or their rates in the order of the turning axes.
+        """Return angles or their rates in the order of the body-fixed axes.
 
         A second call with the result returns the original order.
         """
@@ -840,12 +841,12 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     else:
         first = np.arctan2(-sign * R[..., j, m], R[..., m, m])
         second = np.arctan2(sign * R[..., i, m], np.hypot(R[..., j, m], R[..., m, m]))
-    # R_first^T R = R_second R_third. In this product, the row of the second axis depends on the third angle
-    # only.
+    # R_first^T R = R_second R_third. The row of this product that belongs to the second axis depends only on
+    # the third angle.
     cosine, sine = np.cos(first), np.sin(first)
     row = cosine[..., np.newaxis] * R[..., j, :] + (sign * sine)[..., np.newaxis] * R[..., m, :]
-    # R_third rotates about the third axis, in the plane of the second axis and a remaining one. In a proper
-    # sequence the remaining axis is `other`, else it is the first axis.
+    # R_third rotates about the third axis, so it rotates the plane of two axes: the second axis and the axis
+    # `rest`.
     rest, sense = (m, sign) if axes.proper else (i, -sign)
     third = np.arctan2(-sense * row[..., rest], row[..., j])
     return axes.turning(np.stack((first, second, third), axis=-1)).copy()

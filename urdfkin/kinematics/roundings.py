@@ -1,9 +1,9 @@
-"""Bounds on the difference of two correct computations, in numbers of roundings; all tolerances use them.
+"""Bounds on the rounding errors by which two correct computations differ; all tolerances use these bounds.
 
-The unit is eps = 2^-52 times the rounded number. Each operation has an error of half an eps at most. Errors
-are counted to first order. A tolerance is a count of this module times a scale. The scales are computed
-elsewhere: in `urdfkin.verify.bounds` for the forward recursion, and in the modules of `urdfkin.dh` for
-tables.
+The unit of an error is eps = 2^-52 times the rounded number. Each operation has an error of at most half an
+eps. Errors are counted to first order. A tolerance is a count of this module times a scale. The scales are
+computed elsewhere: in `urdfkin.verify.bounds` for the forward recursion, and in the modules of `urdfkin.dh`
+for tables.
 
 **A joint.** For each joint, the recursion multiplies the rotation so far by the joint's constant rotation and
 by its rotation about its axis. If *all* roundings add up, the error of a component of a rotated vector grows
@@ -17,39 +17,41 @@ for each joint by
 | all of a joint about a coordinate axis | 5.7 | 16.8 |
 
 The worst cases of the parts do not occur together, so the error of the whole joint is smaller than the sum of
-the parts. The two errors may have opposite signs, so the bound for the difference is 5.7 + 16.8 = 22.5.
-`tests/kinematics/test_roundings.py` computes these counts: it runs the same equations on numbers that record
-each of their roundings.
+the parts. The errors of urdfkin and of Pinocchio may have opposite signs, so the bound for the difference is
+5.7 + 16.8 = 22.5. `tests/kinematics/test_roundings.py` computes these counts: it runs the same equations on
+numbers that record each of their roundings.
 
-The sum over the joints and the cross product of each term add 2 eps at most in each implementation, for the
-two or three factors of that term together (`bounds`). The count uses one joint more than the path has. This
-covers the frame's own offset and the first of these sums. Rounding 22.5 up to `ROUNDINGS` = 24 covers the
-others.
+The sum over the joints and the cross products of a term add at most 2 eps in each implementation. This is the
+total for the two or three factors of the term (`urdfkin.verify.bounds`). The count uses one joint more than
+the path has. The additional joint covers the frame's own offset and the first of these sums. `ROUNDINGS` is
+24 instead of 22.5, which covers the other sums.
 
-The recursion expresses its vectors in the world's axes or in a link's. In the world's axes, each of R d and z
-is rotated by all joints before it, once for each factor. In a link's axes, w of link k is rotated back by the
-joints before it. A term of link k is rotated by the joints up to the frame, and R rotates it once by all
-joints. For w x (w x d) these are at most three times the joints of the path, as for the three factors in the
-world's axes.
+The recursion expresses its vectors in the world's axes or in a link's axes. In the world's axes, each factor
+R d or z is rotated once by every joint before it. In a link's axes, the joints before link k rotate w of link
+k back. The joints between link k and the frame rotate a term of link k. Finally R, the product of all
+rotations, rotates the term once. For w x (w x d), the number of rotations is at most three times the number
+of joints of the path. The three factors have the same number of rotations in the world's axes.
 
-A joint about an axis that is **not a coordinate axis** needs two more products before its rotation. One is
-the constant rotation times the rotation that turns z to the axis. The other is the product with the inverse
-of that rotation, for the previous joint. Pinocchio uses Rodrigues' formula. In urdfkin and in Pinocchio, the
-result depends on the length of the axis. If all 340 roundings add up, the error is 41. The bound does not
-allow for this. If each rounding is uniformly distributed in its half unit, the standard deviation is 3.3.
-`ROUNDINGS` is seven standard deviations for a single joint.
+If a joint's axis is **not a coordinate axis**, urdfkin needs two more products before the joint's rotation.
+The first product multiplies the constant rotation by the rotation that turns z to the axis. The second
+product multiplies the constant rotation by the inverse of this rotation for the previous joint. Pinocchio
+uses Rodrigues' formula. In urdfkin and in Pinocchio, the result depends on the length of the axis. If all 340
+roundings add up, the error is 41. The bound does not cover this worst case. If each rounding error is
+uniformly distributed over its range, the standard deviation of the sum is 3.3. `ROUNDINGS` is seven standard
+deviations for a single joint.
 
 Pinocchio replaces an axis within 1e-12 of a coordinate axis by that coordinate axis. Let Q be the rotation
 that turns the file's axis to the coordinate axis, and let t be its angle (the tilt). Then |Q R Q^T - R| <= 2
-|Q - 1| <= 2 t. A vector that the joint rotates, or moves along its axis, has an error of 2 t at most. Each
-later factor also has an error of 2 t at most. A tilt larger than eps is a finding (URDF514). It adds 2 t /
-eps to the roundings of each factor, for the frames after that joint only.
+|Q - 1| <= 2 t. If the joint rotates a vector, or translates it along its axis, the error is at most 2 t. The
+same error occurs in each later factor. A tilt larger than eps is a finding (URDF514). For the frames after
+that joint, the tilt adds 2 t / eps to the roundings of each factor.
 
-**An export** (`urdfkin.export`) writes the same equations without products with 0 and 1. A number of a
-constant's row or of an offset is omitted if it is less than half an eps of the largest number there. This
-causes an error of half an eps, but the product and the sum that are omitted have no rounding. The compiler
-decides whether products and sums are fused. The sine and cosine are those of a library. In batches in C they
-are polynomials of an angle that is reduced in three parts, with an error of one eps:
+**An export** (`urdfkin.export`) writes the same equations without products with 0 and 1. Small numbers in a
+row of a constant rotation, or in an offset, are omitted. A number is small if it is less than half an eps of
+the largest number in that row or offset. The omission causes an error of half an eps, but it also removes the
+rounding errors of a product and of a sum. The compiler decides whether products and sums are fused. The sine
+and cosine are those of a library. In batches in C, the sine and cosine are polynomials with an error of one
+eps. Their angle is reduced in three parts.
 
 | Roundings of the polynomials, with r the reduced angle | |
 |---|---|
@@ -68,10 +70,12 @@ The counts of an export's joint are
 | rotation about the axis, with such a sine and cosine | 2.5 | 2.6 |
 | all of an export's joint | 6.5 | 7.2 |
 
-Omitting components of an offset causes an error of 0.5 each, 0.7 of its length. This is less than the 1.5 of
-the omitted products with a row, or of those of a cross product. With Pinocchio's 16.8, an export's joint has
-24.0 if nothing is fused, plus the sums above. The bound does not allow for this; the standard deviation is
-the same as urdfkin's. The comparison of an export with true values (test vectors) uses 7.2 of `ROUNDINGS`.
+Each omitted component of an offset causes an error of 0.5; two components cause an error of 0.7 of the
+offset's length. The omission also removes products with a row, or products of a cross product. These products
+would have an error of 1.5, which is larger. If nothing is fused, an export and Pinocchio differ by at most
+7.2 + 16.8 = 24.0 for each joint, plus the sums above. `ROUNDINGS` does not cover this worst case. The
+standard deviation is the same as for urdfkin. In a comparison of an export with true values (test vectors),
+the error is at most 7.2, which is within `ROUNDINGS`.
 
 **An export in single precision** has a bound of its own for each number of a test vector. The unit is eps =
 2^-23. `urdfkin.export.single` multiplies the error of each operation and of each constant by the derivative
@@ -85,31 +89,33 @@ of the result, and adds the absolute values. The error of one operation is
 | sine and cosine of a library: two units in the last place, CUDA's bound; others have smaller ones | 2.0 |
 | sine and cosine by the polynomials of C's batches, in eps of 1 | 1.0 |
 
-A change of sign has no error. The inputs of test vectors are single-precision numbers, which have no error
-either. A number below the smallest normal number, 2^-126, has an error of 2^-126 at most, because GPUs and
-some compilers replace it by 0. The code's constants have the errors of the double code: its bound is added,
-multiplied by 2^-52 / 2^-23. These are the only errors: an export has no other operations.
+A change of sign has no error. The inputs of test vectors are single-precision numbers, so they have no error.
+A number below the smallest normal number, 2^-126, has an error of 2^-126 at most, because GPUs and some
+compilers replace it by 0. The constants also have the rounding errors of the export in double precision.
+Therefore, the bound of that export is added, multiplied by 2^-52 / 2^-23. An export has no other operations,
+so there are no other errors.
 
-**MuJoCo**, the optional second oracle, computes the orientation as a unit quaternion. It multiplies this
-quaternion by those of the constant rotation and of the joint's rotation, about an axis that it normalises. At
-each link it normalises the quaternion and converts it to a matrix. If all roundings add up, the error is
+**MuJoCo**, the optional second oracle, computes the orientation as a unit quaternion. For each joint, MuJoCo
+multiplies this quaternion by the quaternion of the constant rotation and by the quaternion of the joint's
+rotation. MuJoCo normalises the joint's axis first. At each link, MuJoCo normalises the quaternion and
+converts it to a matrix. If all roundings add up, the error is
 
 | | MuJoCo |
 |---|---|
 | a joint about any axis: two products of quaternions, the norm, the matrix | 21.5 |
 
-With urdfkin's 5.7 the difference is 27.2. Rounding it up to `MUJOCO` = 30 covers the same sums as above.
-MuJoCo uses the axes of the file.
+With urdfkin's 5.7 the difference is 27.2. `MUJOCO` is 30 instead of 27.2, which covers the same sums as
+above. MuJoCo uses the axes of the file.
 
 **A mimic joint** adds no rounding. urdfkin and the oracle compute its angle as fl(fl(m q) + c), with the same
-doubles m and c, and neither fuses the two operations. IEEE 754 then defines the result to the last bit. Both
-multiply out chains of mimic rules in the same order, starting with the mimicked joint. The errors of sine and
-cosine are counted above; the reduction of their argument is exact for every size. A mistake in a mimic
-joint's angle is therefore detected, even at 1e12 rad.
+doubles m and c, and neither fuses the two operations. IEEE 754 then defines the result to the last bit. If a
+mimic joint mimics another mimic joint, urdfkin and the oracle combine the rules in the same order, from the
+mimicked joint outwards. The errors of sine and cosine are counted above. The reduction of their argument is
+exact for every size. A mistake in a mimic joint's angle is therefore detected, even at 1e12 rad.
 
 **A base** that is rotated counts as one joint more. A base that is not rotated adds no rounding. The user's
-matrix M has nine correct digits. Both implementations replace it by the nearest rotation, each by its own
-method. The distance of M from a rotation therefore does not matter. The counts, with u = eps/2, are
+matrix M has nine correct digits. Both implementations replace M by the nearest rotation, each by its own
+method. Therefore, it does not matter how far M is from a rotation. The counts, with u = eps/2, are
 
 | | urdfkin | Pinocchio |
 |---|---|---|
@@ -135,13 +141,14 @@ satisfy it up to
 | MuJoCo's residual: x - x0, c1 times that, y - y0, two differences | 2.5 |
 | sum | 7.5 |
 
-This is multiplied by the size of all these terms and by the number of rules up to the mimicked joint, plus
-one.
+The tolerance is this sum, multiplied by the size of all these terms and by k + 1. Here k is the number of
+mimic rules up to the mimicked joint.
 
 **Numbers near zero.** A product below the smallest normal number loses bits. Its error is 2^-1075, half the
 smallest subnormal number, which is (eps/2) times the smallest normal number. Every scale that is not zero is
-therefore at least the smallest normal number (`urdfkin.kinematics.number_kinds`). The counts of this module
-then cover this error too, also after later multiplications. The least unit is eps times that number, 2^-1074.
+therefore at least the smallest normal number (`urdfkin.kinematics.number_kinds`). Then the counts of this
+module cover this error too, also after later multiplications. The smallest unit is eps times the smallest
+normal number, 2^-1074.
 
 **A row** of a Denavit-Hartenberg table has 8 roundings at most:
 
@@ -153,7 +160,7 @@ then cover this error too, also after later multiplications. The least unit is e
 | the sum of the pose's position and the row's | 0.5 |
 | sum | 8.0 |
 
-The tool counts as one row more.
+The tool counts as one more row.
 """
 
 from __future__ import annotations
@@ -175,16 +182,16 @@ LEAST_UNIT = EPS * SMALLEST
 #: This number replaces a divisor 0 if the dividend is 0 too. It is smaller than every measured number.
 NOT_ZERO = 1e-300
 
-#: Roundings for each joint and each factor, of urdfkin and Pinocchio together; derived above.
+#: Roundings for each joint and each factor in a comparison of urdfkin with Pinocchio (derivation above).
 ROUNDINGS = 24.0
-#: Roundings for each joint and each factor, of urdfkin and MuJoCo together; derived above.
+#: Roundings for each joint and each factor in a comparison of urdfkin with MuJoCo (derivation above).
 MUJOCO = 30.0
-#: Roundings for each mimic rule of an MJCF file, between the tree and MuJoCo; derived above.
+#: Roundings for each mimic rule of an MJCF file in a comparison of the tree with MuJoCo (derivation above).
 MJCF_RULE = 8.0
-#: Roundings for each row of a table; derived above.
+#: Roundings for each row of a Denavit-Hartenberg table (derivation above).
 ROW = 8.0
 
-# An export in single precision (`urdfkin.export.single`); derived above.
+# Constants for an export in single precision (`urdfkin.export.single`); derivation above.
 
 SINGLE_EPS = 2.0**-23
 #: The smallest normal number, and the largest number.
@@ -200,48 +207,52 @@ SINGLE_OPERATION = {
     "sin": 2.0,
     "cos": 2.0,
 }
-#: Error of a sine or a cosine by polynomials, in eps of 1.
+#: Error of a sine or cosine that is computed by a polynomial, in eps; not relative to the value.
 SINGLE_POLYNOMIAL = 1.0
 
 # Rounding errors in the constant pose between two joint axes (`urdfkin.dh.common_normals`).
 
-#: For each URDF joint with a constant transform in the pose, by two parsers. The worst case is 18.9 (the
-#: table above without the rotation about the axis). The standard deviation is 2.4, and this is nearly six
-#: times that.
+#: Roundings for each URDF joint whose constant transform is part of the pose, in a comparison of two parsers.
+#: The worst case is 18.9 (the table above without the rotation about the axis). The standard deviation is
+#: 2.4, so this count is nearly six standard deviations.
 CONSTANT = 13.7
-#: For the two axes: each is divided by its length, 0.5, or rotated into place by Rodrigues' formula, 2.0.
+#: Roundings for the two axes. The division of an axis by its length contributes 0.5. The rotation of an axis
+#: by Rodrigues' formula contributes 2.0.
 AXES = 5.0
-#: For each joint, in the program that wrote the file. A double that is written with fifteen digits (DBL_DIG)
-#: has an error of half a unit in the last digit. For an angle up to pi this is 5e-15 rad or 22.5 eps. It
-#: counts for roll and pitch, which tilt an axis; yaw does not.
+#: Roundings for each joint by the program that wrote the file. A double that is written with fifteen digits
+#: (DBL_DIG) has an error of half a unit in the last digit. For an angle up to pi this is 5e-15 rad or 22.5
+#: eps. The error is counted for roll and for pitch, because both tilt an axis; yaw does not tilt an axis.
 WRITTEN = 45.0
-#: For a length along an axis, in units of the length of the path whose positions are summed: 2.4 for the dot
-#: product, and 0.5 for each sum; few sums are as large as the whole path.
+#: Roundings for a length along an axis. The unit is eps times the length of the path whose positions are
+#: summed. The dot product contributes 2.4, and each sum contributes 0.5. Only a few sums are as large as the
+#: whole path.
 SUMMED = 4.0
 
-# Numbers that are round up to rounding errors.
+# Tolerances for round numbers: a number within the tolerance of a round number becomes this round number.
 
-#: An angle up to pi: 1.2 for a computed multiple of pi/12, 1.0 for the number in a file (half a unit in the
-#: last place), and 1.1 for arctan2.
+#: Roundings for an angle up to pi. A computed multiple of pi/12 contributes 1.2. The number in a file
+#: contributes 1.0 (half a unit in the last place). The function arctan2 contributes 1.1.
 ANGLE = 4.0
-#: An entry of a rotation: a difference of two products, 0.75; one factor is itself such a difference, 0.75.
+#: Roundings for an entry of a rotation. The entry is a difference of two products, which contributes 0.75.
+#: One of the factors is such a difference too, which contributes 0.75 more.
 ENTRY = 2.0
-#: A length with twelve digits: half of its largest error.
+#: Roundings for a length that is rounded to twelve digits: half of `SUMMED`.
 DIGITS = SUMMED / 2.0
-#: An angle between two rotations. One is computed from roll, pitch and yaw, 3.1. The other is the product of
-#: three rotations: sine and cosine, 0.5 each, and two products, 1.4 and 1.8.
+#: Roundings for an angle between two rotations. One rotation is computed from roll, pitch and yaw, which
+#: contributes 3.1. The other rotation is the product of three rotations. The sine and the cosine contribute
+#: 0.5 each, and the two products contribute 1.4 and 1.8.
 TURN = 8.0
 
-#: Widening of the limits of a mimic joint when they are converted to the mimicked joint: 0.5 each for a
-#: difference and a quotient there and for a product and a sum here, and as much again so that a value at the
-#: limits is accepted.
+#: Roundings for the limits of a mimic joint that are converted to limits of the mimicked joint. The
+#: conversion has a difference and a quotient, and the mimic rule has a product and a sum. Each of these four
+#: operations contributes 0.5. The total is doubled, so that a value at the limits is accepted.
 FOLLOWER = 4.0
 
 
 def of_joints(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
     """Return the number of roundings for each factor of a term.
 
-    It is for a comparison of two programs that read the same URDF.
+    The count applies to a comparison of two programs that read the same URDF.
 
     Args:
         joints: (...,) number of joints on the path.
@@ -255,9 +266,9 @@ def of_joints(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
 
 
 def of_rows(rows: int) -> float:
-    """Return the number of roundings of the pose that a table and its tool give.
+    """Return the number of roundings of a pose that is computed from a table with `rows` rows and a tool.
 
-    It does not contain the half eps of q, which is counted with the angles.
+    The count does not contain the half eps of q, which is counted with the angles.
     """
     return ROW * (rows + 1)
 
@@ -265,8 +276,8 @@ def of_rows(rows: int) -> float:
 def of_rows_read_back(rows: int) -> float:
     """Return the number of roundings in a comparison of a table with the URDF that was written from it.
 
-    Pinocchio's computation has as many roundings as the computation with the table. The conversion to roll,
-    pitch and yaw has twice as many.
+    The count is 4 times `of_rows`. The computation with the table and the computation by Pinocchio contribute
+    one `of_rows` each. The conversion to roll, pitch and yaw contributes two.
     """
     return 4.0 * of_rows(rows)
 
@@ -274,8 +285,8 @@ def of_rows_read_back(rows: int) -> float:
 def of_two_texts(joints: int) -> float:
     """Return the number of roundings of a pose after `joints` joints, for two URDF texts of the same robot.
 
-    The parser and the writer round each joint's constant transform and its axis. If fixed joints are merged,
-    the writer rounds the product of their constants, which adds no more roundings.
+    The parser and the writer round each joint's constant transform and its axis. If the writer merges fixed
+    joints, it rounds only the product of their constant transforms, so there are no more roundings.
     """
     return (CONSTANT + WRITTEN + AXES) * (joints + 1)
 
@@ -283,6 +294,6 @@ def of_two_texts(joints: int) -> float:
 def of_a_fit(rows: int) -> float:
     """Return the number of roundings in a comparison of a URDF with a table that was fitted to it.
 
-    A fit ends within 12.5 times `of_rows`.
+    The iteration of a fit stops at errors of up to 12.5 times `of_rows`.
     """
     return 12.5 * of_rows(rows)

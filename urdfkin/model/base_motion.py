@@ -23,8 +23,8 @@ class BaseMotion:
         placement: (..., 4, 4) T_world_base. The rotation matrix may be rounded, even to one digit; the
             computation uses the nearest exact rotation matrix
             (`urdfkin.kinematics.rotation.nearest_rotation`).
-        velocity: (..., 6) [linear; angular] of the base's origin, world axes, m/s and rad/s.
-        acceleration: (..., 6) [linear; angular], classical, world axes, m/s^2 and rad/s^2.
+        velocity: (..., 6) velocity of the base's origin, [linear; angular], in world axes, m/s and rad/s.
+        acceleration: (..., 6) classical acceleration, [linear; angular], in world axes, m/s^2 and rad/s^2.
 
     Raises:
         InputError: a field has a wrong shape or a non-finite number, or the placement is not a rigid motion.

@@ -1,4 +1,4 @@
-"""A path between two frames as a sequence of joint axes, from which Denavit-Hartenberg tables are made.
+"""A path between two frames as a sequence of joint axes. Denavit-Hartenberg tables are derived from it.
 
 As in section 7.5 of the textbook, joint i rotates about, or translates along, z_{i-1} at O_{i-1}. The vector
 d_{i-1,i} leads from O_{i-1} to O_i. The path may lead from parent to child, from child to parent, or through
@@ -250,7 +250,7 @@ def _bounds(limit: Limit | None) -> tuple[float, float]:
 
 
 def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
-    """Return the path from `base` (None: the root) to `tip`.
+    """Return the path from `base` to `tip`. If `base` is None, the path starts at the root.
 
     Args:
         tree: The robot.

@@ -45,11 +45,11 @@ WIDEST = 10.0
 
 @dataclass(frozen=True, slots=True)
 class NarrowedRange:
-    """A mimicked joint's own range, and the smaller range in which its mimic joints keep their limits.
+    """A mimicked joint's own range, and the smaller range in which its mimic joints are within their limits.
 
     Attributes:
         joint: Name of the mimicked joint.
-        own: The range that the limits of the mimicked joint give.
+        own: The range that follows from the limits of the mimicked joint.
         kept: The part of the range `own` in which all mimic joints are within their limits; None if there is
             no such part.
         by: Names of the mimic joints whose limits make the range smaller.
@@ -107,7 +107,7 @@ def own_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
 def coordinate_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
     """Return the ranges of `own_ranges`, narrowed so that the mimic joints are within their limits.
 
-    A range is not narrowed if no part of it keeps the mimic joints within their limits.
+    If no value of a range keeps the mimic joints within their limits, this range is not narrowed.
     """
     ranges = own_ranges(tree)
     narrowed = {one.joint: one.kept for one in narrowed_ranges(tree)}
@@ -211,7 +211,7 @@ def rate_names(tree: KinematicTree) -> tuple[str, ...]:
 def _names_and_units(
     tree: KinematicTree, of: Mapping[JointKind, Mapping[str, str]]
 ) -> Iterator[tuple[str, str]]:
-    """Yield a unique name and the unit of each number of q or v; no name with a suffix is a joint's name."""
+    """Yield a unique name and the unit of each number of q or v. A name with a suffix is never a joint's."""
     taken = set[str]()
     for joint in tree.joints:
         if not joint.nv:
@@ -268,7 +268,7 @@ def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
 
 
 def _other_lengths(tree: KinematicTree, what: str) -> dict[int, Hint]:
-    """Return lengths of q or v in Pinocchio that differ from urdfkin's, each with a hint for a message."""
+    """Return a hint for each length of q or v that is correct in Pinocchio but not in urdfkin."""
     follow = any(joint.mimic for joint in tree.joints)
     free = Hint(
         "leave out the mimic joints, which have no coordinate, or load with mimic=False (--no-mimic)",
@@ -445,7 +445,7 @@ def numbers(tree: KinematicTree, value: Given, what: str) -> FloatArray:
 
 
 def shaped(tree: KinematicTree, value: Given, what: str, *, look: bool = True) -> FloatArray:
-    """Return the result of `numbers` with quaternions of norm 1; raises InputError.
+    """Return the result of `numbers`, with the quaternions of floating joints normalised.
 
     If `look` is true, values of q that look like degrees cause a `DegreesWarning`.
     """
@@ -458,7 +458,7 @@ def shaped(tree: KinematicTree, value: Given, what: str, *, look: bool = True) -
 
 
 def checked(tree: KinematicTree, value: Given, what: str, *, look: bool = True) -> FloatArray:
-    """Return the result of `shaped`; raises NotFiniteError if a number is not finite."""
+    """Return the result of `shaped`. Raise NotFiniteError if a number is not finite."""
     array = shaped(tree, value, what, look=look)
     if not np.isfinite(array).all():
         where = np.argwhere(~np.isfinite(array))[0]

@@ -53,7 +53,8 @@ class CoordinateLayout:
         what: "q", "v" or "a".
         names: The name of each number.
         units: "rad", "m", "" for a number without a unit (such as a quaternion's), or None if unknown.
-        spans: For each joint with several numbers: the index of the first number, and the count of numbers.
+        spans: For each joint with several numbers: the index of its first number, and how many numbers it
+            has.
         poses: Returns the named poses. `poses`, `otherwise` and `lengths` are called only when needed.
         otherwise: Returns a hint for each name that is not a coordinate, such as a fixed joint.
         lengths: Returns a hint for each wrong length that users often pass, such as the length of q in
@@ -97,7 +98,7 @@ keeps: 'neutral, elbow=...'
     def named(
         self, value: str | Mapping[str, ArrayLike], where: str
     ) -> tuple[dict[str, ArrayLike], FloatArray | None]:
-        """Return the values by name in a text or mapping, and the named pose that begins the text or None.
+        """Return the values by name from a text or mapping, and the named pose that begins the text or None.
 
         Raises:
             InputError: the text has numbers without names, or a name twice.
@@ -244,7 +245,9 @@ keeps: 'neutral, elbow=...'
 
 
 def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
-    """Return a text or mapping unchanged, a table with labels as a mapping, and None for numbers in order.
+    """Return values that are given by name: a text or mapping unchanged, a table with labels as a mapping.
+
+    The result is None if the values are numbers in order.
 
     Raises:
         InputError: a label occurs twice, or `value` is a list of tables with labels.
@@ -309,7 +312,7 @@ def listed(names: Sequence[str]) -> str:
 
 
 def _cells(text: str) -> list[str]:
-    """Split a text at commas; without commas, at blanks."""
+    """Split a text at commas, or at blanks if the text has no commas."""
     text = " ".join(text.split())
     if text[:1] + text[-1:] in ("[]", "()", "{}"):
         text = text[1:-1].strip()

@@ -51,7 +51,8 @@ class Coupling:
     def matrix(self) -> FloatArray:
         """The matrix G (joints, coordinates).
 
-        Column k contains the joint velocities if coordinate k has velocity 1.
+        Column k contains the velocities of the joints if coordinate k has velocity 1 and all others have
+        velocity 0.
         """
         G = np.zeros((len(self.joints), len(self.names)))
         G[np.arange(len(self.joints)), self._leader_index] = self._multiplier

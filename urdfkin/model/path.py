@@ -1,11 +1,11 @@
-"""A path: a product of constant poses and elementary motions. The module computes its poses and its Jacobian.
+"""The poses and the Jacobian of a path, which is a product of constant poses and elementary motions.
 
     T(x) = C_0 E_1(x_1) C_1 E_2(x_2) ...,      E_k = Rx, Ry, Rz, Tx, Ty or Tz of the amount x_k
 
 Chains, Denavit-Hartenberg tables, screws, and the models that `dh --compare` and `calibrate` fit have this
-form. Only the meaning of the amounts x_k differs: joint values, cells of a table, or parameters. The
-derivative of the pose at the path's end with respect to an amount is a twist. Let e be the axis of the motion
-and O a point of this axis, in the frame before the path. The twist is then
+form. Only the meaning of the amounts x_k differs: joint values, cells of a table, or parameters. Let p be the
+position of the path's end. The derivative of the end's pose with respect to an amount is a twist (dp/dx, w).
+Let e be the axis of the motion and O a point of this axis, in the frame before the path. The twist is
 
     rotation   dp/dx = e x (p - O),   w = e;       translation   dp/dx = e,   w = 0
 
@@ -96,7 +96,7 @@ class Path:
         return self.columns_at(self.frames(amounts))
 
     def columns_at(self, frames: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the same as `columns`, for the poses (..., steps, 4, 4) that `frames` returned."""
+        """Return the same as `columns`, from the poses (..., steps, 4, 4) that `frames` returned."""
         T = frames[..., -1, :, :]
         motions = [(i, step) for i, step in enumerate(self.steps) if isinstance(step, Motion)]
         # A motion does not move its own axis, so the frame after the motion also contains the axis.

@@ -47,9 +47,9 @@ class Column:
         z: The joint's axis.
         turns: Whether the joint is revolute.
         carrier: State of the frame that carries the joint's axis.
-        order: Index of the column on the path.
+        order: Position of the column's joint on the path, counted from the base.
         place: Index of the joint velocity in v.
-        factor: Factor by which this joint velocity is multiplied: the multiplier of a mimic joint.
+        factor: Multiplier of the mimic rule, by which the joint velocity is multiplied.
     """
 
     z: Vector
@@ -62,18 +62,19 @@ class Column:
 
 @dataclass(eq=False)
 class Recursion:
-    """The steps of the recursion. Each step computes a link's state from that of the link before it.
+    """The steps of the recursion. Each step computes a link's state from the state of the link before it.
 
     Attributes:
         eq: The equations.
-        own: Whether motion is expressed in each link's own axes (True) or in the world's (False).
+        own: Whether velocities and accelerations are expressed in each link's own axes (True) or in the
+            world's axes (False).
     """
 
     eq: Any
     own: bool = False
 
     def seen(self, s: State, x: Vector) -> Vector:
-        """Return a vector x, given in the link's own axes, in the axes that `own` selects.
+        """Convert a vector x from the link's own axes to the axes that `own` selects.
 
         The selected axes are the link's own axes or the world axes.
         """
@@ -152,7 +153,7 @@ class Recursion:
         return self.eq.point_acceleration(s.acc, s.alpha, s.w, self.eq.minus(ZERO, s.p)), s.alpha
 
     def in_reference(self, s: State, reference: Reference, linear: Vector, angular: Vector) -> Six:
-        """Return two vectors, given in world axes, in the axes of the reference frame."""
+        """Convert two vectors from world axes to the axes of the reference frame."""
         if reference.own_axes:
             back = self.eq.transposed(s.R)
             linear, angular = self.eq.rotate(back, linear), self.eq.rotate(back, angular)
@@ -203,10 +204,10 @@ class Recursion:
     def hessian(
         self, s: State, columns: Sequence[Column], reference: Reference
     ) -> Iterator[tuple[int, int, Number, Six]]:
-        """Yield the derivative of each Jacobian column in the direction of each joint velocity.
+        """Yield the derivative of each Jacobian column with respect to each joint coordinate.
 
-        Each item consists of the column's index, the index of the joint velocity in v, a factor and the
-        derivative.
+        Each item has four parts: the index of the column, the index of the joint velocity in v, a factor and
+        the derivative.
         """
         to = ZERO if reference.at_world else s.p
         ends = [(one, self._column(one, to)) for one in columns]
@@ -216,13 +217,14 @@ class Recursion:
                 yield of.place, by.place, of.factor * by.factor, self.in_reference(s, reference, *change)
 
     def _change(self, six: Any, by: Any, reference: Reference, *, before: bool) -> tuple[Vector, Vector]:
-        """Return the derivative of a Jacobian column in the direction of a joint velocity.
+        """Return the derivative of a Jacobian column with respect to one joint coordinate.
 
         Args:
             six: The Jacobian column whose derivative is returned.
             by: The Jacobian column of the joint that moves.
             reference: The reference frame.
-            before: Whether the moving joint is the joint of the column `six`, or is before it on the path.
+            before: Whether the joint that moves belongs to the column `six`, or is before the joint of this
+                column on the path.
         """
         eq = self.eq
         change: tuple[Vector, Vector] = ZERO, ZERO

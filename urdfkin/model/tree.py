@@ -126,7 +126,7 @@ class Limit:
 #: turn 400 degrees.
 LARGEST_ANGLE = 2.5 * math.pi
 #: A value is far outside a joint's limits if it exceeds them by more than the larger of these two amounts.
-#: The first amount is in radians or metres. The second is a share of the joint's range.
+#: The first amount is in radians or metres. The second amount is a fraction of the joint's range.
 _OUTSIDE, _OF_RANGE = 0.5, 0.25
 
 
@@ -176,8 +176,8 @@ class Joint:
         limit: Limits of the joint; None if the joint has no limits.
         mimic: Mimic rule of the joint; None if the joint has its own coordinate.
         tilt: Angle (rad) between the joint's axis in Pinocchio and `axis` (URDF514), usually 0. No result of
-            urdfkin uses this angle, but differences from Pinocchio may be larger by it.
-        lock: If this joint is a moving joint of the URDF that the user fixed: that joint and its value.
+            urdfkin uses this angle, but it may increase the differences from Pinocchio.
+        lock: The original joint and its value, if the user fixed a moving joint of the URDF; else None.
     """
 
     name: str
@@ -467,7 +467,10 @@ class KinematicTree:
         return None
 
     def _unambiguous(self, *names: FrameName) -> list[str]:
-        """Return a list with the first of the given frame names that is not the name of a link or joint."""
+        """Return the first given frame name that is not also the name of a link or joint, as a list.
+
+        The list is empty if there is no such name.
+        """
         known = self._link_index.keys() | self._joint_index.keys()
         return [str(name) for name in names if name not in known][:1]
 

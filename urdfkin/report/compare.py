@@ -7,8 +7,8 @@ A change is a regression in these cases:
 - More results lie outside their bound.
 - A quantity or a table is no longer compared, or there are fewer samples or results.
 - A bound is wider for the same joints.
-- The worst disagreement grew by more than a factor, and is above the error of a single rounding. The same
-  applies to its ratio to the bound, above a tenth.
+- The worst disagreement grew by more than a factor, and is above the error of a single rounding.
+- The ratio of the worst disagreement to the bound grew by more than this factor, and is above a tenth.
 
 A changed model is not a regression: its joints are listed with their axes, placements, limits and mimic
 rules. A new file name is not a regression either: robots are matched by the name in their text.
@@ -170,7 +170,8 @@ def _cell(value: Units | str) -> str:
 
 #: A worst disagreement may grow by this factor without a regression: the maximum of random samples varies.
 FACTOR = 2.0
-#: A worst disagreement up to this many eps * scale is no regression. A single rounding can be as large.
+#: A worst disagreement up to this many eps * scale is no regression, because a single rounding error can have
+#: this size.
 FLOOR = 2.0
 #: A ratio to the bound up to this value is no regression.
 _SHARE_FLOOR = 0.1
@@ -222,7 +223,7 @@ class Comparison:
         return 1 if self.regressions else 0
 
     def as_dict(self, command: str | None = None) -> ComparisonDocument:
-        """Return plain data for JSON; `command` is the command that asked for it."""
+        """Return plain data for JSON; `command` is the command line that requested the data."""
         document = {
             "schema": COMPARISON.name,
             "versions": versions(),
@@ -245,7 +246,7 @@ class ChangeEntry(TypedDict):
 
 
 class ComparisonDocument(Header):
-    """The output of `urdfkin report compare --format json`; `sha256` belongs to the new report's robots."""
+    """The output of `urdfkin report compare --format json`; `sha256` lists the robots of the new report."""
 
     changes: Annotated[list[ChangeEntry], says("All changes between the two reports.")]
 
@@ -315,7 +316,7 @@ def _robots(old: Document, new: Document, factor: float) -> Iterator[Change]:
 
 
 def by_source(document: Document) -> dict[str, Robot]:
-    """Return robots by their source. If a source occurs several times, a number is added to it."""
+    """Return robots by their source. If a source occurs several times, a number is added to its name."""
     named: dict[str, Robot] = {}
     for robot in document["robots"]:
         source, count = robot["source"], 1
@@ -413,7 +414,10 @@ def _grew(old: Units, new: Units, factor: float, floor: float = FLOOR) -> bool:
 
 
 def _findings(source: str, old: Robot, new: Robot) -> Iterator[Change]:
-    """Yield changed numbers of errors and warnings by code. The verdict shows whether an error matters."""
+    """Yield a change for each code whose number of errors or warnings changed.
+
+    The verdict shows whether an error matters.
+    """
     counts: list[dict[str, int]] = [{}, {}]
     for count, robot in zip(counts, (old, new), strict=True):
         for finding in robot["findings"]:
@@ -427,7 +431,7 @@ def _findings(source: str, old: Robot, new: Robot) -> Iterator[Change]:
 
 
 def figures(old: Document, new: Document) -> list[tuple[str, Units | str, Units | str]]:
-    """Return each quantity with its worst disagreement in the old and new report; empty if not compared."""
+    """Return each quantity with its worst disagreement in both reports; empty if it was not compared."""
     names = dict.fromkeys(c["quantity"] for d in (old, new) for r in d["robots"] for c in r["checks"])
     return [(name, _worst(old, name), _worst(new, name)) for name in names]
 

@@ -35,7 +35,7 @@ def _by_element(found: Changes) -> dict[str, list[Change]]:
 
 
 def lines_of(found: Changes) -> list[str]:
-    """Return a line for each change, and a line for each changed joint: how far its changes move a frame."""
+    """Return a line for each change, and for each changed joint a line with the distance a frame moves."""
     lines = [f"{found.sources[0]} -> {found.sources[1]}"]
     for element, changes in _by_element(found).items():
         lines += [f"  {change}" for change in changes]

@@ -2,8 +2,8 @@
 
 The plot has one row for each quantity, with all reference frames together. The x axis of the histogram is
 logarithmic and shows the disagreement in eps * scale. The histogram shows the results, and the triangle shows
-the worst result. The bar shows the bound, from the frame with the fewest joints before it to the frame with
-the most. A quantity is verified if its histogram lies left of its bar.
+the worst result. The bar shows the range of the bound over all frames. The bound is smallest for the frame
+with the fewest joints before it. A quantity is verified if its histogram lies left of its bar.
 
 The data of the 3D view is compact: links, joints and chains with their tables. The numbers of the 3D view
 have seven digits for display; the JSON document has the full numbers.
@@ -54,7 +54,7 @@ def distributions(robot: Robot, edges: Sequence[float], prefix: str) -> str:
 
 
 def _right(checks: Sequence[Check], edges: Sequence[float]) -> float:
-    """Return the right end of the axis, beyond every bound and every finite disagreement."""
+    """Return the right end of the axis, which is larger than every bound and every finite disagreement."""
     ends = [check["bound"][1] or 1.0 for check in checks] + [check["worst"] or 1.0 for check in checks]
     return float(min(max(ends) * 2.0, edges[-1] * 10.0))
 
@@ -156,11 +156,14 @@ def scene(model: Model, chains: list[Chain]) -> dict[str, Any]:
     """Return a robot as data for the script of the page, `assets/view3d.js`.
 
     Returns:
-        `links`: names. `joints`: one list for each joint: name, index of its kind, parent link, child link,
-            pose in
-        the parent (three rows of four), axis or 0, index in q or -1, lower and upper limit (None: no limit),
-        mimic rule (the mimicked joint's index in q, multiplier, offset) or 0. `chains`: base link, tip link,
-        two tables.
+        A dict with these entries, among others.
+
+        * `links`: the names.
+        * `joints`: one list for each joint. It contains the name, the index of the kind, the parent link, the
+          child link, the pose in the parent (three rows of four), the axis or 0, the index in q or -1, the
+          lower and the upper limit (None: no limit), and the mimic rule or 0. A mimic rule is the mimicked
+          joint's index in q, the multiplier and the offset.
+        * `chains`: the base link, the tip link and two tables for each chain.
     """
     links = {name: i for i, name in enumerate(model["links"])}
     joints = {joint["name"]: i for i, joint in enumerate(model["joints"])}

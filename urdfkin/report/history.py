@@ -125,9 +125,10 @@ class History:
 
     Attributes:
         runs: The runs, the oldest first.
-        robots: For each robot, under its latest source: the results in each run. Worse verdicts come first.
+        robots: For each robot, the results in each run. The key is the robot's latest source. Worse verdicts
+            come first.
         unusable: Files that cannot be used, with the reason.
-        repeated: Files whose run another file also contains, each with the name of that file.
+        repeated: Files with a run that is already in another file, each with the name of the other file.
     """
 
     runs: list[Run] = field(default_factory=list)
@@ -141,7 +142,7 @@ class History:
         return 2 if self.unusable else 0
 
     def as_dict(self, command: str | None = None) -> HistoryDocument:
-        """Return plain data for JSON; `command` is the command that asked for it."""
+        """Return plain data for JSON; `command` is the command line that requested the data."""
         last = len(self.runs) - 1
         latest = [points[-1]["sha256"] for points in self.robots.values() if points[-1]["run"] == last]
         document = {
@@ -194,7 +195,10 @@ def _rank(found: History, points: Sequence[Point]) -> tuple[bool, int]:
 
 
 def _files(paths: Sequence[Path]) -> Iterator[Path]:
-    """Yield each report: a file or a store. A folder has files with the suffix .json, at any depth."""
+    """Yield the path of each report, which is a file or a store.
+
+    A folder contributes all its files with the suffix .json, at any depth.
+    """
     count = 0
     for path in paths:
         inside = _in_folder(path) if is_folder(path) and not _is_store(path) else iter([path])
@@ -232,7 +236,7 @@ def _in_folder(folder: Path) -> Iterator[Path]:
 
 
 def _in_order(files: Sequence[Path], found: History) -> Iterator[tuple[str, Document]]:
-    """Yield each report in the order of the starts. Note files that cannot be used, and repeated runs."""
+    """Yield each report, ordered by start time. Record files that cannot be used, and repeated runs."""
     starts = list[tuple[float, str, Path]]()
     for path in files:
         try:
@@ -263,7 +267,7 @@ def _unused(path: Path, error: UrdfkinError) -> Unused:
 
 
 def _start(path: Path) -> tuple[float, str]:
-    """Return the start of a run in seconds, infinity if it is not a date, and its text."""
+    """Return the start time of a run in seconds and as text. If the text is not a date, return infinity."""
     data = _read(path) if is_folder(path) else parse_json(read_bytes(path, MOST), str(path))
     text = str(data.get("started", "")) if isinstance(data, dict) else ""
     try:
@@ -424,7 +428,7 @@ def words_of(change: ChangeEntry) -> str:
 
 
 def _share(one: Run | Point) -> str:
-    """Return the largest share of a bound as text; empty if nothing was compared."""
+    """Return the largest ratio of a disagreement to its bound as text; empty if nothing was compared."""
     return percent(one["share_of_bound"]) if one["results"] else ""
 
 

@@ -1,8 +1,8 @@
 """Report as an HTML page that works offline, uses no network and escapes every name.
 
 A large report is split: the page has the summary, and a file for each robot has its details. The page loads
-such a file when you unfold the robot. The files are scripts, because a browser lets a page from disk load no
-other files.
+such a file when you unfold the robot. The files are scripts, because a page that is opened from disk cannot
+load other types of files.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ MOST = 5_000_000
 
 @cache
 def environment() -> Environment:
-    """Return the template environment. Every name is escaped; a missing name is an error."""
+    """Return the template environment. It escapes every name and rejects undefined variables."""
     from jinja2 import Environment, PackageLoader, StrictUndefined  # noqa: PLC0415  keeps --help fast
 
     environment = Environment(
@@ -268,9 +268,10 @@ def _robot(robot: Robot, index: int, document: Document) -> dict[str, Any]:
 
 
 def _plot(robot: Robot, index: int, document: Document) -> str:
-    """Return the plot of a robot; empty without matplotlib, or if it would take too long.
+    """Return the plot of a robot, or an empty text.
 
-    The tables contain the same numbers.
+    The text is empty if matplotlib is not installed, or if the plots of all robots would take too long. The
+    tables contain the same numbers.
     """
     if not installed() or (len(document["robots"]) > _DRAWN and robot["verdict"] == "verified"):
         return ""
@@ -278,7 +279,7 @@ def _plot(robot: Robot, index: int, document: Document) -> str:
 
 
 def when(started: str) -> str:
-    """Return the start time as text; the input itself if it is not an ISO date."""
+    """Return the start time as text. If the input is not an ISO date, return the input."""
     try:
         moment = datetime.fromisoformat(started)
     except ValueError:

@@ -57,7 +57,8 @@ def _bytes(root: ET.Element) -> bytes:
 def functions_as_junit(checks: Sequence[FunctionCheck]) -> bytes:
     """Return the checks of `urdfkin verify` as a JUnit XML file.
 
-    Each function has a test case. It fails if the function disagrees, or if no oracle confirms the reference.
+    Each function has a test case. The test case fails if the function disagrees with the reference, or if no
+    oracle confirms the reference.
     """
     cases = [_function_case(check) for check in checks]
     failures = str(sum(case.find("failure") is not None for case in cases))

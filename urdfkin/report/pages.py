@@ -70,7 +70,7 @@ def overview(robot: Robot, quantities_of: Sequence[Sequence[str]]) -> dict[str, 
 
 
 def reason(robot: Robot) -> str:
-    """Return the reason of a verdict, without the lines of errors that are among the findings below it."""
+    """Return the reason of a verdict, without errors that the list of findings below it repeats."""
     first, *lines = (robot["reason"] or "").split("\n")
     found = [(one["code"], one["message"]) for one in robot["findings"] if one["severity"] == "error"]
     others = [line for line in lines if not any(code in line and words in line for code, words in found)]
@@ -108,7 +108,10 @@ def joint_rows(model: Model) -> list[dict[str, Any]]:
 
 
 def _remaining_range(joint: Joint) -> str:
-    """Return a sentence on the range that mimic joints' limits allow a joint; empty for its whole range."""
+    """Return a sentence about the part of a joint's range in which its mimic joints are within their limits.
+
+    The text is empty if this part is the whole range.
+    """
     kept = joint.get("kept")
     if kept is None:
         return ""
@@ -146,7 +149,7 @@ def _limits(limit: Limit | None, kind: str) -> dict[str, str]:
 def heat_map(robot: Robot, model: Model) -> tuple[list[str], list[tuple[str, list[Cell]]]]:
     """Return the column heads, and the name and cells of each moving joint.
 
-    A cell shows the worst of all reference frames.
+    A cell shows the worst disagreement of all reference frames.
     """
     quantities_of = columns([robot])
     frame = {name: i for i, name in enumerate(robot["frames"])}
@@ -164,7 +167,7 @@ def heat_map(robot: Robot, model: Model) -> tuple[list[str], list[tuple[str, lis
 
 
 def _columns(model: Model) -> dict[str, list[int]]:
-    """Return the columns of the full Jacobian that belong to each joint, mimic joints included."""
+    """For each joint, return the indices of its columns in the Jacobian with mimic joints."""
     own: dict[str, list[int]] = {}
     at = 0
     for joint in model["joints"]:
@@ -186,10 +189,11 @@ def _cell(checks: Sequence[Check], where: dict[str, list[int]]) -> Cell:
 
 
 def _share(check: Check, subject: int) -> float:
-    """Return an upper bound on the ratio of a subject's worst disagreement to its bound.
+    """Return an upper bound on the ratio of a worst disagreement to its bound.
 
-    The disagreement is divided by the tightest bound of all results. The ratio is therefore an upper bound.
-    The result is limited to the largest ratio of the whole check.
+    The disagreement is the worst one of a frame, a joint or a column. It is divided by the tightest bound of
+    all results. The ratio is therefore an upper bound. The result is at most the largest ratio of the whole
+    check, which is known exactly.
     """
     value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["share_of_bound"]
     if not value:  # a disagreement of 0 lies within every bound
@@ -290,7 +294,7 @@ def check_rows(robot: Robot) -> list[dict[str, Any]]:
 
 
 def failures(robot: Robot) -> list[dict[str, Any]]:
-    """Return the rows of the failed checks, those with the largest ratios of disagreement to bound first."""
+    """Return the rows of the failed checks. The largest ratio of a disagreement to its bound comes first."""
     failing = sorted(
         (check for check in robot["checks"] if check["failed"]),
         key=lambda check: -_sortable(check["share_of_bound"]),

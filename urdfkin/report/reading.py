@@ -1,8 +1,8 @@
 """Reader of report documents. This module checks the layout and the consistency of all entries.
 
-A report is evidence, and may have been edited or truncated. Entries that follow from other entries are
-computed again and compared: the outcome, verdicts, sums, ratios and percentiles. The links and joints of a
-robot must form a tree, and the indices of the joints in q and v must be consistent.
+A report is used as evidence, but it may have been edited or truncated. Entries that follow from other entries
+are computed again and compared: the outcome, verdicts, sums, ratios and percentiles. The links and joints of
+a robot must form a tree, and the indices of the joints in q and v must be consistent.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def moving_names(model: Model) -> list[str]:
 
 
 def column_names(model: Model) -> list[str]:
-    """Return the name of the joint of each column of the full Jacobian, mimic joints included."""
+    """For each column of the Jacobian with mimic joints, return the name of its joint."""
     return [joint["name"] for joint in model["joints"] for _ in range(_size(joint)[1])]
 
 
@@ -335,7 +335,7 @@ def read_document(path: Path) -> Document:
 
 
 def stored_document(folder: Path) -> Document:
-    """Read the document of a campaign's store and check it like a file.
+    """Read the document in the folder of a validation campaign, and check it like a file.
 
     Raises:
         SourceError: The store cannot be read.

@@ -34,7 +34,7 @@ TURNED = ("radians_seen", "radians")
 #: The default question: are the two robots equivalent?
 EQUIVALENT = Question()
 #: If a bound is at most this factor times the rounding error of one number, it counts as rounding. The factor
-#: is needed because a sum adds the rounding errors of its terms.
+#: is larger than 1 because a sum adds the rounding errors of its terms.
 DUST = 1.001
 #: Heading of the list of joints whose mimic joints leave their limits.
 NARROWED = "limits of mimic joints, which the bounds of the distance ignore"
@@ -65,7 +65,7 @@ def headline(found: Sameness, question: Question = EQUIVALENT) -> str:
 
 
 def _within(found: Sameness, most: float) -> str:
-    """Return the answer to --within: do all frames stay within a distance? If not, which one leaves it?"""
+    """Return whether all frames stay within the distance `--within`, or which frame does not."""
     limit = f"WITHIN {most:g} m and rad without changes of B: "
     if found.within(most):
         return f"{limit}no frame is ever off by more than {_both(*found.written)}"
@@ -131,7 +131,7 @@ def rows(frames: Sequence[Interval]) -> list[list[str]]:
 
 
 def as_written(found: Sameness) -> str:
-    """Return in words how far a frame of B is from A's frame if the models are compared as they are written.
+    """Return in words the distance between a frame of A and a frame of B, without changes of B.
 
     Return an empty text if the distance is within rounding.
     """
@@ -150,7 +150,7 @@ def where(found: Sameness, frame: Interval) -> str:
 
 
 def renamed(found: Sameness) -> list[str]:
-    """Return lines about joints and links that have different names, and about other orders of joints."""
+    """Return lines about joints and links with different names, and about joints in a different order."""
     pairs = [one for one in found.joints if one.a != one.b]
     guessed = [one for one in pairs if one.b not in spellings(one.a) and one.a not in spellings(one.b)]
     joints = [f"joint {one.a} is {one.b}" for one in pairs]
@@ -198,7 +198,7 @@ PAIRS = ("A", "B", "verdict", "at most apart", "single precision")
 
 
 def _pair_rows(found: Sequence[Sameness], question: Question) -> list[tuple[str, ...]]:
-    """Return a row for each pair: sources, verdict, largest distance, and that of single precision."""
+    """Return a row for each pair: sources, verdict, largest distance, largest single-precision distance."""
     rows = list[tuple[str, ...]]()
     for one in found:
         words = "differs" if not one else "same" if one.verdict is Verdict.SAME else "equivalent"
@@ -253,7 +253,7 @@ def as_document(found: Sameness) -> TextDocument:
 
 
 def attained(frame: Interval) -> str:
-    """Return in words how far a frame of B is from A's frame at the worst configuration.
+    """Return in words the distance between a frame of A and a frame of B at the worst configuration.
 
     Return an empty text if the two frames coincide.
     """
@@ -310,7 +310,7 @@ HALF, FILLED = 150.0, 0.9
 SCALE, FOOT = 0.3, 6.0
 #: Length of a frame's axes in the close view, as a share of the distance shown.
 AXIS = 0.35
-#: Two views: title, azimuth and elevation of the direction of view, radians.
+#: Two views, each with its title, and with the azimuth and elevation of the direction of view in radians.
 VIEWS = (("from the front", 0.6, 0.35), ("from the side", 0.6 + np.pi / 2.0, 0.35))
 
 
@@ -327,8 +327,8 @@ def as_html(
         found: The result of `same`.
         robots: A and B.
         question: The question.
-        options: Other options of the command, for the line that repeats it.
-        started: Date and time on the page; None: now.
+        options: Other options of the command. The page shows a command line that repeats the comparison.
+        started: Date and time on the page. None means the current time.
     """
     from urdfkin.report.html import as_is, asset, environment, when  # noqa: PLC0415  loads Jinja
     from urdfkin.verify.oracles import versions  # noqa: PLC0415
@@ -380,7 +380,7 @@ def pictures(
     Args:
         found: The result of `same`.
         robots: A and B.
-        worst: The worst frame with its configurations; None: draw the zero configuration.
+        worst: The worst frame with its configurations. If this is None, the zero configuration is drawn.
         written: Whether to draw B as written, not with the changes that make it equivalent to A.
 
     Returns:

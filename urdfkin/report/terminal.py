@@ -1,7 +1,7 @@
 """Report on a terminal: tables and the failures.
 
-A terminal of 80 columns shows two tables, a terminal of at least 100 columns one wide table. Colours only
-repeat information of the text.
+A terminal of 80 columns shows two tables. A terminal of at least 100 columns shows one wide table. Colours
+only repeat information of the text.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ def check_name(check: Check) -> str:
 
 
 def second_reader_words(robot: Robot) -> str:
-    """Return in words whether the tree of yourdfpy, the second reader, agrees with ours.
+    """Return in words whether yourdfpy, the second reader, reads the same tree as urdfkin.
 
     Return an empty text if there was no comparison.
     """
@@ -47,7 +47,7 @@ def second_reader_words(robot: Robot) -> str:
 
 
 def units(value: Units, *, compared: bool = True) -> str:
-    """Format a disagreement: `inf` for None (infinity), an empty text if nothing was compared."""
+    """Format a disagreement. None means infinity (`inf`); the text is empty if nothing was compared."""
     if not compared:
         return ""
     if value is None:
@@ -124,10 +124,10 @@ def nearer(line: Judged) -> Literal["urdfkin", "Pinocchio", "equal"]:
 
 
 def nearer_counts(lines: Sequence[Judged]) -> str:
-    """Return three counts of rows of the accuracy study.
+    """Return text that compares the errors of urdfkin and Pinocchio in the accuracy study.
 
-    The counts are the numbers of rows in which urdfkin's typical error is smaller than, equal to and larger
-    than Pinocchio's.
+    The text contains the number of rows in which urdfkin's typical error is smaller than Pinocchio's. It also
+    contains the numbers of rows with equal errors and with a larger error.
     """
     counts = Counter(nearer(line) for line in lines)
     return (
@@ -139,7 +139,7 @@ def nearer_counts(lines: Sequence[Judged]) -> str:
 def judged_on(judgement: Judgement) -> str:
     """Return a text about the result of the accuracy study.
 
-    The text states the number of samples, whether the base moved, and the counts of `nearer_counts`.
+    The text states the number of samples, whether the base moved, and the numbers of `nearer_counts`.
     """
     moving = " on a moving base" if judgement.get("moving_base") else ""
     return f"{counted(judgement['samples'], 'sample')}{moving}; {nearer_counts(judgement['lines'])}"
@@ -218,7 +218,7 @@ def counted(n: int, noun: str) -> str:
 
 
 def verdict_counts(document: Document) -> dict[str, int]:
-    """Return the number of robots for each verdict, worst first, without zeros."""
+    """Return the number of robots for each verdict that occurs, the worst verdict first."""
     counts = dict.fromkeys(VERDICTS, 0)
     for robot in document["robots"]:
         counts[robot["verdict"]] += 1

@@ -142,7 +142,10 @@ def put(place: Path, data: bytes) -> None:
 
 
 def get(place: Path) -> bytes | None:
-    """Return the content of a file of `put`; None if it is missing, or, with a warning, if it is damaged."""
+    """Return the content of a file that `put` wrote, or None.
+
+    The result is None if the file is missing, or, with a warning, if the file is damaged.
+    """
     try:
         content = read_if_there(place, MOST_DATA)
     except SourceError as error:

@@ -81,10 +81,10 @@ class Layout(Generic[_T]):
     Attributes:
         name: Name and version, the value of the entry "schema".
         type: The type of the document.
-        verdicts: The possible verdicts; empty for a document without a header.
+        verdicts: The possible verdicts; empty if the document has no header.
         made_by: The command that writes such a document.
-        is_open: Whether a document may have entries that the type lacks. A later version of urdfkin may write
-            such entries.
+        is_open: Whether a document may have entries that `type` does not define. A later version of urdfkin
+            may write such entries.
     """
 
     name: str
@@ -177,7 +177,7 @@ class Layout(Generic[_T]):
 
 
 def _unknown_entry(data: Any, document: Any, place: str = "$") -> tuple[str, str] | None:
-    """Return the place of an entry that a type lacks; None if there is none."""
+    """Return the place and the name of an entry that a type does not define, or None."""
     if isinstance(data, dict):
         if unknown := [name for name in data if name not in document]:
             return place, f"unknown entry {unknown[0]!r}"
@@ -218,7 +218,7 @@ def plain(value: Any) -> Any:
 
 
 def read_json(path: Path) -> object:
-    """Read a JSON file. Raise SourceError, or InputError if it is not JSON."""
+    """Read a JSON file. Raise SourceError if it cannot be read, and InputError if it is not JSON."""
     return parse_json(read_bytes(path, MOST_DATA, pipes=True), str(path))
 
 

@@ -23,7 +23,7 @@ from urdfkin.errors import InputError, SourceError
 
 @dataclass(frozen=True, slots=True)
 class Edit:
-    """Replacement of the bytes from `start` up to, but without, `end` by `text`.
+    """A replacement of some bytes by `text`. The first byte is `start`; the byte `end` is not replaced.
 
     If `start` equals `end`, the edit is an insertion.
     """
@@ -70,7 +70,7 @@ def read_bytes(path: Path, most: int = MOST, *, pipes: bool = False) -> bytes:
     Args:
         path: A regular file, or a link to one.
         most: Largest size in bytes.
-        pipes: Whether to read pipes and devices too. Set it only for a path that the user named.
+        pipes: Whether to read pipes and devices too. Use True only for a path that the user named.
 
     Raises:
         SourceError: the file cannot be read, is not a regular file, or is larger than `most`.
@@ -146,7 +146,7 @@ def read_if_there(path: Path, most: int = MOST) -> bytes | None:
 def read_text(path: Path, most: int = MOST, *, pipes: bool = False) -> str:
     """Return the text of a UTF-8 file, which may begin with a byte order mark.
 
-    Errors are those of `read_bytes`.
+    The function raises the same errors as `read_bytes`.
     """
     try:
         return read_bytes(path, most, pipes=pipes).decode("utf-8-sig")
@@ -186,7 +186,7 @@ def read_start_of_standard_input(count: int) -> bytes:
 def exists(path: Path) -> bool:
     """Return whether a path exists.
 
-    The result is True if the name is too long. Reading the file then reports the error.
+    If the name is too long, the result is True, and the error occurs when the file is read.
     """
     try:
         return path.exists()
@@ -197,7 +197,7 @@ def exists(path: Path) -> bool:
 def is_folder(path: Path) -> bool:
     """Return whether a path is a folder.
 
-    The result is False if the name is too long. Reading the file then reports the error.
+    If the name is too long, the result is False, and the error occurs when the file is read.
     """
     try:
         return path.is_dir()

@@ -1,7 +1,7 @@
 """Read files of an older version of a git repository.
 
 The module uses only git commands that read git objects. Commands that read the working tree (`diff`,
-`status`) would run programs, and the settings of an untrusted repository could name these programs.
+`status`) run external programs. The settings of an untrusted repository could name any program.
 """
 
 from __future__ import annotations

@@ -4,8 +4,8 @@ Child processes of urdfkin do not import from the current folder. urdfkin runs i
 robots, and `python -c` and `python -m` search the current folder first: a file `json.py` beside a robot would
 be run. Libraries also search the current folder for settings files.
 
-A fork copies all locks but only the forking thread. A lock that another thread holds at that moment would
-stay locked in the child for ever. `urdfkin.system.locks.lock_over_forks` prevents this.
+A fork copies all locks but only one thread, which is the thread that forks. A lock that another thread holds
+at that moment would stay locked in the child for ever. `urdfkin.system.locks.lock_over_forks` prevents this.
 
 `with_stack` runs a function on a thread with a large stack. Pinocchio and its parser traverse a robot
 recursively: a chain of about 3,000 links overflows a stack of 8 MiB, and a few hundred links overflow a
@@ -32,7 +32,7 @@ _ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1"}
 
 
 def own_python(code: str, *, options: Sequence[str] = ()) -> list[str]:
-    """Return the command of a new interpreter with the same import path, without the current folder.
+    """Return the command of a new interpreter. Its import path is the same, but without the current folder.
 
     Args:
         code: Python code to run.

@@ -35,8 +35,8 @@ PAGE_COLOURS = {
 TEXT, GRID, FIRST, SECOND, THIRD = PAGE_COLOURS
 FORMATS = ("svg", "png", "pdf")
 
-#: Okabe and Ito's colours, distinguishable with every colour vision deficiency. A sign, a dash or a position
-#: always repeats the meaning of a colour, because some readers see no colours.
+#: Okabe and Ito's colours, distinguishable with every colour vision deficiency. Some readers see no colours.
+#: Therefore, a sign, a dash or a position always has the same meaning as the colour.
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK = COLOURS = (
     "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000",
 )  # fmt: skip

@@ -145,8 +145,8 @@ def disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
         outside = check.share > 1.0
         if outside.any():
             axes.plot(t[outside], check.units[outside], "x", color=BAD, label="outside the bound")
-    # Bounds are about a hundred times the usual disagreement, so the axis is logarithmic. Below 1, the size
-    # of one rounding, the axis is linear.
+    # Bounds are about a hundred times the usual disagreement, so the axis is logarithmic. Below 1, which is
+    # the size of one rounding error, the axis is linear.
     axes.set_yscale("symlog", linthresh=1.0)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_ylim(bottom=0.0)
@@ -249,8 +249,8 @@ def _limits(robot: Robot, what: str, i: int) -> tuple[float, float]:
 _PAGE = (7.6, 10.4)
 #: Height of a panel, and of title and footer together, in inches.
 _HEIGHT, _WORDS = 2.1, 0.9
-#: Number of letters per inch in the footer, number of letters per inch in a legend, and width of a legend's
-#: line marker in letters.
+#: Three numbers for the layout of text: letters per inch in the footer, letters per inch in a legend, and the
+#: width of a legend's line marker in letters.
 _LETTERS, _LETTERS_OF_LEGEND, _HANDLE = 16, 22, 8
 #: Sentence for the footer of a figure if v and a were not computed exactly from q.
 _RATES_UNCHECKED = (

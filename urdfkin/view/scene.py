@@ -100,7 +100,7 @@ class Shape:
         kind: "box", "cylinder", "sphere" or "mesh".
         size: Box: x, y, z; cylinder: radius, length; sphere: radius; mesh: scale x, y, z. Metres.
         T_link_shape: (4, 4) pose of the shape in the link's frame.
-        colour: Red, green, blue, opacity in 0 to 1; None: the colours of the mesh file.
+        colour: Red, green, blue and opacity, each from 0 to 1. None means the colours of the mesh file.
         file: The mesh's file; None for other kinds, and for a file that is not found.
         address: The mesh's address in the URDF; "" for other kinds.
     """

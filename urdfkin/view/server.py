@@ -12,11 +12,11 @@ Four independent measures keep them out:
 
 `RequestFilter` decides about requests; it does not depend on viser or a network.
 
-Viser checks neither Host nor Origin and has no option for it. It starts its web server by a call of
-`websockets.asyncio.server.serve`. This module replaces that call and answers the requests itself. Before a
-robot is shown, the module tests the running server with requests that it must refuse. It stops the server if
-the server accepts one of these requests.
-A new version of viser can therefore make the viewer fail, but it cannot make it insecure.
+Viser checks neither the Host header nor the Origin header, and has no option to check them. Viser starts its
+web server by a call of `websockets.asyncio.server.serve`. This module replaces that function and answers the
+requests itself. Before a robot is shown, the module tests the running server with requests that it must
+refuse. It stops the server if the server accepts one of these requests. A new version of viser can therefore
+make the viewer fail, but it cannot make it insecure.
 
 The address is not passed to the browser on its command line, which every user of the machine can read. The
 browser opens a file in a private folder instead, which redirects it.
@@ -173,8 +173,8 @@ def policy(nonce: str, host: str) -> str:
 
 LOOPBACK = "127.0.0.1"
 
-#: The only message type that the server itself accepts from a page: a control has changed. Messages about the
-#: camera are handled by each connection.
+#: The only type of message that the server itself accepts from a page. The message reports that a control has
+#: changed. Messages about the camera are handled by each connection.
 _ACCEPTED = ("GuiUpdateMessage",)
 #: Replacements in the text of viser's page. These replacements add the nonce to the first script, and to the
 #: script that the first script creates.
@@ -304,7 +304,7 @@ def _page() -> Callable[[str], bytes]:
 
 @contextlib.contextmanager
 def _responding_with(answer: Callable[[Any, Any], Any]) -> Iterator[None]:
-    """While viser starts its server, make it answer with `answer` and log nothing about refused requests."""
+    """Inside this context, let new servers respond with `answer`, without a log of refused requests."""
     from websockets.asyncio import server as module  # noqa: PLC0415  with viser
 
     plain: Any = module.serve

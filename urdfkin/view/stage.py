@@ -132,7 +132,7 @@ def scalar_first(R: FloatArray) -> FloatArray:
     return np.asarray(np.roll(quaternion_of(R), 1, axis=-1), dtype=np.float64)
 
 
-#: Maximum seconds until a page that opens has its final layout.
+#: Maximum time (s) between the opening of a page and its final layout.
 _OPENING = 15.0
 #: Direction from the robot to the camera, fraction of the view that the robot fills, and viser's vertical
 #: field of view in rad.
@@ -207,7 +207,7 @@ class Stage:
         server.on_client_connect(self._welcome)
 
     def fill(self, Ts: FloatArray) -> None:
-        """Choose the view from n placements (n, links, 4, 4) of the links; the robot fills this view."""
+        """Set the view so that the robot fills it in n placements (n, links, 4, 4) of the links."""
         points = [Ts[:, :, :3, 3].reshape(-1, 3)]
         for link, box in self._corners:
             R, p = Ts[:, link, :3, :3], Ts[:, link, np.newaxis, :3, 3]
@@ -217,7 +217,7 @@ class Stage:
         initial.position, initial.look_at = camera(self._filling, aspect=1.2, fov=_FOV)
 
     def _add_shapes(self, tree: KinematicTree) -> bool:
-        """Add the shapes; return whether some are missing, so that the skeleton is needed."""
+        """Add the shapes. Return whether shapes are missing; then the skeleton is shown."""
         self.missing: list[Shape] = []
         for k, shape in enumerate(shapes(self.robot)):
             handle = self._add_shape(f"/robot/{tree.link_index(shape.link)}/shape{k}", shape)
@@ -304,7 +304,7 @@ class Stage:
     def _welcome(self, client: Any) -> None:
         """Set the camera of a new client.
 
-        Set it once more when the page's panel has reduced the width of the view.
+        The camera is set again when the panel of the page has reduced the width of the view.
         """
         begin, aspects = time.monotonic(), [0.0]
 

@@ -60,7 +60,7 @@ class Row:
     Attributes:
         at: Index in the vector.
         name: Name of the number.
-        turns: Whether it is an angle or a derivative of an angle.
+        turns: Whether the number is an angle or a derivative of an angle.
         lower, upper: Range of the slider.
     """
 
@@ -163,7 +163,10 @@ def _marks(lower: float, upper: float) -> tuple[tuple[float, str], tuple[float, 
 
 
 def coordinate_rows(robot: Robot) -> list[Row]:
-    """Return a row for each coordinate with a range, within its joint's limits; quaternions have none."""
+    """Return a row for each coordinate that can change, with the range of its joint's limits.
+
+    The components of a quaternion have no row.
+    """
     rows = []
     for joint, at in zip(robot.tree.joints, robot.tree.q_index, strict=True):
         for k in range(min(joint.nq, 3)):
@@ -292,15 +295,16 @@ class Viewer:
     Args:
         server: The server from `urdfkin.view.server.new_server`.
         robot: The robot to show.
-        q: (nq,) start configuration; None: the neutral configuration, moved to within the limits.
+        q: (nq,) start configuration. None means the neutral configuration, moved to within the limits.
         trajectory: A trajectory to play; it starts at its first sample.
-        conversion: The convention of the field of q, to copy or type; None: urdfkin's.
+        conversion: The convention of q in the text field, where q can be copied or typed. None means
+            urdfkin's convention.
 
     Attributes:
         q: (nq,) configuration of the sliders, rad and m.
         v: (nv,) joint velocities.
         a: (nv,) joint accelerations.
-        motion: The chosen frame's motion in the chosen reference, checked.
+        motion: The motion of the chosen frame in the chosen reference frame, with its check.
         player: The controls of the trajectory; None without one.
     """
 

@@ -71,7 +71,7 @@ class JointRule:
     Attributes:
         name: The joint's name in the target program. None means the name in the URDF.
         sign: 1 or -1.
-        zero: The target program's value where the URDF's joint is at 0.
+        zero: The joint value in the target program if the joint value of the URDF is 0.
         unit: "rad", "deg", "turn", "m", "mm", or the number of units in one turn. None means the convention's
             unit.
     """
@@ -83,14 +83,14 @@ class JointRule:
 
     @property
     def factor(self) -> float | None:
-        """The sign times the number of units in one rad or m; None for a joint in the convention's unit."""
+        """The sign times the number of units in one rad or m; None if `unit` is None."""
         if self.unit is None:
             return None
         return self.sign * (_UNITS[self.unit] if isinstance(self.unit, str) else self.unit / math.tau)
 
     @property
     def of(self) -> str:
-        """What the unit measures: "angle" or "length"; "" if the joint uses the convention's unit."""
+        """The kind of unit: "angle" or "length"; "" if the joint uses the convention's unit."""
         if self.unit is None:
             return ""
         return "length" if self.unit in _LENGTHS else "angle"
@@ -296,8 +296,8 @@ def _quoted(text: str) -> str:
 
 _IDENTIFIER = re.compile("[A-Za-z_][A-Za-z0-9_]*")
 _DIGITS = string.digits + string.ascii_uppercase + string.ascii_lowercase
-#: A transcoded name ends with numbers in base 62. A digit of at least this value is followed by another digit
-#: of the same number.
+#: A transcoded name ends with numbers in base 62. If a digit has at least this value, the next digit belongs
+#: to the same number.
 _CONTINUES = 31
 
 
@@ -342,11 +342,12 @@ def transcoded(name: str) -> str:
 
     Different names give different results.
 
-    The result begins with "tn__". The characters of the name that OpenUSD allows follow, and then "_". After
-    that comes a number with digits of base 62 for each other character, in the order of code points. The
-    number encodes the character and its position in the name: the difference of its code point from the
-    previous code point, times the number of possible positions, plus the position (Bootstring encoding).
-    Source: github.com/PixarAnimationStudios/OpenUSD-proposals, proposals/transcoding_invalid_identifiers.
+    The result begins with "tn__". The characters of the name that OpenUSD allows follow, and then "_". Then a
+    number with digits of base 62 follows for each other character, in the order of code points. This number
+    encodes the character and its position in the name (Bootstring encoding). It is d n + p. Here d is the
+    difference of the code point from the previous code point, n is the number of possible positions, and p is
+    the position. Source: github.com/PixarAnimationStudios/OpenUSD-proposals,
+    proposals/transcoding_invalid_identifiers.
 
     >>> transcoded("1"), transcoded("arm-2"), transcoded("arm_2")
     ('tn__1_', 'tn__arm2_g6', 'arm_2')

@@ -55,7 +55,7 @@ class _Column:
 class _Block:
     """A planar or floating joint for which the target program defines another velocity.
 
-    The velocity is expressed in another frame, or is the velocity of another point.
+    The target program expresses the velocity in another frame, or uses the velocity of another point.
     """
 
     joint: Joint
@@ -178,7 +178,9 @@ class Conversion:
         tag = "link" if order.endswith("link") else "joint"
         written = {e.get("name", ""): k for k, e in enumerate(plain_xml(self._urdf).iterfind(tag))}
         names = tree.links[1:] if tag == "link" else [joint.name for joint in tree.joints]
-        place = [written.get(name, -1) for name in names]  # the file has no root joint, which comes first
+        place = [
+            written.get(name, -1) for name in names
+        ]  # -1 puts the root joint, which is not in the file, first
         if order == "name":
             return sorted(every, key=lambda i: (place[i] >= 0, tree.joints[i].name))
         if order == "file":
@@ -324,8 +326,8 @@ class Conversion:
         self._plain_q = bool((self._q_factor == 1.0).all() and not self._q_zero.any())
         self._plain_q &= not any(c.part for c in columns)
         self._same_q = self._plain_q and np.array_equal(self._q_index, np.arange(self.tree.nq))
-        # For each number of urdfkin's q, find the column of the target program that contains it. A mimic
-        # joint's column is used only if no other column contains the number.
+        # For each number of urdfkin's q, find the column of the target program's q that contains this number.
+        # A mimic joint's column is used only if no other column contains the number.
         self._q_source = [
             min((k for k, c in enumerate(columns) if c.at == at and c.factor), key=lambda k: columns[k].copy)
             for at in range(self.tree.nq)
@@ -819,7 +821,7 @@ class Reordering:
 
 
 def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | None:
-    """Return the formula that computes "q" or "v" of convention `end` from "q" or "v" of `start`, or None.
+    """Return the formula that converts "q" or "v" from convention `start` to convention `end`, or None.
 
     There is no formula if one of the two conventions stores the cosine and the sine of an angle, or if the
     two conventions express a base velocity in different frames.

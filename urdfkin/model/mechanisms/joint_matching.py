@@ -1,15 +1,14 @@
 """Candidates for matching two mechanisms: pairs of joints, and poses and joint zeros that align joint axes.
 
 Joints at two matched bodies are paired in three ways: by the names that the user gives, by equal names, and
-by geometry. Other functions yield candidate poses of a body and candidate zeros of a joint. The matcher tries
-each candidate.
+by geometry. The module also computes candidates for the pose of a body and for the zero of a joint. The
+matcher tries each candidate.
 
 Two subtrees match exactly if joint zeros exist with which every axis of one subtree coincides with an axis of
-the other. The angles of the two joints before the subtrees do not matter, because another choice of a joint's
-zero can compensate for an angle. Whether the subtrees match therefore depends only on the two joints and on
-the directions and positions of the two joint axes. The result is computed once for each such case and then
-stored. The search therefore visits each pair of joints only a few times, even for long chains and for many
-joints with two possible zeros.
+the other. Each subtree follows a joint. The angle of this joint does not matter, because another zero of the
+joint can compensate for the angle. Therefore, the result depends only on the two joints, and on the
+directions and positions of their axes. Each result is computed once and then stored. The search visits each
+pair of joints only a few times, even for long chains and for many joints with two possible zeros.
 """
 
 from __future__ import annotations
@@ -62,7 +61,7 @@ _FAMILIES = {
 
 
 class Pairing:
-    """The pairs of joints of mechanism A with joints of mechanism B, for each pair of bodies.
+    """For each pair of bodies, find the pairs of a joint of mechanism A and a joint of mechanism B.
 
     Args:
         a: One mechanism.
@@ -97,7 +96,7 @@ class Pairing:
     ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
         """Return the pairs of matched joints that follow two bodies, and the joints without a partner.
 
-        The joints of A without a partner and those of B without a partner are returned separately.
+        The joints without a partner are returned separately for A and for B.
 
         Args:
             bodies: The body of A and the body of B.
@@ -130,7 +129,7 @@ class Pairing:
     ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
         """Return the joint pairs found by name, and the joints that must be paired by geometry.
 
-        The joints of A and those of B that must be paired by geometry are returned separately.
+        The joints that must be paired by geometry are returned separately for A and for B.
         """
         if (known := self._by_names.get((bodies, via))) is None:
             known = self._by_names[bodies, via] = self._named_alike(bodies, via)
@@ -165,7 +164,7 @@ class Pairing:
         )
 
     def likeliest(self, bodies: tuple[int, int], e: Edge, edges: Sequence[Edge], X: FloatArray) -> list[Edge]:
-        """Return the joints of B whose partners the user did not name, sorted by similarity to a joint of A.
+        """Sort joints of B by similarity to a joint of A, without the joints whose partners the user named.
 
         The most similar joint comes first.
 
@@ -206,9 +205,9 @@ class Pairing:
     def _geometries(
         self, mechanism: Mechanism, body: int, edges: Sequence[Edge], T: FloatArray
     ) -> list[tuple[int, _JointGeometry]]:
-        """Return the geometry of the joints whose partners the user did not name, with their indices.
+        """Return the index and the geometry of each joint whose partner the user did not name.
 
-        The rigid motion T is applied to the joints first.
+        The function first applies the rigid motion T to the joints.
         """
         return [
             (i, _JointGeometry.of(mechanism, edge, T, self._signature(mechanism, body, edge)))
@@ -321,9 +320,10 @@ class Axis:
         return Axis(self.screw.moved(T), self.turns, self.seen.moved(T))
 
     def height(self, u: FloatArray) -> float | None:
-        """Return the height (m), measured along u, of the reference line's point nearest to the joint's axis.
+        """Return the coordinate (m) along u of a point of the reference line.
 
-        If the nearest point is not unique, the result is None.
+        This point is the one nearest to the joint's axis. If the nearest point is not unique, the result is
+        None.
         """
         s, start = self.screw, self.seen
         along_s = float(start.direction @ s.direction)
@@ -358,8 +358,8 @@ def behind(
 ) -> Iterator[Both[Axis]]:
     """Yield pairs of joint axes, one at a body of A and one at a body of B.
 
-    If a joint's axis is parallel to the line `seen`, the joint does not change the direction of that line.
-    The axes after this joint are then yielded too.
+    If a joint's axis is parallel to the line `seen`, the joint does not change the direction of that line. In
+    this case the function also yields the axes after this joint.
     """
     for e, f in _next_joints(mechanisms, via, bodies):
         axes = _axis(mechanisms[0], e, seen[0]), _axis(mechanisms[1], f, seen[1])
@@ -374,8 +374,9 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
     """Yield poses of B's root that align the first axis of B with the first axis of A, then the later axes.
 
     After the first axis is aligned, a rotation about it and a translation along it are still free. The axes
-    after the first axis determine this rotation and this translation. If no axes follow, as for a rotor, the
-    other axes of the same body determine the rotation and the translation.
+    after the first axis determine this rotation and this translation. If no axes follow the first axis, the
+    other axes of the same body determine the rotation and the translation. An example is the body of a drone
+    with rotors.
     """
     firsts = _firsts((a, b), (None, None), bodies, ())
     for (ours, theirs), near, far in firsts:
@@ -393,12 +394,12 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
 def root_poses_by_siblings(
     a: Mechanism, b: Mechanism, bodies: Both[int], alike: Callable[[Edge, Edge], bool]
 ) -> Iterator[FloatArray]:
-    """Yield poses of B's root that align three joint axes of a body of B with three axes of a body of A.
+    """Yield poses of B's root that align up to three joint axes of a body of B with axes of a body of A.
 
     Args:
         a: One mechanism.
         b: The other mechanism.
-        bodies: A body of A and a body of B, with several joints each.
+        bodies: A body of A and a body of B. Each of the two bodies has several joints.
         alike: Function that returns whether a joint of A may be paired with a joint of B.
     """
     edges = _with_axes(a, bodies[0])
@@ -455,9 +456,10 @@ def _guesses(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: boo
 def _firsts(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], near: tuple[Both[Axis], ...]
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
-    """Return pairs of first revolute axes, one of A and one of B, with the axes before and after each pair.
+    """Return pairs of the first revolute axes after two bodies, with the axes before and after each pair.
 
-    If there is no revolute axis, pairs of prismatic axes are returned.
+    Each pair has an axis of A and an axis of B. If there is no revolute axis, pairs of prismatic axes are
+    returned.
     """
     found = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):
@@ -496,8 +498,8 @@ def _axis(mechanism: Mechanism, edge: Edge, seen: Screw | None = None) -> Axis:
 #: the bodies after the joints, the joints, and the pose of B's body before the joints.
 Poses = Callable[[tuple[int, int], Pair, FloatArray], Iterable[FloatArray]]
 
-#: Largest number of joints on a path for the recursive search. Robots with longer paths are matched joint by
-#: joint.
+#: Largest number of joints on a path for the recursive search. The matcher matches robots with longer paths
+#: joint by joint.
 DEEPEST = 200
 #: Largest number of attempts to find a partner at B's body for each joint at A's body.
 MOST_ASSIGNMENTS = 5000
@@ -558,13 +560,13 @@ class Congruence:
         return None if found is None else found[0]
 
     def behind(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> FloatArray | None:
-        """Return the pose (4, 4) of B's body after two joints that gives an exact match, or None.
+        """Return the pose (4, 4) of B's body after two joints if the subtrees match exactly, else None.
 
         Args:
             e: Joint of A.
             f: Joint of B.
             bodies: The bodies before the joints.
-            X: (4, 4) pose of B's body before the joint, as for `at`.
+            X: (4, 4) pose of B's body before the joint, as in the method `at`.
         """
         found = None if self._off else self._behind(e, f, bodies, X)
         return None if found is None else found.X
@@ -634,7 +636,7 @@ class Congruence:
         return found
 
     def _rate(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> Rates:
-        """Return which coordinate of A corresponds to which coordinate of B, for two matched joints.
+        """Return the corresponding coordinates of A and B for two matched joints.
 
         The result is empty if one of the two joints has no coordinate.
         """
@@ -652,7 +654,7 @@ class Congruence:
         return {x: (y, (1.0 if alike != back else -1.0) * m / n)}
 
     def _together(self, some: Rates, others: Rates) -> Rates | None:
-        """Return the union of two sets of corresponding coordinates.
+        """Merge two sets of corresponding coordinates.
 
         If the two sets contradict each other, the result is None.
         """
@@ -673,7 +675,7 @@ class Congruence:
         return self.tolerance.holds(*self.pairing.mismatch(e, f, IDENTITY, X))
 
     def _same_case(self, e: Edge, X: FloatArray, other: FloatArray) -> bool:
-        """Return whether a joint's motion can undo the difference of two poses of B's body before it."""
+        """Return whether a motion of the joint can compensate for the difference of two poses of B's body."""
         kind = self.a.joint(e).kind
         if kind.nq > 1:
             return family(kind) == "floating" or self.tolerance.holds(*apart(X, other))

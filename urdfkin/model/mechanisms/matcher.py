@@ -1,18 +1,18 @@
 """Align mechanism B with mechanism A.
 
-The alignment matches the joints of A and B. The alignment chooses the base of B, the order of B's joints, and
-the sense and the zero of each joint.
+The alignment matches the joints of A and B. It chooses the base of B, the order of B's joints, and the sense
+and the zero of each joint. The sense is the sign of the joint's coordinate.
 
 The matcher starts at a common body and goes outwards through A and B at the same time. At each joint it
-chooses the sense and the zero of B's joint. With this choice, as many as possible of B's later links and axes
-coincide with links and axes of A. `align` calls the matcher for several starting bodies and joint orders, and
-returns the best result.
+chooses the sense and the zero of B's joint. The best choice is the one with which most of B's later links and
+axes coincide with links and axes of A. `align` calls the matcher for several starting bodies and joint
+orders, and returns the best result.
 
 Most joint zeros are determined by axes or link frames. If neither an axis nor a common link frame follows a
-joint, only a mimic rule determines the joint's zero. Let v = m w + c be a rule of A and v' = m' w' + c' a
-rule of B. The two rules are equivalent if the substitution v' = s v + o, w' = s' w + o' converts one rule to
-the other. If nothing is attached to the joint's link, its offset o is free, and the rules determine it. For a
-revolute joint, a multiple of a full turn may always be added to o.
+joint, only a mimic rule determines the joint's zero. Let v = m w + c be a mimic rule of A, and let v' = m' w'
++ c' be the corresponding rule of B. The two rules are equivalent if the substitution v' = s v + o, w' = s' w
++ o' converts one rule to the other. If nothing is attached to the joint's link, the joint's offset o is free,
+and the mimic rules determine o. For a revolute joint, a multiple of a full turn may always be added to o.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ AHEAD = 6
 #: of a body of B coincide with axes of a body of A.
 MOST_ROOT_POSES = 48
 #: If two choices have equally many agreements, one choice is better only if its largest difference is less
-#: than this fraction of the other choice's.
+#: than this fraction of the other choice's largest difference.
 TWICE_AS_WELL = 0.5
 
 #: The value that the matcher chooses for a joint: an offset, or a pose for a planar or floating joint.
@@ -74,7 +74,7 @@ Score = tuple[int, float]
 
 @dataclass(slots=True)
 class Ahead:
-    """The number of look-ahead steps that a search may still make; several matchers may share this object."""
+    """The number of look-ahead steps that a search may still make. Several matchers may share this object."""
 
     left: int
 
@@ -105,11 +105,12 @@ class MechanismMatcher:
         a: One mechanism.
         b: The other mechanism, which is aligned with `a`.
         pairing: Finds the joints of `a` and `b` that may be matched.
-        gauge: Prescribed free choices; None: the choices with which most joints and links agree.
+        gauge: Prescribed free choices. If this is None, the matcher makes the choices with which most joints
+            and links agree.
         ahead: The number of look-ahead steps that the matcher may make.
         tolerance: Tolerance for the comparison of poses and axes.
-        base: A link of `a` and a link of `b`. The matcher begins at the bodies of these links; None: at the
-            likeliest bodies.
+        base: A link of `a` and a link of `b`. The matcher begins at the bodies of these links. If this is
+            None, it begins at the likeliest bodies.
     """
 
     def __init__(
@@ -125,7 +126,7 @@ class MechanismMatcher:
         self.a, self.b, self.pairing, self.gauge, self.ahead = a, b, pairing, gauge, ahead
         self.tolerance, self.base = tolerance, base
         self.size = size_of(a, b)
-        #: Finds subtrees that match exactly; None if the gauge is prescribed.
+        #: Finds subtrees that match exactly; None if the free choices are prescribed.
         self.exact = Congruence(a, b, pairing, tolerance, self._poses_behind) if gauge is None else None
 
     # -- where to begin ------------------------------------------------------------------------------
@@ -166,7 +167,7 @@ class MechanismMatcher:
         return None
 
     def _exact_places(self, base: tuple[int, int]) -> Iterator[FloatArray]:
-        """Yield poses of B's root for which all axes of B's body coincide with axes of A's body."""
+        """Yield poses of B's root with which all axes of B's body coincide with axes of A's body."""
         yield from self._by_names(base)
         siblings = root_poses_by_siblings(self.a, self.b, base, lambda e, f: self.pairing.alike(base, e, f))
         some = (
@@ -179,7 +180,7 @@ class MechanismMatcher:
     def _places(self, base: tuple[int, int]) -> Iterator[FloatArray]:
         """Yield candidate poses of B's root.
 
-        The first is the pose of A's root. Then come poses that align links of equal names, and poses that
+        The first is the pose of A's root. Poses that align links of equal names follow, and then poses that
         align axes.
         """
         yield from self._by_names(base)
@@ -202,9 +203,9 @@ class MechanismMatcher:
         common with it. If no body of B has a link name in common with A's root body, every body of B is tried
         as its partner.
 
-        If A's root body has no link names in common with B, B's root body is also yielded, with the body of A
-        that has most link names in common. A's root may have no counterpart in B, for example before a
-        floating joint.
+        If A's root body has no link names in common with B, the function also yields B's root body. The
+        partner of this body is the body of A that has most link names in common with it. A's root may have no
+        counterpart in B, for example before a floating joint.
         """
         if self.base is not None:
             yield self.a.body_of[self.base[0]], self.b.body_of[self.base[1]]
@@ -295,7 +296,10 @@ class MechanismMatcher:
             found.frames.append(FramePair(link_a, link_b, place.previous, home, end, angle, way))
 
     def _as_tools(self, place: Place, taken: list[tuple[int, int]]) -> FramePair | None:
-        """If no links of two bodies match, return one link of each body as different end-effector frames."""
+        """Return one link of each body as a pair of different end-effector frames, or None.
+
+        The result is None if links of the two bodies match, or if a body has no link of its own.
+        """
         ours, theirs = self._own_links(place)
         if taken or not ours or not theirs:
             return None
@@ -327,7 +331,7 @@ class MechanismMatcher:
         return ours, [j for j in self.b.bodies[place.bodies[1]] if names_b[j] not in names_a]
 
     def _step(self, place: Place, e: Edge, f: Edge, index: int, depth: int) -> tuple[Step, Place, Score]:
-        """Return the step over a pair of joints, the position after the joints and that position's score."""
+        """Return the step over a pair of joints, the position after them, and the score of this position."""
         kinds = family(self.a.joint(e).kind), family(self.b.joint(f).kind)
         via = e, f
         backwards = e.outer == place.bodies[0], f.outer == place.bodies[1]
@@ -356,7 +360,7 @@ class MechanismMatcher:
     def _free(
         self, place: Place, there: Place, backwards: tuple[bool, bool], depth: int, kind: str
     ) -> tuple[Step, Place, Score]:
-        """Pass a planar or floating joint, whose frame and whose origin of coordinates are free choices."""
+        """Match a planar or floating joint. Its frame and the zero of its coordinates are free choices."""
         e, f = _both(there.via)
         homes = self.a.homes[e.joint + 1], self.b.homes[f.joint + 1]
         at, seen = place.G @ homes[0], place.XC @ homes[1]
@@ -400,7 +404,7 @@ class MechanismMatcher:
         plane: FloatArray | None,
         poses_behind: Iterable[FloatArray],
     ) -> Iterator[FloatArray]:
-        """Yield candidates for the rigid motion N between B's joint frame and the body after the joint.
+        """Yield candidates for the rigid motion N of a planar or floating joint (P_b = M P_a N).
 
         The candidates are the identity, N in the zero configuration, and motions that align a link or an
         axis.
@@ -409,7 +413,8 @@ class MechanismMatcher:
             there: The position after the joint, with B in its zero configuration.
             at: (4, 4) the joint's frame.
             home_b: (4, 4) the frame of B's joint in the zero configuration.
-            plane: (4, 4) N of a planar joint, up to a motion in the joint's plane; None for a floating joint.
+            plane: (4, 4) a valid N of a planar joint; all others differ by a motion in the joint's plane.
+                None for a floating joint.
             poses_behind: (4, 4) poses that align B's axes after the joint with A's.
         """
         yield IDENTITY if plane is None else plane
@@ -424,7 +429,7 @@ class MechanismMatcher:
     def _like(
         self, place: Place, there: Place, backwards: tuple[bool, bool], depth: int, *, turns: bool
     ) -> tuple[Step, Place, Score]:
-        """Pass a joint that is revolute in A and B, or prismatic in A and B.
+        """Match a joint that is revolute in A and B, or prismatic in A and B.
 
         The method chooses the sense and the zero of B's joint, and decides whether the two axes differ.
         """
@@ -446,7 +451,8 @@ class MechanismMatcher:
                 zero = 0.0 if self.tolerance.holds(*apart(place.XC, exact)) else zero
             offset, there, score = self._best_zero(there, place.G, t, turns, zero, depth)
             return Step(a, b, kind, place.previous, sense, offset, IDENTITY, s, s, 0.0, 0.0), there, score
-        # Either the joint and all bodies after it are displaced in B, or only the joint's axis differs.
+        # There are two possibilities: the joint and all bodies after it are displaced in B, or only the
+        # joint's axis differs.
         with_it = self._best_zero(there, K @ place.G, t, turns, zero, depth)
         if depth == AHEAD:
             alone = self._best_zero(there, place.G, t, turns, zero, depth)
@@ -560,8 +566,9 @@ def _best_of(scored: Sequence[tuple[_Free, Place, Score]]) -> tuple[_Free, Place
 def better(score: Score, than: Score) -> bool:
     """Return whether `score` is better than the score `than`.
 
-    A score with more agreements is better. Of two scores with equally many agreements, a score is better if
-    its largest difference is less than half of the other's.
+    A score with more agreements is better. If both scores have equally many agreements, the largest
+    differences decide. In this case a score is better only if its largest difference is less than half of the
+    other one.
     """
     return score[0] > than[0] or (score[0] == than[0] and score[1] < TWICE_AS_WELL * than[1])
 
@@ -574,7 +581,7 @@ def _value_of(screw: Screw, T: FloatArray, *, turns: bool) -> float:
 
 
 def _outwards(screw: Screw, backwards: bool) -> Screw:
-    """Return a joint's screw for the motion of the body that is farther from the base.
+    """Return a joint's screw with the sign that describes the motion of the body farther from the base.
 
     If the path goes through the joint from child to parent, the screw is reversed.
     """
@@ -605,8 +612,8 @@ def _normals_apart(at: FloatArray, seen: FloatArray) -> tuple[FloatArray, float,
     return between(start, end.reversed() if start.direction @ end.direction < 0.0 else end, turns=False)
 
 
-#: Largest number of orders that are tried for commuting joints. This number is the number of orders of five
-#: prismatic joints.
+#: Largest number of orders that are tried for commuting joints. Five prismatic joints have this number of
+#: orders.
 MOST_ORDERS = 120
 #: Total number of look-ahead steps of one search; this number of steps takes some seconds. Without names,
 #: TALOS needs 500 steps and Baxter 1,000.
@@ -626,7 +633,8 @@ def align(a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | N
         a: One mechanism.
         b: The other mechanism.
         given: Names of joints of A, each with the name of the matched joint in B.
-        gauge: Prescribed free choices; None: the choices with which most joints and links agree.
+        gauge: Prescribed free choices. If this is None, the function makes the choices with which most joints
+            and links agree.
     """
     if gauge is not None:
         for taken in gauge.orders:
@@ -651,15 +659,15 @@ def _orders_to_try(
 ) -> Iterator[Sequence[str]]:
     """Yield other orders of commuting joints of B.
 
-    If A has joints with all these names, only the order of A's joints is yielded. Otherwise all orders are
-    yielded.
+    If A has joints with all these names, the function yields only the order in A and the reverse of this
+    order. Otherwise it yields all orders.
 
     Args:
         a: One mechanism.
         b: The other mechanism.
         given: Names of joints of A, each with the name of the matched joint in B.
         run: Names of the commuting joints of B, from the inner body outwards.
-        orders: All other orders of these joints that their axes allow.
+        orders: All other orders of these joints that give the same motion.
     """
     called = {given.get(joint.name, joint.name): i for i, joint in enumerate(a.tree.joints)}
     if not all(name in called for name in run):
@@ -674,7 +682,7 @@ def _orders_to_try(
 def _by_rules(best: Alignment) -> Alignment:
     """Return the alignment in which the mimic rules determine joint zeros.
 
-    If this alignment agrees less well than the given alignment, the given alignment is returned.
+    If this alignment is worse than the given alignment, the function returns the given alignment.
     """
     zeros = zeros_by_rules(best, tolerance_of(best.a, best.b))
     if not zeros:
@@ -711,10 +719,11 @@ def _nearly(best: Alignment, given: Mapping[str, str]) -> Alignment:
 
     If there is none, the given alignment is returned.
 
-    If every axis differs slightly, no exact agreement decides between two candidates. The search is therefore
-    repeated with increasing tolerances until everything agrees. Then the mechanisms are aligned once more,
-    with the exact tolerance and the free choices of the last search, so that the small differences are
-    reported. A large difference counts as a wrong choice only if an earlier joint has a smaller difference.
+    If every axis differs slightly, no axes agree exactly, so the search cannot decide between two candidates.
+    Therefore, the search is repeated with increasing tolerances until everything agrees. Then the mechanisms
+    are aligned once more. This last alignment uses the exact tolerance and the free choices of the last
+    search, so it reports the small differences. Only tolerances between the smallest difference and half of
+    the largest difference are tried.
     """
     a, b, (least, most), ahead = best.a, best.b, best.inner_off, Ahead(MOST_AHEAD)
     for angle in NEARLY:
@@ -755,29 +764,29 @@ def _best_alignment(
     return best
 
 
-#: Numbers of full turns by which the zero of a mimicked joint may be changed.
+#: Numbers of full turns that may be added to the zero of a mimicked joint.
 TURNS = (0, 1, -1)
-#: Tolerance of a joint zero that follows from the positions of axes, as a multiple of the angle tolerance.
-#: It is large because two axes that are close together give an inexact joint zero.
+#: Tolerance of a joint zero that follows from the positions of axes, as a multiple of the angle tolerance. It
+#: is large because a joint zero is inexact if it follows from two axes that are close together.
 LEVER = 1e4
 
 
 @dataclass(frozen=True, slots=True)
 class _Rule:
-    """A joint that moves with a coordinate x of A and a coordinate y of B.
+    """A joint whose value depends on a coordinate x of A and a coordinate y of B.
 
-    The joint's value is m x + c in A and n y + d in B. The alignment has the sense s and the offset o: B's
-    value is s times A's value, plus o.
+    The joint's value is m x + c in A and n y + d in B. In the alignment, B's value is s times A's value plus
+    o, with the sense s and the offset o.
 
     Attributes:
         step: Index of the step.
-        slope: The product s m: the slope of A's value with B's sense.
-        constant: The product s c: the constant of A's value with B's sense.
+        slope: The slope m of A's rule, multiplied by the sense s.
+        constant: The constant c of A's rule, multiplied by the sense s.
         n: Multiplier of B's rule.
         d: Offset of B's rule.
         offset: The offset o that the alignment found.
         turns: Whether the joint is revolute.
-        free: Whether o is free: no axis and no common link determines it.
+        free: Whether o is free, because no axis and no common link determines it.
         meets: Whether links of A and of B coincide on the body after the joint.
     """
 
@@ -792,15 +801,15 @@ class _Rule:
     meets: bool
 
     def beta(self, turn: int) -> float:
-        """Return beta in y = alpha x + beta, after the joint's zero is changed by some full turns."""
+        """Return beta in y = alpha x + beta, if some full turns are added to the joint's zero."""
         return (self.constant + self.offset + 2.0 * math.pi * turn - self.d) / self.n
 
     def wanted(self, beta: float) -> float:
-        """Return the joint's offset o that corresponds to the constant beta in y = alpha x + beta."""
+        """Return the offset o of the joint for which y = alpha x + beta has the given constant beta."""
         return self.n * beta + self.d - self.constant
 
     def allows(self, offset: float, tolerance: Tolerance) -> bool:
-        """Return whether the joint can have this offset, up to rounding."""
+        """Return whether this offset is possible for the joint, up to rounding."""
         off = offset - self.offset
         if self.turns:
             off = math.remainder(off, 2.0 * math.pi)
@@ -808,7 +817,7 @@ class _Rule:
 
 
 def zeros_by_rules(found: Alignment, tolerance: Tolerance) -> Mapping[str, tuple[int, float]]:
-    """Return the sense and the offset of each joint of A whose zero the mimic rules change."""
+    """Return the new sense and offset of each joint of A whose zero must change because of a mimic rule."""
     zeros = dict[str, tuple[int, float]]()
     for rules in _groups(found):
         alphas = [rule.slope / rule.n for rule in rules if rule.n]
@@ -857,10 +866,10 @@ def _as_rule(joint: Joint) -> tuple[str, float, float]:
 
 
 def _is_determined(found: Alignment, i: int) -> tuple[bool, bool]:
-    """Return two facts about the zero of a joint.
+    """Return whether a joint's zero is determined, and whether links after the joint coincide.
 
-    The first is whether axes or links with common names determine the zero. The second is whether links
-    without common names, on the bodies after the joint in A and in B, coincide.
+    The zero is determined by axes, or by links with common names. The second result is True if a link of A
+    and a link of B after the joint coincide, even if their names differ.
     """
     names = set(found.a.labels) & set(found.b.labels)
     behind = {i}
@@ -875,7 +884,7 @@ def _is_determined(found: Alignment, i: int) -> tuple[bool, bool]:
 
 
 def _keeps_axis(one: Step, other: Step) -> bool:
-    """Return whether the motion of the first joint leaves the axis of the second joint in its place."""
+    """Return whether the axis of the second joint stays fixed when the first joint moves."""
     if "turns" not in (one.kind, other.kind):
         return other.kind == "prismatic"
     if {one.kind, other.kind} - {"turns", "prismatic"}:

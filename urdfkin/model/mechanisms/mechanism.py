@@ -1,37 +1,38 @@
 """A robot as a mechanism of rigid bodies and joint screws in the zero configuration; two aligned mechanisms.
 
-By the product of exponentials a link's pose is exp(S_1 t_1) ... exp(S_n t_n) H. The unit screws S_i and the
-pose H are those of the zero configuration, in one common frame. The links between the joints do not occur in
-this product, so links that are fixed to each other may be merged or split. Any body may serve as the root: a
-path from another body passes some joints backwards, with reversed screws.
+By the product of exponentials, a link's pose is exp(S_1 t_1) ... exp(S_n t_n) H. The unit screws S_i and the
+pose H are those of the zero configuration, in one common frame. This product does not contain the links
+between the joints, so links that are fixed to each other may be merged or split. Any body may be the root. A
+path from another body passes some joints backwards, and the screws of these joints are reversed.
 
-The coordinates of a planar or floating joint are a pose P. If the frame of B's joint, or the frame of the
-body after this joint, is another than in A, the motions are equal for
+The coordinates of a planar or floating joint describe a pose P. The frame of B's joint, or the frame of the
+body after this joint, may differ from A's. In this case, the motions of A and B are equal if
 
-    P_b = M P_a N,      or      M P_a^-1 N if one model's joint is reversed.
+    P_b = M P_a N,      or M P_a^-1 N if the joint is reversed in one model.
 
-For a floating joint any rigid M and N are valid. For a planar joint, M P N must be in the plane for every P
-in the plane. This requires that M raises the plane by as much as N lowers it. Either M and N both turn the
+For a floating joint, any rigid M and N are valid. For a planar joint, M P N must be in the plane for every P
+in the plane. Therefore, N lowers the plane by the same distance by which M raises it. M and N both turn the
 plane over, or neither of them does.
 
-**Alignment.** The matcher starts from a body of A that corresponds to a body of B. Let G be the rigid motion
-that moves a body of A, in A's zero configuration, to the corresponding body of B in B's zero configuration. A
-joint of A moves by exp(S t), and the matched joint of B by exp(S' t'). B's coordinate may have the opposite
-sense and a different zero. Therefore t' and S' are expressed with A's sense and zero. G changes at a joint if
-B's axis, or the body after the joint, has a different pose than in A. B is therefore the same as A, except
-that a rigid motion L is inserted before some joints and some axes are different:
+**Alignment.** The matcher starts from a body of A that corresponds to a body of B. A rigid motion G moves a
+body of A to the corresponding body of B, both in the zero configuration. A joint of A moves by exp(S t), and
+the matched joint of B moves by exp(S' t'). B's coordinate may have the opposite sense (sign) and a different
+zero. Therefore, S' and t' are converted to A's sense and zero. G stays the same from body to body where the
+models agree. G changes at a joint if the joint's axis, or the body after the joint, has different poses in A
+and B. Therefore, B is the same as A, with two exceptions: some axes are different, and a rigid motion L is
+inserted before some joints:
 
-    T_A = exp(S_1 t_1) ... exp(S_n t_n) H,      T_B = L_1 exp(S'_1 t'_1) ... L_n exp(S'_n t'_n) L H,
+    T_A = exp(S_1 t_1) ... exp(S_n t_n) H,      T_B = L_1 exp(S'_1 t'_1) ... L_n exp(S'_n t'_n) L H.
 
-with S'_i = S_i, t'_i = t_i and L_i = 1 for each joint at which A and B agree. The two models have the same
-motion if and only if nothing differs. There is one exception: two revolute joints on a common line can divide
-the sum of their rotations differently.
+If A and B agree at joint i, then S'_i = S_i, t'_i = t_i and L_i = 1. The two models have the same motion if
+and only if nothing differs. There is one exception: two revolute joints on a common line can divide the sum
+of their rotations differently.
 
 **Variables.** The joint values of A and of B are linear functions of shared variables. Each coordinate of A
 is a variable. The coordinates of B are computed from these variables, with the senses and zeros of the
-joints. Each joint value of A or B is therefore a constant plus a multiple of one variable. A motion that only
-B has is a separate variable. Examples are a joint of B that is a mimic joint in A, and a joint of B that is
-fixed in A.
+joints. Each joint value of A or B is therefore a constant plus a multiple of one variable. If a joint can
+move independently only in B, its coordinate is a separate variable. Examples are a joint that is a mimic
+joint in A, and a joint that is fixed in A.
 """
 
 from __future__ import annotations
@@ -72,8 +73,8 @@ def between(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArray, float
     """Return the smallest motion from one joint axis to another, its tilt (rad) and its shift (m).
 
     The motion tilts the axis about the first joint's origin and then shifts it perpendicular to itself. The
-    motion contains no rotation about the axis and no shift along the axis, because these belong to the
-    joint's zero or have no effect. The axis of a prismatic joint has no position, so its shift is 0.
+    motion contains no rotation about the axis and no shift along the axis. Such a motion changes only the
+    joint's zero, or has no effect. The axis of a prismatic joint has no position, so its shift is 0.
     """
     R, tilt = shortest_turn(start.direction, end.direction)
     across = np.zeros(3)
@@ -147,7 +148,7 @@ class JointTransform:
     def holds_for(self, kind: JointKind) -> bool:
         """Return whether M and N are rigid and the joint can reach M P N.
 
-        The test uses two poses P, zero and a generic pose.
+        The function tests two poses P: the identity and a generic pose.
         """
         if not all(is_pose(JointKind.FLOATING, T) for T in (self.before, self.behind)):
             return False
@@ -198,9 +199,9 @@ def onto_plane(P: FloatArray) -> FloatArray:
 def undoing(M: FloatArray) -> FloatArray:
     """Return N (4, 4) for which M P N is in the plane for every P in the plane.
 
-    M must keep the direction of the plane's normal or reverse it. M is then composed of a translation by h
-    along the normal, a motion in the plane, and possibly half a turn about x. N reverses the translation and
-    the half turn.
+    M must keep the direction of the plane's normal or reverse it. Then M consists of a translation along the
+    normal and a motion in the plane. If M reverses the normal, M also contains half a turn about x. N undoes
+    the translation and the half turn.
     """
     over = np.diag([1.0, -1.0, -1.0, 1.0]) if M[2, 2] < 0.0 else np.eye(4)
     return over @ pose(p=(0.0, 0.0, -M[2, 3]))
@@ -246,9 +247,9 @@ class Mechanism:
 
     Args:
         tree: The robot.
-        parting: Indices of fixed joints that separate two bodies, because these joints move in the other
-            model.
-        labels: For each link the name by which links are paired; None: the names in the tree.
+        parting: Indices of fixed joints that move in the other model. The links before and after such a joint
+            belong to different bodies.
+        labels: For each link, the name by which links are paired. None stands for the names in the tree.
     """
 
     def __init__(
@@ -289,7 +290,7 @@ class Mechanism:
         return known
 
     def in_order(self, names: Sequence[str]) -> Mechanism:
-        """Return the same mechanism with consecutive joints in another order that their axes allow.
+        """Return the same mechanism with consecutive joints in another order that gives the same motion.
 
         Links between reordered joints belong to no body in the result.
 
@@ -326,9 +327,9 @@ class Mechanism:
         return len(run) == len(names) and one_line and all(self._commute(*two, tolerance) for two in changed)
 
     def orders_of_runs(self, tolerance: Tolerance) -> Iterator[Iterator[list[str]]]:
-        """Yield, for each run of consecutive joints, the orders of its joints that give the same motion."""
+        """For each run of consecutive joints, yield the joint orders that give the same motion."""
         run: list[Edge] = []
-        for edge in self.edges:  # depth first: the next edge continues the run if the body has no other
+        for edge in self.edges:  # depth first: a run ends at a body with several child joints
             if run and edge.inner == run[-1].outer and len(self.edges_of[edge.inner]) == 2:
                 run.append(edge)
                 continue
@@ -410,7 +411,7 @@ def size_of(a: Mechanism, b: Mechanism) -> float:
 
 
 def between_lines(s: Screw, t: Screw, *, placed: bool) -> tuple[float, float]:
-    """Return the angle (rad) and the distance (m) of two axes; the distance is 0 if `placed` is false."""
+    """Return the angle (rad) and the distance (m) of two axes. If `placed` is false, the distance is 0."""
     ux, uy, uz = s.direction.tolist()  # called thousands of times; plain floats are faster
     vx, vy, vz = t.direction.tolist()
     sine = math.hypot(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx)
@@ -441,8 +442,8 @@ class Step:
         before: (4, 4) the rigid motion L that is inserted before B's joint, in A's zero configuration.
         axis: Screw of A's joint in the zero configuration. The sign of the screw describes the motion of the
             body that is farther from the base.
-        other: Screw of B's joint, with the same rule for its sign. If the two screws agree, `other` is the
-            same Python object as `axis`.
+        other: Screw of B's joint, with the same sign convention. If the two screws agree, `other` is the same
+            Python object as `axis`.
         tilt: Angle (rad) between the axes of the two joints, or between the normals of two planar joints.
         shift: Distance (m) between the axes of the two joints; for planar or floating joints, between the
             origins of their frames.
@@ -479,7 +480,7 @@ class FramePair:
     Attributes:
         a: Link of A (index in its tree).
         b: Link of B (index in its tree).
-        previous: Index of the step whose joints move the links; -1 if no joint moves them.
+        previous: Index of the last step on the path to the links; -1 if no joint moves the links.
         home: (4, 4) pose of A's link in the zero configuration.
         end: (4, 4) the rigid motion L that is inserted after the last joint, in A's zero configuration.
         tilt: Angle (rad) between the frames of A's link and B's link on the matched body.
@@ -515,15 +516,16 @@ class Alignment:
     Attributes:
         a: One mechanism.
         b: The other mechanism.
-        base: The link of A and the link of B at which the matcher began.
+        base: The link of A and the link of B from which the matcher started.
         X: (4, 4) pose of B's root in A's root frame.
-        steps: The joint pairs, in an order in which each pair comes after all pairs before it on its path.
+        steps: The joint pairs, ordered outwards from the base: a pair comes after all pairs between it and
+            the base.
         frames: The pairs of matched links.
         only_a: Indices of the joints that only A has.
         only_b: Indices of the joints that only B has.
         matched: Number of joint pairs and link pairs that agree.
-        worst: The largest difference between a joint or link of A and the matched one of B, m. Differences of
-            angles are multiplied by the robot's size.
+        worst: The largest difference (m) between a joint or link of A and the matched joint or link of B.
+            Differences of angles are multiplied by the robot's size.
     """
 
     a: Mechanism
@@ -557,7 +559,7 @@ class Alignment:
 
     @property
     def inner_off(self) -> tuple[float, float]:
-        """Smallest and largest difference (m) of matched joint axes, and of matched links that carry joints.
+        """Smallest and largest difference (m) of matched joint axes and of matched links with child joints.
 
         Pairs that agree are not counted. If all pairs agree, the two results are 0.
         """
@@ -588,10 +590,10 @@ class Alignment:
         )
 
     def exchangeable(self, given: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
-        """Yield joint pairs of the same body, two at a time, that could exchange their partners in B.
+        """Yield two joint pairs at a time whose partners in B could be exchanged.
 
-        The user named no partner for the joints of A in these pairs, and B has no joints with the same names.
-        Each of the pairs is on the path to a joint or link that differs.
+        Both pairs are at the same body. The user named no partner for their joints of A, and B has no joints
+        with the same names. A joint or link that differs follows on the path after each of these pairs.
         """
         known_names = {joint.name for joint in self.b.tree.joints} | set(given)
         ends = [i for i, step in enumerate(self.steps) if step.differs]
@@ -646,10 +648,10 @@ class Gauge:
     """Prescribed values of the free choices: the pose of B's root, and the sense and zero of each joint.
 
     Attributes:
-        base: A link of A and a link of B. The matcher begins at the bodies of these links; None: it chooses
-            the bodies by names.
+        base: A link of A and a link of B. The matcher begins at the bodies of these links. If this is None,
+            it chooses the bodies by names.
         X: (4, 4) pose of B's root in A's root frame.
-        zeros: Sense and offset of each joint of A whose sense and offset differ from (1, 0.0).
+        zeros: Sense and offset of joints of A, by name. All other joints have the sense 1 and the offset 0.0.
         conversions: For each planar or floating joint whose coordinates in A and B differ: the conversion
             from A's coordinates to B's coordinates.
         orders: New orders of consecutive joints of B. Each entry lists some consecutive joints in their new
@@ -663,8 +665,8 @@ class Gauge:
     orders: tuple[tuple[str, ...], ...] = ()
 
 
-#: The gauge without any change: the roots of A and B have the same pose, and the coordinates of A and B are
-#: equal.
+#: Free choices that change nothing: the roots of A and B have the same pose, and the coordinates of A and B
+#: are equal.
 AS_WRITTEN = Gauge()
 
 
@@ -693,8 +695,8 @@ class Pair:
     b: Line
     #: Sense and offset for the value of B's joint in B's own coordinates, which is sense * b + offset.
     written: Line
-    #: Difference of the two constants (rad or m) that counts as rounding, in addition to the rounding of one
-    #: step.
+    #: Because of rounding, the two constants may differ by this value (rad or m), in addition to the rounding
+    #: error of one step.
     rounding: float = 0.0
 
     @property
@@ -715,8 +717,7 @@ class Variables:
         freer_a: Indices of the steps whose joint is independent in A and a mimic joint in B.
         freer_b: Indices of the steps whose joint is independent in B and a mimic joint in A.
         rules: Indices of the steps with different mimic rules in A and B.
-        leaders: For each coordinate of B, by joint name: the linear function that computes the coordinate
-            from a variable.
+        leaders: For each coordinate of B, by joint name: the coordinate as a linear function of a variable.
     """
 
     pairs: tuple[Pair | None, ...]
@@ -761,7 +762,7 @@ class _Maker:
     def _leaders(self) -> dict[str, Line]:
         """Return each coordinate of B as a linear function of a coordinate of A, or as a separate variable.
 
-        Steps whose joint is independent in A are used first.
+        Joints that are independent in A are processed before joints that are mimic joints in A.
         """
         tree, used, lines = self.trees[1], set[str](), dict[str, Line]()
         own = [i for i, joint in enumerate(tree.joints) if joint.kind.nq == 1 and joint.mimic is None]

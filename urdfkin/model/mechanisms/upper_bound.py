@@ -1,29 +1,28 @@
 """Upper bounds on the distance between a frame's poses in two models, proven for all configurations.
 
 Support functions. The support function of a set W of points is h(u) = max over p in W of u . p. A bound on
-distances needs only h, and a joint changes h in a simple way. Suppose that W rotates about an axis by any
-angle of a range. The new h'(u) is then the largest h over the directions that result when u is rotated back
-by these angles. If W translates, h'(u) is h(u) plus the largest product of u and the translation. Therefore,
-one function of the direction describes the reach of a chain with any number of joints, without a search over
-joint values.
+distances needs only h. If a joint moves W, the new support function h' follows from h. Suppose that W rotates
+about an axis by any angle of a range. If u is rotated back by these angles, it takes a range of directions.
+Then h'(u) is the largest h over these directions. If W translates, h'(u) is h(u) plus the largest product of
+u and the translation. Therefore, one function of the direction describes the reach of a chain with any number
+of joints. No search over joint values is necessary.
 
 The values of h are stored at the points of a grid on the surface of a cube. The function h is convex, and h(s
 u) = s h(u) for s >= 0, so interpolation between grid points gives an upper bound. For a rotation, the
 directions form an arc. The arc lies in a circumscribed polygon, and h on the polygon is largest at a corner.
-For each joint, the grid makes the bound too large by a fraction. This fraction decreases with the square of
+At each joint, the grid makes the bound too large by a relative error. This error decreases with the square of
 the distance between grid points.
 
-Recursion. Let y be the position of B's frame, as the joints after joint i move it, and let d be y minus the
-position of A's frame. The joint and its L change d to
+Recursion. Let y be the position of B's frame if only the joints after joint i move. Let d be y minus the
+position of A's frame. The motions of joint i and its L change d to
 
     d' = (L - 1) e(S' t') y  +  (e(S' t') - e(S t')) y  +  (e(S t') - e(S t)) y  +  e(S t) d.
 
-If nothing differs at the joint, all terms but the last are 0. For each direction u, the largest u . d' is at
-most the sum of the largest values of u times each term. The support functions of y and d give these values.
-If the models have a single difference, there is a single term, and only the grid makes the bound larger than
-the true maximum. Several differences may be largest in different configurations, so their bound is larger
-than the true maximum. If only fixed offsets differ, a sum of path lengths gives a second bound without grid
-error.
+If nothing differs at the joint, all terms but the last are 0. For each direction u, the maximum of u . d' is
+at most the sum of the maxima of u times each term. The support functions of y and d give these maxima. If the
+models have a single difference, there is a single term, and only the grid makes the bound larger than the
+true maximum. Several differences may be largest in different configurations, so their bound is larger than
+the true maximum. If only fixed offsets differ, a sum of path lengths gives a second bound without grid error.
 """
 
 from __future__ import annotations
@@ -60,7 +59,7 @@ class Grid:
 
     Attributes:
         cells: Number of cells along an edge of a face.
-        segments: Number of sides of the polygon that contains a full circle of directions.
+        segments: Number of sides of a polygon that is circumscribed about a full circle of directions.
     """
 
     cells: int
@@ -158,7 +157,7 @@ class Support:
     def slid(self, direction: FloatArray, low: float, high: float) -> Support:
         """Return the support function of the set after translations along a direction.
 
-        The distances (m) of these translations are all distances from `low` to `high`.
+        The set is translated by every distance (m) from `low` to `high`.
         """
         c = self.grid.points @ direction
         with np.errstate(invalid="ignore"):
@@ -181,9 +180,9 @@ class Support:
     def largest(self) -> float:
         """Return an upper bound (m) on the distance of any point of the set from the origin.
 
-        A vector between the grid points g_k of a cell is a sum of c_k g_k with c_k >= 0. All g_k are within
-        an angle r of the cell's centre, so the vector's length is at least cos r times the sum of c_k |g_k|.
-        Therefore h divided by this length is at most 1 / cos r times the largest h(g_k) / |g_k|.
+        Let g_k be the grid points of a cell. A vector u between them is a sum of c_k g_k with c_k >= 0. All
+        g_k are within an angle r of the cell's centre. Therefore, |u| is at least cos r times the sum of c_k
+        |g_k|, and h(u) / |u| is at most 1 / cos r times the largest h(g_k) / |g_k|.
         """
         share = (self.values / self.grid.lengths).max(initial=0.0)
         return float(share) / math.cos(math.atan(math.sqrt(2.0) / self.grid.cells))
@@ -215,7 +214,8 @@ def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]
 
 #: The two grids: a coarse grid for every frame, and a fine grid for the frame with the largest bound.
 COARSE, FINE = Grid(8, 24), Grid(16, 48)
-#: If the range of a variable needs more grid values than this number, they are not examined one by one.
+#: If the range of a variable needs more sample values than this number, the values are not examined one by
+#: one.
 MOST_VALUES = 1024
 
 
@@ -244,7 +244,7 @@ def upper_bounds(
 def behind_first(
     found: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[Step], list[Pair | None]]:
-    """Return the steps on the path to a frame, and their joint values, from the first step that differs."""
+    """Return the steps and joint values on the path to a frame, starting with the first step that differs."""
     steps = found.path(frame.previous)
     pairs = [variables.pairs[i] for i in found.indices(frame.previous)]
     first = next((i for i, (s, p) in enumerate(zip(steps, pairs, strict=True)) if _differs(s, p)), len(steps))
@@ -304,7 +304,7 @@ def at_the_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
 def passed(
     step: Step, pair: Pair | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
-    """Return the support functions of d and y before a step, computed from those after the step."""
+    """Compute the support functions of d and y before a step from the support functions after the step."""
     # A planar or floating joint has no limits, so it may rotate d into any direction.
     # The largest value of d's support function therefore holds for all directions.
     if pair is None:
@@ -365,7 +365,7 @@ def _prismatic_difference(step: Step, pair: Pair, variables: Variables, grid: Gr
 
 
 def _values(pair: Pair, variables: Variables, grid: Grid) -> FloatArray | None:
-    """Return values (n,) of the variable that moves a revolute joint in A and B.
+    """Return sample values (n,) of a variable that moves a revolute joint both in A and in B.
 
     If A and B have different variables, or if the variable has no limits, the result is None.
     """
@@ -382,15 +382,16 @@ def _values(pair: Pair, variables: Variables, grid: Grid) -> FloatArray | None:
 
 
 def _common_difference(step: Step, pair: Pair, z: FloatArray, y: Support, d: Support) -> Support:
-    """Return the support function of a joint's difference if the same variable moves the joint in A and B.
+    """Return the support function of the difference of two matched joints that the same variable moves.
 
-    Consider two neighbouring values of the variable, which differ by h. Between them, the bound is the larger
-    of the bounds at these two values, plus h^2/8 times the largest second derivative. For t' = t + c the
+    Consider two neighbouring values of the variable, which differ by h. For all values between these two
+    values, the bound is the sum of two terms. The first term is the larger of the two bounds at the
+    neighbouring values. The second term is h^2/8 times the largest second derivative. For t' = t + c the
     second derivative is, up to its sign, R' P' x' - R P x. Here x is the vector from the axis to y, P
     projects perpendicular to the axis, and R' rotates about the other axis: |R' - R| <= 2 |u' - u| + |c|, |P'
-    - P| <= |u' - u|, and the perpendicular part of x' - x is the offset of the axes. In all other cases, the
-    second derivative is at most the sum of the second derivatives of the two rotations, each times its
-    squared slope.
+    - P| <= |u' - u|, and the perpendicular part of x' - x is the offset of the axes. If t' is not t + c, each
+    of the two rotations has its own second derivative, multiplied by its squared slope. The second derivative
+    of the difference is at most the sum of these two.
     """
     G = y.grid.points
     axis, other = step.axis, step.other
