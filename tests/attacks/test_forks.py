@@ -106,6 +106,21 @@ CASES = {
         fork(ask)
         thread.join()
         """,
+    "a robot, while another thread needs the lock of logging during an import": """
+        import logging
+        from urdfkin.system.locks import importing
+        has = threading.Event()
+        def work():
+            with importing:
+                has.set()
+                time.sleep(1.0)
+                logging.getLogger("of a module that is imported")
+        thread = threading.Thread(target=work)
+        thread.start()
+        has.wait()
+        fork(lambda: robot.placement(q[:3], "tool0"))
+        thread.join()
+        """,
     "a pool of processes": """
         import multiprocessing
         robot.jacobian(q, "tool0", threads=2)
@@ -122,7 +137,9 @@ CASES = {
 @pytest.mark.parametrize("case", CASES)
 def test_a_forked_child_computes(case: str) -> None:
     code = HARNESS + textwrap.dedent(CASES[case])
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=250
+    )
     assert done.returncode == 0, done.stderr
     assert set(done.stdout.splitlines()) == {"ended with 0"}, done.stderr
 

@@ -8,29 +8,72 @@ from __future__ import annotations
 
 import os
 import threading
-from contextlib import suppress
+
+
+_locks: list[threading.RLock] = []
+_acquired: list[threading.RLock] = []
 
 
 def lock_over_forks() -> threading.RLock:
     """Return a lock that a child process never inherits in a locked state.
 
     A fork waits until the lock is free. After the fork, the lock is unlocked in the parent and in the child.
+    A fork acquires the locks in reverse order of their creation. A thread that needs two of them must acquire
+    them in the same order.
 
     Use this function for locks of modules only. A lock of an object would stay registered after the object is
     deleted, until the process ends.
     """
+    importing.register()
     lock = threading.RLock()
-
-    def release() -> None:
-        with suppress(
-            RuntimeError
-        ):  # another thread created this lock during the fork, so the lock was not acquired before the fork
-            lock.release()
-
-    os.register_at_fork(before=lock.acquire, after_in_parent=release, after_in_child=release)
+    _locks.append(lock)
     return lock
 
 
-#: The lock that a thread holds during a lazy import. Without this lock, another thread could fork a child
-#: during the import. The child would wait for ever for the end of that import.
-importing = lock_over_forks()
+def _before_fork() -> None:
+    for lock in reversed(_locks[:]):
+        lock.acquire()
+        _acquired.append(lock)
+
+
+def _after_fork() -> None:
+    while _acquired:
+        _acquired.pop().release()
+
+
+class _ImportLock:
+    """The lock that a thread holds during a lazy import.
+
+    Without this lock, another thread could fork a child during the import. The child would wait for ever for
+    the end of that import.
+
+    `logging` has a lock that a fork acquires too. An imported module may need that lock, so a fork must acquire
+    this lock first. Python calls the functions that acquire locks in reverse order of their registration.
+    For this reason, the function of this module is registered after `logging` is imported.
+    """
+
+    def __init__(self) -> None:
+        self._lock, self._registered = threading.RLock(), False
+        _locks.append(self._lock)
+
+    def register(self) -> None:
+        """Let each later fork acquire the locks of this module."""
+        with self._lock:
+            if not self._registered:
+                import logging  # noqa: F401, PLC0415  not at the start: a folder could replace it
+
+                os.register_at_fork(
+                    before=_before_fork, after_in_parent=_after_fork, after_in_child=_after_fork
+                )
+                self._registered = True
+
+    def __enter__(self) -> None:
+        if not self._registered:
+            self.register()
+        self._lock.acquire()
+
+    def __exit__(self, *error: object) -> None:
+        self._lock.release()
+
+
+importing = _ImportLock()
