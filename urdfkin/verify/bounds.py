@@ -77,8 +77,8 @@ class Magnitudes:
         vel: (n, frames) linear velocity, m/s.
         alpha: (n, frames) angular acceleration, rad/s^2.
         acc: (n, frames) linear acceleration, m/s^2.
-        roundings: (n, frames) number of roundings of one factor. The number counts each URDF joint on the
-            path, a rotated base, and one additional joint.
+        roundings: (n, frames) number of roundings of one factor, for all URDF joints on the path, a rotated
+            base, and one additional joint.
     """
 
     p: FloatArray
@@ -337,10 +337,10 @@ def against_true_values(size: Magnitudes, angles: float, rules: int) -> Magnitud
 
     - Roll, pitch and yaw have an error of half an eps of their size, so all vectors after the joint are
       rotated by at most (|roll| + |pitch| + |yaw|) / 2 eps.
-    - A mimic joint's value is m x + c. Rounding m, the product and the sum adds an error of at most (3 |m x|
-      + |c|) / 2 eps. Rounding c adds an error of at most |c| / 2 eps. The error of x is multiplied by |m|.
-      After a revolute mimic joint, all vectors are rotated by the sum of these errors. Each mimic rule adds a
-      relative error of 3/2 eps to a displacement or a joint velocity.
+    - A mimic joint's value is m x + c. The roundings of m, of the product and of the sum add at most (3 |m x|
+      + |c|) / 2 eps. The rounding of c adds at most |c| / 2 eps. The error of x is multiplied by
+      |m|. After a revolute mimic joint, all vectors are rotated by the sum of these errors. Each mimic rule
+      adds a relative error of 3/2 eps to a displacement or a joint velocity.
 
     An error of 1 eps rad changes each factor by at most 1 eps of its length.
 
@@ -372,7 +372,7 @@ def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) 
     rounding error of the difference is at most (eps/2) (|q| + |ref|) rad. All bodies after the hinge are
     rotated by this angle. An entry of a rotation matrix changes by at most this angle. A coordinate of a
     position changes by at most this angle times the length. The bound allows twice these changes, which
-    covers terms of second order. The allowed change is therefore the fraction `angles` / k of k eps scale.
+    covers terms of second order. Relative to k eps scale, the allowed change is `angles` / k.
 
     Args:
         bound: Bound of the tree's placements, (n, frames, 4, 4).
@@ -528,10 +528,9 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
     where r is a vector of the reciprocal basis of the axes. Here |u| = 1 and |r| = 1 / s, where s = |e_i x t|
     is the sine or cosine of the middle angle.
 
-    Let the error of t be delta = k eps. Then u rotates by delta / s. The change of r is -(r . du) u - (r .
-    dt) r', where r' is the reciprocal vector of t. The length of this change is at most 2 delta / s^2. Here s
-    is the smallest possible value, `apart` - delta. Let the relative error of w be delta too. Then the errors
-    are:
+    Let the error of t be delta = k eps. Then u rotates by delta / s. Let r' be the reciprocal vector of t.
+    Then r changes by -(r . du) u - (r . dt) r', which has at most the length 2 delta / s^2. Here s is the
+    smallest possible value, `apart` - delta. Let the relative error of w be delta too. Then the errors are:
 
     - outer angles: 2 delta / s^2 + delta / s <= 3 delta / s^2
     - middle angle: delta / s + delta <= 2 delta / s
@@ -560,8 +559,8 @@ def quaternion_jacobian_bound(bound: Bound) -> Bound:
 
     The position rows have the Jacobian's bound. Let delta be the error of R. The numbers of 4 q q^T are
     linear in R. The longest row of 4 q q^T has at least the length 2, and its error is below 4.6 delta.
-    Therefore, the error of q is below 2.3 delta. Half the quaternion product of w and q has an error of (2.3
-    + 1) / 2 delta relative to w. This error is below the 2 delta of the Jacobian's two factors.
+    Therefore, the error of q is below 2.3 delta. Relative to w, half the quaternion product of w and q has an
+    error of (2.3 + 1) / 2 delta. This error is below the 2 delta of the Jacobian's two factors.
     """
     return Bound(np.concatenate((bound.scale, bound.scale[..., 5:, :]), axis=-2), bound.k)
 

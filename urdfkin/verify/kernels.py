@@ -85,7 +85,7 @@ def _is_in_threes(scale, k):
 def _divide_threes(ours, theirs, unit, width, units):
     """Write the largest difference of each group of three numbers with a common scale.
 
-    The difference is in units of the bound and may be NaN or inf.
+    The difference is in multiples of eps * scale and may be NaN or inf.
     """
     for j in range(width):
         x = abs(ours[j] - theirs[j])

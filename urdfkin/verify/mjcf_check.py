@@ -162,8 +162,8 @@ def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
     frames = [LinkFrame.of(name) for name, _ in answer["frames"]]
     plan = compile_tree(tree, [tree.frame_link(frame) for frame in frames])
     ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
-    # urdfkin and MuJoCo round, and the angles in the URDF text are rounded too. The bound is therefore twice
-    # the bound for a comparison with MuJoCo.
+    # urdfkin and MuJoCo round, and the angles in the URDF text are rounded too.
+    # The bound is therefore twice the bound for a comparison with MuJoCo.
     size = about_the_root(magnitudes(plan, q, None, None, STILL_STATE))
     bound = PLACEMENT.bound(plan, size, None)
     bound = Bound(bound.scale, 2.0 * bound.k)

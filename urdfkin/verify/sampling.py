@@ -116,9 +116,9 @@ Verify = bool | Literal["sample"]
 #: Number of configurations of a call that `verify="sample"` checks.
 SAMPLE = 100
 
-#: Largest number of values, and of configurations, that are compared at a time. The number is large enough
-#: for efficient array expressions and small enough for the processor's cache. The number also limits the
-#: memory for large batches.
+#: Largest number of values, and of configurations, that are compared at a time.
+#: The number is large enough for efficient array expressions and fits into the processor's cache.
+#: The number also limits the memory for large batches.
 _AT_A_TIME = 262_144
 _MOST = 4096
 

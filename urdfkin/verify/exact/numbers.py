@@ -34,7 +34,7 @@ DIGITS = 50
 _TWO_DOUBLES = 30
 #: Number of bits for each decimal digit, and number of additional bits.
 #: Fifteen digits get 55 bits, two more than a double has.
-#: The reason is that a midpoint and a radius of 53 bits can be four times as wide as two ends of 53 bits.
+#: An interval with a midpoint of 53 bits can be four times as wide as an interval with ends of 53 bits.
 _BITS, _MORE_BITS = math.log2(10.0), 5
 #: First number: significant digits of a written decimal; 17 digits determine every double.
 #: Second number: digits of the decimal before it is rounded.
