@@ -139,7 +139,7 @@ def _shares(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[FloatArra
 
 
 def _together(first: Bound, second: Bound) -> Bound:
-    """Return the sum of two bounds k * eps * scale; the sum has the k of the second bound."""
+    """Return the sum of two bounds k * eps * scale, expressed with the k of the second bound."""
     size = first.k * first.scale + second.k * second.scale
     with np.errstate(invalid="ignore", over="ignore"):
         return Bound(size / second.k, second.k)

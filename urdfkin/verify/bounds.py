@@ -62,8 +62,8 @@ from urdfkin.verify.comparison import KERNELS
 _UNTURNED = np.eye(3).ravel()
 #: Indices of the position, the velocities and the accelerations in the state of a moving base.
 _OF_BASE = 9, 12, 15, 18, 21
-#: Number of configurations that the compiled kernel `lengths` computes at a time. The intermediate results
-#: for this number of configurations fit into the processor's first-level cache.
+#: Number of configurations that the compiled kernel `lengths` computes at a time.
+#: The intermediate results for these configurations fit into the processor's first-level cache.
 _BLOCK = 64
 
 
@@ -244,7 +244,7 @@ def _place(link: _Link, state: State, q: Any) -> State:
 
 
 def _free_lengths(link: _Link, q: Any, v: Any, a: Any) -> tuple[Length, ...]:
-    """Return the displacement of a planar or floating joint, its velocities and its accelerations."""
+    """Return the lengths of a planar or floating joint's displacement, velocities and accelerations."""
     at, (slides, turns) = link.v, _FREE_PARTS[link.kind]
     (u, o), (u_rate, o_rate) = (
         (_norm(x[at : at + slides]), _norm(x[at + slides : at + slides + turns])) for x in (v, a)
@@ -294,7 +294,7 @@ def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
 
 
 def bound_of(scale: FloatArray, factors: int, size: Magnitudes, reference: Reference = _ALIGNED) -> Bound:
-    """Return the bound with a scale (n, frames, ...).
+    """Return the bound of a quantity with the given scale (n, frames, ...).
 
     The `k` of the bound is the number of factors times the number of roundings of one factor.
     """
@@ -574,7 +574,7 @@ def hidden_scalar(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
 
 
 def nearest_singularity(plan: CompiledTree) -> float:
-    """Return the smallest distance (rad) from the singularity at which results have a valid digit.
+    """Return the smallest distance (rad) from a singularity for which results still have a valid digit.
 
     The distance is four times the error of R.
     """

@@ -78,7 +78,7 @@ def check_relative_placement(
     Args:
         bound_of: Function for the bound of placements in the world.
         oracle: The oracle's model of the robot.
-        x: The configurations. The last frame of the compiled tree of `x` is the other frame.
+        x: The configurations. Frame a is the last frame of the compiled tree of `x`.
         ours: urdfkin's results; not used.
         by: The oracle.
     """

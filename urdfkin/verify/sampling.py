@@ -109,8 +109,9 @@ def draw(tree: KinematicTree, n: int, rng: np.random.Generator, *, with_special:
     return Samples(q, v, a)
 
 
-#: True: check all results of a call. False: check none. "sample": check the results of `SAMPLE`
-#: configurations.
+#: True: check all results of a call.
+#: False: check none.
+#: The string "sample": check the results of `SAMPLE` configurations.
 Verify = bool | Literal["sample"]
 
 #: Number of configurations of a call that `verify="sample"` checks.

@@ -27,7 +27,7 @@ from urdfkin.model.tree import FloatArray, KinematicTree
 #: Largest number of columns in a dependent set, and largest number of columns of a Jacobian.
 #: The search for dependent sets is limited to these numbers.
 _LARGEST_SET, _MOST_COLUMNS = 4, 16
-#: Rounding error of the decomposition of a small matrix, in eps for each row or column.
+#: Rounding error of the singular value decomposition of a small matrix, in eps for each row or column.
 _ROUNDINGS = 16.0
 #: At random configurations, a singular value below this fraction of the Jacobian's size counts as 0.
 _USUAL = 1e-9
@@ -385,7 +385,7 @@ class _Explanation:
 
 
 def _sparse(rows: FloatArray) -> FloatArray:
-    """Return a basis with many zeros for the space that some rows span, computed by elimination."""
+    """Return a sparse basis of the row space of a matrix, computed by elimination."""
     basis, n = rows.copy(), len(rows)
     free = list(range(basis.shape[1])) if n > 1 else []
     for i in range(n if n > 1 else 0):
@@ -399,7 +399,7 @@ def _sparse(rows: FloatArray) -> FloatArray:
 
 
 def _basis(rows: FloatArray) -> FloatArray:
-    """Return an orthonormal basis for the space that some rows span.
+    """Return an orthonormal basis of the row space of a matrix.
 
     The rows are orthogonal projections of orthonormal vectors.
     """

@@ -53,6 +53,6 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
 
 
 def _defect(table: DHTable) -> float:
-    """Return the distance of base and tool from rigid motions; a table may have only six digits."""
+    """Return the distance of the base and tool matrices from rigid motions; they may have six digits only."""
     rotations: list[FloatArray] = [table.base[:3, :3], table.tool[:3, :3]]
     return sum(float(np.linalg.norm(R.T @ R - np.eye(3))) for R in rotations)

@@ -19,9 +19,9 @@ with prismatic displacements. Columns of the Jacobian are scaled by the mimic mu
 includes the table's own lengths, but at most `PROMISED` times the robot's reach. Lengths in tables with
 Hayati rows never exceed that limit.
 
-With only four parameters, nearly parallel axes may need lengths of kilometres. When two such lengths cancel,
-the error is eps times their size. A difference within that error is not a disagreement, but the table loses
-digits. `TableCheck.loss` then states this loss.
+A row has only four parameters, so nearly parallel axes may need lengths of kilometres. When two such lengths
+cancel, the error is eps times their size. A difference within that error is not a disagreement, but the table
+loses digits. `TableCheck.loss` then states this loss.
 """
 
 from __future__ import annotations
@@ -254,8 +254,8 @@ class Sizes:
             moves on these paths.
         rates: (n,) sum of all |joint velocity|, rad/s and m/s.
         accelerations: (n,) sum of all |joint acceleration|, rad/s^2 and m/s^2.
-        rounding: (n,) number of roundings times eps, including those of angles, plus the tilts that a table
-            omits (`urdfkin.dh.common_normals`).
+        rounding: (n,) eps times the number of roundings (joints, rows and angles), plus the tilts that a
+            table omits (`urdfkin.dh.common_normals`).
     """
 
     reach: FloatArray

@@ -58,8 +58,8 @@ def answer_of(request: Mapping[str, Any]) -> dict[str, Any]:
     """Return the answer to a request.
 
     Args:
-        request: `path`; `name`, the file's name in messages; `variants`; `articulation`; `check`, whether to
-            compare with OpenUSD's readers.
+        request: Mapping with `path`, `name` (the file's name in messages), `variants`, `articulation`, and
+            `check` (whether to compare with OpenUSD's readers).
     """
     read = read_usd(
         request["path"],
