@@ -240,7 +240,7 @@ _WORTH_LOADING, _WORTH_COMPILING = 30, 300
 
 
 def _kernels_pay(samples: int) -> bool:
-    """Return whether kernels save more time on these samples than loading or compiling them takes."""
+    """Return whether kernels save more time on these samples than their loading or compilation takes."""
     return samples > _WORTH_COMPILING or (samples > _WORTH_LOADING and are_on_disk())
 
 

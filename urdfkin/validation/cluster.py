@@ -101,7 +101,7 @@ def _client(scheduler: str) -> Iterator[Client]:
 
 
 class _Portless:
-    """A part of a Dask cluster without web pages, because all users of the machine could open such pages."""
+    """A part of a Dask cluster without web pages. All users of the machine could open such pages."""
 
     def start_http_server(self, *_: object, **__: object) -> None:
         """Do nothing; this method overrides Dask's method, which starts a web server."""

@@ -132,7 +132,8 @@ class _Block(_Work):
     def tallies(self, second: SecondWitness | None) -> Iterator[tuple[Key, Tally]]:
         """Yield the error statistics of each quantity.
 
-        The result of a joint is the result of its child link, which Pinocchio computes with another function.
+        The result of a joint is the result of its child link. Pinocchio computes the two results with
+        different functions.
         """
         inputs = self.x.q, self.x.v, self.x.a
         for row in validated():

@@ -1,9 +1,9 @@
 """Find common mistakes that explain a wrong result of a user's function.
 
-Each mistake predicts the results of a function with this mistake from urdfkin's results. Examples are
-exchanged rows, another reference frame, another frame, other units, and joints in another order. A mistake is
-named if it explains all but a thousandth of the difference at every configuration. Mistakes with the same
-prediction are all named.
+For each mistake, the module computes the results of a function with this mistake from urdfkin's results.
+Examples are exchanged rows, another reference frame, another frame, other units, and joints in another order.
+A mistake is named if it explains all but a thousandth of the difference at every configuration. Mistakes with
+the same prediction are all named.
 """
 
 from __future__ import annotations

@@ -64,7 +64,7 @@ class FunctionError:
 
 @dataclass(frozen=True)
 class WorstResult:
-    """The result with the largest ratio of its difference to its bound.
+    """The result with the largest ratio of difference to bound.
 
     Attributes:
         sample: Index of the configuration.
@@ -116,7 +116,8 @@ class FunctionCheck(Displayable):
         oracle_share: Largest ratio of a difference between the function and the oracle to the bound times
             `factor`; None without an oracle.
         rows: Largest ratio in each row of the result, by name.
-        columns: Largest ratio in each column of the result, by joint velocity; empty for other quantities.
+        columns: Largest ratio in each column of the result, by joint velocity; empty if the quantity has no
+            such columns.
         worst: The worst result; None if no result was compared.
         errors: Number of exceptions and wrong shapes.
         first_errors: The first of these exceptions and wrong shapes.

@@ -407,7 +407,7 @@ def acceleration_scale(plan: CompiledTree, size: Magnitudes, reference: Referenc
     d_k. Over all joints, these lengths add up to the sum of w_k^2 times the length of link k, as in eq.
     7.130. The vectors d_k are sums of the vectors between joint origins and have the rounding errors of the
     sums in eq. 7.77. The sum of the 4 n terms of n joints has n + 3 roundings. The roundings of d_k and of
-    this sum are below the 2 eps that each joint has for sums.
+    this sum are below the 2 eps that each joint is allowed for sums.
     """
     shared = eq.tangential(size.w, size.vel)
     linear = size.acc + shared
@@ -454,9 +454,9 @@ def jacobian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -
 def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
     """Return (n, frames, 6, nv), the size of the terms of J-dot.
 
-    A revolute column is at most as long as the frame's path. The lever arm of the column changes at most as
-    fast as the frame's origin moves. In LOCAL the numbers are components along the frame's axes, which
-    rotate.
+    The column of a revolute joint is at most as long as the path to the frame. The lever arm of the column
+    changes at most as fast as the frame's origin moves. In LOCAL the numbers are components along the frame's
+    axes, which rotate.
     """
     turning, sliding = column_weights(plan)
     w, p, vel = size.w[..., None], size.p[..., None], size.vel[..., None]

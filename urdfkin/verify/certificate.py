@@ -149,7 +149,8 @@ class Line:
     Attributes:
         quantity: Name of the quantity.
         checked: Number of results that the oracle confirmed.
-        worst: Largest difference between a checked result and the oracle's, in multiples of eps * scale.
+        worst: Largest difference between a checked result and the oracle's result, in multiples of eps *
+            scale.
         share: Largest ratio of a difference to its bound.
         unchecked: Number of results that were returned without a check.
     """

@@ -167,7 +167,7 @@ def coupling(full, columns, index, factor, out):
 # -- the recursion on lengths --------------------------------------------------------------------------------
 
 _TURN, _SLIDE = int(Motion.TURN), int(Motion.SLIDE)
-#: Number of values in a link's state, and number of lengths of a planar or floating joint.
+#: Number of values in the state of a link, and number of lengths of a planar or floating joint.
 _STATE = _FREE = 5
 
 

@@ -3,8 +3,8 @@
 Pinocchio checks every result with the URDF text that urdfkin writes for the tree. This check does not include
 the conversion from the MJCF file to the tree. Therefore `load` compares the tree with MuJoCo's own model of
 the file. `load` compares the placements of bodies and sites, and the equalities that became mimic rules.
-`load` also compares the placements with the placements by Pinocchio's MJCF reader. Pinocchio's reader is
-known to read some files differently, so a difference from this reader is reported but is not an error.
+`load` also compares the placements with those of Pinocchio's MJCF reader. Pinocchio's reader is known to read
+some files differently, so a difference from this reader is reported but is not an error.
 """
 
 from __future__ import annotations

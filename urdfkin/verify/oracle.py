@@ -247,8 +247,8 @@ class Frames:
         robot: Name of the robot, for errors.
         bodies: Index of the frame of each link.
         joints: Index of the frame of each joint.
-        carriers: For the frame of each link that a joint carries: the index of the joint's frame. A link's
-            frame that is missing here is also the frame of the joint.
+        carriers: For the frame of each child link: the index of the frame of its parent joint. A link's frame
+            without an entry is also the frame of the parent joint.
     """
 
     def __init__(
@@ -371,7 +371,7 @@ def davenport(M: NDArray[Any]) -> NDArray[Any]:
 def _in_own_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
     """Return R^T times the linear half and R^T times the angular half of a six-vector.
 
-    For a quaternion (u, w) and a half x, this is x + 2 w (x x u) + 2 (x x u) x u.
+    For a quaternion (u, w), each half x becomes x + 2 w (x x u) + 2 (x x u) x u.
     """
     u, w = quaternion[..., np.newaxis, :3], quaternion[..., np.newaxis, 3:]
     x = six.reshape(*six.shape[:-1], 2, 3)

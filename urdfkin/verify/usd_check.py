@@ -9,7 +9,7 @@ the conversion from the stage to the tree. Therefore `load` makes two comparison
   configuration, each link must have the placement of its prim. The file states these transforms separately
   from the joint frames, so a difference is a warning about the file.
 
-Both comparisons allow only for the single precision of the numbers in a stage.
+Both comparisons allow only for rounding to single precision, in which a stage stores its numbers.
 """
 
 from __future__ import annotations

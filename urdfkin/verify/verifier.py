@@ -359,7 +359,7 @@ class Verifier:
         return check
 
     def tree_parameters(self, parameters: TreeParameters) -> str | None:
-        """Compare the placements of all links by tree parameters with Pinocchio's.
+        """Compare the placements of all links, computed from tree parameters, with Pinocchio's placements.
 
         Returns:
             A line of text about the agreement; None, with a warning, if Pinocchio cannot check the robot.
@@ -399,9 +399,9 @@ class Verifier:
 def comparison_with_oracle(
     quantity: Quantity, oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary
 ) -> Comparison:
-    """Compare urdfkin's results (n, frames, ...) for some configurations with an oracle's.
+    """Compare urdfkin's results (n, frames, ...) for some configurations with the results of an oracle.
 
-    Large results are compared in blocks, while the oracle's are still in the cache.
+    Large results are compared in blocks, while the oracle's results are still in the cache.
     """
     if quantity.blocks is None:
         theirs, bound = oracle_results_with_bound(quantity, oracle, x, ours, by)

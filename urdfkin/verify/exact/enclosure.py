@@ -67,7 +67,7 @@ class Enclosure:
     def width(self) -> FloatArray:
         """The difference `upper - lower`. The width is 0 for each number whose true value is a double.
 
-        For all other numbers, it is at least the distance between two neighbouring doubles.
+        For all other numbers, the width is at least the distance between two neighbouring doubles.
         """
         return self.upper - self.lower
 

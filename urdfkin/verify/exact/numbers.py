@@ -193,7 +193,7 @@ class ExactJoint:
 
 
 def read_exact(text: str, tree: KinematicTree, among: Iterable[int] | None = None) -> dict[int, ExactJoint]:
-    """Return the exact numbers of joints by their index in the tree, from the URDF text.
+    """Read the exact numbers of joints from the URDF text; return them by the joints' index in the tree.
 
     Args:
         text: The URDF text.
@@ -230,7 +230,7 @@ class _Text:
         raise InputError("a joint is not in the URDF text", where=robot, found=joint.name)
 
     def locked(self, free: ExactJoint, lock: Lock) -> ExactJoint:
-        """Return a joint that is fixed at the exact value of a double."""
+        """Return a joint that is locked at the exact value of a double."""
         R, p = free.R, free.p
         value = free.multiplier * exact(lock.q) + free.offset
         if lock.joint.kind.turns:
@@ -259,7 +259,7 @@ class _Text:
         return x, y, z
 
     def rotation(self, origin: Element | None) -> Matrix:
-        """Return the rotation of rpy or, from URDF 1.1 on, of `quat_xyzw`, a quaternion of any length."""
+        """Return the rotation of `rpy` or, from URDF 1.1 on, of the quaternion `quat_xyzw` of any length."""
         if self.quaternions and origin is not None and "quat_xyzw" in origin.attrib:
             return from_quaternion(self.numbers(origin, "quat_xyzw", ""))
         return from_rpy(self.vector(origin, "rpy", "0 0 0"))
