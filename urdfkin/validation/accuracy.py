@@ -1,6 +1,6 @@
 """Accuracy study: errors of urdfkin and of Pinocchio relative to values with at least fifty digits.
 
-The values are balls (intervals) that contain the true values, as in an enclosure. Therefore, no error is
+The values with fifty digits are intervals that contain the true values. Therefore, no error is
 underestimated.
 
 Errors are in eps * scale. Verification uses the same scale, so you can compare the errors with the numbers of
@@ -50,8 +50,7 @@ from urdfkin.verify.verifier import bound_of, oracle_results, own_results
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _BALLS = np.vectorize(exact, otypes=[object])
-#: For each line of the study about analytical Jacobians: the representations of an orientation that it
-#: covers.
+#: Representations of the orientation that share a line of the study, by the name of the line.
 _REPRESENTATIONS = {
     "euler angles": tuple(name for name in SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
@@ -130,8 +129,8 @@ def judge(robot: Robot, *, samples: int = 5, seed: int = 0, base: BaseMotion | N
     line for the analytical Jacobians of quaternions. Sequences about fixed axes are left out, because they
     have the same Jacobians with the rows in reverse order. Samples nearer to a singularity than
     `Robot.analytical_jacobian` accepts are skipped. Samples in which rounding hides the sign of the
-    quaternion are skipped too. Pinocchio computes no analytical Jacobians. Therefore, the rotation and the
-    Jacobian of each library are inserted into (7.122).
+    quaternion are skipped too. Pinocchio computes no analytical Jacobians. Therefore, the study inserts the
+    rotation and the Jacobian of each library into eq. 7.122.
 
     Args:
         robot: The loaded robot.
@@ -241,7 +240,11 @@ class _Work:
 
 
 def _moving_columns(scale: FloatArray) -> NDArray[np.intp]:
-    """Return indices (n, links, most) of the columns that move each link, padded with other columns."""
+    """Return indices (n, links, most) of the columns that move each link.
+
+    Here `most` is the largest number of such columns. A link with fewer such columns also gets the indices of
+    columns that are 0.
+    """
     idle = ~(scale > 0.0).any(axis=-2)
     most = int((~idle).sum(axis=-1).max(initial=0))
     return np.argsort(idle, axis=-1, kind="stable")[..., :most]
@@ -282,7 +285,7 @@ def _line(quantity: str, reference: str | None, compared: Sequence[_Compared]) -
 
 @partial(np.vectorize, otypes=[float])
 def _error(x: float, true: Number) -> float:
-    """Return an upper bound on the distance of a double from the true value in a ball."""
+    """Return an upper bound on |x - t|, where t is the true value, which an interval contains."""
     return float(abs(exact(true) - x).upper())
 
 

@@ -84,8 +84,8 @@ def validate(
             report names the third library. This needs the extra `mujoco`.
         isolate: Run each robot in its own process, `jobs` processes at a time. If a process crashes, its
             robot is reported as not verified with the reason, and the other robots continue.
-        executor: Runs the chunks if they shall not run in local processes. The argument is an executor with
-            the interface of `concurrent.futures`, or a cluster (`urdfkin.validation.cluster.connected`).
+        executor: Runs the chunks instead of local processes. The argument is an executor with the interface
+            of `concurrent.futures`, or a cluster (`urdfkin.validation.cluster.connected`).
         store: A folder in which each finished chunk is saved. After any interruption, the same call resumes
             the run. The function `stored` makes a report from the folder at any time.
         retry: "failed": compute again the robots in the store that could not be checked. The texts of these
@@ -144,7 +144,7 @@ def validate(
                     campaign.enter(campaign.task(i, index), failure(found[i], error))
             missing = [robot for i, robot in enumerate(found) if any(True for _ in collector.missing(i))]
             if _kernels_pay(len(missing) * samples) and (isolate or any(map(_is_robot, missing))):
-                load_kernels()  # here, so that no worker compiles and no robot's time includes it
+                load_kernels()  # first, so that no worker compiles and no robot's time includes compiling
                 begin = time.perf_counter()
             collector.begin()
             _engine(jobs, isolate, executor).run(campaign.work(), campaign.enter)
@@ -233,12 +233,14 @@ def _judgements(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Jud
     return tuple(None if isinstance(one, NotJudged) else one for one in found), None not in found
 
 
-#: Smallest number of samples for which kernels save time: if they are on disk, and if they must be compiled.
+#: Smallest numbers of samples for which kernels save time.
+#: First number: the kernels are on disk.
+#: Second number: the kernels must be compiled.
 _WORTH_LOADING, _WORTH_COMPILING = 30, 300
 
 
 def _kernels_pay(samples: int) -> bool:
-    """Return whether kernels save more time on these samples than loading or compiling them takes."""
+    """Return whether kernels save more time on these samples than their loading or compilation takes."""
     return samples > _WORTH_COMPILING or (samples > _WORTH_LOADING and are_on_disk())
 
 

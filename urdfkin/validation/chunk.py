@@ -2,7 +2,7 @@
 
 A sample depends only on the seed and on the index of the sample. Inputs and results of a chunk are plain
 data, so a chunk can run in this process, in another process or on another machine. Samples 0, 1 and 2 of a
-robot are the neutral configuration and the two ends of the limits.
+robot are the neutral configuration, the lower limits and the upper limits.
 
 Samples are drawn 25 at a time, each draw with its own seed. A chunk compares several draws together. The
 number of draws in a chunk does not change any result; it only changes the cost of distributing and storing
@@ -33,11 +33,11 @@ from urdfkin.verify.sampling import Samples, draw
 DRAWN = 25
 #: Number of special configurations before the random configurations.
 SPECIAL = 3
-#: Minimum number of chunks of a robot, so that several workers can share the robot. A robot with fewer draws
-#: has fewer chunks.
+#: Minimum number of chunks of a robot, so that several workers can share the robot.
+#: A robot with fewer draws has fewer chunks.
 _CHUNKS = 8
-#: Maximum number of draws in a chunk. For a typical robot, 40 draws take one second and give a few kilobytes
-#: of results.
+#: Maximum number of draws in a chunk.
+#: For a typical robot, 40 draws take one second and give a few kilobytes of results.
 _DRAWS = 40
 
 
@@ -47,7 +47,8 @@ class Chunk:
 
     Attributes:
         subject: The robot.
-        seed: Seed of the samples. Each draw combines the seed with the index of the draw.
+        seed: Seed of the samples. The random generator of a draw is initialized with this seed and the index
+            of the draw.
         index: Index of the chunk within the robot.
         first: Index of the chunk's first draw.
         samples: Number of random configurations.
@@ -151,8 +152,9 @@ def chunks(subject: RobotInput, samples: int, seed: int, most: int | None = None
     return (cut.chunk(subject, seed, index, most) for index in range(len(cut)))
 
 
-#: Cache of the latest robot. A worker gets the chunks of a robot one after another, and reads the robot only
-#: once. Two large robots at a time would need too much memory.
+#: Cache of the latest robot.
+#: A worker gets the chunks of a robot one after another, and reads the robot only once.
+#: Two large robots at a time would need too much memory.
 _cache: dict[RobotInput, tuple[Robot, Oracle, SecondWitness | None]] = {}
 
 

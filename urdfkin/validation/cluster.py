@@ -30,11 +30,11 @@ from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.verify.oracles import version
 
-#: The maximum number of chunks in flight (sent and not yet answered) is the first number times the number of
-#: the workers' threads, plus the second number. This maximum is so large that no thread waits for a chunk.
+#: At most _FOR_EACH * (threads of all workers) + _MORE chunks are in flight (sent and not yet answered).
+#: This maximum is so large that no thread waits for a chunk.
 _FOR_EACH, _MORE = 2, 4
-#: Maximum number of times a chunk is sent when Dask loses its worker. A robot can crash only the process in
-#: which its chunks run, not Dask's worker.
+#: Maximum number of times a chunk is sent when Dask loses its worker.
+#: A robot can only crash the process of its chunks, not Dask's worker.
 _TRIES = 20
 #: Seconds between two counts of the workers.
 _COUNT = 1.0
@@ -101,7 +101,7 @@ def _client(scheduler: str) -> Iterator[Client]:
 
 
 class _Portless:
-    """A part of a Dask cluster without web pages, because all users of the machine could open such pages."""
+    """A part of a Dask cluster without web pages. All users of the machine could open such pages."""
 
     def start_http_server(self, *_: object, **__: object) -> None:
         """Do nothing; this method overrides Dask's method, which starts a web server."""

@@ -171,8 +171,8 @@ class _Robot:
         return self.done == len(self.part)
 
     def report(self, subject: RobotInput, wanted: int) -> RobotReport:
-        # Leave out results of chunks after the failed chunk, because it depends on the timing of the workers
-        # whether these chunks were computed.
+        # Leave out results of chunks after the failed chunk.
+        # The timing of the workers determines which of these chunks were computed.
         last = min(self.failures, default=self.part.stop)
         failure = self.failures.get(last)
         results = [result for run, result in self._runs if run.start < last]

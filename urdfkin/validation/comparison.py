@@ -122,8 +122,8 @@ class _Block(_Work):
         whole = len(links) == len(robot.all_frames)
         self.plan = robot.plan(links) if whole else compile_tree(tree, links)
         self.size = magnitudes(self.plan, x.q, x.v, x.a, STILL_STATE)
-        # The Jacobian of a joint is the Jacobian of its child link. Links come first among the frames, the
-        # root before all.
+        # The Jacobian of a joint is the Jacobian of its child link.
+        # In the list of frames, the links come first, beginning with the root.
         moving = [i + 1 for i, joint in enumerate(tree.joints) if joint.kind.nv]
         joints = slice(bisect_left(moving, frames.start), bisect_left(moving, frames.stop))
         self.joint_rows = [link - frames.start for link in moving[joints]]
@@ -132,7 +132,8 @@ class _Block(_Work):
     def tallies(self, second: SecondWitness | None) -> Iterator[tuple[Key, Tally]]:
         """Yield the error statistics of each quantity.
 
-        The result of a joint is the result of its child link, which Pinocchio computes with another function.
+        The result of a joint is the result of its child link. Pinocchio computes the two results with
+        different functions.
         """
         inputs = self.x.q, self.x.v, self.x.a
         for row in validated():
@@ -145,7 +146,7 @@ class _Block(_Work):
                     yield self._compare(joint, reference, ours[:, self.joint_rows], self.part(bound), second)
 
     def part(self, bound: Bound) -> Bound:
-        """Select the rows of the block's joints from a bound that has a row for each frame."""
+        """Return the bound for the joints of the block, selected from the bound for its frames."""
         return Bound(bound.scale[:, self.joint_rows], bound.k[:, self.joint_rows])
 
     def asked(self, row: Quantity, reference: Reference | None) -> QueryBatch:

@@ -1,9 +1,9 @@
 """Find common mistakes that explain a wrong result of a user's function.
 
-Each mistake predicts the results of a function with this mistake from urdfkin's results. Examples are
-exchanged rows, another reference frame, another frame, other units, and joints in another order. A mistake is
-named if it explains all but a thousandth of the difference at every configuration. Mistakes with the same
-prediction are all named.
+For each mistake, the module computes the results of a function with this mistake from urdfkin's results.
+Examples are exchanged rows, another reference frame, another frame, other units, and joints in another order.
+A mistake is named if it explains all but a thousandth of the difference at every configuration. Mistakes with
+the same prediction are all named.
 """
 
 from __future__ import annotations
@@ -31,14 +31,15 @@ EXPLAINED = 1e-3
 _MOST = 3
 #: Number of configurations at which exchanges of two joints are tried.
 _FEW = 4
-#: Smallest scale of a number, as a fraction of the largest scale. This fraction is needed because a number
-#: that must be 0 has the scale 0.
+#: Smallest divisor of a difference, as a fraction of the largest scale.
+#: The scale itself may be 0, for a number that must be 0.
 _LEAST = 1e-9
 _HALVES = [3, 4, 5, 0, 1, 2]
 _G = 9.81
 
-#: Inputs of a function: q, q and v, or q, v and a. To simulate a mistake, the inputs are changed. urdfkin
-#: then computes the results that a function with this mistake would return.
+#: Inputs of a function: q, q and v, or q, v and a.
+#: A mistake is simulated with changed inputs.
+#: From these inputs, urdfkin computes the results that a function with this mistake returns.
 Inputs = tuple[FloatArray, ...]
 
 
@@ -50,7 +51,7 @@ class Diagnosis:
         inputs: q, or q and v, or q, v and a, in the function's convention.
         found: The function's results (n, ...).
         expected: urdfkin's results.
-        scale: The scale of the rounding bound of each expected number.
+        scale: The scale of the bound of each number in `expected`.
         compute: A function (inputs, frame, reference) that returns urdfkin's results.
     """
 
@@ -84,8 +85,8 @@ class Diagnosis:
 def diagnose(mistakes: Mistakes, case: Diagnosis) -> list[str]:
     """Return at most three sentences about the mistakes that explain the results; the list may be empty.
 
-    A combination of a mistake with exchanged halves of the six-vectors is named only if no single mistake
-    explains the results.
+    Each mistake is also combined with exchanged linear and angular halves of the six-vectors. Such a
+    combination is named only if no single mistake explains the results.
     """
     single, double = list[tuple[float, str]](), list[tuple[float, str]]()
     swaps = mistakes.exchanged_halves
@@ -134,14 +135,14 @@ class Mistakes:
     def exchanged_halves(self) -> str:
         """A sentence which states that the linear and angular halves of a six-vector are exchanged.
 
-        The sentence is empty for a quantity without such halves.
+        The sentence is empty if the quantity has no linear and angular halves.
         """
         first = "linear" if self._angular_first else "angular"
         return f"the {first} rows come first" if self.row.shape[0] == 6 else ""
 
     @property
     def expected_halves(self) -> str:
-        """The names of the two halves in their right order."""
+        """A sentence which states whether the linear or the angular rows come first in the convention."""
         tool = "urdfkin" if self.conversion is None else self.conversion.convention.name
         return f"{tool} has the {'angular' if self._angular_first else 'linear'} rows first"
 
@@ -267,7 +268,10 @@ class Mistakes:
                 yield words.replace(" q ", all_inputs), partial(case.compute, everywhere)
 
     def _turning(self) -> list[tuple[int, int]]:
-        """Return the indices in q and in v of each joint with one angle, in the function's convention."""
+        """Return the indices in q and in v of each joint whose coordinate is a single angle.
+
+        The indices are those of the function's convention.
+        """
         return [(q, v) for _, q, v, turns in self._axes() if turns]
 
     def _axes(self) -> list[tuple[str, int, int, bool]]:
@@ -419,7 +423,7 @@ class Mistakes:
             )
 
     def _of_frames(self, case: Diagnosis) -> Iterator[Mistake]:
-        """Yield a mistake for each other link, namely that the function computes the frame of this link."""
+        """Yield, for each other link, the mistake that the function uses this link instead of the frame."""
         names = [f"link:{name}" for name in self.robot.link_names if name != self.frame]
         if self.row.against is not None or not names:
             return

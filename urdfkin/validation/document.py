@@ -159,7 +159,7 @@ class Finding(TypedDict):
 
 
 class Row(TypedDict):
-    """A row of a Denavit-Hartenberg table: the constant parts, metres and radians."""
+    """The constant parameters of a row of a Denavit-Hartenberg table, in metres and radians."""
 
     joint: Annotated[str, says("Name of the joint.")]
     kind: Annotated[Literal["revolute", "continuous", "prismatic"], says("Kind of the joint.")]
@@ -294,7 +294,7 @@ class Pair(TypedDict):
 
 
 class Alone(TypedDict):
-    """For each of three libraries: number of results in which it differs and the other two agree."""
+    """For each of three libraries: the number of results in which it differs and the other two agree."""
 
     urdfkin: Annotated[Count, says("Number of results in which only urdfkin differs.")]
     pinocchio: Annotated[Count, says("Number of results in which only Pinocchio differs.")]

@@ -32,8 +32,8 @@ class Row:
 
     Attributes:
         robot: Index of the robot; -1 before the first task was taken.
-        index: Index of the latest chunk that was taken. The lower this index is, the more chunks of the robot
-            are left.
+        index: Index of the latest chunk that was taken. A lower index means that more chunks of the robot are
+            left.
     """
 
     def __init__(self, tasks: Iterable[Task]) -> None:
@@ -82,7 +82,7 @@ class WorkQueue:
         return None
 
     def next(self, row: Row) -> Task | None:
-        """Return the next task of a robot; None if no task is left, or if the robot was ended."""
+        """Return the next task of a robot; None if no task is left, or if the robot was removed."""
         task = next(row, None)
         if task is None or task.robot in self._ended:
             if row in self._begun:
@@ -97,11 +97,11 @@ class WorkQueue:
         self._waiting = chain([row], self._waiting)
 
     def end(self, robot: int) -> None:
-        """Return no further tasks of a robot from now on."""
+        """Remove a robot from the queue; its remaining tasks are not returned any more."""
         self._ended.add(robot)
 
     def withdraw(self, robot: int) -> list[Task]:
-        """End a robot, and return the remaining tasks of this robot."""
+        """Remove a robot from the queue, and return its remaining tasks."""
         self.end(robot)
         return [task for row in self._begun if row.robot == robot for task in row]
 

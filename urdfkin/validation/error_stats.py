@@ -1,8 +1,8 @@
 """Error statistics of a validation, which can be added over chunks, processes and machines.
 
-A `Tally` counts the results of one quantity in one reference frame. Addition of tallies is associative and
-commutative. If two tallies have worst cases with the same ratio, their sum contains the worst case with the
-earlier sample. The sum therefore does not depend on the division of the samples into chunks.
+A `Tally` contains the statistics of one quantity in one reference frame. Tallies can be added in any order
+and grouping. If the worst cases of two tallies have the same ratio, the sum keeps the case with the earlier
+sample. The sum therefore does not depend on the division of the samples into chunks.
 
 With a second oracle, `ThreeSides` compares three results: urdfkin's, Pinocchio's and the second oracle's.
 Each pair of libraries has a bound. Two results agree if their difference lies within the bound of their pair.
@@ -101,8 +101,8 @@ def three_sides(
         ours: Results of urdfkin.
         pinocchios: Results of Pinocchio.
         second_oracles: Results of the second oracle.
-        first: Bound of the difference of urdfkin and Pinocchio.
-        second: Bound of the difference of urdfkin and the second oracle.
+        first: Bound on the difference between urdfkin and Pinocchio.
+        second: Bound on the difference between urdfkin and the second oracle.
     """
     if not ours.size:
         return ThreeSides(by, Pair(), Pair())
@@ -139,7 +139,7 @@ def _shares(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[FloatArra
 
 
 def _together(first: Bound, second: Bound) -> Bound:
-    """Return the sum of two bounds k * eps * scale; the sum has the k of the second bound."""
+    """Return the sum of two bounds k * eps * scale, expressed with the k of the second bound."""
     size = first.k * first.scale + second.k * second.scale
     with np.errstate(invalid="ignore", over="ignore"):
         return Bound(size / second.k, second.k)
@@ -211,9 +211,9 @@ class Tally:
         )
 
     def beside(self, other: Tally) -> Tally:
-        """Return one tally for all frames of this tally and of another tally.
+        """Combine the statistics of other frames with the statistics of these frames.
 
-        The two tallies must have the same samples.
+        The two tallies must belong to the same samples.
         """
         joined = replace(self, by_frame=()) + replace(other, by_frame=())
         return replace(joined, by_frame=self.by_frame + other.by_frame)
@@ -285,5 +285,5 @@ def tally(
     )
 
 
-#: Key of a tally: the quantity and the reference frame.
+#: Key of error statistics: the quantity and the reference frame.
 Key = tuple[str, str]

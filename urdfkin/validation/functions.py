@@ -45,8 +45,7 @@ _AT_A_TIME = 256
 _DIAGNOSED = 48
 #: Largest number of exceptions and wrong shapes that are stored with their message.
 _KEPT = 5
-#: If all relative differences are below this number, the diagnosis is that the function rounds to single
-#: precision.
+#: Largest relative difference for the diagnosis that the function rounds to single precision.
 _SINGLE = 1e-5
 
 
@@ -65,7 +64,7 @@ class FunctionError:
 
 @dataclass(frozen=True)
 class WorstResult:
-    """The result with the largest ratio of its difference to its bound.
+    """The result with the largest ratio of difference to bound.
 
     Attributes:
         sample: Index of the configuration.
@@ -117,7 +116,8 @@ class FunctionCheck(Displayable):
         oracle_share: Largest ratio of a difference between the function and the oracle to the bound times
             `factor`; None without an oracle.
         rows: Largest ratio in each row of the result, by name.
-        columns: Largest ratio in each column of the result, by joint velocity; empty for other quantities.
+        columns: Largest ratio in each column of the result, by joint velocity; empty if the quantity has no
+            such columns.
         worst: The worst result; None if no result was compared.
         errors: Number of exceptions and wrong shapes.
         first_errors: The first of these exceptions and wrong shapes.
@@ -263,10 +263,10 @@ def verify_function(
 ) -> FunctionCheck:
     """Compare the results of your function with urdfkin's and the oracle's results, within the derived bound.
 
-    The function receives q (nq,), and v and a (nv,) if the quantity needs them, in rad, m and seconds. The
-    values are random within the limits; the zero configuration and the joint limits come first. In every
-    eighth sample, v and a are a hundred times larger, so that quadratic terms have a visible effect. An
-    exception of the function and a wrong shape are results of the check, not exceptions of this function.
+    The function receives q (nq,), and v and a (nv,) if the quantity needs them, in rad, m and s. The values
+    are random within the limits; the zero configuration and the joint limits come first. In every eighth
+    sample, v and a are a hundred times larger, so that quadratic terms have a visible effect. An exception of
+    the function and a wrong shape are results of the check, not exceptions of this function.
 
     Args:
         function: The function to check: q -> result, (q, v) -> result or (q, v, a) -> result.
@@ -364,12 +364,12 @@ class _Compared:
     theirs: FloatArray | None
 
     def shares(self, other: FloatArray) -> FloatArray:
-        """Return the ratio of each number's difference from another result to its bound."""
+        """Compare with another result; return the ratio of each difference to its bound."""
         k = self.k.reshape(-1, *[1] * (self.found.ndim - 1))
         return self.units(other) / k
 
     def units(self, other: FloatArray) -> FloatArray:
-        """Return the difference of each number from another result, in eps * scale.
+        """Compare with another result; return each difference in eps * scale.
 
         A number whose difference is not finite gets inf.
         """
@@ -535,7 +535,7 @@ class _Run:
         return found
 
     def _rounding_of_the_conversion(self, q: FloatArray) -> float:
-        """Return the rounding errors of a conversion that is not a mere permutation, in eps * scale.
+        """Return the rounding errors of a conversion, in eps * scale; they are 0 for a permutation.
 
         The function receives an angle that the conversion has rounded. This angle differs from urdfkin's
         angle by up to 2 eps |q|. The joint's rotation matrix, which is a factor of each term, is therefore

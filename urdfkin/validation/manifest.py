@@ -2,7 +2,7 @@
 
 The manifest defines the chunks and their keys. The key of a chunk is the sha256 of all data on which the
 numbers of the chunk depend. If the code, the text of the robot or the options change, the keys change too.
-Results of an older state are therefore never reused.
+Therefore, results of older code, texts or options are never reused.
 """
 
 from __future__ import annotations

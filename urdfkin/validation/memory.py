@@ -16,8 +16,8 @@ from urdfkin.validation.comparison import BLOCK_BYTES, frame_bytes
 
 #: Fraction of the free memory that a validation uses.
 SHARE = 0.5
-#: Memory (bytes) that Pinocchio needs, measured with version 4.1.0. The workspace takes the first number
-#: times nv^3, and each link takes the second number.
+#: Memory (bytes) that Pinocchio needs, measured with version 4.1.0.
+#: The workspace needs _FOR_CUBE * nv^3, and each link needs _FOR_LINK.
 _FOR_CUBE, _FOR_LINK = 64, 24_000
 #: Number of arrays that exist at the same time and have the size of a block of samples.
 _ARRAYS = 12

@@ -21,12 +21,11 @@ class Verdict(StrEnum):
     VERIFIED = "verified"
 
 
-#: Exit codes of a run with a disagreement, with a robot that cannot be read, and with a robot that Pinocchio
-#: did not check.
+#: Exit codes: a disagreement, a robot that cannot be read, and a robot that Pinocchio did not check.
 DISAGREEMENT, INPUT, UNCHECKED = 1, 2, 3
 #: Exit code of an interrupted run: 128 + SIGINT, as in shells.
 INTERRUPTED = 130
-#: Each verdict that fails a run, with its words for one robot and for several.
+#: The verdicts of a failed run, each with its wording for one robot and for several robots.
 _WORDS = {
     Verdict.DISAGREES: ("disagrees", "disagree"),
     Verdict.NOT_VERIFIED: ("is not verified", "are not verified"),

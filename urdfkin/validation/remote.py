@@ -22,8 +22,7 @@ from urdfkin.validation.worker_processes import WorkerProcess
 if TYPE_CHECKING:
     from urdfkin.validation.chunk import Chunk
 
-#: The result of a chunk on a worker. The result is the pickle of the answer, the cause of the chunk's
-#: crashes, or the versions on the worker's machine.
+#: Result of a chunk on a worker: the pickled answer, the cause of its crashes, or the worker's versions.
 Found = (
     tuple[Literal["answer"], bytes]
     | tuple[Literal["died"], str]

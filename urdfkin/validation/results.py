@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-#: Packages of urdfkin that only display results. The code of these packages may change between two runs of a
-#: campaign.
+#: Packages of urdfkin that only display results.
+#: The code of these packages may change between two runs of a campaign.
 _SHOWING = ("cli", "report", "view")
 #: Libraries that compute results or read robots.
 LIBRARIES = ("urdfkin", "numpy", "numba", "llvmlite", "yourdfpy", *(one.package for one in ORACLES.values()))
@@ -106,7 +106,7 @@ class RobotReport:
         return sum(tally.failed for tally in self.tallies.values())
 
     def of(self, quantity: str) -> list[Tally]:
-        """Return the tallies of one quantity, one for each reference frame."""
+        """Return the error statistics of one quantity, one entry for each reference frame."""
         return [tally for (kind, _), tally in self.tallies.items() if kind == quantity]
 
     def worst(self, quantity: str) -> float | None:

@@ -41,7 +41,7 @@ class RobotInput:
         origin: Source of the robot (also if `source` is the text) and its loading options.
         stamp: The sha256 of the robot's text; empty if the text cannot be read.
         file: The file name in findings, if `source` is the text.
-        listed: Findings in the MJCF or USD that the text was converted from.
+        listed: Findings in the MJCF or USD file from which the text was converted.
         made: Whether the text was converted from another format than URDF.
     """
 

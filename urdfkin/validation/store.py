@@ -36,8 +36,8 @@ _MANIFEST, _LOCK, _CHUNKS, _ASIDE = "manifest.json", "lock", "chunks", "damaged"
 _WRITING = ".writing"
 #: File with the settings of the accuracy study (`urdfkin.validation.accuracy_store`).
 JUDGE = "judge.json"
-#: Suffix of a file with the accuracy result of a robot. The accuracy store defines the key in the file's
-#: name.
+#: Suffix of a file with the accuracy result of a robot.
+#: The accuracy store defines the key in the file's name.
 JUDGED = ".judged"
 _DONE, _FAILED = ".chunk", ".failed"
 

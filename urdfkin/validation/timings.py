@@ -14,7 +14,9 @@ _T = TypeVar("_T")
 
 @dataclass(slots=True)
 class Clock:
-    """Computing time (seconds) of each part of a validation; `compare` is the rest of the total time.
+    """Computing time (seconds) of each part of a validation.
+
+    `compare` is the total time minus the times of the other parts.
 
     Attributes:
         read: Reading the file and building the models of urdfkin and Pinocchio.
@@ -54,7 +56,7 @@ class Clock:
             setattr(self, part, getattr(self, part) + (time.perf_counter() - begin))
 
     def close(self, seconds: float) -> None:
-        """Set `compare` to the rest of the total time in seconds, after all other parts."""
+        """Set `compare` to the total time in seconds minus the times of all other parts."""
         self.compare = max(0.0, seconds - self.read - self.urdfkin - self.pinocchio - self.second)
 
     def as_dict(self) -> dict[str, Any]:

@@ -31,7 +31,7 @@ from urdfkin.validation.engines import DIED, DIED_TWICE, Enter, Row, Task, Work,
 
 #: The module with the function `serve` that a process runs.
 WORKER = "urdfkin.validation.worker_processes"
-#: Maximum time (seconds) that a worker process may take to end after its pipe has ended.
+#: Maximum time (seconds) between the end of a worker's pipe and the end of its process.
 _GRACE = 5.0
 
 

@@ -8,11 +8,12 @@ A result is accepted if each of its numbers differs from the oracle's number by 
 computations add the same terms in different orders, their difference is proportional to the size of the
 terms, not to the sum.
 
-*k* counts roundings to first order in eps (`urdfkin.kinematics.roundings`), a fixed number for each joint on
-the path. Each joint rotates the result of the joints after it. Rotations do not amplify an error, so the
-error grows only linearly with the number of joints.
+*k* is the number of roundings to first order in eps (`urdfkin.kinematics.roundings`). Each joint on the path
+adds a fixed number of roundings. Each joint also rotates the vectors of the joints after it. A rotation does
+not amplify an error, so the error grows only linearly with the number of joints.
 
-A quantity is multilinear in rotated vectors. Each vector is a *factor* with its own rounding error:
+Each term of a quantity is a product of rotated vectors. Each vector is a *factor* with its own rounding
+error:
 
 | Quantity | Factors | Vectors in a term |
 |---|---|---|
@@ -29,12 +30,12 @@ product with p (WORLD).
 Measured differences are a fraction of an eps for each joint, because rounding errors rarely add up in the
 worst way. Reports state these differences in multiples of eps * scale, which can be compared between robots.
 
-`magnitudes` runs the recursion on lengths. The function evaluates eq. 7.58 and 7.127 to 7.130 with the number
-types of `urdfkin.kinematics.number_kinds`. With these number types, no intermediate value exceeds the result.
-One term is different in Pinocchio: eq. 7.129 has v_i w_{i-1} x z, Pinocchio has v_i w_i x z. The joint's own
-part of w_i is parallel to z and contributes only rounding, v_i^2 |z x z|. This rounding is relevant for fast
-joints with an oblique axis. The scale of alpha includes this rounding, because the equation receives the w of
-the link after the joint.
+`magnitudes` runs the forward recursion on the lengths of the vectors. The function evaluates eq. 7.58 and
+7.127 to 7.130 with the number types of `urdfkin.kinematics.number_kinds`. With these number types, no
+intermediate value exceeds the result. One term is different in Pinocchio. Eq. 7.129 has v_i w_{i-1} x z;
+Pinocchio has v_i w_i x z. The difference is v_i^2 z x z, which is 0 except for rounding. This rounding is
+relevant for fast joints with an oblique axis. The scale of alpha includes this rounding, because the scale is
+computed with w_i instead of w_{i-1}.
 """
 
 from __future__ import annotations
@@ -61,8 +62,8 @@ from urdfkin.verify.comparison import KERNELS
 _UNTURNED = np.eye(3).ravel()
 #: Indices of the position, the velocities and the accelerations in the state of a moving base.
 _OF_BASE = 9, 12, 15, 18, 21
-#: Number of configurations that the compiled kernel `lengths` computes at a time. The intermediate results
-#: for this number of configurations fit into the processor's first-level cache.
+#: Number of configurations that the compiled kernel `lengths` computes at a time.
+#: The intermediate results for these configurations fit into the processor's first-level cache.
 _BLOCK = 64
 
 
@@ -76,8 +77,8 @@ class Magnitudes:
         vel: (n, frames) linear velocity, m/s.
         alpha: (n, frames) angular acceleration, rad/s^2.
         acc: (n, frames) linear acceleration, m/s^2.
-        roundings: (n, frames) roundings of one factor. They are the roundings of each URDF joint on the path,
-            of a rotated base, and of one additional joint.
+        roundings: (n, frames) number of roundings of one factor, for all URDF joints on the path, a rotated
+            base, and one additional joint.
     """
 
     p: FloatArray
@@ -97,8 +98,8 @@ def magnitudes(
     Args:
         plan: The compiled tree.
         q: (n, nq) rad, m.
-        v: (n, nv) or None. Without v only `p` and `roundings` are valid; placements and Jacobians need no
-            others.
+        v: (n, nv) or None. Without v, only `p` and `roundings` are valid. Placements and Jacobians need only
+            these two.
         a: (n, nv) or None.
         base: (1 or n, 24) state of the moving base.
     """
@@ -115,13 +116,13 @@ def magnitudes(
             preload.spend("lengths", time.thread_time() - begin)
     else:
         _by_kernel(kernel, lengths, inputs, out)
-    turned = (base[:, :9] != _UNTURNED).any(axis=1)  # a rotated base has the rounding error of a joint
+    turned = (base[:, :9] != _UNTURNED).any(axis=1)  # a rotated base adds as many roundings as a joint
     out[5] = of_joints(plan.depth + 1 + turned[:, np.newaxis], plan.tilts)
     return Magnitudes(*out)
 
 
 def _by_steps(lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """Write the magnitudes of the frames, by NumPy or, for one configuration, with Python's numbers."""
+    """Write the magnitudes of the frames with NumPy; for one configuration, use Python numbers."""
     q, base, *rates = (_columns(x, out.shape[1]) for x in inputs)
     states = [tuple(_norm(base[at : at + 3]) for at in _OF_BASE)]
     for link in lengths.links:
@@ -133,7 +134,7 @@ def _by_steps(lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) 
 
 
 def _by_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """Write the magnitudes of the frames by a kernel, with the bits of `_by_steps`."""
+    """Write the magnitudes of the frames with a kernel; they are bitwise equal to those of `_by_steps`."""
     links = lengths.links
     # An input that is the same for all configurations has one row.
     q, base, v, a = (x if x.strides[0] else x[:1] for x in inputs)
@@ -154,7 +155,7 @@ def _by_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out
 
 
 def _rows(columns: Sequence[FloatArray]) -> FloatArray:
-    """Return columns as the rows of an array; a column of one number is repeated."""
+    """Return an array with the given columns; a column with a single number is repeated."""
     rows = np.empty((max(map(len, columns), default=1), len(columns)))
     for row, column in zip(rows.T, columns, strict=True):
         row[:] = column
@@ -162,7 +163,7 @@ def _rows(columns: Sequence[FloatArray]) -> FloatArray:
 
 
 class _Link(NamedTuple):
-    """A step of the recursion on lengths; the mimic multiplier and the constant are absolute values."""
+    """A step of the recursion on lengths, with the absolute values of the mimic multiplier and constant."""
 
     kind: int
     q: int
@@ -174,7 +175,7 @@ class _Link(NamedTuple):
 
 
 class _End(NamedTuple):
-    """A frame: its step, its index in the output, and the length from the step to the frame."""
+    """A frame, with its step, its index in the output, and the length from the step to the frame."""
 
     step: int
     place: int
@@ -182,7 +183,7 @@ class _End(NamedTuple):
 
 
 class _Lengths(NamedTuple):
-    """The steps and frames of a plan, as Python's numbers and as the tables of the kernel."""
+    """The steps and frames of a compiled tree, as Python numbers and as arrays for the kernel."""
 
     links: list[_Link]
     ends: list[_End]
@@ -190,7 +191,7 @@ class _Lengths(NamedTuple):
 
 
 def _lengths(plan: CompiledTree) -> _Lengths:
-    """Return the steps and frames of a plan as Python numbers; the result is stored for later calls."""
+    """Return the steps and frames of a compiled tree; the result is stored for later calls."""
     found: _Lengths | None = plan.made.get("lengths")
     if found is None:
         lengths, count = counted(plan.lengths).tolist(), len(plan.steps)
@@ -213,7 +214,7 @@ def _lengths(plan: CompiledTree) -> _Lengths:
 
 
 def _columns(x: FloatArray, n: int) -> Any:
-    """Return the columns of an array (n or 1, ...); if there is only one row, return Python numbers."""
+    """Return the columns of an array (n or 1, ...); for one configuration, return Python numbers."""
     return x[0].tolist() if n == len(x) == 1 else x.T
 
 
@@ -226,7 +227,7 @@ def _carried_place(state: State, d: Length) -> State:
     return eq.point_position(state[0], None, d), *state[1:]
 
 
-#: For a joint with several coordinates: the number of its displacements, and the number of its rotations.
+#: For a planar or floating joint: the number of translations, and the number of rotations.
 _FREE_PARTS = {int(Motion.PLANAR): (2, 1), int(Motion.FLOATING): (3, 3)}
 
 
@@ -243,7 +244,7 @@ def _place(link: _Link, state: State, q: Any) -> State:
 
 
 def _free_lengths(link: _Link, q: Any, v: Any, a: Any) -> tuple[Length, ...]:
-    """Return the displacement of a planar or floating joint, its velocities and its accelerations."""
+    """Return the lengths of a planar or floating joint's displacement, velocities and accelerations."""
     at, (slides, turns) = link.v, _FREE_PARTS[link.kind]
     (u, o), (u_rate, o_rate) = (
         (_norm(x[at : at + slides]), _norm(x[at + slides : at + slides + turns])) for x in (v, a)
@@ -282,9 +283,10 @@ class Bound:
 
 
 def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
-    """Return the factor `k` of each result, an array of shape `leading`; a result has a single `k`.
+    """Return the `k` of each result, as an array of shape `leading`.
 
-    A k that is not finite and positive becomes NaN, so that no result is within its bound.
+    All numbers of a result have the same `k`. A k that is not finite and positive becomes NaN, so that no
+    result is within its bound.
     """
     k = bound.k.reshape(bound.k.shape[: len(leading)])
     k = np.where((k > 0.0) & (k < np.inf), k, np.nan)
@@ -292,9 +294,9 @@ def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
 
 
 def bound_of(scale: FloatArray, factors: int, size: Magnitudes, reference: Reference = _ALIGNED) -> Bound:
-    """Return the bound with a scale (n, frames, ...).
+    """Return the bound of a quantity with the given scale (n, frames, ...).
 
-    The factor k of the bound is the number of factors times the roundings of a factor.
+    The `k` of the bound is the number of factors times the number of roundings of one factor.
     """
     factors += reference is not _ALIGNED
     k = factors * size.roundings
@@ -305,11 +307,12 @@ def bound_of(scale: FloatArray, factors: int, size: Magnitudes, reference: Refer
 def about_the_root(size: Magnitudes) -> Magnitudes:
     """Return the magnitudes for a comparison of urdfkin with MuJoCo.
 
-    MuJoCo stores velocities, accelerations and Jacobian columns for a centre of mass, which is at the root
-    here (`urdfkin.verify.mujoco`). At the end, MuJoCo moves them to the frame. The distance of the centre of
-    mass from a joint or from the frame is at most the length of the path, so lever arms are at most 2 p.
-    Storing and moving each use a cross product with a lever arm, which is one more factor. The number of
-    factors is at most doubled. The rounding of each joint is `MUJOCO` instead of `ROUNDINGS`.
+    MuJoCo refers velocities, accelerations and Jacobian columns to a centre of mass, which is at the root
+    here (`urdfkin.verify.mujoco`). At the end, MuJoCo converts them to the frame's origin. The distance of
+    the centre of mass from a joint or from the frame is at most the length of the path. Therefore, lever arms
+    are at most 2 p. Both conversions, to the centre of mass and to the frame, use a cross product with a
+    lever arm. Each cross product adds one factor, which at most doubles the number of factors. Each joint has
+    `MUJOCO` roundings instead of `ROUNDINGS`.
     """
     p = 2.0 * size.p
     shared = eq.tangential(size.w, size.vel)
@@ -324,25 +327,26 @@ def about_the_root(size: Magnitudes) -> Magnitudes:
 
 
 def against_true_values(size: Magnitudes, angles: float, rules: int) -> Magnitudes:
-    """Return the magnitudes for a comparison of one program with true values, rounded to 17 digits.
+    """Return the magnitudes for a comparison of one program with true values.
 
-    The true values belong to the decimals of the URDF and to the doubles q, v and a. Of `ROUNDINGS` = 24 for
-    each joint, one program has 16.8 at most (`urdfkin.kinematics.roundings`). The other 7.2 cover the
-    conversions to doubles: half an eps each for an offset, an axis and the true value itself. An axis rotates
-    twice, so it counts twice. Two kinds of numbers need roundings of their own:
+    The true values are those of the decimals in the URDF and of the doubles q, v and a. They are rounded to
+    17 digits. `ROUNDINGS` = 24 roundings are allowed for each joint, and one program has at most 16.8
+    roundings (`urdfkin.kinematics.roundings`). The other 7.2 roundings cover the conversions to doubles: half
+    an eps each for an offset, an axis and the true value itself. An axis is used in two rotations, so it
+    counts twice. Two kinds of numbers need additional roundings:
 
-    - Roll, pitch and yaw have an error of half an eps of their size, so all vectors after the joint turn by
-      at most (|roll| + |pitch| + |yaw|) / 2 eps.
-    - A mimic joint's value is m x + c. The roundings of m, of the product and of the sum have an error of at
-      most (3 |m x| + |c|) / 2 eps. The rounding of c has an error of at most |c| / 2 eps, and the error of x
-      is multiplied by |m|. A revolute mimic joint rotates all vectors after the joint by the sum of these
-      errors. For each mimic rule, the relative error of a displacement or of a rate is 3/2 eps.
+    - Roll, pitch and yaw have an error of half an eps of their size, so all vectors after the joint are
+      rotated by at most (|roll| + |pitch| + |yaw|) / 2 eps.
+    - A mimic joint's value is m x + c. The roundings of m, of the product and of the sum add at most (3 |m x|
+      + |c|) / 2 eps. The rounding of c adds at most |c| / 2 eps. The error of x is multiplied by
+      |m|. After a revolute mimic joint, all vectors are rotated by the sum of these errors. Each mimic rule
+      adds a relative error of 3/2 eps to a displacement or a joint velocity.
 
     An error of 1 eps rad changes each factor by at most 1 eps of its length.
 
     Args:
         size: Magnitudes for two programs.
-        angles: Sum of these errors of angles over the joints of the path, in eps.
+        angles: Sum of the above errors of angles over the joints of the path, in eps.
         rules: Number of mimic rules on the path; each rule in a chain of rules counts.
     """
     return replace(size, roundings=size.roundings + angles + 1.5 * rules)
@@ -358,17 +362,17 @@ def placement_scale(plan: CompiledTree, size: Magnitudes) -> FloatArray:
 
 @_BEYOND
 def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) -> Bound:
-    """Return the bound between placements of the tree of an MJCF file and of MuJoCo's model of that file.
+    """Return the bound on the difference between the tree's and MuJoCo's placements for an MJCF file.
 
-    The tree contains constant sums of a body's position, the anchors of its joints and a slide's reference
-    value. MuJoCo computes these sums again for each configuration. If the sum of the lengths of these terms
-    exceeds the length of the path, the scale of positions is this sum.
+    A body's position, the anchors of its joints and a slide's reference value are added. The tree contains
+    this sum as a constant. MuJoCo computes the sum for each configuration. If the sum of the lengths of these
+    terms exceeds the length of the path, the scale of positions is this sum of lengths.
 
     MuJoCo rotates a hinge by the rounded difference fl(q - ref); the tree rotates it by ref and by q. The
-    rounding of the difference is at most (eps/2) (|q| + |ref|) rad. This angle rotates everything after the
-    hinge. A number of a rotation changes by at most the angle. A number of a position changes by at most the
-    angle times the length. The bound allows twice these changes, for terms of second order. The change as a
-    fraction of k eps is angle / k.
+    rounding error of the difference is at most (eps/2) (|q| + |ref|) rad. All bodies after the hinge are
+    rotated by this angle. An entry of a rotation matrix changes by at most this angle. A coordinate of a
+    position changes by at most this angle times the length. The bound allows twice these changes, which
+    covers terms of second order. Relative to k eps scale, the allowed change is `angles` / k.
 
     Args:
         bound: Bound of the tree's placements, (n, frames, 4, 4).
@@ -397,12 +401,13 @@ def acceleration_scale(plan: CompiledTree, size: Magnitudes, reference: Referenc
     Pinocchio computes classical accelerations from spatial accelerations. The difference is the term w x vel,
     which the scale includes.
 
-    The scale is also valid for the sum of an acceleration breakdown, which groups the terms by joints. With
-    d_k from joint k to the frame, the terms v_k z x (v_k z x d_k) and 2 w_{k-1} x (v_k z x d_k) have the
-    length (w_k^2 - w_{k-1}^2) d_k. Here w_k is the sum of the joint velocities up to joint k. The sum of
-    these lengths over all joints is w^2 times the length of each link, as in eq. 7.130. The d_k are sums of
-    interorigin vectors and round like the sums of eq. 7.77. The sum of the 4 n parts has n + 3 roundings. The
-    roundings of d_k and of this sum are below the 2 eps that each joint has for sums.
+    An acceleration breakdown groups the terms by joints. The scale is also valid for the sum of a breakdown.
+    Let d_k be the vector from joint k to the frame, and let w_k be the sum of the joint velocities up to
+    joint k. The terms v_k z x (v_k z x d_k) and 2 w_{k-1} x (v_k z x d_k) have the length (w_k^2 - w_{k-1}^2)
+    d_k. Over all joints, these lengths add up to the sum of w_k^2 times the length of link k, as in eq.
+    7.130. The vectors d_k are sums of the vectors between joint origins and have the rounding errors of the
+    sums in eq. 7.77. The sum of the 4 n terms of n joints has n + 3 roundings. The roundings of d_k and of
+    this sum are below the 2 eps that each joint is allowed for sums.
     """
     shared = eq.tangential(size.w, size.vel)
     linear = size.acc + shared
@@ -438,7 +443,7 @@ def jacobian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -
     """Return (n, frames, 6, nv), the size of the terms of Jacobians.
 
     The size in linear rows is the path's length for revolute joints and 1 for prismatic joints. For joints
-    that are not on the path, it is 0.
+    that are not on the path, the size is 0.
     """
     turning, sliding = column_weights(plan)
     linear, angular = eq.turning_column(turning, size.p[..., None])
@@ -449,9 +454,9 @@ def jacobian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -
 def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
     """Return (n, frames, 6, nv), the size of the terms of J-dot.
 
-    A revolute column is at most as long as the frame's path. The lever arm of the column changes at most as
-    fast as the frame's origin moves. In LOCAL the numbers are components along the frame's axes, which
-    rotate.
+    The column of a revolute joint is at most as long as the path to the frame. The lever arm of the column
+    changes at most as fast as the frame's origin moves. In LOCAL the numbers are components along the frame's
+    axes, which rotate.
     """
     turning, sliding = column_weights(plan)
     w, p, vel = size.w[..., None], size.p[..., None], size.vel[..., None]
@@ -464,9 +469,11 @@ def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Referen
     return _six_rows(linear, angular)
 
 
-#: Number of products in a linear row of Pinocchio's Hessian: z x (z x d) of two revolute joints, and z x z of
-#: a revolute joint and a prismatic joint. The first entry is for pairs with j before or equal to i, the
-#: second entry for pairs with j after i.
+#: Number of products in a linear row of Pinocchio's Hessian, for the joints i and j of an entry.
+#: First number of a pair: z x (z x d) of two revolute joints.
+#: Second number of a pair: z x z of a revolute joint and a prismatic joint.
+#: The first pair is for j before or equal to i.
+#: The second pair is for j after i.
 _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = {
     Reference.LOCAL_WORLD_ALIGNED: ((5.0, 2.0), (2.0, 1.0)),
     Reference.WORLD: ((2.0, 1.0), (0.0, 0.0)),
@@ -478,17 +485,17 @@ _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = 
 def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
     """Return (n, frames, 6, nv, nv), the size of the terms of Hessians, summed over pairs of columns.
 
-    The column of a mimic joint counts for the coordinate of the mimicked joint. No d is longer than the path.
-    Pinocchio computes each entry from two columns c = [z x d; z] at the world origin. The products it adds
-    are:
+    The column of a mimic joint counts for the coordinate of the mimicked joint. A lever arm d is never longer
+    than the path. Pinocchio computes each entry from two Jacobian columns c = [z x d; z] at the world origin.
+    Pinocchio adds these products:
 
     - two for c_1 x c_2, whose linear rows are w_1 x v_2 + v_1 x w_2
     - one more to move the result to the frame's origin p, p x (w_1 x w_2)
     - two more to move the other column there, (v - p x w) x w
 
     These counts give the numbers five, two and three in `_PAIR_TERMS`. urdfkin needs the single product z x
-    (z x d), or the two products of c_1 x c_2. In LOCAL, R rotates the two columns first. The two products of
-    five factors (R, z, R, z, d) in urdfkin are below the allowed three products of four factors.
+    (z x d), or the two products of c_1 x c_2. In LOCAL, R rotates the two columns first. urdfkin then has two
+    products of five factors (R, z, R, z, d). The bound allows more: three products of four factors.
     """
     shape = len(plan.frames), plan.nv, plan.nv
     turning, mixed, angular = np.zeros(shape), np.zeros(shape), np.zeros(shape)
@@ -516,20 +523,22 @@ def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) ->
 def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> Bound:
     """Return the bound of analytical Jacobians with Euler angles, (n, frames, 6, nv).
 
-    The position rows have the Jacobian's bound. The angle rows are r . w for the outer angles and u . w for
-    the middle angle, with the reciprocal basis of the axes e_i, u and t = R e_k (`analytical_reference`).
-    Here |u| = 1 and |r| = 1 / s, where s = |e_i x t| is the sine or cosine of the middle angle.
+    The position rows have the Jacobian's bound. The angles have the axes e_i, u and t = R e_k
+    (`analytical_reference`). The row of the middle angle is u . w. The rows of the outer angles are r . w,
+    where r is a vector of the reciprocal basis of the axes. Here |u| = 1 and |r| = 1 / s, where s = |e_i x t|
+    is the sine or cosine of the middle angle.
 
-    Let t have the error delta = k eps. Then u rotates by delta / s. By -(r . du) u - (r . dt) r', r changes
-    by 2 delta / s^2, with the smallest possible s, `apart` - delta. Let w have the relative error delta too.
-    Then the errors are:
+    Let the error of t be delta = k eps. Then u rotates by delta / s. Let r' be the reciprocal vector of t.
+    Then r changes by -(r . du) u - (r . dt) r', which has at most the length 2 delta / s^2. Here s is the
+    smallest possible value, `apart` - delta. Let the relative error of w be delta too. Then the errors are:
 
     - outer angles: 2 delta / s^2 + delta / s <= 3 delta / s^2
     - middle angle: delta / s + delta <= 2 delta / s
 
-    The Jacobian's bound has two factors, so the scales are 1.5 / s^2 and 1 / s times the Jacobian's. In
-    urdfkin and in the reference, arctan2 and the sine of the angle add rounding errors of about 3 eps.
-    Products and quotients add about 10 eps. The additional joint in `roundings` covers these errors.
+    The Jacobian's bound has two factors, that is 2 delta. The scales are therefore 1.5 / s^2 and 1 / s times
+    the Jacobian's scale. In urdfkin and in the reference, arctan2 and the sine of the angle add rounding
+    errors of about 3 eps. Products and quotients add about 10 eps. `Magnitudes.roundings` counts one
+    additional joint, which covers these errors.
 
     Args:
         bound: Bound of the Jacobian.
@@ -548,9 +557,10 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
 def quaternion_jacobian_bound(bound: Bound) -> Bound:
     """Return the bound (n, frames, 7, nv) of analytical Jacobians with quaternions, which are never singular.
 
-    The position rows have the Jacobian's bound. A row of 4 q q^T is linear in R. The error of this row is
-    below 4.6 delta and its length at least 2, so the error of q is below 2.3 delta. Half the product of w and
-    q has an error of (2.3 + 1) / 2 delta relative to w, which is below the Jacobian's two factors.
+    The position rows have the Jacobian's bound. Let delta be the error of R. The numbers of 4 q q^T are
+    linear in R. The longest row of 4 q q^T has at least the length 2, and its error is below 4.6 delta.
+    Therefore, the error of q is below 2.3 delta. Relative to w, half the quaternion product of w and q has an
+    error of (2.3 + 1) / 2 delta. This error is below the 2 delta of the Jacobian's two factors.
     """
     return Bound(np.concatenate((bound.scale, bound.scale[..., 5:, :]), axis=-2), bound.k)
 
@@ -564,7 +574,7 @@ def hidden_scalar(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
 
 
 def nearest_singularity(plan: CompiledTree) -> float:
-    """Return the smallest distance (rad) from the singularity at which results have a valid digit.
+    """Return the smallest distance (rad) from a singularity for which results still have a valid digit.
 
     The distance is four times the error of R.
     """
@@ -590,17 +600,18 @@ def _column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
 
 
 def movable(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.bool_]:
-    """Return (frames, 6, nv), True for the numbers of a Jacobian that are not 0 for every q and base.
+    """Return (frames, 6, nv): False for the entries of a Jacobian that are always 0, else True.
 
-    The linear rows of a revolute column are z x d. The vector d is 0 for every q if the path has no length
-    and no prismatic joint. In WORLD the path leads from the root to the joint, else from the joint to the
-    frame.
+    An entry is always 0 if it is 0 for every q and every motion of the base. The linear rows of a revolute
+    column are z x d. The vector d is 0 for every q if the path has no length and no prismatic joint. In
+    WORLD, this path leads from the root to the joint. In the other reference frames, it leads from the joint
+    to the frame.
     """
     found = np.zeros((len(plan.frames), 6, plan.nv), dtype=bool)
     turns, multipliers = plan.steps[:, Step.KIND] == Motion.TURN, plan.geometry[:, Geometry.MULTIPLIER :]
     extends = (plan.lengths[: len(turns)] > 0.0) | (~turns & (multipliers != 0.0).any(axis=1))
     for f, (end, place) in enumerate(plan.frames):
-        path, step = list[int](), int(end)  # from the frame's step to the root's
+        path, step = list[int](), int(end)  # the steps from the frame to the root
         while step >= 0:
             path.append(step)
             step = int(plan.parents[step])

@@ -57,7 +57,7 @@ class Call:
         frame: Name of a link or joint, or several names.
         reference: A `Reference` or its name.
         base: Motion of the root link; None: fixed at the world origin.
-        given: The inputs that the quantity needs, of q, v and a.
+        given: Those of the inputs q, v and a that the quantity needs.
         also: Additional frames; they are computed after the frames in `frame` and are not returned.
         options: Other arguments of the method, by name.
 

@@ -124,11 +124,11 @@ def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> Co
     """Compare urdfkin's results with the oracle's results.
 
     Args:
-        ours: urdfkin's results. The first `axes` axes number the results; the other axes belong to a single
-            result.
+        ours: urdfkin's results. The first `axes` axes index the results; the other axes index the numbers of
+            one result.
         theirs: The oracle's results, of the same shape.
         bound: Bound on the difference. The arrays `scale` and `k` of the bound broadcast against the results.
-        axes: Number of leading axes that count results.
+        axes: Number of axes that index the results.
     """
     return comparison_of(worst_of_each(ours, theirs, bound.scale, axes), bound)
 
@@ -149,7 +149,8 @@ class Line:
     Attributes:
         quantity: Name of the quantity.
         checked: Number of results that the oracle confirmed.
-        worst: Largest difference between a checked result and the oracle's, in multiples of eps * scale.
+        worst: Largest difference between a checked result and the oracle's result, in multiples of eps *
+            scale.
         share: Largest ratio of a difference to its bound.
         unchecked: Number of results that were returned without a check.
     """
@@ -320,7 +321,7 @@ class Account:
     """The entries of a ledger for one quantity.
 
     Attributes:
-        checked: One comparison for all results that the oracle confirmed.
+        checked: Combined comparison of all results that the oracle confirmed.
         unchecked: Number of results that the oracle could not check, or that `verify="sample"` left out.
         not_asked_for: Number of results of calls with verify=False.
         counters: Arrays and indices of the counters in which fast evaluators count their unchecked results.
@@ -350,7 +351,7 @@ class Ledger:
     _reasons: dict[str, None] = field(default_factory=dict)
 
     def account(self, quantity: str) -> Account:
-        """Return the account of a quantity. Code that counts results often can store and reuse it."""
+        """Return the account of a quantity. The caller may keep the account and use it again."""
         with _entering:
             return self._accounts.setdefault(quantity, Account())
 

@@ -24,11 +24,12 @@ from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
 def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | None:
     """Compare a chain with Pinocchio's placements; return a line of text about the agreement.
 
-    Pinocchio's frame of a joint is the frame of its child link. Along the chain, this frame comes after the
-    joint's motion if the chain passes the joint from parent to child. The frame comes before the motion if
-    the chain passes the joint from child to parent. Pinocchio computes from the root to the two ends of the
-    chain; urdfkin computes from one end to the other end. The bound uses the joints and lengths of the two
-    paths from the root to the ends of the chain. Neither computation uses more joints or lengths than these.
+    Pinocchio's frame of a joint is the frame of its child link. If the chain passes the joint from parent to
+    child, this frame comes after the joint's motion. If the chain passes the joint from child to parent, the
+    frame comes before the joint's motion. Pinocchio computes from the root to the two ends of the chain;
+    urdfkin computes from one end to the other end. The bound uses all joints and lengths of the two paths
+    from the root to the ends of the chain. These include all joints and lengths that Pinocchio or urdfkin
+    uses.
 
     Args:
         verifier: Verifier of the robot.

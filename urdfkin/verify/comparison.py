@@ -1,4 +1,4 @@
-"""Compute the largest difference of each result from the oracle's (`bounds.disagreement`).
+"""Compute the largest difference of each result from the oracle's result (`bounds.disagreement`).
 
 For large batches a compiled kernel computes the differences in one pass, because NumPy would take as long as
 Pinocchio itself. The kernel and NumPy return equal numbers.
@@ -15,7 +15,7 @@ from urdfkin.compiled import preload
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
 from urdfkin.model.tree import FloatArray
 
-#: The module with the compiled kernels of checks, and the kernels of this module that are used here.
+#: Module with the compiled kernels of checks, and the names of the kernels that checks use.
 KERNELS = "urdfkin.verify.kernels"
 CHECKS = "worst", "coupling"
 _NO_BITS = np.empty(0, dtype=np.int64)
@@ -25,11 +25,11 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
     """Return, for each result, the largest value of `bounds.disagreement` over the result's numbers.
 
     Args:
-        ours: urdfkin's results. The first `axes` axes number the results; the other axes belong to a single
-            result.
+        ours: urdfkin's results. The first `axes` axes index the results; the other axes index the numbers of
+            one result.
         theirs: The oracle's results, of the same shape.
         scale: Scale of the bound; it broadcasts against the results.
-        axes: Number of leading axes that count results.
+        axes: Number of axes that index the results.
 
     Returns:
         An array with the shape of the leading axes, in multiples of eps * scale.
@@ -48,7 +48,7 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
     else:
         worst = units = unit = np.empty(n)
         bits = out_bits = _NO_BITS
-        if len(size) < n:  # results that share a scale need the scratch memory
+        if len(size) < n:  # scratch memory is needed if results share a scale
             unit, units, out_bits = np.empty(size.size), np.zeros(numbers), worst.view(np.int64)
             bits = units.view(np.int64)
         kernel(one, other, size, worst, out_bits, unit, units, bits)
@@ -56,7 +56,7 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
 
 
 def _rows(x: FloatArray, shape: tuple[int, ...], n: int, numbers: int) -> FloatArray:
-    """Return an array as `n` rows, after it is broadcast to a shape."""
+    """Broadcast an array to a shape, and return it as `n` rows."""
     if x.shape != shape:
         x = np.broadcast_to(x, shape)
     return np.ascontiguousarray(x).reshape(n, numbers)

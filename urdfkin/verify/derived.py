@@ -38,8 +38,8 @@ def check_analytical_jacobian(
         bound_of: Function for the bound of the velocity Jacobian.
         oracle: The oracle's model of the robot.
         x: The configurations.
-        ours: urdfkin's results. The results determine the sign of a quaternion if rounding errors hide its
-            sign.
+        ours: urdfkin's results. If rounding errors hide the sign of a quaternion, the oracle's quaternion
+            gets the sign of this result.
         by: The oracle.
     """
     aligned = Reference.LOCAL_WORLD_ALIGNED
@@ -51,8 +51,9 @@ def check_analytical_jacobian(
         quat = oracle.quaternions(x.query)
         bound = bounds.quaternion_jacobian_bound(bound)
         theirs, hidden = quaternion_jacobian(quat, J_v), bounds.hidden_scalar(bound, quat.shape[:-1])
-        # q and -q are the same rotation. The quaternion with qw >= 0 is used. If rounding hides the sign of
-        # qw, each of the two quaternions is accepted.
+        # The quaternions q and -q are the same rotation.
+        # The quaternion with qw >= 0 is used.
+        # If rounding hides the sign of qw, both quaternions are accepted.
         with_other = (ours * theirs)[..., 3:, :].sum(axis=(-2, -1)) < 0.0
         turned = with_other & (np.abs(quat[..., 3]) <= hidden)
         theirs[..., 3:, :] *= np.where(turned, -1.0, 1.0)[..., np.newaxis, np.newaxis]
@@ -68,16 +69,16 @@ def check_relative_placement(
     """Return relative placements (n, frames, 4, 4) from an oracle, and their bound.
 
     The placement is the pose of frame b relative to frame a. Let s_a and s_b be the path lengths of the
-    frames, and k_a and k_b the roundings of their placements. The position is R_a^T (p_b - p_a). The error of
-    the position is k_b s_b + k_a s_a from p_a and p_b, plus k_a |p_b - p_a| from R_a. Since |p_b - p_a| <=
-    s_a + s_b, the sum is at most (2 k_a + k_b) (s_a + s_b). The error of the product of rotations is k_a +
-    k_b. The difference and the products add rounding errors of about 5 eps. The additional joint in each k
-    covers these rounding errors.
+    frames. Let k_a and k_b be the numbers of roundings of their placements. The position is R_a^T (p_b -
+    p_a). The errors of p_a and p_b add k_b s_b + k_a s_a to the error of the position. The error of R_a adds
+    k_a |p_b - p_a|. Since |p_b - p_a| <= s_a + s_b, the sum is at most (2 k_a + k_b) (s_a + s_b). The error
+    of the product of rotations is k_a + k_b. The difference and the products add rounding errors of about 5
+    eps. Each k counts one additional joint, which covers these rounding errors.
 
     Args:
         bound_of: Function for the bound of placements in the world.
         oracle: The oracle's model of the robot.
-        x: The configurations. The last frame of the compiled tree of `x` is the other frame.
+        x: The configurations. Frame a is the last frame of the compiled tree of `x`.
         ours: urdfkin's results; not used.
         by: The oracle.
     """

@@ -23,7 +23,7 @@ from urdfkin.kinematics import lengths as steps
 from urdfkin.kinematics.arithmetic import bound, rebound
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST
 
-#: The bits of inf, as a whole number.
+#: Bit pattern of inf, as an integer.
 _INFINITE = 0x7FF0000000000000
 _WITHOUT_SIGN = 0x7FFFFFFFFFFFFFFF
 #: Number of rows that are loaded into the cache in advance.
@@ -83,7 +83,10 @@ def _is_in_threes(scale, k):
 
 @helper()
 def _divide_threes(ours, theirs, unit, width, units):
-    """Write the largest difference of each three numbers with a common scale; it may be NaN or inf."""
+    """Write the largest difference of each group of three numbers with a common scale.
+
+    The difference is in multiples of eps * scale and may be NaN or inf.
+    """
     for j in range(width):
         x = abs(ours[j] - theirs[j])
         y = abs(ours[j + width] - theirs[j + width])
@@ -96,10 +99,10 @@ def _divide_threes(ours, theirs, unit, width, units):
 
 @helper()
 def _most(x, count):
-    """Return the bits of the largest of several numbers, each of which is at least 0, inf or NaN.
+    """Return the bit pattern of the largest of several non-negative numbers, which may be inf or NaN.
 
-    The bits of such numbers, as whole numbers, have the same order as the numbers. Some processors set the
-    sign of NaN, so the sign is removed.
+    As integers, the bit patterns of non-negative numbers have the same order as the numbers. Some processors
+    set the sign bit of NaN, so the sign bit is removed.
     """
     most = 0
     for j in range(count):
@@ -111,18 +114,18 @@ def _most(x, count):
 def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
     """Write the largest difference in each row; inf for a row that is not finite.
 
-    If the scale has fewer rows, they are repeated. The arrays `out_bits` and `bits` are `out` and `units` as
-    whole numbers. The compiler finds the largest of several whole numbers at once.
+    If the scale has fewer rows, its rows are repeated. The arrays `out_bits` and `bits` are views of `out`
+    and `units` as integers, because the compiler can vectorize the maximum of integers.
 
     Args:
         ours: urdfkin's results.
         theirs: The oracle's results.
         scale: Scale of the bound.
         out: The largest difference in each row.
-        out_bits: The same memory.
-        unit: Scratch memory of the size of `scale`, if that has fewer rows.
-        units: Scratch memory of a row.
-        bits: The same memory.
+        out_bits: The memory of `out`, as integers.
+        unit: Scratch memory of the size of `scale`. It is used only if `scale` has fewer rows than `out`.
+        units: Scratch memory for one row.
+        bits: The memory of `units`, as integers.
     """
     known = in_threes = len(scale) < len(out)
     for k in range(len(scale)):
@@ -164,7 +167,7 @@ def coupling(full, columns, index, factor, out):
 # -- the recursion on lengths --------------------------------------------------------------------------------
 
 _TURN, _SLIDE = int(Motion.TURN), int(Motion.SLIDE)
-#: Number of values in a link's state, and number of lengths of a planar or floating joint.
+#: Number of values in the state of a link, and number of lengths of a planar or floating joint.
 _STATE = _FREE = 5
 
 
@@ -213,7 +216,10 @@ def _of_row(x, row, at):
 
 @helper()
 def _read(x, first, m, at, factor, to):
-    """Write the product of a factor and a length for m configurations, which may share one row of `x`."""
+    """Write the product of a factor and |x| in column `at`, for m configurations.
+
+    An array `x` with one row is used for all configurations.
+    """
     step = 1 if len(x) > 1 else 0
     for i in range(m):
         to[i] = _product(factor, abs(x[(first + i) * step, at]))
@@ -245,9 +251,9 @@ def lengths(links, sizes, ends, tips, q, v, a, free, base, s, out):
     """Write the five magnitudes of each configuration and frame, by the recursion on lengths.
 
     Args:
-        links: Kind, q, v and parent of each step.
-        sizes: Length, multiplier and constant of each step.
-        ends: Step and index in the output of each frame.
+        links: Kind, index in q, index in v, and parent of each step.
+        sizes: Length, mimic multiplier and mimic constant of each step.
+        ends: For each frame: its step, and its index in the output.
         tips: Length from the step to the frame.
         q: Coordinates. In q, v, a, free and base, an array with one row is used for all configurations.
         v: Joint velocities.

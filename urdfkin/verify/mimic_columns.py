@@ -26,7 +26,7 @@ def coupled(full: FloatArray, columns: Places, index: Places, factor: FloatArray
 
     Args:
         full: (..., Pinocchio's nv) columns for all joints.
-        columns: Indices of the columns of J_full that are added, in the order of summation.
+        columns: Indices of the columns of J_full to add, in the order of the additions.
         index: (Pinocchio's nv,) index in v for each column of J_full.
         factor: (Pinocchio's nv,) the number in G by which each column of J_full is multiplied.
         nv: Length of v.

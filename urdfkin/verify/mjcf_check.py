@@ -3,8 +3,8 @@
 Pinocchio checks every result with the URDF text that urdfkin writes for the tree. This check does not include
 the conversion from the MJCF file to the tree. Therefore `load` compares the tree with MuJoCo's own model of
 the file. `load` compares the placements of bodies and sites, and the equalities that became mimic rules.
-`load` also compares the placements with the placements by Pinocchio's MJCF reader. Pinocchio's reader is
-known to read some files differently, so a difference from this reader is reported but is not an error.
+`load` also compares the placements with those of Pinocchio's MJCF reader. Pinocchio's reader is known to read
+some files differently, so a difference from this reader is reported but is not an error.
 """
 
 from __future__ import annotations
@@ -162,8 +162,8 @@ def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
     frames = [LinkFrame.of(name) for name, _ in answer["frames"]]
     plan = compile_tree(tree, [tree.frame_link(frame) for frame in frames])
     ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
-    # urdfkin and MuJoCo round, and the angles in the URDF text are rounded too. The bound is therefore twice
-    # the bound for a comparison with MuJoCo.
+    # urdfkin and MuJoCo round, and the angles in the URDF text are rounded too.
+    # The bound is therefore twice the bound for a comparison with MuJoCo.
     size = about_the_root(magnitudes(plan, q, None, None, STILL_STATE))
     bound = PLACEMENT.bound(plan, size, None)
     bound = Bound(bound.scale, 2.0 * bound.k)

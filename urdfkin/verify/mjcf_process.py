@@ -1,12 +1,13 @@
 """Compile an MJCF file with MuJoCo and with Pinocchio's MJCF reader; this program is a separate process.
 
 A few lines of MJCF, such as nested `<replicate>` or `nuser_body`, can require any amount of time and memory.
-A defect of a parser can crash the process. Therefore a separate process compiles the file, and the caller's
-process receives only plain data from it. The request comes on standard input. Each answer is a line of JSON
-on standard output:
+A defect of a parser can crash the process. Therefore, a separate process compiles the file, and the caller's
+process receives only plain data. The request comes on standard input. Each answer is a line of JSON on
+standard output:
 
-1. the robot, compiled without its shapes 2. the robot, compiled from the complete file 3. the placements of
-the bodies by Pinocchio's reader
+1. the robot, compiled without its shapes
+2. the robot, compiled from the complete file
+3. the placements of the bodies by Pinocchio's reader
 
 If the process ends early, the answers that it has already written remain valid.
 """
@@ -83,8 +84,8 @@ def answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
 
     Args:
         request: Mapping with `path` or `text`, with `name` (the file's name in messages), and with `samples`.
-            This is the number of random configurations in addition to the zero configuration; 0 means no
-            configuration.
+            `samples` is the number of random configurations in addition to the zero configuration; 0 means no
+            configuration at all.
     """
     path, samples = request["path"], int(request["samples"])
     source = path if path is not None else request["text"]
@@ -207,7 +208,7 @@ def _numbered(model: Any, names: Sequence[str]) -> Iterator[tuple[str, tuple[int
     """Yield the name of each joint with its index in q and its number of coordinates.
 
     Pinocchio combines several joints of a body into one joint. The name of the combined joint is `Composite_`
-    followed by the name of the first joint. The combined joint has one coordinate for each of its joints.
+    followed by the name of the first joint. In q, each of the original joints has one number.
     """
     for j, name in list(enumerate(map(str, model.names)))[1:]:
         joint, first = model.joints[j], name.removeprefix("Composite_")

@@ -45,8 +45,8 @@ def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in names])
     ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
     theirs = _placements(model, _configurations(model, tree, q), made)
-    # urdfkin and Pinocchio round, and the angles in the URDF text are rounded too. Twice the bound is
-    # therefore allowed.
+    # urdfkin and Pinocchio round, and the angles in the URDF text are rounded too.
+    # Therefore, twice the bound is allowed.
     bound = PLACEMENT.bound(plan, magnitudes(plan, q, None, None, STILL_STATE), None)
     found = compare(ours, theirs, Bound(bound.scale, 2.0 * bound.k), 2)
     if not found.agrees:

@@ -7,8 +7,8 @@ method. Before MuJoCo reads the text, this module makes these changes:
 - Meshes and inertials are removed. Each link becomes a body. Only the root has a mass, so that the centre of
   mass, MuJoCo's point of reference, is the root's origin.
 - Links and joints get numbers as names, because MuJoCo reserves some names.
-- Floating and planar joints become slides with a ball or a hinge, because MuJoCo's free joint can connect a
-  body to the world only.
+- Floating and planar joints become slides with a ball joint or a hinge, because MuJoCo's free joint can
+  connect a body to the world only.
 - The rules of `rules_of_text` couple the mimic joints. MuJoCo would turn the mimic rules into constraints,
   and its kinematics ignores constraints.
 
@@ -45,8 +45,8 @@ from urdfkin.verify.pinocchio import depth_of
 
 #: Mass (kg) and moments of inertia (kg m^2) that each link has while MuJoCo reads the text.
 _MASS = "1"
-#: Longest chain of links that is accepted. MuJoCo refuses more than 1,023 links, after a time that grows with
-#: the square of their number.
+#: Longest chain of links that is accepted.
+#: MuJoCo rejects more than 1,023 links, after a time that grows with the square of their number.
 _DEEPEST = 1_000
 #: MuJoCo's joints for a planar or floating joint, in the order of its coordinates.
 _PARTS = {"planar": ("slide x", "slide y", "hinge"), "floating": ("slide x", "slide y", "slide z", "ball")}
@@ -246,7 +246,7 @@ class MujocoOracle(Oracle):
             for rows in (slice(0, 3), slice(3, 6)):
                 rate[..., rows, :] -= np.cross(w, J[..., rows, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         out = _referred(which, poses, rate, columns=True)
-        if which.at_world:  # the term p x J_angular also changes with p
+        if which.at_world:  # the time derivative of p x J_angular contains vel x J_angular
             out[..., :3, :] += np.cross(vel, J[..., 3:, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         return out
 
@@ -335,8 +335,8 @@ class MujocoOracle(Oracle):
             second = (S @ x.a[..., None] + self._spread_rate(q, v) @ v[..., None])[..., 0]
         rates = np.array(np.broadcast_to(rates, (n, self._model.nv)))
         if self.moving_base and base is not None:
-            # The velocities of the slides are in world axes; the velocity of the ball joint is in the base's
-            # own axes.
+            # The velocities of the slides are in world axes.
+            # The velocity of the ball joint is in the base's own axes.
             at, back = self._places[0].their_v, np.swapaxes(_rotation(qpos[:, 3:7]), -1, -2)
             velocity, acceleration = np.asarray(base.velocity), np.asarray(base.acceleration)
             rates[:, at : at + 3] = velocity[..., :3]
@@ -388,8 +388,8 @@ class MujocoOracle(Oracle):
 def _weighing_its_root(model: Any, root: str) -> Any:
     """Set all masses except the root's to zero, so that the centre of mass is at the root's origin.
 
-    MuJoCo computes velocities at the centre of mass. If this point is the root's origin, zero lever arms are
-    exactly zero.
+    MuJoCo computes velocities relative to the centre of mass. With the centre of mass at the root's origin, a
+    lever arm of length zero is computed as exactly zero.
     """
     body = model.body(root).id
     for mass in (model.body_mass, model.body_subtreemass):

@@ -1,8 +1,8 @@
 """Define the base class of the oracles, the query that its methods take, and the conversion of arguments.
 
-urdfkin converts the arguments of a call for its own computation. This module converts them a second time for
-the oracle, from the URDF text, the oracle's model and the user's numbers. Apart from the exceptions below,
-the two conversions share no code. A wrong broadcast, order or name in one of them therefore leads to a
+urdfkin converts the arguments of a call for its own computation. This module converts the arguments a second
+time for the oracle, from the URDF text, the oracle's model and the user's numbers. Apart from the exceptions
+below, the two conversions share no code. A wrong broadcast, order or name in one of them therefore leads to a
 disagreement.
 
 | Part | In this module | In urdfkin's own computation |
@@ -14,8 +14,8 @@ disagreement.
 | moving base | `free_flyer` and others | `BaseMotion` |
 
 This module looks up names in the list of joints. The oracle compares the order of this list with the order of
-joints in the oracle's model. The two conversions share the values of named poses and the parser of units
-(`urdfkin.errors.numbers`).
+joints in the oracle's model. The only exceptions are the values of named poses and the parser of units
+(`urdfkin.errors.numbers`), which both conversions use.
 
 Mimic rules: Pinocchio's model has no mimic joints (`urdfkin.verify.pinocchio`), so this module reads the
 rules. The module parses the text again at the first check.
@@ -82,7 +82,7 @@ def resolved_rules(rules: dict[str, Mimic]) -> dict[str, Mimic]:
 def _resolved(joint: str, rules: dict[str, Mimic], known: dict[str, Mimic]) -> Mimic:
     """Return the resolved rule q_mimic = m_1 (m_2 (... q_independent ...) + o_2) + o_1.
 
-    The products are computed from the independent joint outwards. The results are stored in `known`, so each
+    The computation starts with the rule of the independent joint. The results are stored in `known`, so each
     rule of a chain is resolved only once.
     """
     chain = [joint]
@@ -116,7 +116,7 @@ _COORDINATES = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 
 
 class _Place(NamedTuple):
-    """A joint: its (nq, nv) in Pinocchio, its first indices in Pinocchio and urdfkin, and its mimic rule."""
+    """(nq, nv) of a joint in Pinocchio, its first indices in Pinocchio and urdfkin, and its mimic rule."""
 
     sizes: tuple[int, int]
     full_q: int
@@ -174,7 +174,10 @@ class Layout:
         self._same_v &= bool((self._index == np.arange(model.nv)).all())
 
     def _of_sizes(self, sizes: tuple[int, int]) -> tuple[Places, Places, FloatArray, FloatArray]:
-        """Return, for joints with one size, the indices in Pinocchio's and urdfkin's q, and mimic rules."""
+        """Return the indices in Pinocchio's q and in urdfkin's q, the multipliers and the offsets.
+
+        The joints are those with the given (nq, nv) in Pinocchio.
+        """
         own = [place for place in self._places if place.sizes == sizes]
         return (
             np.array([place.full_q for place in own], dtype=np.int64),
@@ -244,8 +247,8 @@ class Frames:
         robot: Name of the robot, for errors.
         bodies: Index of the frame of each link.
         joints: Index of the frame of each joint.
-        carriers: For the frame of each link that a joint carries: the index of the joint's frame. A link's
-            frame that is missing here is also the frame of the joint.
+        carriers: For the frame of each child link: the index of the frame of its parent joint. A link's frame
+            without an entry is also the frame of the parent joint.
     """
 
     def __init__(
@@ -346,8 +349,8 @@ def nearest_quaternion(M: FloatArray) -> FloatArray:
     """Return the unit quaternion (..., 4), scalar last, of the rotation nearest to M (..., 3, 3)."""
     K = davenport(M)
     q = np.linalg.eigh(K).eigenvectors[..., -1:]
-    # For a rotation, K + I = 4 q q^T. The product of K + I and q does not contain the parts of the other
-    # eigenvectors.
+    # For a rotation, K + I = 4 q q^T.
+    # The product (K + I) q removes the components of q along the other eigenvectors.
     q = (K @ q + q)[..., 0]
     unit: FloatArray = q / np.linalg.norm(q, axis=-1, keepdims=True)
     return unit
@@ -368,7 +371,7 @@ def davenport(M: NDArray[Any]) -> NDArray[Any]:
 def _in_own_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
     """Return R^T times the linear half and R^T times the angular half of a six-vector.
 
-    For a quaternion (u, w) and a half x, this is x + 2 w (x x u) + 2 (x x u) x u.
+    For a quaternion (u, w), each half x becomes x + 2 w (x x u) + 2 (x x u) x u.
     """
     u, w = quaternion[..., np.newaxis, :3], quaternion[..., np.newaxis, 3:]
     x = six.reshape(*six.shape[:-1], 2, 3)
@@ -501,7 +504,7 @@ class OracleQuery:
         reference: A `Reference` or its name.
         base: Motion of the base; None: fixed at the world origin.
         inputs: q, or q and v, or q, v and a, as numbers that broadcast.
-        named: The original argument of each input that was given by names; None for every other input.
+        named: For each input: the original argument if it contains names, otherwise None.
         joints: For each joint with coordinates, in order: its name and its number of joint velocities.
     """
 
@@ -533,7 +536,7 @@ class OracleQuery:
     def _by_name(
         self, x: FloatArray, given: str | Mapping[str, ArrayLike], of: Mapping[int, tuple[str, ...]]
     ) -> FloatArray:
-        """Return `x` after each number that was given by name is written to the index of its name."""
+        """Write the numbers that were given by name into `x`, and return `x`."""
         names = _Names(self._joints, of)
         for name, value in given.items() if isinstance(given, Mapping) else names.pairs(given):
             x[..., names.place(name)] = _number(value) if isinstance(value, str) else np.asarray(value, float)

@@ -16,10 +16,10 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.certificate import VerificationError
 from urdfkin.verify.pinocchio import pinocchio
 
-#: Rounding errors of urdfkin and of Pinocchio together, in eps; each is less than 8 eps. In `roundings`,
-#: these errors are counted in the same way as the errors of a joint. For angles, the operations are arctan2,
-#: sines, cosines and products of three numbers. For quaternions, they are a square root, a quotient and
-#: products of two numbers.
+#: Sum of the rounding errors of urdfkin and of Pinocchio, in eps; the error of each is less than 8 eps.
+#: These errors are counted like the errors of a joint in `urdfkin.kinematics.roundings`.
+#: For angles, the operations are arctan2, sines, cosines and products of three numbers.
+#: For quaternions, the operations are a square root, a quotient and products of two numbers.
 _ROUNDINGS = 16.0
 
 

@@ -109,24 +109,24 @@ def _owner(file: Path) -> tuple[str, str] | None:
     return None
 
 
-#: Bytes of stack for each link. Pinocchio processes links recursively; version 4.1.0 needs less than 4 kB for
-#: each.
+#: Bytes of stack for each link.
+#: Pinocchio processes links recursively; version 4.1.0 needs less than 4 kB for each link.
 _STACK_FOR_A_LINK = 16_384
 #: A chain of fewer links fits into any stack.
 _SHALLOW = 100
-#: Largest nv that is accepted. Pinocchio 4.1.0 needs about 64 bytes * nv^3 (measured), so the memory stays
-#: below 2 GB.
+#: Largest nv that is accepted.
+#: Pinocchio 4.1.0 needs about 64 bytes * nv^3 (measured), so the memory stays below 2 GB.
 MOST_RATES = 315
 
-#: Number of Pinocchio's result values that are collected and then copied together. This number of values fits
-#: into the processor's cache.
+#: Number of Pinocchio's result values that are collected and then copied together.
+#: These values fit into the processor's cache.
 _AT_A_TIME = 16384
 #: Function that returns the results for the next configurations; the argument is their number.
 _Next = Callable[[int], list[FloatArray]]
 #: Name of the free-flyer of a moving base.
 _BASE = "base"
 
-#: Precedes the names of links while Pinocchio reduces a model.
+#: Prefix of the names of links while Pinocchio reduces a model.
 _LINK_MARK = "\x01"
 
 
@@ -182,8 +182,8 @@ def _reduced(model: Any, text: str, lock: Mapping[str, float], *, coupled: bool)
             raise OracleError("Pinocchio has no such joint to lock", where=str(model.name), found=repr(name))
         at, numbers = model.joints[i].idx_q, model.joints[i].nq  # 0 for a mimic joint of a coupled model
         q[at : at + numbers] = (value,) if numbers == 1 else (np.cos(value), np.sin(value))[:numbers]
-    # `buildReducedModel` looks frames up by name alone, but a link may have the name of a joint. A mark that
-    # XML forbids in a name makes the names of the links different.
+    # `buildReducedModel` looks frames up by name alone, but a link may have the name of a joint.
+    # A prefix that XML forbids makes the names of the links different from the names of joints.
     bodies = [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
     for frame in bodies:
         frame.name = _LINK_MARK + frame.name
@@ -238,8 +238,8 @@ class PinocchioOracle(Oracle):
             base.
         """
         pin, model, nowhere = self._pin, self._model, self._pin.SE3.Identity()
-        # appendModel rejects a link with the name of a joint or of the free-flyer. Numbers as names avoid
-        # that.
+        # appendModel rejects a link with the name of a joint or of the free-flyer.
+        # Numbers as names avoid this error.
         for j in joints:
             model.names[j] = f"joint {j}"
         for i in range(1, model.nframes):
@@ -311,10 +311,9 @@ class PinocchioOracle(Oracle):
     def jacobians(self, x: QueryBatch) -> FloatArray:
         """Return Jacobians (n, frames, 6, nv).
 
-        `computeFrameJacobian` computes the Jacobian of a single frame.
-
-        `computeFrameJacobian` uses only the joints of the frame's path. Jacobians of several frames are
-        computed by `getFrameJacobian`, and Jacobians of joints by `getJointJacobian`.
+        `computeFrameJacobian` computes the Jacobian of a single frame, from the joints on its path only.
+        `getFrameJacobian` computes the Jacobians of several frames. `getJointJacobian` computes the Jacobians
+        of joints.
         """
         pin = self._pin
         if len(x.frames) == 1 and not (x.joints or x.divided):
@@ -333,7 +332,7 @@ class PinocchioOracle(Oracle):
             yield self._layout.couple(block)
 
     def _frame_jacobians(self, x: QueryBatch) -> _Next:
-        """Return a function that returns the Jacobians of the only frame for the next configurations."""
+        """Return a function of m that returns the Jacobians of the frame for the next m configurations."""
         (one,), wanted = self._ids(x), self._reference(x.reference)
         found = self._each(self._pin.computeFrameJacobian, self._inputs(x, 1), one, wanted)
         return lambda n: list(islice(found, n))
@@ -417,7 +416,7 @@ class PinocchioOracle(Oracle):
 
 
 def _stacked(compute: _Next, *shape: int) -> FloatArray:
-    """Return results as one array of a shape (n, frames, ...)."""
+    """Return the results as one array with the given shape (n, frames, ...)."""
     out = np.empty(shape)
     for _ in _blocks(compute, shape[0], out):
         pass
@@ -431,7 +430,7 @@ def _blocks(compute: _Next, n: int, memory: FloatArray) -> Iterator[FloatArray]:
     without columns, and returns a vector for one column.
 
     Args:
-        compute: Returns the results of all frames for the next configurations.
+        compute: Function of m that returns the results of all frames for the next m configurations.
         n: Number of configurations.
         memory: (n or one block, frames, ...) array that is written. With n rows, the blocks follow each
             other. With fewer rows, each block overwrites the block before it.
@@ -449,7 +448,7 @@ def _blocks(compute: _Next, n: int, memory: FloatArray) -> Iterator[FloatArray]:
 
 
 def _block(*shape: int) -> int:
-    """Return the number of configurations whose results of a shape are collected before they are copied."""
+    """Return the number of configurations whose results are collected and then copied together."""
     return _AT_A_TIME // (math.prod(shape) or 1) or 1
 
 

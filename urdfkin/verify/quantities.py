@@ -1,4 +1,4 @@
-"""The table of quantities: names, shapes, functions that compute and check them, bounds and help texts.
+"""The table of quantities: names, shapes, functions for computation and checks, bounds and help texts.
 
 Many parts of urdfkin use this table: methods of `Robot`, checks, validation, the accuracy study, plots,
 reports, replay lines and the command line. A new quantity is a row here, plus the functions that the row
@@ -64,13 +64,14 @@ class Quantity:
         shape: Shape of one result; "nv" stands for the robot's nv.
         equations: Equations of the textbook.
         compute: Function (plan, *inputs, reference, base=, out=, threads=) that returns (n, frames, ...). If
-            `recursive` is False, a method of `Robot` calls it in another way.
+            `recursive` is False, a method of `Robot` calls the function with other arguments.
         ask: Function (oracle, query) that returns the oracle's (n, frames, ...).
         blocks: Function (oracle, query) that yields the oracle's results in blocks of configurations, for
             large results.
         scale: Function (plan, magnitudes, reference) that returns the size of the terms of the quantity
             (`urdfkin.verify.bounds`).
-        factors: Number of rotated vectors in each term of [linear; angular], in LOCAL_WORLD_ALIGNED.
+        factors: Number of rotated vectors in a term of the quantity, in LOCAL_WORLD_ALIGNED
+            (`urdfkin.verify.bounds`).
         against: Function (oracle, part, ours, by) that returns the oracle's results and the bound, for
             quantities that need more than `ask` and `scale`.
         exact: Function (motion, link, reference) that returns exact values, for the accuracy study and for
@@ -87,7 +88,7 @@ class Quantity:
         units: Unit of each group of three numbers, by the group's name.
         command: Command that computes one case again, if there is one.
         summary: Line in the list of commands, if the quantity has a command of its own.
-        page: The help text of the command after its summary.
+        page: Help text of the command, without the summary.
         example: Example command line.
     """
 

@@ -109,16 +109,17 @@ def draw(tree: KinematicTree, n: int, rng: np.random.Generator, *, with_special:
     return Samples(q, v, a)
 
 
-#: True: check all results of a call. False: check none. "sample": check the results of `SAMPLE`
-#: configurations.
+#: True: check all results of a call.
+#: False: check none.
+#: The string "sample": check the results of `SAMPLE` configurations.
 Verify = bool | Literal["sample"]
 
 #: Number of configurations of a call that `verify="sample"` checks.
 SAMPLE = 100
 
-#: Largest number of values, and of configurations, that are compared at a time. The number is large enough
-#: for efficient array expressions and small enough for the processor's cache. The number also limits the
-#: memory for large batches.
+#: Largest number of values, and of configurations, that are compared at a time.
+#: The number is large enough for efficient array expressions and fits into the processor's cache.
+#: The number also limits the memory for large batches.
 _AT_A_TIME = 262_144
 _MOST = 4096
 

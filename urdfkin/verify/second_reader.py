@@ -36,12 +36,13 @@ from urdfkin.verify.oracle import resolved_rules
 if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf
 
-#: Largest difference of an entry of two rotation matrices that are computed from the same angles. In each of
-#: the two computations, a sine and a cosine have an error of one eps, and two products and a sum have half an
-#: eps each. The sum of the terms is at most 1.
+#: Largest difference between the entries of two rotation matrices that are computed from the same angles.
+#: In each computation, a sine and a cosine have an error of one eps each.
+#: Two products and a sum have an error of half an eps each.
+#: The sum of the terms is at most 1.
 _ROTATION = 9.0 * EPS
-#: Largest difference of an entry of two normalised axes. In each of the two computations, the length has an
-#: error of 2 eps, and the quotient is rounded once.
+#: Largest difference between the components of two normalised axes.
+#: In each computation, the length has an error of 2 eps, and the quotient is rounded once.
 _AXIS = 5.0 * EPS
 #: If the length of an axis differs from 1 by more than this, the axis counts as not normalised.
 _UNIT = 1e-6
@@ -64,7 +65,7 @@ class SecondReading:
         joints: Number of compared joints, fixed joints included.
         differences: Differences between the two readings, each caused by an error of one reader.
         known: Differences that are known faults of yourdfpy.
-        unread: Why yourdfpy cannot read the text; None if it can.
+        unread: Reason why yourdfpy cannot read the text; None if it can.
     """
 
     by: str

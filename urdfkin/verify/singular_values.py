@@ -6,8 +6,8 @@ errors. The first error is the error of J, for which `urdfkin.verify.bounds` com
 error is the residual of the decomposition, J - U S V^T.
 
 The computed U and V are not exactly orthogonal. Let |U^T U - I| <= a and |V^T V - I| <= b. By Ostrowski's
-theorem, each singular value of U S V^T is a singular value of S times a factor between (1 - a)^(1/2) (1 -
-b)^(1/2) and (1 + a)^(1/2) (1 + b)^(1/2).
+theorem, each singular value of U S V^T is a singular value of S times a factor. This factor lies between (1 -
+a)^(1/2) (1 - b)^(1/2) and (1 + a)^(1/2) (1 + b)^(1/2).
 
 The computed residuals have rounding errors too. The error of a sum of m products is at most m eps times the
 sum of the absolute values of the products. Two measures keep every intermediate value in the range of

@@ -1,10 +1,10 @@
 """Explain a singular Jacobian by its rank, the lost directions, and the joints that cause the loss of rank.
 
-A left null vector u of J is a lost direction. The frame has no velocity along it: u^T J v = 0 for every v. A
-right null vector is a null motion, which consists of joint velocities that do not move the frame. A smallest
-dependent set is a set of linearly dependent columns of which each proper subset is independent. Such a set
-shows which joints cause the loss of rank. A geometric reason, such as parallel axes, is stated only if the
-columns satisfy its condition within the error bound of J.
+A left null vector u of J is a lost direction. The frame cannot move along u, because u^T J v = 0 for every v.
+A right null vector is a null motion, which consists of joint velocities that do not move the frame. A
+smallest dependent set is a set of linearly dependent columns of which each proper subset is independent. Such
+a set shows which joints cause the loss of rank. A geometric reason, such as parallel axes, is stated only if
+the columns satisfy its condition within the error bound of J.
 
 A column of a revolute joint is [a x z; z], where z is the axis and a leads from the frame's origin to a point
 of the axis. Therefore, two joint axes are collinear if their columns are equal up to sign. An axis passes
@@ -24,13 +24,12 @@ from urdfkin.errors.display import Displayable, TextDocument, six_digits
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import FloatArray, KinematicTree
 
-#: Limits of the search for dependent columns: the largest number of columns in a set, and the largest number
-#: of columns of a Jacobian for which the search is made.
+#: Largest number of columns in a dependent set, and largest number of columns of a Jacobian.
+#: The search for dependent sets is limited to these numbers.
 _LARGEST_SET, _MOST_COLUMNS = 4, 16
-#: Rounding error of the decomposition of a small matrix, in eps for each row or column.
+#: Rounding error of the singular value decomposition of a small matrix, in eps for each row or column.
 _ROUNDINGS = 16.0
-#: At a random configuration, a singular value counts as 0 if it is smaller than this fraction of the
-#: Jacobian's size.
+#: At random configurations, a singular value below this fraction of the Jacobian's size counts as 0.
 _USUAL = 1e-9
 
 
@@ -47,8 +46,8 @@ class FrameColumns:
             for a column that does not belong to a single joint axis.
         active: (6, nv) False for numbers of the Jacobian that are 0 for every q.
         samples: Function that returns Jacobians (n, 6, nv) at random configurations on a fixed base.
-        moving_base: Whether the user gives the base's motion. The samples have a fixed base, so lost
-            directions at the samples cannot be compared with those on a moving base.
+        moving_base: Whether the user gives the base's motion. If so, lost directions cannot be compared with
+            those of `samples`, which have a fixed base.
     """
 
     J: FloatArray
@@ -194,8 +193,8 @@ class _Explanation:
         usual, never = self._of_samples()
         directions = U[:, self._rank :].T
         directions = _basis(directions - directions @ never @ never.T)
-        # If an arm has fewer joints than the Jacobian has rows, some directions are lost in every
-        # configuration. These directions depend on the configuration.
+        # An arm with fewer joints than the Jacobian's rows has lost directions in every configuration.
+        # These directions depend on the configuration.
         known = len(directions) == usual - self._rank and not (self._columns.moving_base and never.size)
         lost = np.zeros((len(directions) if known else 0, 6))
         if known:
@@ -276,7 +275,7 @@ class _Explanation:
     def _joined(self, sets: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
         """Join pairs of dependent columns that have a column in common.
 
-        An example are the columns of three parallel prismatic joints.
+        For example, each pair of columns of three parallel prismatic joints is dependent.
         """
         joined: list[set[int]] = []
         if self._linear_only:
@@ -340,8 +339,8 @@ class _Explanation:
         # three linearly dependent directions lie in a plane; four directions are always dependent
         if parallel:
             return f"{axes} are parallel{' and lie in one plane' if len(one) == 3 else ''}."
-        # If all axes pass through one point a, each axis satisfies a x z = v. Here z is the direction of the
-        # axis, and v contains the linear rows of its column.
+        # If all axes pass through one point a, each axis satisfies a x z = v.
+        # Here z is the direction of the axis, and v contains the linear rows of the joint's column.
         crosses = np.concatenate([_cross_matrix(-axis) for axis in z])
         a, *_ = np.linalg.lstsq(crosses, v.ravel(), rcond=None)
         if np.abs(crosses @ a - v.ravel()).max() > off * float(np.linalg.cond(crosses)):
@@ -386,7 +385,7 @@ class _Explanation:
 
 
 def _sparse(rows: FloatArray) -> FloatArray:
-    """Return a basis with many zeros for the space that some rows span, computed by elimination."""
+    """Return a sparse basis of the row space of a matrix, computed by elimination."""
     basis, n = rows.copy(), len(rows)
     free = list(range(basis.shape[1])) if n > 1 else []
     for i in range(n if n > 1 else 0):
@@ -400,7 +399,7 @@ def _sparse(rows: FloatArray) -> FloatArray:
 
 
 def _basis(rows: FloatArray) -> FloatArray:
-    """Return an orthonormal basis for the space that some rows span.
+    """Return an orthonormal basis of the row space of a matrix.
 
     The rows are orthogonal projections of orthonormal vectors.
     """

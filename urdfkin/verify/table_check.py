@@ -27,7 +27,7 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
 
     Args:
         verifier: Verifier of the robot.
-        table: The table that the robot was made of.
+        table: The table from which the robot was made.
 
     Raises:
         TableError: the placements of the tip differ by more than rounding.
@@ -38,8 +38,8 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
     own = table.coupling.select(verifier.tree, q)
     theirs = verifier.oracle().placements(QueryBatch([LinkFrame.of(link_names(table)[-1])], (q,)))[:, 0]
     off = np.abs(theirs - table.placement(own))[:, :3]
-    # The matrices of base and tool may be rotations to six digits only, but the URDF contains exact
-    # rotations.
+    # The matrices of base and tool may be rotations to six digits only.
+    # The URDF contains exact rotations.
     rows, metres, defect = len(table.rows), table.rounding(own), _defect(table)
     turn = EPS * of_rows_read_back(rows) + defect
     allowed = metres * (of_rows_read_back(rows) / of_rows(rows) + defect / (EPS * ROW))
@@ -53,6 +53,6 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
 
 
 def _defect(table: DHTable) -> float:
-    """Return the distance of base and tool from rigid motions; a table may have only six digits."""
+    """Return the distance of the base and tool matrices from rigid motions; they may have six digits only."""
     rotations: list[FloatArray] = [table.base[:3, :3], table.tool[:3, :3]]
     return sum(float(np.linalg.norm(R.T @ R - np.eye(3))) for R in rotations)

@@ -15,13 +15,13 @@ computes the table's results. The bound is the sum of the rounding errors of urd
 the deviation that a snapped table declares.
 
 The scale of rounding is the robot's size: the path lengths from the root to the table's base and to its tip,
-with prismatic displacements. Columns of the Jacobian are scaled by the mimic multipliers. The scale includes
-the table's own lengths, up to `PROMISED` times the robot's reach. Lengths in tables with Hayati rows never
-exceed that limit.
+with prismatic displacements. Columns of the Jacobian are scaled by the mimic multipliers. The scale also
+includes the table's own lengths, but at most `PROMISED` times the robot's reach. Lengths in tables with
+Hayati rows never exceed that limit.
 
-With only four parameters, nearly parallel axes may need lengths of kilometres. When two such lengths cancel,
-the error is eps times their size. A difference within that error is not a disagreement, but the table loses
-digits. `TableCheck.loss` then states this loss.
+A row has only four parameters, so nearly parallel axes may need lengths of kilometres. When two such lengths
+cancel, the error is eps times their size. A difference within that error is not a disagreement, but the table
+loses digits. `TableCheck.loss` then states this loss.
 """
 
 from __future__ import annotations
@@ -248,14 +248,14 @@ class Sizes:
 
     Attributes:
         reach: (n,) sum of the path lengths from the root to the table's base and to its tip, m.
-        turning: (columns,) for each coordinate, the sum of |multiplier| of its revolute joints on these
-            paths.
-        sliding: (columns,) for each coordinate, the sum of |multiplier| of its prismatic joints on these
-            paths.
+        turning: (columns,) for each coordinate: the sum of |multiplier| over the revolute joints that it
+            moves on these paths.
+        sliding: (columns,) for each coordinate: the sum of |multiplier| over the prismatic joints that it
+            moves on these paths.
         rates: (n,) sum of all |joint velocity|, rad/s and m/s.
         accelerations: (n,) sum of all |joint acceleration|, rad/s^2 and m/s^2.
-        rounding: (n,) number of roundings times eps, including those of angles, plus the tilts that a table
-            omits (`urdfkin.dh.common_normals`).
+        rounding: (n,) eps times the number of roundings (joints, rows and angles), plus the tilts that a
+            table omits (`urdfkin.dh.common_normals`).
     """
 
     reach: FloatArray
@@ -297,8 +297,8 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
                 weights[joint.kind.turns][names.index(leader)] += factor
     own = own_length(table)
     reach = np.maximum(reach, np.minimum(own, PROMISED * reach))
-    # Rounding occurs at the joints in Pinocchio, at the joints of the chain that the rows are made of, and at
-    # the rows. The acceleration relative to the base contains four factors that a tilt rotates.
+    # Rounding errors come from Pinocchio's joints, the joints of the chain, and the rows of the table.
+    # A tilt rotates four factors of the acceleration relative to the base.
     counted = of_rows(len(table.rows)) + of_joints(joints, 4.0 * tilt) + angles
     rounding = EPS * counted + left_out(chain(tree, table.tip_frame, table.base_frame))
     return Sizes(reach, weights[True], weights[False], rates, accelerations, rounding)

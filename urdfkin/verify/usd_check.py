@@ -3,13 +3,13 @@
 Pinocchio checks every result with the URDF text that urdfkin writes for the tree. This check does not include
 the conversion from the stage to the tree. Therefore `load` makes two comparisons:
 
-- with OpenUSD's own parser of UsdPhysics: the bodies, frames, free directions and limits of each joint. A
+- with OpenUSD's own parser of UsdPhysics: the bodies, frames, degrees of freedom and limits of each joint. A
   difference is an error.
 - with the transforms of the prims, by UsdGeom: the stage shows the robot in one configuration. In this
   configuration, each link must have the placement of its prim. The file states these transforms separately
   from the joint frames, so a difference is a warning about the file.
 
-Both comparisons allow only for the single precision of the numbers in a stage.
+Both comparisons allow only for rounding to single precision, in which a stage stores its numbers.
 """
 
 from __future__ import annotations
@@ -51,16 +51,15 @@ from urdfkin.verify.verifier import Verifier
 PATIENCE = 60.0
 #: Largest accepted size of the process's output, bytes.
 _MOST = 400_000_000
-#: Bound on the angle error of a joint's rotation in OpenUSD's parser, in roundings to single precision. If
-#: the four numbers of a quaternion are rounded, the error of its angle is at most 2 roundings. The product of
-#: two quaternions adds 4 roundings to each of the four numbers. The error vector of the four numbers then has
-#: length 8, which is an error of 16 in the angle.
+#: Bound on the angle error of a joint's rotation in OpenUSD's parser, in roundings to single precision.
+#: Rounding the four numbers of a quaternion changes its angle by at most 2 roundings.
+#: The product of two quaternions adds 4 roundings to each of the four numbers.
+#: The error vector of the four numbers then has length 8, which is an error of 16 in the angle.
 _ROTATION = 18.0
-#: Number of roundings of a joint's origin: one of the scale, one of the product with the scale, and one of
-#: the transformed origin.
+#: Number of roundings of a joint's origin: the scale, the product with the scale, and the transformed origin.
 _ORIGIN = 3.0
-#: Bound on the angle error of a prim's rotation, in roundings to single precision. The rotation has three
-#: angles, and each angle is at most one turn (2 pi).
+#: Bound on the angle error of a prim's rotation, in roundings to single precision.
+#: The rotation has three angles, and each angle is at most one turn (2 pi).
 _TRANSFORM = 6.0 * np.pi
 
 
@@ -198,20 +197,19 @@ def _angle(R: FloatArray) -> float:
     return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
 
 
-#: For each joint name: four bounds on errors of single precision, in the order of
-#: `urdfkin.urdf.usd.Usd.single`.
+#: For each joint name: four bounds on rounding errors, in the order of `urdfkin.urdf.usd.Usd.single`.
 Single = Mapping[str, tuple[float, float, float, float]]
 
 
 def single_precision(tree: KinematicTree, single: Single) -> FloatArray:
-    """Return how far single precision can move and turn each link, (links, 2): metres and radians.
+    """Return bounds (links, 2) on the displacement (m) and rotation (rad) of each link by rounding.
 
-    The error of a stored number is at most half of the distance to the next number in single precision; a
-    zero is exact. The three errors of an origin's numbers form a vector, whose length is the error of the
-    origin. The four errors of a unit quaternion form a vector, and the angle error is twice the length of
-    this vector. An angle error moves each later link by at most the angle times the length of the path to
-    this link. The error of a mimic rule m q + c is 2^-24 (|m q| + |c|), for the largest |q| within the
-    limits.
+    The numbers of a stage are rounded to single precision. The error of a stored number is at most half of
+    the distance to the next number in single precision; a zero is exact. The three errors of an origin's
+    numbers form a vector, whose length is the error of the origin. The four errors of a unit quaternion form
+    a vector, and the angle error is twice the length of this vector. An angle error moves each later link by
+    at most the angle times the length of the path to this link. The error of a mimic rule m q + c is 2^-24
+    (|m q| + |c|), for the largest |q| within the limits.
 
     Args:
         tree: The robot.

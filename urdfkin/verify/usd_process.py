@@ -1,12 +1,12 @@
 """Program that reads a USD stage in a separate process, with urdfkin's reader and with OpenUSD's own.
 
-A defect of OpenUSD's parsers, which are written in C++, can crash the process; a stage can require any amount
-of time and memory. The caller's process receives only plain data. The request comes on standard input, the
+A defect of OpenUSD's parsers, which are written in C++, can crash the process. A stage can require any amount
+of time and memory. The caller's process receives only plain data. The request comes on standard input. The
 answer is a line of JSON on standard output.
 
-OpenUSD contains a second reader of the joints: the parser of its package UsdPhysics. It resolves bodies,
-joint frames and limits with other code than `urdfkin.urdf.usd`. The answer contains the numbers of both
-readers.
+OpenUSD contains a second reader of the joints: the parser of its package UsdPhysics. This parser resolves
+bodies, joint frames and limits with other code than `urdfkin.urdf.usd`. The answer contains the numbers of
+both readers.
 """
 
 from __future__ import annotations
@@ -58,8 +58,8 @@ def answer_of(request: Mapping[str, Any]) -> dict[str, Any]:
     """Return the answer to a request.
 
     Args:
-        request: `path`; `name`, the file's name in messages; `variants`; `articulation`; `check`, whether to
-            compare with OpenUSD's readers.
+        request: Mapping with `path`, `name` (the file's name in messages), `variants`, `articulation`, and
+            `check` (whether to compare with OpenUSD's readers).
     """
     read = read_usd(
         request["path"],
@@ -116,7 +116,7 @@ def _described(physics: Any, one: Any, read: Usd) -> list[Any]:
 
 
 def _freedoms(physics: Any, one: Any) -> str:
-    """Return the free directions of a joint."""
+    """Return the names of a joint's degrees of freedom, such as `transX` or `rotX`."""
     for kind, word in ((physics.RevoluteJointDesc, "rot"), (physics.PrismaticJointDesc, "trans")):
         if isinstance(one, kind):
             return f"{word}{str(one.axis).rpartition('.')[2][-1].upper()}"

@@ -69,8 +69,8 @@ class Verifier:
         policy: Default of `verify` in calls.
         mimic: True: mimic joints are coupled. False: every mimic joint moves freely.
         unverifiable: Known reason why Pinocchio cannot check the robot; None if there is none.
-        oracle: The oracle that checks the results of methods, "pinocchio" or "mujoco". Pinocchio alone checks
-            tables, and Pinocchio alone is used for the accuracy study and for enclosures.
+        oracle: The oracle that checks the results of methods, "pinocchio" or "mujoco". Tables, the accuracy
+            study and enclosures always use Pinocchio.
 
     Attributes:
         ledger: Record of checked and unchecked results.
@@ -96,8 +96,8 @@ class Verifier:
         self._refusals: dict[str, str] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        # Pinocchio's models are rebuilt when needed. A copy of a verifier, in this or another process, has
-        # not yet returned results, so the ledger of the copy is empty.
+        # Pinocchio's models are rebuilt when needed.
+        # A copy of a verifier has not yet returned results, so the ledger of the copy is empty.
         return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
 
     def oracle(self, base: BaseMotion | None = None, by: OracleLibrary = PINOCCHIO) -> Oracle:
@@ -332,7 +332,7 @@ class Verifier:
     def table(self, table: DHTable, samples: int = TABLE_SAMPLES) -> TableCheck | None:
         """Check a Denavit-Hartenberg table with Pinocchio.
 
-        A warning is issued for a strict table whose very large lengths make it lose digits.
+        Warn if a strict table loses digits because of very large lengths.
 
         Returns:
             The result; None, with a warning, if Pinocchio cannot check the robot.
@@ -359,7 +359,7 @@ class Verifier:
         return check
 
     def tree_parameters(self, parameters: TreeParameters) -> str | None:
-        """Compare the placements of all links by tree parameters with Pinocchio's.
+        """Compare the placements of all links, computed from tree parameters, with Pinocchio's placements.
 
         Returns:
             A line of text about the agreement; None, with a warning, if Pinocchio cannot check the robot.
@@ -399,9 +399,9 @@ class Verifier:
 def comparison_with_oracle(
     quantity: Quantity, oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary
 ) -> Comparison:
-    """Compare urdfkin's results (n, frames, ...) for some configurations with an oracle's.
+    """Compare urdfkin's results (n, frames, ...) for some configurations with the results of an oracle.
 
-    Large results are compared in blocks, while the oracle's are still in the cache.
+    Large results are compared in blocks, while the oracle's results are still in the cache.
     """
     if quantity.blocks is None:
         theirs, bound = oracle_results_with_bound(quantity, oracle, x, ours, by)

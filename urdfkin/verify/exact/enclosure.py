@@ -37,8 +37,9 @@ from urdfkin.verify.quantities import (
 )
 from urdfkin.verify.verifier import Verifier, oracle_results, own_results
 
-#: Smallest and largest accepted number of decimal digits. A double has 15 digits. A computation with more
-#: than 10,000 digits takes too long.
+#: Smallest and largest accepted number of decimal digits.
+#: A double has 15 digits.
+#: A computation with more than 10,000 digits takes too long.
 LEAST_DIGITS, MOST_DIGITS = 15, 10_000
 
 _ENDS = np.vectorize(ends, otypes=[float, float])
@@ -66,7 +67,7 @@ class Enclosure:
     def width(self) -> FloatArray:
         """The difference `upper - lower`. The width is 0 for each number whose true value is a double.
 
-        For all other numbers, it is at least the distance between two neighbouring doubles.
+        For all other numbers, the width is at least the distance between two neighbouring doubles.
         """
         return self.upper - self.lower
 
@@ -172,7 +173,7 @@ def enclose(
         hessian: Whether to enclose the Hessian too.
 
     Raises:
-        InputError: a batch, a wrong length, or an invalid number of digits.
+        InputError: a batch of inputs, a wrong length, or an invalid number of digits.
         UnknownNameError: the frame or reference does not exist.
     """
     if digits is not None:

@@ -1,7 +1,8 @@
 """Compute with intervals that contain the true values, and read the exact decimals of a URDF text.
 
-A ball is an interval: a midpoint with many digits, and a radius. Arb (python-flint) proves that the result of
-each sum, product, quotient, root, sine and cosine contains the true value. Vectors are triples of balls.
+An interval consists of a midpoint with many digits, and a radius. The library Arb (python-flint) guarantees
+that the result of each sum, product, quotient, root, sine and cosine contains the true value. Vectors are
+triples of intervals.
 
 `read_exact` reads the decimals of a URDF text without rounding them to doubles. Names and order of the joints
 come from the tree. `urdfkin.urdf.lint` has already checked the text.
@@ -26,16 +27,17 @@ from urdfkin.model.tree import Joint, JointKind, KinematicTree, Lock
 from urdfkin.system.locks import lock_over_forks
 from urdfkin.system.plain_xml import plain_xml
 
-#: Number of digits in the accuracy study. A double has 16 digits, so fifty digits are enough to measure an
-#: error in its last digit.
+#: Number of digits in the accuracy study.
+#: A double has 16 digits, so fifty digits are enough to measure an error in its last digit.
 DIGITS = 50
-#: Twice the number of digits of a double.
+#: Twice the 15 decimal digits of a double.
 _TWO_DOUBLES = 30
-#: Bits for each decimal digit, and additional bits. Fifteen digits get 55 bits, two more than a double has,
-#: because a ball with 53 bits is up to four times as wide as an interval whose ends have 53 bits.
+#: Number of bits for each decimal digit, and number of additional bits.
+#: Fifteen digits get 55 bits, two more than a double has.
+#: An interval with a midpoint of 53 bits can be four times as wide as an interval with ends of 53 bits.
 _BITS, _MORE_BITS = math.log2(10.0), 5
-#: The first number is the number of significant digits of a written decimal; 17 digits determine every
-#: double. The second number is the number of digits while the decimal is computed.
+#: First number: significant digits of a written decimal; 17 digits determine every double.
+#: Second number: digits of the decimal before it is rounded.
 _SIGNIFICANT, _ALL_DIGITS = 17, 200
 #: Additional bits of precision during iterations.
 _SPARE = 30
@@ -44,7 +46,7 @@ _ONE_THREAD = lock_over_forks()
 
 
 def enough_digits(joints: int) -> int:
-    """Return the number of digits with which balls are smaller than the last digit of a double.
+    """Return a number of digits with which intervals are narrower than the last digit of a double.
 
     One digit is added for each joint before the frame. A joint with an oblique axis loses a third of a digit.
     """
@@ -64,12 +66,12 @@ def precision(digits: int) -> Iterator[None]:
 
 
 def exact(value: Number) -> Number:
-    """Return a double or an integer as a ball with radius 0; return a ball unchanged."""
+    """Return a double or an integer as an interval of width 0; return an interval unchanged."""
     return arb(value)
 
 
 def ends(x: Number) -> tuple[float, float]:
-    """Return the ends of a ball or an integer, rounded outward to doubles."""
+    """Return the ends of an interval or an integer, rounded outward to doubles."""
     if isinstance(x, int):  # for a large robot, most numbers are zeros
         return float(x), float(x)
     return _outward(x.lower(), -math.inf), _outward(x.upper(), math.inf)
@@ -83,11 +85,11 @@ def _outward(end: arb, towards: float) -> float:
 
 
 def decimal(x: Number, negligible: float) -> str | None:
-    """Return a ball as a decimal of 17 significant digits; None if the ball is too large for that.
+    """Return an interval as a decimal of 17 significant digits; None if the interval is too wide.
 
-    The radius of the ball is below 1e-20 times the number, and the midpoint is rounded to 17 digits. The
-    decimal therefore differs from the true value by at most 0.501 units of its last digit. A ball that
-    contains 0 is 0 if its radius is below 1e-10 of `negligible`.
+    The radius must be at most 1e-20 times the midpoint. The midpoint is rounded to 17 digits. Therefore, the
+    decimal differs from the true value by at most 0.501 units of its last digit. An interval that contains 0
+    becomes 0 if its radius is at most 1e-10 of `negligible`.
 
     >>> with precision(50):
     ...     decimal(exact(1) / 3, 1e-15), decimal(exact(2), 1e-15), decimal(arb(0.0, 1e-40), 1e-15)
@@ -142,7 +144,9 @@ def from_quaternion(quaternion: Sequence[Number]) -> Matrix:
 
 
 def nearest_rotation(M: Matrix) -> Matrix:
-    """Return the rotation nearest to M, the orthogonal factor U of M = U H; M must be nearly a rotation.
+    """Return the rotation nearest to M, which must be nearly a rotation.
+
+    The nearest rotation is the orthogonal factor U of M = U H.
 
     Each step of Newton's iteration X - X (X^T X - I)/2 doubles the number of correct digits. The result X = U
     (1 + E) has the same orthogonal factor U. X^T X - 1 = 2 E + E^2. The eigenvalues of E are above -1, so |E|
@@ -189,7 +193,7 @@ class ExactJoint:
 
 
 def read_exact(text: str, tree: KinematicTree, among: Iterable[int] | None = None) -> dict[int, ExactJoint]:
-    """Return the exact numbers of joints by their index in the tree, from the URDF text.
+    """Read the exact numbers of joints from the URDF text; return them by the joints' index in the tree.
 
     Args:
         text: The URDF text.
@@ -206,7 +210,7 @@ def read_exact(text: str, tree: KinematicTree, among: Iterable[int] | None = Non
     }
 
 
-@lru_cache(maxsize=1)  # parsing the text of a large robot takes longer than enclosing a sample
+@lru_cache(maxsize=1)  # parsing a large text takes longer than the enclosure of a sample
 class _Text:
     """Reader of the joints of a URDF text."""
 
@@ -226,7 +230,7 @@ class _Text:
         raise InputError("a joint is not in the URDF text", where=robot, found=joint.name)
 
     def locked(self, free: ExactJoint, lock: Lock) -> ExactJoint:
-        """Return a joint that is fixed at the exact value of a double."""
+        """Return a joint that is locked at the exact value of a double."""
         R, p = free.R, free.p
         value = free.multiplier * exact(lock.q) + free.offset
         if lock.joint.kind.turns:
@@ -255,7 +259,7 @@ class _Text:
         return x, y, z
 
     def rotation(self, origin: Element | None) -> Matrix:
-        """Return the rotation of rpy or, from URDF 1.1 on, of `quat_xyzw`, a quaternion of any length."""
+        """Return the rotation of `rpy` or, from URDF 1.1 on, of the quaternion `quat_xyzw` of any length."""
         if self.quaternions and origin is not None and "quat_xyzw" in origin.attrib:
             return from_quaternion(self.numbers(origin, "quat_xyzw", ""))
         return from_rpy(self.vector(origin, "rpy", "0 0 0"))

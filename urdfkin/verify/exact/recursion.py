@@ -1,4 +1,4 @@
-"""The forward recursion of section 7.7 with balls. A ball is an interval that contains the true value.
+"""The forward recursion of section 7.7, computed with intervals that contain the true values.
 
 The equations are those of `urdfkin.kinematics.equations`, in world axes as in the textbook. The inputs are
 the URDF's decimals and the exact values of q, v and a. The results are reference values that measure rounding
@@ -29,8 +29,9 @@ from urdfkin.verify.oracle import BaseNumbers
 
 _RECURSION = Recursion(equations)
 
-#: For each joint velocity of a planar or floating joint: the index of the child link's axis along or about
-#: which the link moves, and whether the motion is a rotation.
+#: Axis and kind of motion for each joint velocity of a planar or floating joint.
+#: The first entry is the index of an axis of the child link.
+#: The second entry is True for a rotation about this axis and False for a translation along it.
 _FREE_AXES = {
     JointKind.PLANAR: ((0, False), (1, False), (2, True)),
     JointKind.FLOATING: tuple((k, turns) for turns in (False, True) for k in range(3)),
@@ -83,7 +84,7 @@ def move(
         tree: The robot.
         joints: The exact numbers of the joints, by joint index. A joint comes after all joints on its path to
             the root.
-        q: (nq,) coordinates, as doubles or balls.
+        q: (nq,) coordinates, as doubles or intervals.
         v: (nv,) joint velocities.
         a: (nv,) joint accelerations.
         base: State of the root link; None: fixed at the world origin.
