@@ -50,7 +50,7 @@ from urdfkin.robot import Robot
 from urdfkin.robot.loading import load
 from urdfkin.urdf.sources import Source, is_usd
 from urdfkin.verify.oracles import PINOCCHIO
-from urdfkin.verify.sampling import checked_choice
+from urdfkin.verify.verifier import checked_choice
 
 #: Number of configurations at which Pinocchio checks the distances between matching frames.
 CONFIRMED = 8

@@ -25,7 +25,7 @@ from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.sources import Origin, Source, Text, as_word, entry_of, is_urdf_path, is_usd, read_source
 from urdfkin.urdf.writer import to_urdf as write_urdf
 from urdfkin.verify.oracles import OracleName, oracle_library
-from urdfkin.verify.sampling import Verify, checked_choice
+from urdfkin.verify.verifier import Verify, checked_choice
 
 if TYPE_CHECKING:
     from urdfkin.dh.screws import ProductOfExponentials

@@ -9,14 +9,13 @@ import numpy as np
 from urdfkin.compiled.plan import compile_tree
 from urdfkin.errors import OracleError
 from urdfkin.model.base_motion import STILL_STATE
-from urdfkin.model.configuration import neutral
+from urdfkin.model.configuration import neutral, sample
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, LinkFrame
 from urdfkin.urdf.foreign import Modelled
 from urdfkin.verify.bounds import Bound, magnitudes
 from urdfkin.verify.certificate import compare
 from urdfkin.verify.pinocchio import MOST_RATES, pinocchio, version
 from urdfkin.verify.quantities import PLACEMENT
-from urdfkin.verify.sampling import sample
 from urdfkin.verify.verifier import Verifier
 
 #: Number of random configurations that are compared, in addition to the zero configuration.

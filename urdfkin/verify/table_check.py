@@ -12,9 +12,9 @@ import numpy as np
 from urdfkin.dh.convert import link_names
 from urdfkin.dh.table import DHTable
 from urdfkin.kinematics.roundings import EPS, ROW, of_rows, of_rows_read_back
+from urdfkin.model.configuration import sample
 from urdfkin.model.tree import FloatArray, LinkFrame
 from urdfkin.verify.oracle import QueryBatch
-from urdfkin.verify.sampling import sample
 from urdfkin.verify.tables import TableError
 from urdfkin.verify.verifier import Verifier
 
