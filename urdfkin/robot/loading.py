@@ -169,7 +169,7 @@ def _load_table(
     from urdfkin.dh.screws import ProductOfExponentials  # noqa: PLC0415
     from urdfkin.dh.table import DHTable  # noqa: PLC0415
     from urdfkin.verify.chain_checks import check_screws  # noqa: PLC0415
-    from urdfkin.verify.table_check import check_table_source  # noqa: PLC0415
+    from urdfkin.verify.model_check import check_table_source  # noqa: PLC0415
 
     _refuse_arguments(xacro_args, "a table")
     table: DHTable | ProductOfExponentials

@@ -77,3 +77,13 @@ def _worst(ours: FloatArray, theirs: FloatArray, scale: FloatArray) -> FloatArra
     finite = np.logical_and.reduce([np.isfinite(x).all(axis=1) for x in (ours, theirs, scale)])
     worst: FloatArray = np.where(finite, units.max(axis=1, initial=0.0), np.inf)
     return worst
+
+
+def load_kernels() -> None:
+    """Compile all kernels, or load them from disk, before worker processes start.
+
+    Otherwise each worker process would compile all kernels itself.
+    """
+    preload.load_kernels()
+    for name in CHECKS:
+        preload.load(name, KERNELS)
