@@ -15,9 +15,11 @@ from urdfkin.compiled import preload
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
 from urdfkin.model.tree import FloatArray
 
-#: The module with the compiled kernels of checks, and the kernels of this module that are used here.
+#: The module with the compiled kernels of checks, the kernels that a check of one configuration uses too, and
+#: the kernel that only checks of batches use.
 KERNELS = "urdfkin.verify.kernels"
 CHECKS = "worst", "coupling"
+_OF_BATCHES = "lengths"
 _NO_BITS = np.empty(0, dtype=np.int64)
 
 
@@ -85,5 +87,5 @@ def load_kernels() -> None:
     Otherwise each worker process would compile all kernels itself.
     """
     preload.load_kernels()
-    for name in CHECKS:
+    for name in (*CHECKS, _OF_BATCHES):
         preload.load(name, KERNELS)
