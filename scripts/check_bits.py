@@ -33,13 +33,13 @@ import urdfkin
 from urdfkin.compiled.preload import Way, only
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.base_motion import BaseMotion
+from urdfkin.model.configuration import draw_base
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.verify.call import Call
 from urdfkin.verify.quantities import Quantity, recursive_quantities
-from urdfkin.verify.sampling import draw_base
 from urdfkin.verify.verifier import bound_of
 
 #: Numbers of configurations of the tested batches.

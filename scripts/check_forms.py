@@ -30,11 +30,11 @@ from urdfkin.dh import FORMATS, DHTable, export
 from urdfkin.errors import InputError
 from urdfkin.export import LANGUAGES
 from urdfkin.kinematics.roundings import EPS, of_rows
+from urdfkin.model.configuration import sample
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import examples
 from urdfkin.verify.oracle import QueryBatch
-from urdfkin.verify.sampling import sample
 
 #: Number of configurations of each table.
 SAMPLES = 4

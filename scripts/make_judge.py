@@ -8,12 +8,12 @@ from statistics import median
 import numpy as np
 
 import urdfkin
+from urdfkin.model.configuration import draw_base
 from urdfkin.report.words import nearer_counts
 from urdfkin.system.documents import plain
 from urdfkin.validation.accuracy import Judgement, Line, judge
 from urdfkin.verify.exact.numbers import DIGITS
 from urdfkin.verify.pinocchio import version
-from urdfkin.verify.sampling import draw_base
 
 PAGE = Path(__file__).parents[1] / "docs" / "judge.md"
 #: Name and kind of each robot.

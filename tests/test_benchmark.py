@@ -22,8 +22,7 @@ from scripts.benchmarking.peers import breadth_first, positions, spread
 from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, TIP, Subject, bare_urdf, chain_urdf
 from scripts.benchmarking.tables import tables
 from scripts.benchmarking.timing import DifferenceError, Table, Work, agree, measure
-from urdfkin.compiled.plan import Step
-from urdfkin.compiled.program import program_of
+from urdfkin.compiled.plan import Step, program_of
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 

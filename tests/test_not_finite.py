@@ -7,7 +7,7 @@ import pytest
 
 import urdfkin
 from tests.laws.subjects import robot_of, state
-from urdfkin.compiled.program import LANES
+from urdfkin.compiled.plan import LANES
 from urdfkin.errors import InputError, NotFiniteError
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.tree import FloatArray

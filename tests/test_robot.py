@@ -20,7 +20,7 @@ from urdfkin.kinematics.rotation import exp_rotation
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.reference import Reference
 from urdfkin.robot import _INSIDE, Robot
-from urdfkin.verify import sampling, verifier
+from urdfkin.verify import verifier
 from urdfkin.verify.certificate import Comparison
 from urdfkin.verify.oracle import QueryBatch
 from urdfkin.verify.pinocchio import PinocchioOracle
@@ -200,7 +200,7 @@ def test_a_disagreement_whose_share_is_no_number_is_raised_too(
     ):
         found = iter(results)
         monkeypatch.setattr(verifier, "compare", lambda *_, found=found: next(found))
-        monkeypatch.setattr(sampling, "_MOST", 1)
+        monkeypatch.setattr(verifier, "_MOST", 1)
         with pytest.raises(urdfkin.VerificationError):
             panda.placement(panda.sample(len(results)), "panda_hand", verify=True)
 

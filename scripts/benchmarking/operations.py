@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from urdfkin.compiled import axes, outputs, recursion
-from urdfkin.compiled.plan import CompiledTree
-from urdfkin.compiled.program import KEPT_ROWS, WIDTH, Head, Op, program_of
+from urdfkin.compiled.plan import KEPT_ROWS, WIDTH, CompiledTree, Head, Op, program_of
 from urdfkin.kinematics.arithmetic import bound
 
 #: Number of operations that compute the sine and the cosine of an angle (`compiled.python_numbers`).

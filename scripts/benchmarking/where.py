@@ -1,6 +1,6 @@
 """Measure how the time of a batch, and of a single call, is divided among its parts.
 
-The forward recursion is a program of a few instructions (`urdfkin.compiled.program`). To measure a part, the
+The forward recursion is a program of a few instructions (`urdfkin.compiled.plan`). To measure a part, the
 program runs with the instructions of this part and without them. The difference of the two times is the time
 of the part. The parts of a single call are measured with calls that stop early, such as a call of an empty
 Python function and a call with rejected arguments.
@@ -20,7 +20,7 @@ from scripts.benchmarking.timing import Work, times
 from urdfkin.compiled.evaluate import is_staged, task_of
 from urdfkin.compiled.machine import kernels
 from urdfkin.compiled.machine.single import single
-from urdfkin.compiled.program import WIDTH, Head, Op, Program, program_of
+from urdfkin.compiled.plan import WIDTH, Head, Op, Program, program_of
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray

@@ -51,11 +51,11 @@ from urdfkin.urdf.sources import Origin
 MODULES = (
     "verify.oracle", "verify.call", "model.chain", "model.configuration", "model.mimic",
     "dh.convert", "model.configuration_like",
-    "verify.table_check", "kinematics.bodies", "verify.pinocchio", "model.base_motion",
-    "compiled.evaluate", "compiled.plan", "compiled.program", "model.reference", "robot",
+    "verify.model_check", "kinematics.bodies", "verify.pinocchio", "model.base_motion",
+    "compiled.evaluate", "compiled.plan", "model.reference", "robot",
     "kinematics.rotation", "kinematics.inputs",
     "model.path", "model.tree", "urdf.reader", "urdf.writer",
-    "verify.bounds", "verify.derived", "verify.certificate", "verify.sampling", "verify.analytical_reference",
+    "verify.bounds", "verify.derived", "verify.certificate", "verify.analytical_reference",
     "verify.quantities", "verify.tables", "verify.verifier",
 )  # fmt: skip
 

@@ -14,13 +14,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import urdfkin
-from urdfkin.model.configuration import narrowed_ranges
+from urdfkin.model.configuration import draw, narrowed_ranges
 from urdfkin.report.html import as_html
 from urdfkin.robot import Robot
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.document import VALIDATION
 from urdfkin.validation.robot_summary import describe
-from urdfkin.verify.sampling import draw
 
 
 def gripper(kind: str, bounds: tuple[float, float], *rules: tuple[float, float, float, float]) -> Robot:

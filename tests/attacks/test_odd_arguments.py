@@ -17,7 +17,7 @@ import pytest
 
 import urdfkin
 from urdfkin.compiled import evaluate
-from urdfkin.compiled.program import LANES
+from urdfkin.compiled.plan import LANES
 from urdfkin.robot import Robot
 from urdfkin.robot.trajectory import line
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import urdfkin
-from urdfkin.compiled.plan import LARGE
-from urdfkin.compiled.program import LANES
+from urdfkin.compiled.plan import LANES
+from urdfkin.compiled.python_numbers import LARGE
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.robot import Robot

@@ -13,9 +13,9 @@ from tests.cli.running import process, urdfkin
 from tests.robots.odd_urdfs import urdf_of
 from urdfkin.dh import read_table
 from urdfkin.dh.parse_table import references
+from urdfkin.model.configuration import sample
 from urdfkin.model.tree import FloatArray
 from urdfkin.urdf.catalogue import catalogue
-from urdfkin.verify.sampling import sample
 
 QUANTITIES = {
     "placement": "q",

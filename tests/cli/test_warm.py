@@ -14,6 +14,7 @@ from urdfkin.compiled import kept, preload
 from urdfkin.compiled.machine import kernels as every_kernel
 from urdfkin.compiled.machine.compiling import Kernel
 from urdfkin.validation import campaign
+from urdfkin.verify import kernels as checking
 
 
 def kernels(cache: Path) -> list[str]:
@@ -69,8 +70,9 @@ def test_nothing_is_started_to_compile_kernels_that_are_on_disk(monkeypatch: pyt
 def test_warm_compiles_every_kernel_of_the_package(tmp_path: Path) -> None:
     done = process("warm", XDG_CACHE_HOME=str(tmp_path))
     assert done.code == 0, done.err
-    every = [name for name, value in vars(every_kernel).items() if isinstance(value, Kernel)]
-    assert {"hessians", "imus"} <= set(every) <= set(kernels(tmp_path))
+    found = [vars(module).items() for module in (every_kernel, checking)]
+    every = {name for values in found for name, value in values if isinstance(value, Kernel)}
+    assert {"hessians", "imus", "lengths"} <= every <= set(kernels(tmp_path))
 
 
 def test_programs_are_told_by_one_warning_of_a_logger(

@@ -257,7 +257,8 @@ def test_a_certificate_of_what_was_turned_round_holds() -> None:
 
 def confirmed(**changed: Any) -> dict[str, Any]:
     """A confirmation by Pinocchio of another distance than it finds."""
-    return {"by": "Pinocchio 4.1.0", "configurations": 8, "metres": 1e-19, "reason": ""} | changed
+    done = {"state": "confirmed", "by": "Pinocchio 4.1.0", "configurations": 8, "metres": 1e-19, "reason": ""}
+    return done | changed
 
 
 FORGED: dict[str, Any] = {
@@ -297,7 +298,10 @@ FORGED: dict[str, Any] = {
     "an entry is listed twice": lambda d: d["differences"].append(d["differences"][0]),
     "neither a confirmation": lambda d: d.update(checked=confirmed(configurations=7)),
     "neither a confirmation at": lambda d: d.update(checked=confirmed(reason="no need")),
-    "nor a reason": lambda d: d.update(checked=confirmed(reason="not asked of Pinocchio: I was lazy")),
+    "nor a reason": lambda d: d.update(checked=confirmed(state="not asked", reason="I was lazy")),
+    "nor a reason for": lambda d: d.update(
+        checked=confirmed(state="not verified", by="", configurations=0, metres=0.0)
+    ),
     "nor a reason for its absence": lambda d: d.update(checked=confirmed(by="")),
     "`checked`: Pinocchio finds at most": lambda d: d.update(checked=confirmed()),
     "`orders`: the axes do not allow": lambda d: d["orders"].append(["joint_2", "joint_1"]),

@@ -9,7 +9,7 @@ import pytest
 import urdfkin
 from urdfkin.compiled import evaluate
 from urdfkin.compiled.evaluate import in_blocks
-from urdfkin.compiled.program import LANES
+from urdfkin.compiled.plan import LANES
 from urdfkin.errors import InputError
 from urdfkin.model.tree import FloatArray
 

@@ -10,8 +10,7 @@ import pytest
 import urdfkin
 from tests.laws.subjects import robot_of, state
 from urdfkin.compiled import evaluate
-from urdfkin.compiled.plan import CompiledTree, compile_tree
-from urdfkin.compiled.program import LANES, program_of
+from urdfkin.compiled.plan import LANES, CompiledTree, compile_tree, program_of
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot

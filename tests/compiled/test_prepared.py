@@ -22,8 +22,8 @@ from tests.laws.everything import differing
 from tests.laws.subjects import robot_of, state
 from urdfkin import Reference
 from urdfkin.compiled.machine.single import arrays_are_known, one_configuration, single
+from urdfkin.compiled.plan import KernelArgs
 from urdfkin.compiled.prepared import PreparedFrame
-from urdfkin.compiled.program import KernelArgs
 from urdfkin.errors import InputError, UnknownNameError, UrdfkinError
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot

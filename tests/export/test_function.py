@@ -15,11 +15,11 @@ from urdfkin.export.code import exported
 from urdfkin.export.expression import Node
 from urdfkin.export.function import Function, function_of
 from urdfkin.export.proof import CHECKED
+from urdfkin.model.configuration import draw
 from urdfkin.model.reference import Reference
 from urdfkin.robot import Robot
 from urdfkin.verify.call import Call
 from urdfkin.verify.quantities import ACCELERATION, JACOBIAN
-from urdfkin.verify.sampling import draw
 
 ODD = (
     "floating_root",

@@ -19,9 +19,9 @@ from urdfkin.kinematics.number_kinds import counted, norm, product
 from urdfkin.kinematics.number_kinds import length_equations as on_lengths
 from urdfkin.kinematics.roundings import EPS, SMALLEST
 from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.configuration import draw
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.verify.bounds import magnitudes
-from urdfkin.verify.sampling import draw
 
 #: Every equation of motion; a rotation made of a sine and a cosine has no length.
 EQUATIONS = sorted(

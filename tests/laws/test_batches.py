@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from tests.laws.subjects import NAMES, robot_of, state
 from urdfkin import load
 from urdfkin.compiled.evaluate import PART
-from urdfkin.compiled.program import LANES
+from urdfkin.compiled.plan import LANES
 from urdfkin.errors import InputError, NotFiniteError, RangeError, RepresentationSingularityError
 from urdfkin.kinematics.rotation import euler_of, singularity_distance
 from urdfkin.model.base_motion import BaseMotion

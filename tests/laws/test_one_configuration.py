@@ -10,7 +10,7 @@ import urdfkin
 from tests.laws.everything import by_the_robot, differing, on_its_way_alone, prepared
 from tests.laws.subjects import NAMES, robot_of, state
 from tests.robots.odd_urdfs import Urdf
-from urdfkin.compiled.program import LANES
+from urdfkin.compiled.plan import LANES
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 

@@ -16,8 +16,8 @@ from urdfkin.cli.options import REFERENCES
 from urdfkin.cli.quantity import REPRESENTATIONS
 from urdfkin.compiled.breakdown import acceleration_breakdown
 from urdfkin.compiled.machine.single import single
+from urdfkin.compiled.plan import REFERENCES as IN_KERNELS
 from urdfkin.compiled.plan import compile_tree
-from urdfkin.compiled.program import REFERENCES as IN_KERNELS
 from urdfkin.export.function import function_of
 from urdfkin.export.recursion import QUANTITIES as EXPORTED
 from urdfkin.kinematics.bodies import QUATERNION

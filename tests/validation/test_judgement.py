@@ -19,6 +19,7 @@ from urdfkin.errors import InputError
 from urdfkin.kinematics import equations as eq
 from urdfkin.kinematics.rotation import SEQUENCES, quaternion_of
 from urdfkin.model import base_motion as recursion_base
+from urdfkin.model.configuration import draw_base
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.report.words import judged_on, nearer, nearer_counts
@@ -30,7 +31,6 @@ from urdfkin.verify.exact import recursion as exact_recursion
 from urdfkin.verify.exact.numbers import exact, precision, read_exact
 from urdfkin.verify.oracle import BaseRows
 from urdfkin.verify.quantities import QUANTITIES
-from urdfkin.verify.sampling import draw_base
 
 #: One of each kind: arms, a hand with followers, humanoids, a quadruped, a mobile base, CAD exports.
 ROBOTS = (

@@ -14,11 +14,11 @@ from urdfkin.errors import InputError
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.verify import pinocchio, sampling, verifier
+from urdfkin.verify import pinocchio, verifier
 from urdfkin.verify.certificate import Certificate
 from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.quantities import PLACEMENT, Quantity
-from urdfkin.verify.sampling import SAMPLE, Verify, parts
+from urdfkin.verify.verifier import SAMPLE, Verify, parts
 
 #: Numbers of a part: one configuration at a time, a few, and all.
 SIZES = (1, 200, 10**9)
@@ -116,7 +116,7 @@ def test_the_worst_sample_is_named_in_whatever_part_it_stands(
         q[(*other, 7)] = MARK
         q[(*worst, 7)] = MARK + 1e-4
         for size in SIZES:
-            monkeypatch.setattr(sampling, "_AT_A_TIME", size)
+            monkeypatch.setattr(verifier, "_AT_A_TIME", size)
             for quantity, compute in calls(fresh, q, v, a, motion, True).items():
                 with pytest.raises(urdfkin.VerificationError) as caught:
                     compute()
@@ -138,7 +138,7 @@ def test_the_certificate_does_not_depend_on_the_parts(
     found = list[Certificate]()
     q, v, a = batch(fresh, shape)
     for size in SIZES:
-        monkeypatch.setattr(sampling, "_AT_A_TIME", size)
+        monkeypatch.setattr(verifier, "_AT_A_TIME", size)
         fresh.verifier.ledger = type(fresh.verifier.ledger)()
         for compute in calls(fresh, q, v, a, motion, True).values():
             compute()
@@ -184,7 +184,7 @@ def test_a_robot_without_moving_joints_has_jacobians_without_columns_in_blocks_t
 def test_of_a_large_batch_a_sample_is_checked_and_the_rest_stated(
     fresh: Robot, monkeypatch: pytest.MonkeyPatch, size: int, base: tuple[int, ...] | None
 ) -> None:
-    monkeypatch.setattr(sampling, "_AT_A_TIME", size)
+    monkeypatch.setattr(verifier, "_AT_A_TIME", size)
     motion = None if base is None else moving(base)
     q, v, a = batch(fresh, (250,))
     for compute in calls(fresh, q, v, a, motion, "sample").values():

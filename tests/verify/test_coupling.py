@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from scripts.check_bits import WAYS
 from urdfkin.compiled.preload import only
-from urdfkin.verify.mimic_columns import coupled
+from urdfkin.verify.oracle import coupled
 
 
 @given(st.data())

@@ -7,7 +7,7 @@ import pytest
 
 import urdfkin
 from urdfkin.errors import InputError
-from urdfkin.verify.sampling import draw, draw_base, special
+from urdfkin.model.configuration import draw, draw_base, special
 
 
 @pytest.mark.parametrize("with_special", [True, False])

@@ -18,13 +18,13 @@ from urdfkin.compiled.preload import only
 from urdfkin.errors import InputError
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.configuration import draw, draw_base
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.verify.bounds import Bound, magnitudes
 from urdfkin.verify.call import Call
 from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.quantities import JACOBIAN, QUANTITIES, Quantity
-from urdfkin.verify.sampling import draw, draw_base
 from urdfkin.verify.verifier import bound_of
 
 ARMS = ("panda", "ur5", "talos", "kinova", "tiago", "elbow", "planar_two_link")

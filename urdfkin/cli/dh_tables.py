@@ -32,9 +32,9 @@ from urdfkin.dh.tree_parameters import document as tree_document
 from urdfkin.dh.units import Angles, Lengths
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Strong, TextDocument
+from urdfkin.model.configuration import draw
 from urdfkin.robot import Robot
 from urdfkin.system.files import at_home
-from urdfkin.verify.sampling import draw
 from urdfkin.verify.tables import TableCheck
 from urdfkin.verify.verifier import TABLE_SAMPLES
 

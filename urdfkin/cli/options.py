@@ -521,9 +521,8 @@ def _values(
     robot: Robot, letter: str, text: str, where: str, rng: Any, conversion: Conversion | None
 ) -> FloatArray:
     """Return the (n, width) values of one option, in the given convention."""
-    from urdfkin.model.configuration import places  # noqa: PLC0415  keeps --help fast
+    from urdfkin.model.configuration import places, sample  # noqa: PLC0415
     from urdfkin.robot.trajectory import column_units  # noqa: PLC0415
-    from urdfkin.verify.sampling import sample  # noqa: PLC0415
 
     known = conversion or robot
     names = known.coordinate_names if letter == "q" else known.rate_names

@@ -120,10 +120,10 @@ def _study(
     """Return the accuracy result of a robot, and whether another study would give the same result."""
     import numpy as np  # noqa: PLC0415  keeps --help fast
 
+    from urdfkin.model.configuration import draw_base  # noqa: PLC0415
     from urdfkin.validation.accuracy import judge  # noqa: PLC0415
     from urdfkin.validation.accuracy_store import NotJudged  # noqa: PLC0415
     from urdfkin.validation.robot_input import subject  # noqa: PLC0415
-    from urdfkin.verify.sampling import draw_base  # noqa: PLC0415
 
     is_same = True
     try:

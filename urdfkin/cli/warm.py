@@ -23,7 +23,7 @@ def command() -> None:
     from urdfkin.compiled.kept import cache_folder, listen_to_compile_events  # noqa: PLC0415
     from urdfkin.compiled.machine import kernels  # noqa: PLC0415
     from urdfkin.compiled.machine.single import one_configuration  # noqa: PLC0415
-    from urdfkin.verify.ahead import load_kernels  # noqa: PLC0415
+    from urdfkin.verify.comparison import load_kernels  # noqa: PLC0415
 
     folder = cache_folder()
     if folder is None:

@@ -38,7 +38,7 @@ import numpy as np
 from urdfkin.compiled.evaluate import jacobians, placements
 from urdfkin.compiled.plan import CompiledTree
 from urdfkin.kinematics.roundings import EPS, FOLLOWER, NOT_ZERO
-from urdfkin.model.configuration import WIDEST, neutral, with_unit_quaternions
+from urdfkin.model.configuration import WIDEST, neutral, sample, with_unit_quaternions
 from urdfkin.model.mechanisms.mechanism import (
     IDENTITY,
     Alignment,
@@ -63,7 +63,6 @@ from urdfkin.model.mechanisms.upper_bound import (
 from urdfkin.model.tree import FloatArray, inverse, pose
 from urdfkin.robot import Robot
 from urdfkin.verify.oracle import QueryBatch
-from urdfkin.verify.sampling import sample
 
 #: The first number is the number of random configurations at the start of a search. The second number is the
 #: number of further configurations, in which each variable is at an end of its range.

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, TypedDict, cast
 import numpy as np
 
 from urdfkin.comparison.bounds import Search, own_results, pinocchios, tightened
-from urdfkin.comparison.result import REASONS, Confirmation, Difference, Sameness, Verdict
+from urdfkin.comparison.result import Confirmation, ConfirmationState, Difference, Sameness, Verdict
 from urdfkin.comparison.verdict import CONFIRMED, Comparator
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.roundings import EPS
@@ -154,6 +154,7 @@ class FrameEntry(TypedDict):
 class Confirmed(TypedDict):
     """Pinocchio's confirmation of the bounds."""
 
+    state: Annotated[ConfirmationState, says("Whether the oracle confirmed the bounds.")]
     by: Annotated[str, says("Name and version of the oracle; empty without a confirmation.")]
     configurations: Annotated[
         Count, says("Number of configurations at which the oracle computed the distances.")
@@ -349,10 +350,6 @@ def _statement_errors(document: Certificate, comparator: Comparator, said: Samen
     )
 
 
-#: The confirmation entry of a certificate that Pinocchio did not check.
-_NOTHING = plain(Confirmation())
-
-
 def _place(one: DifferenceEntry) -> tuple[str, str]:
     return one["place"], one["what"]
 
@@ -373,9 +370,10 @@ def _confirmation_errors(
 
     A certificate without a confirmation makes no statement about Pinocchio.
     """
-    if claimed["reason"].startswith(REASONS) and claimed == {**_NOTHING, "reason": claimed["reason"]}:
+    state, reason = claimed["state"], claimed["reason"]
+    if state != "confirmed" and reason and claimed == plain(Confirmation(state, reason=reason)):
         return
-    if claimed["reason"] or claimed["configurations"] != CONFIRMED or not claimed["by"]:
+    if state != "confirmed" or reason or claimed["configurations"] != CONFIRMED or not claimed["by"]:
         yield (
             f"`checked`: there is neither a confirmation at {CONFIRMED} configurations, nor a reason"
             " for its absence"

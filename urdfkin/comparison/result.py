@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -202,8 +202,10 @@ class Tool:
     pose: FloatArray
 
 
-#: First words of the reasons why Pinocchio did not confirm the bounds.
-REASONS = NOT_ASKED, NOT_VERIFIED = "not asked of Pinocchio: ", "not verified by Pinocchio: "
+#: Whether Pinocchio confirmed the bounds, was not asked because the user requested no checks, or could not
+#: confirm them.
+ConfirmationState = Literal["confirmed", "not asked", "not verified"]
+_WORDS = {"not asked": "not asked of Pinocchio", "not verified": "not verified by Pinocchio"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,20 +213,22 @@ class Confirmation:
     """Pinocchio's confirmation of the bounds, or the reason why there is none.
 
     Attributes:
+        state: Whether there is a confirmation, and otherwise the kind of the reason.
         by: Name and version of the oracle: "Pinocchio 4.1.0".
         configurations: Number of configurations at which the oracle computed the distances.
         metres: The largest of these distances.
         reason: Reason why the oracle computed no distances; empty if the oracle computed distances.
     """
 
+    state: ConfirmationState
     by: str = ""
     configurations: int = 0
     metres: float = 0.0
     reason: str = ""
 
     def __str__(self) -> str:
-        if self.reason:
-            return self.reason
+        if self.state != "confirmed":
+            return f"{_WORDS[self.state]}: {self.reason}"
         at = f"at {self.configurations} configurations"
         return f"{self.by} finds at most {self.metres:.2g} m {at}, within the bounds"
 

@@ -12,8 +12,6 @@ import numpy as np
 from urdfkin.comparison.bounds import MOST, Search, pinocchios, tightened
 from urdfkin.comparison.result import (
     FREE,
-    NOT_ASKED,
-    NOT_VERIFIED,
     Confirmation,
     Interval,
     JointMap,
@@ -50,7 +48,7 @@ from urdfkin.robot import Robot
 from urdfkin.robot.loading import load
 from urdfkin.urdf.sources import Source, is_usd
 from urdfkin.verify.oracles import PINOCCHIO
-from urdfkin.verify.sampling import checked_choice
+from urdfkin.verify.verifier import checked_choice
 
 #: Number of configurations at which Pinocchio checks the distances between matching frames.
 CONFIRMED = 8
@@ -241,7 +239,7 @@ class Comparator:
                 for which, tree in zip("AB", self.trees, strict=True)
                 for one in narrowed_ranges(tree)
             ),
-            checked=Confirmation(),
+            checked=Confirmation("not asked", reason="the bounds are not computed yet"),
             trees=self.trees,
         )
 
@@ -425,10 +423,10 @@ class Comparator:
         Pinocchio reads the texts of A and B with its own parser.
         """
         if not all(checked_choice(robot.verifier.policy) for robot in self.robots):
-            return Confirmation(reason=f"{NOT_ASKED}loaded with verify=False")
+            return Confirmation("not asked", reason="loaded with verify=False")
         for robot in self.robots:
             if (reason := robot.verifier.cannot()) is not None:
-                return Confirmation(reason=f"{NOT_VERIFIED}{reason}")
+                return Confirmation("not verified", reason=reason)
         off = self.pinocchio_distances(found, variables)
         for interval, metres in zip(frames, off, strict=False):
             if metres > interval.upper * (1.0 + EPS):
@@ -438,7 +436,7 @@ class Comparator:
                     found=f"{metres:.6g} m, bound {interval.upper:.6g} m",
                     remedy="please report this as an error of urdfkin, with both robots",
                 )
-        return Confirmation(PINOCCHIO.words, CONFIRMED, float(off.max(initial=0.0)))
+        return Confirmation("confirmed", PINOCCHIO.words, CONFIRMED, float(off.max(initial=0.0)))
 
     def pinocchio_distances(self, found: Alignment, variables: Variables) -> FloatArray:
         """Return each frame's largest distance (m) from Pinocchio at `CONFIRMED` configurations."""

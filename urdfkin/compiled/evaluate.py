@@ -23,8 +23,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urdfkin.compiled import preload, recursions
-from urdfkin.compiled.plan import LARGE, CompiledTree
-from urdfkin.compiled.program import LANES, REFERENCES, KernelArgs, Program, lines, program_of, scratch
+from urdfkin.compiled.plan import (
+    LANES,
+    REFERENCES,
+    CompiledTree,
+    KernelArgs,
+    Program,
+    lines,
+    program_of,
+    scratch,
+)
+from urdfkin.compiled.python_numbers import LARGE
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.errors.validators import whole_number
 from urdfkin.model.base_motion import STILL_STATE, against_gravity

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from urdfkin.compiled.program import ONE_ROW, OUT_ROW, PAIR_WIDTH, REFERENCES, ZERO_ROW, Head
+from urdfkin.compiled.plan import ONE_ROW, OUT_ROW, PAIR_WIDTH, REFERENCES, ZERO_ROW, Head
 from urdfkin.compiled.python_numbers import constant, nothing, numbers_of, put, same, write_rows, zero
 from urdfkin.compiled.recursion import put_vector, vector
 from urdfkin.kinematics import equations as eq

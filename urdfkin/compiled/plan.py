@@ -1,31 +1,37 @@
-"""Represent a robot's tree by arrays for the recursion: a step for each moving joint, a row for each frame.
+"""Represent a robot's tree by arrays for the recursion, and by the program that a kernel executes.
 
-As in the textbook, every joint frame is rotated so that the joint's axis is z (`turned` returns this
-rotation). Each revolute joint is then Rz, and each prismatic joint is Tz. Fixed joints are merged into the
-constant offsets between moving joints. A plan contains only the joints that move one of its frames.
+The arrays have a step for each moving joint and a row for each frame. As in the textbook, every joint frame
+is rotated so that the joint's axis is z (`turned` returns this rotation). Each revolute joint is then Rz, and
+each prismatic joint is Tz. Fixed joints are merged into the constant offsets between moving joints. A plan
+contains only the joints that move one of its frames.
+
+The program consists of the instructions for each block of configurations. The instructions are chosen once
+for each robot. There are special instructions for a translation along a coordinate axis and for a rotation
+about a coordinate axis. These instructions take a third of the time of the general instructions. A
+translation by zero needs no instruction. The state of a link stays in registers until the next link is
+computed. At a branch of the tree, the state is saved to memory and read again later.
+
+`KernelArgs` names the arguments of a kernel. The arguments of a kernel are one row of integers: addresses,
+sizes and options.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
-from enum import IntEnum
+from enum import IntEnum, auto
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from urdfkin.compiled.python_numbers import LARGE, Number
 from urdfkin.kinematics.rotation import axis_aligning
+from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
 IntArray = NDArray[np.int64]
-
-
-#: If all coordinates, velocities, lengths and multipliers are below this number, no result overflows. With N
-#: joints, the velocity of a joint is below LARGE^2 and the length of a path is below N LARGE^2. The largest
-#: product, w^2 d, is therefore below N^3 LARGE^6.
-LARGE = 1e45
 
 
 class Step(IntEnum):
@@ -293,3 +299,375 @@ def _leaders(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> 
             if column[Column.STEP] in ancestors:
                 leaders[frame, c] = first.setdefault(column[Column.V], c)
     return leaders
+
+
+# -- the program -----------------------------------------------------------------------------------------
+
+
+class Op(IntEnum):
+    """The instructions of a program.
+
+    An instruction with an axis has four forms, in this order: for the axis x, y, z, and for any axis.
+    """
+
+    END = 0
+    CARRY_X = 1  # translation along a rigid link
+    CARRY_Y = 2
+    CARRY_Z = 3
+    CARRY = 4
+    TURN_X = 5  # constant rotation
+    TURN_Y = 6
+    TURN_Z = 7
+    TURN = 8
+    REVOLUTE = 9
+    PRISMATIC = 10
+    PLANAR = 11
+    FLOATING = 12
+    SAVE = 13
+    RESUME = 14
+    KEEP = 15  # store the data that the joint's Jacobian column needs
+    COLUMN = 16
+    EMIT = 17
+
+
+class Head(IntEnum):
+    """Positions of the numbers at the beginning of a program, before its instructions."""
+
+    CODE = 0  # index of the first instruction
+    NQ = 1
+    NV = 2
+    FRAMES = 3
+    BLOCKS_Q = 4  # index of the list of needed blocks of eight coordinates
+    BLOCKS_V = 5
+    BLOCKS_END = 6
+    ANGLES = 7  # index of the list of joint angles
+    ANGLES_END = 8
+    Q = 9  # first scratch row of the coordinates; the next entries are the first rows of other numbers
+    V = 10
+    A = 11
+    BASE = 12
+
+
+#: Number of configurations in a row of scratch memory. A row fills one AVX-512 register or two AVX2
+#: registers.
+LANES = 8
+#: Number of integers in an instruction: the operation, three operands, and the index of its constants.
+WIDTH = 5
+#: Number of integers in an entry of the list of angles. They are the row of the angle, the row of the sine,
+#: the index of the mimic rule, and whether there is a mimic rule.
+ANGLE_WIDTH = 4
+#: Reserved scratch rows: a row for the number 0, a row for the number 1, rows for a result before it is
+#: written, and a row for an angle. The last value is the first free row.
+ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
+STATE_ROWS, KEPT_ROWS, COLUMN_ROWS = 24, 12, 6
+#: Number of integers in an entry of a list of pairs. An entry describes a Jacobian column: the column's row,
+#: its step, its index in v, and the first scratch row of the sums for that index.
+PAIR_WIDTH = 4
+
+_JOINTS = {
+    Motion.TURN: Op.REVOLUTE,
+    Motion.SLIDE: Op.PRISMATIC,
+    Motion.PLANAR: Op.PLANAR,
+    Motion.FLOATING: Op.FLOATING,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """The program of a kernel.
+
+    Attributes:
+        words: The integers of the program: the numbers of `Head`, then lists and instructions.
+        constants: The constants of the instructions.
+        rows: Number of scratch rows of a run.
+    """
+
+    words: IntArray
+    constants: FloatArray
+    rows: int
+
+    @cached_property
+    def addresses(self) -> tuple[int, int]:
+        """The memory addresses of `words` and `constants`, which are valid while the program exists."""
+        return self.words.ctypes.data, self.constants.ctypes.data
+
+    @cached_property
+    def lists(self) -> tuple[list[int], list[Number]]:
+        """`words` and `constants` as Python lists, for the recursion without a compiler."""
+        words: list[int] = self.words.tolist()
+        return words, list(map(Number, self.constants.tolist()))
+
+
+def program_of(plan: CompiledTree, *, turned: bool, columns: bool = False, pairs: bool = False) -> Program:
+    """Return the program for the frames of a compiled tree, which stores the program for later calls.
+
+    Args:
+        plan: The compiled tree.
+        turned: Whether the state is rotated to the axes of each frame. Placements need this rotation, and so
+            do results in the frame's own axes.
+        columns: Whether Jacobian columns are needed.
+        pairs: Whether the column of each joint, also of a mimic joint, is stored separately, to compute
+            derivatives from pairs of columns.
+    """
+    key = turned, columns, pairs
+    made: Program | None = plan.made.get(key)
+    if made is None:
+        made = plan.made[key] = _Writer(plan, *key).program()
+    return made
+
+
+class _Writer:
+    def __init__(self, plan: CompiledTree, turned: bool, columns: bool, pairs: bool) -> None:
+        self.plan, self.turned, self.columns, self.pairs = plan, turned, columns, pairs
+        self.code: list[tuple[int, int, int, int, int]] = []
+        self.constants: list[float] = [0.0]
+        self.slots: dict[int, int] = {}
+        self.q = FIRST_ROW
+        self.v = self.q + plan.nq
+        self.a = self.v + plan.nv
+        self.base = self.a + plan.nv
+        self.sines = self.base + STATE_ROWS
+        self.kept = self.sines + 2 * len(plan.steps)
+        self.results = self.kept + KEPT_ROWS * len(plan.columns) * columns
+        self.sums = self.results + COLUMN_ROWS * len(plan.columns) * columns
+        self.saved = self.sums + COLUMN_ROWS * len(plan.columns) * pairs
+        self.rules = [self._rule(i) for i in range(len(plan.steps))]
+        parts = _blocks(plan.places_q), _blocks(plan.columns[:, Column.V].tolist()), self._angles()
+        self.lists = [number for part in parts for number in part]
+        begins = np.cumsum([len(Head), *map(len, parts)]).tolist()
+        lists = [*begins[:3], begins[2], begins[3]]
+        self.head = [0, plan.nq, plan.nv, len(plan.frames), *lists, self.q, self.v, self.a, self.base]
+
+    def program(self) -> Program:
+        self._write()
+        self._put(Op.END)
+        rows = self.saved + STATE_ROWS * len(self.slots)
+        self.head[Head.CODE] = len(self.head) + len(self.lists)
+        words = [*self.head, *self.lists, *(word for line in self.code for word in line)]
+        return Program(np.array(words, dtype=np.int64), np.array(self.constants), rows)
+
+    def _write(self) -> None:
+        """Write the instructions for all steps and frames, in the order of the recursion."""
+        events = list(self._events())
+        last = {origin: k for k, (origin, _, _) in enumerate(events)}
+        now, c = -1, 0
+        self._save(-1, last, 0)
+        for k, (origin, step, frame) in enumerate(events):
+            if now != origin:
+                self._put(Op.RESUME, self._slot(origin))
+            if step is not None:
+                self._step(step)
+                now = step
+                while (
+                    self.columns and c < len(self.plan.columns) and self.plan.columns[c, Column.STEP] == step
+                ):
+                    self._put(Op.KEEP, self.kept + KEPT_ROWS * c, int(self.plan.columns[c, Column.AXIS]))
+                    c += 1
+                self._save(step, last, k + 1)
+            elif frame is not None and self._frame(frame):
+                now = -2  # the current state is now the state of the frame
+
+    def _events(self) -> Iterator[tuple[int, int | None, int | None]]:
+        """Yield the events of the recursion in order: each is a step or a frame.
+
+        An event is (previous step, index of the step or None, index of the frame or None).
+        """
+        f = 0
+        for i in range(-1, len(self.plan.steps)):
+            if i >= 0:
+                yield int(self.plan.parents[i]), i, None
+            while f < len(self.plan.frames) and self.plan.frames[f, 0] == i:
+                yield i, None, f
+                f += 1
+
+    def _save(self, step: int, last: Mapping[int, int], following: int) -> None:
+        """Write an instruction that saves the state after a step, if it is needed again later.
+
+        The state is needed again if an event with an index above `following` starts from this state.
+        """
+        if last.get(step, -1) > following:
+            self._put(Op.SAVE, self._slot(step))
+
+    def _slot(self, step: int) -> int:
+        return self.saved + STATE_ROWS * self.slots.setdefault(step, len(self.slots))
+
+    def _put(self, op: Op, *operands: int, at: int = 0) -> None:
+        x, y, z = (*operands, 0, 0, 0)[:3]
+        self.code.append((int(op), x, y, z, at))
+
+    def _constants(self, *numbers: float) -> int:
+        self.constants += map(float, numbers)
+        return len(self.constants) - len(numbers)
+
+    def _rigid(self, R: FloatArray, p: FloatArray, *, turned: bool = True) -> bool:
+        """Write the instructions for a translation by p and a rotation by R.
+
+        The result is True if an instruction was needed.
+        """
+        before = len(self.code)
+        along = np.flatnonzero(p).tolist()
+        if along:
+            op = Op.CARRY_X + along[0] if len(along) == 1 else Op.CARRY
+            self._put(Op(op), at=self._constants(*p))
+        if turned and (np.eye(3) != R).any():
+            about = [axis for axis in range(3) if _is_rotation_about(R, axis)]
+            self._put(Op(Op.TURN_X + about[0]) if about else Op.TURN, at=self._constants(*R.ravel()))
+        return len(self.code) > before
+
+    def _rule(self, i: int) -> int:
+        """Return the index in the constants at which a mimic joint's multiplier and offset begin.
+
+        For other joints, the result is 0.
+        """
+        multiplier, constant = self.plan.geometry[i, Geometry.MULTIPLIER :].tolist()
+        return 0 if (multiplier, constant) == (1.0, 0.0) else self._constants(multiplier, constant)
+
+    def _angles(self) -> list[int]:
+        """Return the list of joint angles.
+
+        The list has an entry of `ANGLE_WIDTH` numbers for each step with a rotation.
+        """
+        angles = []
+        for i, step in enumerate(self.plan.steps):
+            kind, q = Motion(step[Step.KIND]), self.q + int(step[Step.Q])
+            if kind in (Motion.TURN, Motion.PLANAR):
+                angles += [
+                    q + 2 * (kind is Motion.PLANAR),
+                    self.sines + 2 * i,
+                    self.rules[i],
+                    int(self.rules[i] > 0),
+                ]
+        return angles
+
+    def _step(self, i: int) -> None:
+        geometry, step = self.plan.geometry[i], self.plan.steps[i]
+        self._rigid(geometry[:9].reshape(3, 3), geometry[Geometry.OFFSET : Geometry.MULTIPLIER])
+        op, rule, sine = _JOINTS[Motion(step[Step.KIND])], self.rules[i], self.sines + 2 * i
+        first = sine if op is Op.REVOLUTE else self.q + int(step[Step.Q])
+        self._put(op, first, int(step[Step.V]), sine if op is Op.PLANAR else int(rule > 0), at=rule)
+
+    def _frame(self, f: int) -> bool:
+        """Write the instructions that write a frame's results.
+
+        The result is True if these instructions change the current state.
+        """
+        plan, offsets = self.plan, self.plan.offsets[f]
+        moved = self._rigid(offsets[:9].reshape(3, 3), offsets[9:], turned=self.turned)
+        sources = 0
+        if self.columns:
+            self._columns(f)
+            sources = len(self.head) + len(self.lists)
+            self.lists += self._pairs(f) if self.pairs else self._sources(f, self.results)
+        self._put(Op.EMIT, int(plan.frames[f, 1]), sources)
+        return moved
+
+    def _columns(self, f: int) -> None:
+        for c, leader in enumerate(self.plan.leaders[f].tolist()):
+            if leader >= 0:
+                multiplier = float(self.plan.multipliers[c])
+                follows = 0 if multiplier == 1.0 else self._constants(multiplier)
+                to = c if self.pairs else leader
+                how = int(self.plan.columns[c, Column.TURNS]) + 2 * (to != c)
+                rows = self.kept + KEPT_ROWS * c, self.results + COLUMN_ROWS * to
+                self._put(Op.COLUMN, *rows, how, at=follows)
+
+    def _sources(self, f: int, row: int) -> list[int]:
+        """Return the scratch row of each number of the frame's (6, nv) matrix.
+
+        The argument `row` is the first scratch row of the matrix.
+        """
+        plan = self.plan
+        sources = np.full((6, plan.nv), ZERO_ROW, dtype=np.int64)
+        for c in np.flatnonzero(plan.leaders[f] == np.arange(len(plan.columns))):
+            sources[:, plan.columns[c, Column.V]] = row + COLUMN_ROWS * c + np.arange(6)
+        found: list[int] = sources.ravel().tolist()
+        return found
+
+    def _pairs(self, f: int) -> list[int]:
+        """Return the list of pairs of a frame.
+
+        The list consists of the number of columns, an entry (`PAIR_WIDTH` numbers) for each column, and the
+        scratch rows of the sums.
+        """
+        columns, leaders = self.plan.columns, self.plan.leaders[f]
+        own = np.flatnonzero(leaders >= 0)
+        rows = self.results + COLUMN_ROWS * own, self.sums + COLUMN_ROWS * leaders[own]
+        pairs = np.column_stack((rows[0], columns[own, Column.STEP], columns[own, Column.V], rows[1]))
+        return [len(own), *pairs.ravel().tolist(), *self._sources(f, self.sums)]
+
+
+def _is_rotation_about(R: FloatArray, axis: int) -> bool:
+    """Return whether R is exactly a rotation about the coordinate axis with this index."""
+    one = np.eye(3)[axis]
+    return bool((R[axis] == one).all() and (R[:, axis] == one).all())
+
+
+def _blocks(places: Sequence[int]) -> list[int]:
+    """Return the first index of each block of eight indices that contains at least one of `places`."""
+    return sorted({int(place) // 8 * 8 for place in places})
+
+
+#: Size of a cache line of the processor, bytes. Access to a vector that lies across two cache lines takes
+#: twice as long.
+_LINE = 64
+#: The reference frames that the kernels support, each with its number in a kernel. Any other reference frame
+#: raises a KeyError.
+REFERENCES = {
+    known: int(known) for known in (Reference.LOCAL, Reference.WORLD, Reference.LOCAL_WORLD_ALIGNED)
+}
+
+
+class KernelArgs(IntEnum):
+    """Index of each argument in the row of integers.
+
+    Arguments from CORE on are for calls with one configuration.
+    """
+
+    @staticmethod
+    def _generate_next_value_(name: str, start: int, count: int, last_values: list[int]) -> int:
+        return count
+
+    PROGRAM = auto()
+    CONSTANTS = auto()
+    SCRATCH = auto()
+    REFERENCE = auto()
+    N = auto()
+    Q = auto()
+    V = auto()
+    A = auto()
+    #: Address of the base's state (rows of 24 numbers); 0 for a fixed base at the world's origin.
+    BASE = auto()
+    #: Distance in memory between the first numbers of two consecutive configurations; 0 if all configurations
+    #: use the same numbers.
+    STRIDE_Q = auto()
+    STRIDE_V = auto()
+    STRIDE_A = auto()
+    STRIDE_BASE = auto()
+    OUT = auto()
+    #: Number of output numbers for one configuration.
+    WIDTH = auto()
+    #: Address of a buffer that collects the results of a block before they are written to the output; 0 if
+    #: they are written directly.
+    STAGE = auto()
+
+    CORE = auto()
+    NQ = auto()
+    NV = auto()
+    ORDERS = auto()
+    AXES = auto()
+    ROWS = auto()
+    COLUMNS = auto()
+    BUSY = auto()
+    COUNT = auto()
+
+
+def scratch(program: Program) -> FloatArray:
+    """Return memory for the intermediate results of one run of a program."""
+    return lines(program.rows * LANES)
+
+
+def lines(count: int) -> FloatArray:
+    """Return memory for `count` numbers that begins at the start of a cache line."""
+    numbers = np.empty(count + _LINE // 8)
+    first = -numbers.ctypes.data % _LINE // 8
+    return numbers[first : first + count]

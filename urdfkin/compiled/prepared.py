@@ -15,8 +15,7 @@ import numpy as np
 
 from urdfkin.compiled import preload
 from urdfkin.compiled.kept import compiling
-from urdfkin.compiled.plan import CompiledTree
-from urdfkin.compiled.program import KernelArgs
+from urdfkin.compiled.plan import CompiledTree, KernelArgs
 from urdfkin.model.configuration import warn_of_degrees
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.reference import Reference

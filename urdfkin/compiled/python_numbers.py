@@ -16,7 +16,10 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from urdfkin.compiled.plan import LARGE
+#: If all coordinates, velocities, lengths and multipliers are below this number, no result overflows. With N
+#: joints, the velocity of a joint is below LARGE^2 and the length of a path is below N LARGE^2. The largest
+#: product, w^2 d, is therefore below N^3 LARGE^6.
+LARGE = 1e45
 
 LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
 _2_PI, PI_2, PI_2_REST = 2.0 / math.pi, math.pi / 2.0, 6.123233995736766e-17

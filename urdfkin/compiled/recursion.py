@@ -22,7 +22,7 @@ module `python_numbers`. The kernels are copies of these functions for Numba's n
 from __future__ import annotations
 
 from urdfkin.compiled.axes import seen, seen_after
-from urdfkin.compiled.program import (
+from urdfkin.compiled.plan import (
     ANGLE_ROW,
     ANGLE_WIDTH,
     LANES,

@@ -25,13 +25,12 @@ import numpy as np
 
 from urdfkin.compiled.evaluate import in_blocks, is_staged
 from urdfkin.compiled.kept import compiling
-from urdfkin.compiled.plan import CompiledTree
+from urdfkin.compiled.plan import LANES, CompiledTree, KernelArgs, lines
 from urdfkin.compiled.prepared import Fast
-from urdfkin.compiled.program import LANES, KernelArgs, lines
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.export.c import Layout, advance, framed, spare, unit
 from urdfkin.export.code import Code, bare
-from urdfkin.model.configuration import warn_of_degrees
+from urdfkin.model.configuration import draw, warn_of_degrees
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -39,7 +38,6 @@ from urdfkin.system.cache import get, kept_folder, put
 from urdfkin.system.locks import importing, lock_over_forks
 from urdfkin.verify.call import Call
 from urdfkin.verify.quantities import QUANTITIES, Quantity
-from urdfkin.verify.sampling import draw
 from urdfkin.verify.verifier import Verifier
 
 _FLAGS = ("-std=c99", "-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fPIC", "-shared")

@@ -21,6 +21,7 @@ from urdfkin.export.function import Function
 from urdfkin.export.naming import quiet, shown
 from urdfkin.export.single import single_bounds
 from urdfkin.kinematics.roundings import EPS, SINGLE_EPS, SMALLEST
+from urdfkin.model.configuration import draw
 from urdfkin.model.recursion import Number
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -29,7 +30,6 @@ from urdfkin.verify.call import Call, Part
 from urdfkin.verify.certificate import Certificate
 from urdfkin.verify.exact.numbers import DIGITS, enough_digits, exact, precision, read_exact
 from urdfkin.verify.exact.recursion import move
-from urdfkin.verify.sampling import draw
 from urdfkin.verify.verifier import Verifier, bound_of
 
 #: Number of random configurations compared with Pinocchio, besides the neutral one and the limits.

@@ -1,4 +1,4 @@
-"""Configurations: the layout of `q`, named poses, limits and ranges, conversion to and from Pinocchio's.
+"""Configurations: the layout of `q`, named poses, limits and ranges, random samples, and Pinocchio's `q`.
 
 | joint | urdfkin | Pinocchio |
 |---|---|---|
@@ -23,8 +23,9 @@ from numpy.typing import ArrayLike
 
 from urdfkin.errors import DegreesWarning, InputError, NotFiniteError, Question, warn_caller
 from urdfkin.kinematics.inputs import floats
-from urdfkin.kinematics.rotation import NORM_TOLERANCE, unit_quaternions
+from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_of, unit_quaternions
 from urdfkin.kinematics.roundings import EPS, FOLLOWER
+from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.configuration_like import CoordinateLayout, Given, Hint, by_name, listed
 from urdfkin.model.tree import (
     LARGEST_ANGLE,
@@ -150,7 +151,7 @@ def kept_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tuple[f
     """
 
     def keeps(leader: float) -> bool:
-        # As in `configuration.limit_violations`: a limit printed in decimal is rounded.
+        # As in `limit_violations`: a limit printed in decimal is rounded.
         own = rule.multiplier * leader + rule.offset
         return bool(np.nextafter(limit.lower, -np.inf) <= own <= np.nextafter(limit.upper, np.inf))
 
@@ -665,3 +666,97 @@ def _check_mimic_rule(joint: Joint, leader: FloatArray, values: FloatArray) -> N
             remedy="load with mimic=False to give it its own coordinate",
             question=Question.MIMIC_JOINTS,
         )
+
+
+# -- random samples --------------------------------------------------------------------------------------
+
+#: Positions of planar and floating joints lie between -_RANGE and _RANGE, in metres.
+_RANGE = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """`q` (n, nq), `v` and `a` (n, nv)."""
+
+    q: FloatArray
+    v: FloatArray
+    a: FloatArray
+
+
+def sample(tree: KinematicTree, n: int, rng: np.random.Generator) -> FloatArray:
+    """Return random configurations (n, nq), uniform within the limits.
+
+    Continuous joints take any angle. Planar and floating joints take any orientation and positions within
+    +-2 m. A missing limit, or a limit beyond 10 (rad or m), counts as 10. The limits of mimic joints restrict
+    the mimicked joint too. If no value is within the limits of the mimicked joint and of the mimic joint,
+    only the limits of the mimicked joint apply. `limit_violations` then names the mimic joint.
+    """
+    return _uniform(tree, n, rng, coordinate_ranges(tree))
+
+
+def _uniform(
+    tree: KinematicTree, n: int, rng: np.random.Generator, ranges: dict[str, tuple[float, float]]
+) -> FloatArray:
+    q = np.empty((n, tree.nq))
+    for joint, at in zip(tree.joints, tree.q_index, strict=True):
+        if joint.nq == 1:
+            q[:, at] = rng.uniform(*ranges[joint.name], (n, 1))[:, 0]
+        elif joint.nq:
+            q[:, at : at + joint.nq] = _sample_joint(joint, n, rng)
+    return q
+
+
+def _sample_joint(joint: Joint, n: int, rng: np.random.Generator) -> FloatArray:
+    return _SAMPLED[joint.kind](n, rng)
+
+
+def _sample_planar(n: int, rng: np.random.Generator) -> FloatArray:
+    return np.hstack((rng.uniform(-_RANGE, _RANGE, (n, 2)), rng.uniform(-math.pi, math.pi, (n, 1))))
+
+
+def _sample_floating(n: int, rng: np.random.Generator) -> FloatArray:
+    quaternion = rng.standard_normal((n, 4))
+    quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
+    return np.hstack((rng.uniform(-_RANGE, _RANGE, (n, 3)), quaternion))
+
+
+#: The samples of a joint with several coordinates.
+_SAMPLED = {JointKind.PLANAR: _sample_planar, JointKind.FLOATING: _sample_floating}
+
+
+def special(tree: KinematicTree) -> FloatArray:
+    """Return (3, nq): zero configuration, all joints at the lower limit, all joints at the upper limit."""
+    q = np.tile(neutral(tree), (3, 1))
+    ranges = own_ranges(tree)
+    for joint, at in zip(tree.joints, tree.q_index, strict=True):
+        if joint.nq == 1:
+            q[1, at], q[2, at] = ranges[joint.name]
+    return q
+
+
+def draw_base(n: int, rng: np.random.Generator) -> BaseMotion:
+    """Return random motions of the root link, with poses of a floating joint and velocities as in `draw`."""
+    placed = _sample_floating(n, rng)
+    placement = np.tile(np.eye(4), (n, 1, 1))
+    placement[:, :3, :3], placement[:, :3, 3] = rotation_of(placed[:, 3:]), placed[:, :3]
+    velocity, acceleration = rng.standard_normal((2, n, 6))
+    velocity[::8] *= 100.0
+    acceleration[::8] *= 100.0
+    return BaseMotion(placement, velocity, acceleration)
+
+
+def draw(tree: KinematicTree, n: int, rng: np.random.Generator, *, with_special: bool) -> Samples:
+    """Return samples for a validation: `n` random samples and, if requested, the samples of `special`.
+
+    The samples cover the full range of each joint, even if a mimic joint then exceeds its own limits. The
+    equations are valid beyond the limits too. Joint velocities and accelerations are standard normal. In
+    every eighth sample these velocities and accelerations are a hundred times larger, so that the quadratic
+    terms of eq. 7.129 and 7.130 dominate.
+    """
+    q = _uniform(tree, n, rng, own_ranges(tree))
+    if with_special:
+        q = np.concatenate((special(tree), q))
+    v, a = rng.standard_normal((2, len(q), tree.nv))
+    v[::8] *= 100.0
+    a[::8] *= 100.0
+    return Samples(q, v, a)

@@ -40,6 +40,7 @@ from urdfkin.kinematics.roundings import EPS
 from urdfkin.model import configuration, integration
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.chain import FrameChain, chain
+from urdfkin.model.configuration import sample
 from urdfkin.model.configuration_like import Given, listed
 from urdfkin.model.reference import Reference
 from urdfkin.model.summary import Joints, described
@@ -62,10 +63,9 @@ from urdfkin.verify.quantities import (
     quantity,
     recursive_quantities,
 )
-from urdfkin.verify.sampling import Verify, sample
 from urdfkin.verify.singular_values import SingularValues, singular_values
 from urdfkin.verify.singularity import columns_of
-from urdfkin.verify.verifier import Verifier
+from urdfkin.verify.verifier import Verifier, Verify
 
 if TYPE_CHECKING:
     from urdfkin.compiled.breakdown import AccelerationBreakdown

@@ -25,7 +25,7 @@ from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.sources import Origin, Source, Text, as_word, entry_of, is_urdf_path, is_usd, read_source
 from urdfkin.urdf.writer import to_urdf as write_urdf
 from urdfkin.verify.oracles import OracleName, oracle_library
-from urdfkin.verify.sampling import Verify, checked_choice
+from urdfkin.verify.verifier import Verify, checked_choice
 
 if TYPE_CHECKING:
     from urdfkin.dh.screws import ProductOfExponentials
@@ -169,7 +169,7 @@ def _load_table(
     from urdfkin.dh.screws import ProductOfExponentials  # noqa: PLC0415
     from urdfkin.dh.table import DHTable  # noqa: PLC0415
     from urdfkin.verify.chain_checks import check_screws  # noqa: PLC0415
-    from urdfkin.verify.table_check import check_table_source  # noqa: PLC0415
+    from urdfkin.verify.model_check import check_table_source  # noqa: PLC0415
 
     _refuse_arguments(xacro_args, "a table")
     table: DHTable | ProductOfExponentials

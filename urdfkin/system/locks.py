@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import threading
 
-
 _locks: list[threading.RLock] = []
 _acquired: list[threading.RLock] = []
 
@@ -47,7 +46,7 @@ class _ImportLock:
     Without this lock, another thread could fork a child during the import. The child would wait for ever for
     the end of that import.
 
-    `logging` has a lock that a fork acquires too. An imported module may need that lock, so a fork must acquire
+    `logging` has a lock that a fork acquires too. An imported module may need that lock. So a fork must acquire
     this lock first. Python calls the functions that acquire locks in reverse order of their registration.
     For this reason, the function of this module is registered after `logging` is imported.
     """

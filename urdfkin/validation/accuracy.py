@@ -28,6 +28,7 @@ from urdfkin.kinematics.rotation import (
 )
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
 from urdfkin.model.base_motion import BaseMotion
+from urdfkin.model.configuration import Samples, draw
 from urdfkin.model.recursion import Number
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -45,7 +46,6 @@ from urdfkin.verify.exact.numbers import DIGITS, enough_digits, exact, precision
 from urdfkin.verify.exact.recursion import move, on_base
 from urdfkin.verify.oracle import BaseNumbers, BaseRows, davenport
 from urdfkin.verify.quantities import ANALYTICAL_JACOBIAN, JACOBIAN, PLACEMENT, Quantity, validated
-from urdfkin.verify.sampling import Samples, draw
 from urdfkin.verify.verifier import bound_of, oracle_results, own_results
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED

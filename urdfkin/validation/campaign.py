@@ -31,7 +31,7 @@ from urdfkin.validation.results import RobotReport, ValidationReport
 from urdfkin.validation.robot_input import Given, RobotInput, subjects
 from urdfkin.validation.store import Store, opened
 from urdfkin.validation.worker_processes import ProcessEngine
-from urdfkin.verify.ahead import load_kernels
+from urdfkin.verify.comparison import load_kernels
 from urdfkin.verify.oracles import PINOCCHIO, OracleName, oracle_library
 from urdfkin.verify.pinocchio import pinocchio
 

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from urdfkin.model.configuration import Samples, draw
 from urdfkin.model.tree import KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.validation import memory
@@ -27,7 +28,6 @@ from urdfkin.validation.robot_summary import RobotSummary
 from urdfkin.validation.timings import Clock, total
 from urdfkin.verify.oracle import Oracle
 from urdfkin.verify.oracles import PINOCCHIO
-from urdfkin.verify.sampling import Samples, draw
 
 #: Samples in one draw.
 DRAWN = 25

@@ -16,6 +16,7 @@ import numpy as np
 
 from urdfkin.compiled.plan import compile_tree
 from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.configuration import Samples
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointFrame, KinematicTree, freed
 from urdfkin.robot import Robot
@@ -25,7 +26,6 @@ from urdfkin.verify.bounds import Bound, magnitudes
 from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.oracles import OracleLibrary
 from urdfkin.verify.quantities import SCREWS, Quantity, validated
-from urdfkin.verify.sampling import Samples
 
 #: Maximum size of one array of a block, bytes. About ten arrays of this size exist at a time.
 BLOCK_BYTES = 32 * 2**20

@@ -23,6 +23,7 @@ from urdfkin.errors import DegreesWarning, InputError
 from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.errors.validators import as_bool, real_number, safe_repr, whole_number
 from urdfkin.kinematics.roundings import EPS
+from urdfkin.model.configuration import draw
 from urdfkin.model.conventions import Convention
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -32,7 +33,6 @@ from urdfkin.verify.bounds import Bound, disagreement, result_k
 from urdfkin.verify.oracles import versions
 from urdfkin.verify.quantities import ACCELERATION_BREAKDOWN, Quantity
 from urdfkin.verify.quantities import quantity as quantity_of
-from urdfkin.verify.sampling import draw
 from urdfkin.verify.verifier import Verifier, bound_of, oracle_results_with_bound
 
 if TYPE_CHECKING:

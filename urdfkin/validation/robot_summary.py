@@ -19,7 +19,7 @@ import numpy as np
 from urdfkin.dh import DHRow, DHTable
 from urdfkin.dh.make import dh_table
 from urdfkin.errors import InputError
-from urdfkin.model.configuration import NarrowedRange, narrowed_ranges
+from urdfkin.model.configuration import NarrowedRange, draw, narrowed_ranges
 from urdfkin.robot import Robot
 from urdfkin.system.documents import plain
 from urdfkin.urdf.catalogue import catalogue
@@ -27,7 +27,6 @@ from urdfkin.urdf.lint import Finding
 from urdfkin.validation.document import Chain, Model, Row, SecondReading
 from urdfkin.validation.document import Finding as FindingEntry
 from urdfkin.verify.oracle import Oracle
-from urdfkin.verify.sampling import draw
 from urdfkin.verify.second_reader import second_reading
 from urdfkin.verify.tables import check_table
 

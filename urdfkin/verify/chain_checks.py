@@ -14,9 +14,9 @@ from urdfkin.dh.screws import ProductOfExponentials
 from urdfkin.dh.structure import Opw
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, of_joints
 from urdfkin.model.chain import FrameChain, chain
+from urdfkin.model.configuration import sample
 from urdfkin.model.tree import FloatArray, JointFrame
 from urdfkin.verify.oracle import QueryBatch
-from urdfkin.verify.sampling import sample
 from urdfkin.verify.tables import TableError
 from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
 

@@ -15,9 +15,11 @@ from urdfkin.compiled import preload
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
 from urdfkin.model.tree import FloatArray
 
-#: Module with the compiled kernels of checks, and the names of the kernels that checks use.
+#: The module with the compiled kernels of checks.
+#: `CHECKS` are the kernels that a check of one configuration uses too; only checks of batches use `_OF_BATCHES`.
 KERNELS = "urdfkin.verify.kernels"
 CHECKS = "worst", "coupling"
+_OF_BATCHES = "lengths"
 _NO_BITS = np.empty(0, dtype=np.int64)
 
 
@@ -77,3 +79,13 @@ def _worst(ours: FloatArray, theirs: FloatArray, scale: FloatArray) -> FloatArra
     finite = np.logical_and.reduce([np.isfinite(x).all(axis=1) for x in (ours, theirs, scale)])
     worst: FloatArray = np.where(finite, units.max(axis=1, initial=0.0), np.inf)
     return worst
+
+
+def load_kernels() -> None:
+    """Compile all kernels, or load them from disk, before worker processes start.
+
+    Otherwise each worker process would compile all kernels itself.
+    """
+    preload.load_kernels()
+    for name in (*CHECKS, _OF_BATCHES):
+        preload.load(name, KERNELS)

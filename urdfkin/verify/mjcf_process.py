@@ -26,14 +26,13 @@ from typing import Any
 import numpy as np
 
 from urdfkin.errors import InputError, InstallationError, OracleError, UrdfkinError
-from urdfkin.model.configuration import neutral
+from urdfkin.model.configuration import neutral, sample
 from urdfkin.model.tree import FloatArray
 from urdfkin.urdf.confinement import MEMORY, limit
 from urdfkin.urdf.mjcf import Mjcf, read_mjcf
 from urdfkin.urdf.mujoco import library
 from urdfkin.urdf.writer import to_urdf
 from urdfkin.verify.pinocchio import pinocchio
-from urdfkin.verify.sampling import sample
 
 #: Number of coordinates of a free joint.
 _CARTESIAN = 7

@@ -1,4 +1,9 @@
-"""Check a robot that was made from a `pinocchio.Model`: compare the placements of the robot and the model."""
+"""Check the URDF text that urdfkin writes for a `pinocchio.Model` or for a Denavit-Hartenberg table.
+
+Pinocchio checks a robot's results with the robot's URDF text. This module checks the text itself. It compares
+the placements of the robot with those of the model, or Pinocchio's placements of the tip with the products of
+the table's own matrices (eq. 7.64).
+"""
 
 from __future__ import annotations
 
@@ -7,16 +12,20 @@ from typing import Any
 import numpy as np
 
 from urdfkin.compiled.plan import compile_tree
+from urdfkin.dh.convert import link_names
+from urdfkin.dh.table import DHTable
 from urdfkin.errors import OracleError
+from urdfkin.kinematics.roundings import EPS, ROW, of_rows, of_rows_read_back
 from urdfkin.model.base_motion import STILL_STATE
-from urdfkin.model.configuration import neutral
+from urdfkin.model.configuration import neutral, sample
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, LinkFrame
 from urdfkin.urdf.foreign import Modelled
 from urdfkin.verify.bounds import Bound, magnitudes
 from urdfkin.verify.certificate import compare
+from urdfkin.verify.oracle import QueryBatch
 from urdfkin.verify.pinocchio import MOST_RATES, pinocchio, version
 from urdfkin.verify.quantities import PLACEMENT
-from urdfkin.verify.sampling import sample
+from urdfkin.verify.tables import TableError
 from urdfkin.verify.verifier import Verifier
 
 #: Number of random configurations that are compared, in addition to the zero configuration.
@@ -95,3 +104,39 @@ def _configurations(model: Any, tree: KinematicTree, q: FloatArray) -> FloatArra
             own = np.column_stack((np.cos(own), np.sin(own)))
         full[:, to : to + size] = own
     return full
+
+
+def check_table_source(verifier: Verifier, table: DHTable) -> None:
+    """Compare the robot that Pinocchio reads from the URDF with the table.
+
+    Args:
+        verifier: Verifier of the robot.
+        table: The table from which the robot was made.
+
+    Raises:
+        TableError: the placements of the tip differ by more than rounding.
+    """
+    if verifier.cannot() is not None:
+        return
+    q = sample(verifier.tree, _SAMPLES, np.random.default_rng(0))
+    own = table.coupling.select(verifier.tree, q)
+    theirs = verifier.oracle().placements(QueryBatch([LinkFrame.of(link_names(table)[-1])], (q,)))[:, 0]
+    off = np.abs(theirs - table.placement(own))[:, :3]
+    # The matrices of base and tool may be rotations to six digits only.
+    # The URDF contains exact rotations.
+    rows, metres, defect = len(table.rows), table.rounding(own), _defect(table)
+    turn = EPS * of_rows_read_back(rows) + defect
+    allowed = metres * (of_rows_read_back(rows) / of_rows(rows) + defect / (EPS * ROW))
+    if (off[..., 3].max(axis=-1) > allowed).any() or (off[..., :3] > turn).any():
+        raise TableError(
+            "the URDF made of a table differs from the table",
+            where=table.robot,
+            found=f"a tip {off[..., 3].max():.3g} m off",
+            remedy="please report this as an error of urdfkin, with the table",
+        )
+
+
+def _defect(table: DHTable) -> float:
+    """Return the distance of the base and tool matrices from rigid motions; they may have six digits only."""
+    rotations: list[FloatArray] = [table.base[:3, :3], table.tool[:3, :3]]
+    return sum(float(np.linalg.norm(R.T @ R - np.eye(3))) for R in rotations)

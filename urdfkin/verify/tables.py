@@ -38,10 +38,10 @@ from urdfkin.dh.table import DHTable
 from urdfkin.errors import UrdfkinError
 from urdfkin.kinematics.roundings import EPS, NOT_ZERO, of_joints, of_rows
 from urdfkin.model.chain import chain
+from urdfkin.model.configuration import Samples
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.verify.oracle import Oracle, QueryBatch
-from urdfkin.verify.sampling import Samples
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 #: Largest length in a table with Hayati rows, as a multiple of the robot's reach (docs/dh.md).

@@ -8,16 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from urdfkin.compiled import preload
 from urdfkin.compiled.plan import CompiledTree, IntArray
-from urdfkin.errors import OracleError, RangeError, warn_caller
+from urdfkin.errors import InputError, OracleError, RangeError, warn_caller
+from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.roundings import EPS, NOT_ZERO, of_joints
 from urdfkin.model.base_motion import STILL_STATE, BaseMotion
-from urdfkin.model.configuration import warn_of_degrees
+from urdfkin.model.configuration import draw, warn_of_degrees
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.system.lazy_import import own_version
@@ -39,7 +40,6 @@ from urdfkin.verify.oracles import PINOCCHIO, OracleLibrary, OracleName, oracle_
 from urdfkin.verify.pinocchio import build_model, pinocchio, version
 from urdfkin.verify.quantities import QUANTITIES, Quantity
 from urdfkin.verify.replay import replay_line
-from urdfkin.verify.sampling import SAMPLE, Verify, checked_choice, draw, parts
 
 if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
@@ -48,6 +48,20 @@ if TYPE_CHECKING:
 
 #: Number of random configurations in the check of a table; the zero configuration and the limits are added.
 TABLE_SAMPLES = 40
+
+#: True: check all results of a call.
+#: False: check none.
+#: The string "sample": check the results of `SAMPLE` configurations.
+Verify = bool | Literal["sample"]
+
+#: Number of configurations of a call that `verify="sample"` checks.
+SAMPLE = 100
+
+#: Largest number of values, and of configurations, that are compared at a time.
+#: The number is large enough for efficient array expressions and fits into the processor's cache.
+#: The number also limits the memory for large batches.
+_AT_A_TIME = 262_144
+_MOST = 4096
 
 
 class NotVerifiedWarning(UserWarning):
@@ -468,3 +482,36 @@ def oracle_blocks(quantity: Quantity, oracle: Oracle, query: QueryBatch) -> Iter
 
 def _warn(reason: str) -> None:
     warn_caller(f"not verified: {reason}", NotVerifiedWarning)
+
+
+def checked_choice(verify: object) -> Verify:
+    """Return a valid value of `verify`.
+
+    Raises:
+        InputError: the value is not True, False or "sample".
+    """
+    if verify is True or verify is False:
+        return verify
+    if isinstance(verify, str) and verify == "sample":
+        return "sample"
+    raise InputError('verify must be True, False or "sample"', found=safe_repr(verify))
+
+
+def parts(verify: Verify, n: int, numbers: int) -> Iterator[slice | IntArray]:
+    """Yield the indices of the configurations to check, in parts.
+
+    Args:
+        verify: True or "sample".
+        n: Number of configurations.
+        numbers: Number of values in the results of one configuration.
+
+    Yields:
+        Slices or arrays of indices. A sample is random with a fixed seed. A regular choice could be biased,
+        because batches are often ordered.
+    """
+    step = min(_MOST, max(1, _AT_A_TIME // max(1, numbers)))
+    if verify == "sample" and n > SAMPLE:
+        drawn = np.sort(np.random.default_rng(0).choice(n, SAMPLE, replace=False))
+        yield from (drawn[i : i + step] for i in range(0, SAMPLE, step))
+    else:
+        yield from (slice(i, min(i + step, n)) for i in range(0, n, step))

@@ -20,8 +20,8 @@ from numba.extending import intrinsic
 
 from urdfkin.compiled.machine.compiling import compiled, helper
 from urdfkin.compiled.machine.numbers import NOTHING, Known, Lanes, as_number, in_all_lanes
-from urdfkin.compiled.plan import LARGE
-from urdfkin.compiled.program import LANES
+from urdfkin.compiled.plan import LANES
+from urdfkin.compiled.python_numbers import LARGE
 
 NUMBER = Lanes(LANES)
 _VECTOR = ir.VectorType(ir.DoubleType(), LANES)

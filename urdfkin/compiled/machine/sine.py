@@ -20,7 +20,7 @@ from numba.extending import intrinsic
 from urdfkin.compiled.machine.compiling import compiled
 from urdfkin.compiled.machine.memory import put
 from urdfkin.compiled.machine.numbers import fused
-from urdfkin.compiled.program import LANES
+from urdfkin.compiled.plan import LANES
 from urdfkin.compiled.python_numbers import COSINE, LARGEST_ANGLE, NO_FRACTION, PI_2, PI_2_REST, SINE
 
 _2_PI = 2.0 / math.pi

@@ -26,8 +26,7 @@ from numba.extending import intrinsic
 from urdfkin.compiled.machine import kernels
 from urdfkin.compiled.machine.compiling import Core, compiled, core
 from urdfkin.compiled.machine.memory import WHOLE_NUMBERS, whole_numbers_at
-from urdfkin.compiled.plan import CompiledTree, IntArray
-from urdfkin.compiled.program import REFERENCES, KernelArgs, program_of, scratch
+from urdfkin.compiled.plan import REFERENCES, CompiledTree, IntArray, KernelArgs, program_of, scratch
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
