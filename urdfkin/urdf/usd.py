@@ -42,7 +42,7 @@ from urdfkin.model.tree import (
     pose,
 )
 from urdfkin.system.files import MOST
-from urdfkin.system.lazy_import import installed_version
+from urdfkin.system.lazy_import import install_remedy, installed_version
 from urdfkin.urdf.confinement import Ground
 from urdfkin.urdf.mjcf import UNBOUNDED
 from urdfkin.urdf.sources import USD
@@ -156,7 +156,7 @@ def version() -> str:
     """Return the installed version of OpenUSD, without importing it."""
     found = installed_version("usd-core") or installed_version("usd-exchange")
     if found is None:
-        raise InputError("OpenUSD is not installed", remedy="pip install 'urdfkin[usd]'")
+        raise InputError("OpenUSD is not installed", remedy=install_remedy("usd"))
     return found
 
 
@@ -169,7 +169,7 @@ def library() -> Any:
     try:
         from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdPhysics  # noqa: PLC0415  an extra, and heavy
     except ImportError:
-        raise InputError("OpenUSD is not installed", remedy="pip install 'urdfkin[usd]'") from None
+        raise InputError("OpenUSD is not installed", remedy=install_remedy("usd")) from None
     return type(
         "OpenUSD",
         (),
