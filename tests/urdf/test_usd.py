@@ -674,6 +674,15 @@ def test_the_articulation_above_all_prims_has_a_name(write: Write) -> None:
         loaded(write(text), articulation="")
 
 
+def test_a_joint_that_is_listed_already_is_not_listed_for_its_schema(write: Write) -> None:
+    weld = joint(
+        "weld", "Fixed", "lower", "base", "bool physics:excludeFromArticulation = true",
+        '"MjcEqualityWeldAPI"',
+    )  # fmt: skip
+    what = "a tree cannot represent this FixedJoint, which is outside the articulation"
+    assert findings(loaded(write(stage(LINKS + JOINTS + weld)))) == [("USD101", "/arm/weld", what)]
+
+
 # -- hostile files ---------------------------------------------------------------------------------------
 
 
@@ -933,6 +942,31 @@ def test_two_micrometres_are_not_explained_by_single_precision(write: Write) -> 
     found = urdfkin.same(robot, loaded(write(text.replace("0.333", "0.333002"))), boxes=0)
     assert not found.up_to_single
     assert not found
+
+
+ODD = (
+    '<robot name="r"><link name="a"/><link name="b.0"/><link name="c.0"/>'
+    '<joint name="j.0" type="revolute"><parent link="a"/><child link="b.0"/>{limit}</joint>'
+    '<joint name="k.0" type="{kind}"><parent link="b.0"/><child link="c.0"/><origin xyz="1 0 0"/>'
+    '<axis xyz="0 1 0"/>{rest}</joint></robot>'
+)
+RANGE = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
+
+
+def test_a_joint_that_never_moves_or_is_fixed_is_matched_by_its_spelling_in_usd(write: Write) -> None:
+    idle = f'{RANGE}<mimic joint="j.0" multiplier="0"/>'
+    kinds = {"idle": ("revolute", idle), "free": ("revolute", RANGE), "fixed": ("fixed", "")}
+    robots = {
+        name: loaded_name(ODD.format(limit=RANGE, kind=kind, rest=rest))
+        for name, (kind, rest) in kinds.items()
+    }
+    free = loaded(write(as_usd(robots["free"], transcoded)))
+    assert "tn__k0_k3" in [one.name for one in free.tree.joints]
+    for name in ("idle", "fixed"):
+        as_named = urdfkin.same(robots[name], robots["free"], boxes=0)
+        for a, b in ((robots[name], free), (free, robots[name])):
+            found = urdfkin.same(a, b, boxes=0)
+            assert [one.what for one in found.differences] == [one.what for one in as_named.differences]
 
 
 SLIPS = {

@@ -578,8 +578,9 @@ class _Reader:
         if not joint and (ends or any(word in kind for word in _COUPLINGS)):
             what = f"a tree cannot represent this {kind or 'prim with physics:body0 or physics:body1'}"
             self._say("left-out-of-usd", path, what)
+        listed = any(one.where == path and one.kind == "left-out-of-usd" for one in self.remarks)
         for schema in schemas:
-            if not any(word in schema for word in _COUPLINGS) or (joint and _is_mimic(schema)):
+            if listed or not any(word in schema for word in _COUPLINGS) or (joint and _is_mimic(schema)):
                 continue
             if schema == "MjcEqualityJointAPI" and "NewtonMimicAPI" in schemas:
                 # the rule is that of NewtonMimicAPI, with more terms
