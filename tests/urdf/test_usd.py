@@ -502,6 +502,9 @@ def with_schemas(schemas: str, words: str = "") -> str:
 def test_a_coupling_that_is_not_read_is_listed(write: Write, schema: str) -> None:
     robot = loaded(write(with_schemas(f'"{schema}"')))
     assert findings(robot) == [("USD101", "/arm/rail", f"urdfkin does not read {schema}")]
+    robot = loaded(write(with_schemas(f'"{schema}", "PhysxTendonAxisAPI:u"')))
+    what = f"urdfkin does not read {schema}, PhysxTendonAxisAPI:u"
+    assert findings(robot) == [("USD101", "/arm/rail", what)]
 
 
 def test_an_equality_of_mujoco_is_listed_only_for_terms_that_its_mimic_rule_lacks(write: Write) -> None:

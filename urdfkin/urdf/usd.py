@@ -578,9 +578,9 @@ class _Reader:
         if not joint and (ends or any(word in kind for word in _COUPLINGS)):
             what = f"a tree cannot represent this {kind or 'prim with physics:body0 or physics:body1'}"
             self._say("left-out-of-usd", path, what)
-        listed = any(one.where == path and one.kind == "left-out-of-usd" for one in self.remarks)
+        unread = []
         for schema in schemas:
-            if listed or not any(word in schema for word in _COUPLINGS) or (joint and _is_mimic(schema)):
+            if not any(word in schema for word in _COUPLINGS) or (joint and _is_mimic(schema)):
                 continue
             if schema == "MjcEqualityJointAPI" and "NewtonMimicAPI" in schemas:
                 # the rule is that of NewtonMimicAPI, with more terms
@@ -588,7 +588,10 @@ class _Reader:
                     what = f"the terms {', '.join(more)} of this joint's mimic rule are not read"
                     self._say("left-out-of-usd", path, what)
                 continue
-            self._say("left-out-of-usd", path, f"urdfkin does not read {schema}")
+            unread.append(schema)
+        # a joint that is not in the tree is listed already
+        if unread and not any(one.where == path and one.kind == "left-out-of-usd" for one in self.remarks):
+            self._say("left-out-of-usd", path, f"urdfkin does not read {', '.join(unread)}")
 
     def _owner(self, prim: Any) -> str | None:
         """Return the path of the nearest prim at or above a prim that is the root of an articulation."""
@@ -878,7 +881,7 @@ class _Reader:
         below = [group for group in found if group.path.startswith(wanted.rstrip("/") + "/")]
         if own or not below:
             raise UnknownNameError("articulation", wanted, paths, where=self.source)
-        return self._together(below, wanted)
+        return self._together(below, wanted.rstrip("/") or "/")
 
     def _together(self, groups: list[_Articulation], path: str) -> _Articulation:
         """Return one articulation for several that are attached to the world."""
