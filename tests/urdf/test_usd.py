@@ -577,7 +577,7 @@ def test_the_prototypes_of_a_point_instancer_are_left_out_and_listed(write: Writ
     assert findings(robot) == [("USD102", "/arm/crowd", "kinematics does not use this PointInstancer")]
 
 
-def test_values_at_times_only_are_listed(write: Write) -> None:
+def test_time_samples_without_a_default_value_are_listed(write: Write) -> None:
     timed = JOINTS.replace("physics:upperLimit = 3", "physics:upperLimit.timeSamples = { 0: 3 }")
     robot = loaded(write(stage(LINKS + timed)))
     assert ("USD104", "/arm/rail") in [one[:2] for one in findings(robot)]
@@ -588,13 +588,23 @@ def test_values_at_times_only_are_listed(write: Write) -> None:
     timed_finding = next(one for one in findings(robot) if one[0] == "USD104")
     assert timed_finding[1:] == (
         "/arm/upper",
-        "xformOp:translate has values at times, but no default value, so urdfkin leaves it out",
+        "xformOp:translate has time samples, but no default value, so urdfkin leaves it out",
     )
     both = "translate = (0, 0, 1)\ndouble3 xformOp:translate.timeSamples = { 0: (0, 0, 5) }"
     assert findings(loaded(write(text.replace("translate = (0, 0, 1)", both)))) == []
     moved = "double3 xformOp:translate.timeSamples = { 0: (1, 0, 0) }\nuniform token[] xformOpOrder = "
     above = text.replace('def Xform "arm" {', f'def Xform "arm" {{\n{moved}["xformOp:translate"]')
     assert [one[:2] for one in findings(loaded(write(above)))] == [("USD104", "/arm")]
+
+
+def test_a_spline_without_a_default_value_is_listed(write: Write) -> None:
+    if not hasattr(usd.library().Usd.Attribute, "HasSpline"):
+        pytest.skip("this OpenUSD has no splines")
+    spline = "double xformOp:translateZ.spline = {\n1: 1; post held,\n}"
+    text = stage(LINKS + JOINTS).replace("double3 xformOp:translate = (0, 0, 1)", spline)
+    robot = loaded(write(text.replace('["xformOp:translate"]', '["xformOp:translateZ"]', 1)))
+    what = "xformOp:translateZ has a spline, but no default value, so urdfkin leaves it out"
+    assert findings(robot)[0] == ("USD104", "/arm/upper", what)
 
 
 def test_a_layer_in_another_unit_or_with_another_up_axis_is_listed(write: Write) -> None:

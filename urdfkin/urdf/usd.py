@@ -485,23 +485,23 @@ class _Reader:
         return value
 
     def _timed(self, attribute: Any, instead: str) -> None:
-        """Report an attribute that has values at times only."""
+        """Report an attribute that has time samples or a spline, but no default value."""
         path = str(attribute.GetPath())
         if path in self._looked_at:
             return
         self._looked_at.add(path)
-        splines = getattr(attribute, "HasSpline", lambda: False)()
-        if not (splines or attribute.GetNumTimeSamples()):
+        kind = "a spline" if getattr(attribute, "HasSpline", lambda: False)() else "time samples"
+        if kind == "time samples" and not attribute.GetNumTimeSamples():
             return
         if not attribute.GetResolveInfo(self.pxr.Usd.TimeCode.Default()).HasAuthoredValue():
             self._say(
                 "time-samples", str(attribute.GetPrim().GetPath()),
-                f"{attribute.GetName()} has values at times, but no default value, so {instead}",
+                f"{attribute.GetName()} has {kind}, but no default value, so {instead}",
                 "write a default value",
             )  # fmt: skip
 
     def _timed_transform(self, prim: Any) -> None:
-        """Report operations of the transforms of a prim, and of those above it, with values at times only."""
+        """Report operations without a default value in the transforms of a prim and of the prims above it."""
         while prim and (path := str(prim.GetPath())) not in self._looked_at:
             self._looked_at.add(path)
             if prim.IsA(self.pxr.UsdGeom.Xformable):
