@@ -18,6 +18,7 @@ import pytest
 
 from scripts import build_release, measure_size
 from tests.pages import pages
+from urdfkin.system.lazy_import import EXTRAS, install_remedy
 
 ROOT = Path(__file__).parents[1]
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
@@ -113,8 +114,31 @@ def installing() -> list[str]:
     today = "\n".join(
         line for text in texts for line in text.splitlines() if "After the first release" not in line
     )
-    lines = re.findall(r"^pip (?:install|wheel) .*$|(?<=`)pip install [^`]+", today, re.MULTILINE)
+    lines = re.findall(
+        r"(?<=- run: )pip .*$|^pip (?:install|wheel) .*$|(?<=`)pip install [^`]+", today, re.MULTILINE
+    )
     return sorted({line for line in lines if re.search("urdfkin|PATH_OF_TH", line)})
+
+
+def test_a_remedy_names_the_packages_of_the_extra() -> None:
+    extras = PROJECT["optional-dependencies"]
+    assert {name: [package] for name, package in EXTRAS.items()} == {
+        name: packages for name, packages in extras.items() if name not in ("docs", "release", "test")
+    }
+    assert install_remedy("mujoco") == "pip install 'mujoco>=4,<5'"
+
+
+def test_no_message_installs_urdfkin_from_an_index() -> None:
+    files = [file for file in (ROOT / "urdfkin").rglob("*") if file.suffix in (".py", ".toml", ".j2")]
+    assert len(files) > 100
+    found = [
+        (file.name, words)
+        for file in files
+        for words in re.findall(
+            r"""pip install ['"]?urdfkin\W.*|install \W?urdfkin\[.*""", file.read_text("utf-8")
+        )
+    ]
+    assert found == []
 
 
 @pytest.fixture(scope="module")

@@ -351,6 +351,57 @@ def test_a_mesh_that_a_pull_request_takes_away_is_missed_in_a_file_that_it_left(
     assert found("--changed-since", "HEAD") == [("shaped.urdf", "URDF706")]
 
 
+STAGE = """#usda 1.0
+(
+    subLayers = [@./parts.usda@]
+)
+def PhysicsRevoluteJoint "j" {
+    rel physics:body0 = </a>
+    rel physics:body1 = </b>
+}
+"""
+PARTS = """#usda 1.0
+def Xform "a" (prepend apiSchemas = ["PhysicsRigidBodyAPI"]) {
+}
+def Xform "b" (prepend apiSchemas = ["PhysicsRigidBodyAPI"]) {
+}
+"""
+MJCF = """<mujoco><worldbody><body name="a"><joint name="j"/><geom size="1"/>{}</body></worldbody>
+<tendon><fixed name="t"><joint joint="j" coef="1"/></fixed></tendon></mujoco>"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", ["usd", "mjcf"])
+def test_a_usd_or_mjcf_file_is_told_in_full_when_it_or_a_part_of_it_changed(
+    repository: Path, form: str
+) -> None:
+    pytest.importorskip("pxr" if form == "usd" else "mujoco")
+    if form == "usd":
+        put("arm.usda", STAGE)
+        put("parts.usda", PARTS)
+        file, part, changed, expected = "arm.usda", "parts.usda", PARTS + "\n", ["USD301", "USD302"]
+    else:
+        put("arm.xml", MJCF.format('<include file="part.xml"/>'))
+        part, changed = "part.xml", '<mujocoinclude><site name="tip"/></mujocoinclude>\n'
+        put(part, changed.strip())
+        file, expected = "arm.xml", ["MJCF101", "MJCF102"]
+
+    def told(name: str) -> list[str]:
+        return [code for _, code in found("--changed-since", "HEAD", name)]
+
+    assert told(file) == expected
+    git("add", ".")
+    git("commit", "-qm", "a robot of another format")
+    assert told(file) == []
+    assert "(unchanged files: 1)" in check("--changed-since", "HEAD", file).text
+    put(part, changed)
+    assert told(file) == expected
+    git("checkout", "-q", part)
+    assert told(file) == []
+    put(file, Path(file).read_text() + "\n")
+    assert told(file) == expected
+
+
 @pytest.mark.slow
 def test_a_xacro_file_is_told_in_full_when_what_it_may_include_changed(repository: Path) -> None:
     pytest.importorskip("xacrodoc")

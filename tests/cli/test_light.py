@@ -72,7 +72,7 @@ def test_a_command_that_needs_more_says_so() -> None:
     assert done.returncode == 2
     found = re.fullmatch(
         r"urdfkin: error: (\w+) is not installed; "
-        r"install urdfkin with its dependencies: pip install urdfkin\n",
+        r"install urdfkin with its dependencies: pip install PATH_OF_THE_CLONE\n",
         done.stderr,
     )
     assert found is not None

@@ -150,7 +150,7 @@ def test_plots_and_pictures_have_words_for_who_cannot_see_them() -> None:
 def test_a_page_without_matplotlib_lacks_the_plots_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(html_module, "installed", lambda: False)
     text = as_html(arms())
-    assert "pip install 'urdfkin[plots]'" in text
+    assert "pip install &#39;matplotlib&gt;=3.10.7&#39;" in text
     assert 'class="plot"' not in text
 
 

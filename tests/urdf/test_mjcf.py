@@ -282,7 +282,7 @@ def test_it_may_come_as_bytes_or_from_a_stream(monkeypatch: pytest.MonkeyPatch) 
         loaded(b"<mujoco>\xff</mujoco>")
 
 
-@pytest.mark.parametrize("code", ["MJCF101", "MJCF102"])
+@pytest.mark.parametrize("code", ["MJCF101", "MJCF102", "MJCF201"])
 def test_each_of_its_findings_has_a_page_whose_examples_are_true(code: str) -> None:
     said, rule = page(code), find_rule(code.lower())
     assert [

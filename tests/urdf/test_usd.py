@@ -467,6 +467,235 @@ def test_crate_files_and_packages_are_read(write: Write, tmp_path: Path) -> None
         assert robot.placement([0.0, 0.0], "lower")[0, 3] == pytest.approx(2.0)
 
 
+# -- nothing is dropped silently -----------------------------------------------------------------------------
+
+
+def findings(robot: urdfkin.Robot) -> list[tuple[str, str | None, str]]:
+    return [(one.code, one.name, one.message) for one in robot.findings if one.code.startswith("USD")]
+
+
+GEAR = """def PhysxPhysicsGearJoint "gear" {
+rel physics:body0 = </arm/upper>
+rel physics:body1 = </arm/lower>
+}
+"""
+
+
+def test_a_gear_joint_and_a_tendon_are_listed(write: Write) -> None:
+    tendon = 'def MjcTendon "tendon" {\n}\n'
+    robot = loaded(write(stage(LINKS + JOINTS + GEAR + tendon)))
+    assert findings(robot) == [
+        ("USD101", "/arm/gear", "a tree cannot represent this PhysxPhysicsGearJoint"),
+        ("USD101", "/arm/tendon", "a tree cannot represent this MjcTendon"),
+    ]
+
+
+def with_schemas(schemas: str, words: str = "") -> str:
+    """Write the arm whose slide has applied schemas."""
+    rail = f'def PhysicsPrismaticJoint "rail" (prepend apiSchemas = [{schemas}])'
+    text = stage(LINKS + JOINTS.replace('def PhysicsPrismaticJoint "rail"', rail))
+    start = text.index("{", text.index(rail)) + 1
+    return f"{text[:start]}\n{words}\n{text[start:]}"
+
+
+@pytest.mark.parametrize("schema", ["MjcEqualityJointAPI", "PhysxTendonAxisAPI:t", "OtherMimicAPI"])
+def test_a_coupling_that_is_not_read_is_listed(write: Write, schema: str) -> None:
+    robot = loaded(write(with_schemas(f'"{schema}"')))
+    assert findings(robot) == [("USD101", "/arm/rail", f"urdfkin does not read {schema}")]
+    robot = loaded(write(with_schemas(f'"{schema}", "PhysxTendonAxisAPI:u"')))
+    what = f"urdfkin does not read {schema}, PhysxTendonAxisAPI:u"
+    assert findings(robot) == [("USD101", "/arm/rail", what)]
+
+
+def test_an_equality_of_mujoco_is_listed_only_for_terms_that_its_mimic_rule_lacks(write: Write) -> None:
+    words = "rel newton:mimicJoint = </arm/slide>\nfloat mjc:coef2 = {}"
+    both = '"NewtonMimicAPI", "MjcEqualityJointAPI"'
+    slide = body("side") + joint("slide", "Prismatic", "base", "side", 'uniform token physics:axis = "Y"\n'
+        "float physics:lowerLimit = -1\nfloat physics:upperLimit = 1")  # fmt: skip
+    for coefficient, expected in ((0, {}), (1, {"USD101": "/arm/rail"})):
+        text = with_schemas(both, words.format(coefficient)).rstrip().removesuffix("}") + slide + "}"
+        robot = loaded(write(text))
+        assert codes(robot) == expected
+        assert robot.nq == 2
+
+
+def test_a_disabled_mimic_rule_is_listed(write: Write) -> None:
+    words = "rel newton:mimicJoint = </arm/shoulder>\nbool newton:mimicEnabled = false"
+    robot = loaded(write(with_schemas(NEWTON, words)))
+    assert findings(robot) == [("USD101", "/arm/rail", "the mimic rule of this joint is disabled")]
+
+
+def test_a_blocked_value_counts_as_one_that_is_not_written(write: Write) -> None:
+    blocked = joint(
+        "shoulder", "Revolute", "base", "upper",
+        "uniform token physics:axis = None\nfloat physics:lowerLimit = None\n"
+        "float physics:upperLimit = None\npoint3f physics:localPos1 = None\n"
+        "quatf physics:localRot1 = None\nbool physics:jointEnabled = None\n"
+        "bool physics:excludeFromArticulation = None\n"
+        "point3f physics:localPos0 = (0, 0, 1)",
+    )  # fmt: skip
+    robot = loaded(write(stage(body("base", schemas=ROOT) + body("upper", "(0, 0, 1)") + blocked)))
+    (made,) = robot.tree.joints
+    assert made.kind.value == "continuous"
+    assert made.axis == pytest.approx([1.0, 0.0, 0.0])
+    assert findings(robot) == []
+    shut = [name for name in ALL if name != "rotY"]
+    d6 = joint(
+        "j", "", "base", "tip",
+        locked(*shut) + "float limit:rotY:physics:low = None\nfloat limit:rotY:physics:high = 90",
+        limited(*ALL),
+    )  # fmt: skip
+    with pytest.raises(InputError, match=r"joint /arm/j: .* is blocked.*limit:rotY:physics:low = None"):
+        loaded(write(stage(body("base", schemas=ROOT) + body("tip") + d6)))
+
+
+@pytest.mark.parametrize(("free", "factor"), [("rotY", math.pi / 180.0), ("transZ", 0.5)])
+def test_a_d6_joint_keeps_the_limits_of_its_free_direction(write: Write, free: str, factor: float) -> None:
+    shut = [name for name in ALL if name != free]
+    ends = f"float limit:{free}:physics:low = -45\nfloat limit:{free}:physics:high = 90"
+    d6 = joint("j", "", "base", "tip", locked(*shut) + ends, limited(*ALL))
+    robot = loaded(write(stage(body("base", schemas=ROOT) + body("tip") + d6, unit=0.5)))
+    limit = robot.tree.joints[0].limit
+    assert limit is not None
+    assert (limit.lower, limit.upper) == pytest.approx((-45 * factor, 90 * factor))
+
+
+def test_the_prototypes_of_a_point_instancer_are_left_out_and_listed(write: Write) -> None:
+    crowd = 'def PointInstancer "crowd" {\nrel prototypes = </arm/crowd/one>\n%s}\n'
+    inner = 'def Xform "one" {\n' + body("a") + body("b") + GEAR.replace(
+        "PhysxPhysicsGearJoint", "PhysicsRevoluteJoint").replace("/arm/", "/arm/crowd/one/"
+    ).replace("/upper", "/a").replace("/lower", "/b") + "}\n"  # fmt: skip
+    lead = joint("lead", "Fixed", "upper", "crowd/one/a")
+    robot = loaded(write(stage(LINKS + JOINTS + crowd % inner + lead)))
+    assert robot.link_names == ("base", "upper", "lower")
+    (instancer, joined) = findings(robot)
+    assert instancer[:2] == ("USD101", "/arm/crowd")
+    assert "2 bodies and 1 joints, which are not read" in instancer[2]
+    assert joined[:2] == ("USD201", "/arm/lead")
+    assert "is a prototype of a PointInstancer" in joined[2]
+    robot = loaded(write(stage(LINKS + JOINTS + crowd % 'def Cube "one" {\n}\n')))
+    assert findings(robot) == [("USD102", "/arm/crowd", "kinematics does not use this PointInstancer")]
+
+
+def test_time_samples_without_a_default_value_are_listed(write: Write) -> None:
+    timed = JOINTS.replace("physics:upperLimit = 3", "physics:upperLimit.timeSamples = { 0: 3 }")
+    robot = loaded(write(stage(LINKS + timed)))
+    assert ("USD104", "/arm/rail") in [one[:2] for one in findings(robot)]
+    text = stage(LINKS + JOINTS)
+    moving = text.replace("translate = (0, 0, 1)", "translate.timeSamples = { 0: (0, 0, 1) }")
+    assert moving != text
+    robot = loaded(write(moving))
+    timed_finding = next(one for one in findings(robot) if one[0] == "USD104")
+    assert timed_finding[1:] == (
+        "/arm/upper",
+        "xformOp:translate has time samples, but no default value, so urdfkin leaves it out",
+    )
+    both = "translate = (0, 0, 1)\ndouble3 xformOp:translate.timeSamples = { 0: (0, 0, 5) }"
+    assert findings(loaded(write(text.replace("translate = (0, 0, 1)", both)))) == []
+    moved = "double3 xformOp:translate.timeSamples = { 0: (1, 0, 0) }\nuniform token[] xformOpOrder = "
+    above = text.replace('def Xform "arm" {', f'def Xform "arm" {{\n{moved}["xformOp:translate"]')
+    assert [one[:2] for one in findings(loaded(write(above)))] == [("USD104", "/arm")]
+
+
+def test_a_spline_without_a_default_value_is_listed(write: Write) -> None:
+    if not hasattr(usd.library().Usd.Attribute, "HasSpline"):
+        pytest.skip("this OpenUSD has no splines")
+    spline = "double xformOp:translateZ.spline = {\n1: 1; post held,\n}"
+    text = stage(LINKS + JOINTS).replace("double3 xformOp:translate = (0, 0, 1)", spline)
+    robot = loaded(write(text.replace('["xformOp:translate"]', '["xformOp:translateZ"]', 1)))
+    what = "xformOp:translateZ has a spline, but no default value, so urdfkin leaves it out"
+    assert findings(robot)[0] == ("USD104", "/arm/upper", what)
+
+
+def test_a_layer_in_another_unit_or_with_another_up_axis_is_listed(write: Write) -> None:
+    write(stage(LINKS + JOINTS, unit=0.01, up="Y"), "parts/arm.usda")
+    head = '#usda 1.0\n(\n    metersPerUnit = 1\n    upAxis = "Z"\n)\n'
+    for arc in ("references", "payload", "instanceable = true\n    references"):
+        text = f'{head}def Xform "mine" (\n    {arc} = @./parts/arm.usda@</arm>\n) {{\n%s\n}}\n'
+        robot = loaded(write(text % ""))
+        assert codes(robot) == {"USD301": "/mine", "USD302": "/mine"}
+        message = next(one[2] for one in findings(robot) if one[0] == "USD301")
+        assert "the layer parts/arm.usda has metersPerUnit 0.01, but the stage 1" in message
+        resolved = (
+            "double3 xformOp:rotateXYZ:unitsResolve = (90, 0, 0)\n"
+            "double3 xformOp:scale:unitsResolve = (0.01, 0.01, 0.01)\n"
+            'uniform token[] xformOpOrder = ["xformOp:rotateXYZ:unitsResolve", "xformOp:scale:unitsResolve"]'
+        )
+        robot = loaded(write(text % resolved))
+        assert codes(robot) == {}
+        assert robot.placement([0.0, 0.0], "lower")[0, 3] == pytest.approx(0.02)
+    # a layer of shapes only
+    write(f'{HEAD.format(unit=0.01, up="Y")}def Cube "arm" {{\n}}\n', "parts/cube.usda")
+    shape = 'def "shape" (references = @./parts/cube.usda@</arm>) {\n}\n'
+    robot = loaded(write(stage(LINKS.replace('def Xform "upper"', shape + 'def Xform "upper"') + JOINTS)))
+    assert codes(robot) == {"USD102": None}
+
+
+def test_a_sublayer_in_another_unit_is_listed(write: Write) -> None:
+    write(stage(JOINTS, unit=0.01), "joints.usda")
+    text = stage(LINKS).replace("(\n", "(\n    subLayers = [@./joints.usda@]\n", 1)
+    assert codes(loaded(write(text))) == {"USD301": "/arm"}
+
+
+def test_a_variant_inside_an_instance_is_selected(write: Write) -> None:
+    inner = LINKS.replace("translate = (2, 0, 1)", "translate")
+    rail = JOINTS.replace("point3f physics:localPos0 = (2, 0, 0)\n", "")
+    write(HEAD.format(unit=1, up="Z") + VARIANTS.replace("CONTENT", inner + rail), "arm.usda")
+    head = '#usda 1.0\n(\n    metersPerUnit = 1\n    upAxis = "Z"\n    defaultPrim = "outer"\n)\n'
+    part = f'{head}def Xform "outer" {{\ndef "inner" (\n    instanceable = true\n    references = '
+    write(part + "@./arm.usda@</arm>\n) {\n}\n}\n", "nested.usda")
+    whole = f'{head}def "outer" (\n    instanceable = true\n    references = @./nested.usda@\n) {{\n}}\n'
+    path = write(whole)
+    for name, length in (("short", 2.0), ("long", 5.0)):
+        robot = loaded(path, variant={"gripper": name})
+        assert robot.placement([0.0, 0.0], "lower")[0, 3] == pytest.approx(length)
+        assert codes(robot) == {}
+
+
+SHEAR = (
+    "float xformOp:rotateZ = 45\nfloat3 xformOp:scale = (1, 2, 1)\n"
+    'uniform token[] xformOpOrder = ["xformOp:scale", "xformOp:rotateZ"]\n'
+)
+
+
+def test_a_sheared_frame_is_no_link_but_a_sheared_body_is_refused(write: Write) -> None:
+    frame = f'def Xform "skew" {{\n{SHEAR}}}\n'
+    robot = loaded(
+        write(stage(body("base", inside=frame, schemas=ROOT) + LINKS.partition("}\n")[2] + JOINTS))
+    )
+    assert robot.link_names == ("base", "upper", "lower")
+    assert [one[:2] for one in findings(robot)] == [("USD102", "/arm/base/skew")]
+    above = stage(LINKS + JOINTS).replace('"arm" {', '"arm" {\nfloat3 xformOp:scale = (1, 2, 1)\n'
+        'uniform token[] xformOpOrder = ["xformOp:scale"]')  # fmt: skip
+    turned = above.replace('(0, 0, 1)\nuniform token[] xformOpOrder = ["xformOp:translate"]',
+        '(0, 0, 1)\nfloat xformOp:rotateZ = 45\n'
+        'uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:rotateZ"]')  # fmt: skip
+    assert turned != above
+    with pytest.raises(InputError, match=r"/arm/upper: .* has shear.*: found the scale 1, 2, 1 of /arm"):
+        loaded(write(turned))
+
+
+def test_the_articulation_above_all_prims_has_a_name(write: Write) -> None:
+    text = stage(LINKS + JOINTS + joint("mount", "Fixed", "", "base") + body("stray"))
+    robot = loaded(write(text), articulation="/")
+    assert robot.name == "arm"
+    assert codes(robot) == {"USD202": "/arm/stray"}
+    other = text.partition(")\n")[2].replace("/arm", "/other").replace('"arm"', '"other"')
+    two = loaded(write(text + other, "cell.usda"), articulation="/")
+    assert (two.name, two.nq) == ("cell", 4)
+    with pytest.raises(InputError, match="unknown articulation"):
+        loaded(write(text), articulation="")
+
+
+def test_a_joint_that_is_listed_already_is_not_listed_for_its_schema(write: Write) -> None:
+    weld = joint(
+        "weld", "Fixed", "lower", "base", "bool physics:excludeFromArticulation = true",
+        '"MjcEqualityWeldAPI"',
+    )  # fmt: skip
+    what = "a tree cannot represent this FixedJoint, which is outside the articulation"
+    assert findings(loaded(write(stage(LINKS + JOINTS + weld)))) == [("USD101", "/arm/weld", what)]
+
+
 # -- hostile files ---------------------------------------------------------------------------------------
 
 
@@ -726,6 +955,31 @@ def test_two_micrometres_are_not_explained_by_single_precision(write: Write) -> 
     found = urdfkin.same(robot, loaded(write(text.replace("0.333", "0.333002"))), boxes=0)
     assert not found.up_to_single
     assert not found
+
+
+ODD = (
+    '<robot name="r"><link name="a"/><link name="b.0"/><link name="c.0"/>'
+    '<joint name="j.0" type="revolute"><parent link="a"/><child link="b.0"/>{limit}</joint>'
+    '<joint name="k.0" type="{kind}"><parent link="b.0"/><child link="c.0"/><origin xyz="1 0 0"/>'
+    '<axis xyz="0 1 0"/>{rest}</joint></robot>'
+)
+RANGE = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
+
+
+def test_a_joint_that_never_moves_or_is_fixed_is_matched_by_its_spelling_in_usd(write: Write) -> None:
+    idle = f'{RANGE}<mimic joint="j.0" multiplier="0"/>'
+    kinds = {"idle": ("revolute", idle), "free": ("revolute", RANGE), "fixed": ("fixed", "")}
+    robots = {
+        name: loaded_name(ODD.format(limit=RANGE, kind=kind, rest=rest))
+        for name, (kind, rest) in kinds.items()
+    }
+    free = loaded(write(as_usd(robots["free"], transcoded)))
+    assert "tn__k0_k3" in [one.name for one in free.tree.joints]
+    for name in ("idle", "fixed"):
+        as_named = urdfkin.same(robots[name], robots["free"], boxes=0)
+        for a, b in ((robots[name], free), (free, robots[name])):
+            found = urdfkin.same(a, b, boxes=0)
+            assert [one.what for one in found.differences] == [one.what for one in as_named.differences]
 
 
 SLIPS = {

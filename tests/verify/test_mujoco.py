@@ -159,5 +159,5 @@ def test_an_oracle_that_nobody_knows_is_an_error() -> None:
 
 def test_an_oracle_that_is_not_installed_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("urdfkin.urdf.mujoco.installed_version", lambda _: None)
-    with pytest.raises(urdfkin.InputError, match=r"MuJoCo is not installed; pip install 'urdfkin\[mujoco\]'"):
+    with pytest.raises(urdfkin.InputError, match=r"MuJoCo is not installed; pip install 'mujoco>=4,<5'"):
         urdfkin.load(arm(), oracle="mujoco")

@@ -257,7 +257,7 @@ def test_every_overlay_can_be_shown_in_every_reference(viewer: Viewer) -> None:
 
 def test_without_the_extra_one_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "viser", None)
-    with pytest.raises(InputError, match=r"pip install 'urdfkin\[view\]'"):
+    with pytest.raises(InputError, match=r"pip install 'viser>=1'"):
         new_server(port=free_port())
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 import sys
 import warnings
 from collections.abc import Callable, Sequence
@@ -26,7 +27,7 @@ from urdfkin.cli.options import (
 )
 from urdfkin.cli.streams import command_lines, harmless, say, say_file, say_styled
 from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
-from urdfkin.system.files import demand_regular, read_start, write_file
+from urdfkin.system.files import demand_regular, read_bytes, read_start, write_file
 from urdfkin.system.git import Version, version_before
 from urdfkin.system.lazy_import import installed_version
 from urdfkin.urdf.findings import Excerpts, UrdfError, UrdfWarning
@@ -47,7 +48,7 @@ from urdfkin.urdf.lint.settings import (
     read_baseline,
     read_settings,
 )
-from urdfkin.urdf.sources import Text, is_usd, is_xacro, read_source
+from urdfkin.urdf.sources import USD, Text, is_usd, is_xacro, read_source
 
 STYLES = ("terminal", "concise", "json", "sarif", "github")
 _COLOURS = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.NOTE: "blue"}
@@ -409,6 +410,7 @@ class Run:
     accepting: bool
     outcome: Outcome = field(default_factory=Outcome)
     _taken: set[str] = field(default_factory=set)
+    _changed: dict[tuple[str, ...], bool] = field(default_factory=dict)
 
     def take(self, word: str, exclude: Sequence[str]) -> None:
         """Check each file that an argument matches, but no file twice."""
@@ -449,7 +451,15 @@ class Run:
         self.outcome.add(file, replace(found, findings=tuple(findings)))
 
     def _check_other(self, file: str) -> None:
-        """Check a USD or MJCF file. An invalid robot also has findings about the URDF made of it."""
+        """Check a USD or MJCF file. An invalid robot also has findings about the URDF made of it.
+
+        With --changed-since, an unchanged file is skipped; all findings of another file count as new.
+        """
+        if self.version is not None and self._is_unchanged(
+            file, USD if is_usd(file) else _MJCF, self.version
+        ):
+            self.outcome.unchanged += 1
+            return
         from urdfkin.robot.loading import load  # noqa: PLC0415  keeps --help fast
 
         how = how_to_load()
@@ -467,6 +477,19 @@ class Run:
         wanted = self.choice.of(text)
         findings = tuple(self._with_severity(finding) for finding in found if wanted(finding))
         self.outcome.add(file, Examined(text, b"", None, findings, ()))
+
+    def _is_unchanged(self, file: str, parts: tuple[str, ...], version: Version) -> bool:
+        """Return whether a file is as in an older version, with all files that it may refer to.
+
+        Its references are not known here. Therefore all files of the repository with the suffixes `parts`
+        must be unchanged, and no file whose name occurs in this file may have been deleted.
+        """
+        if parts not in self._changed:
+            self._changed[parts] = version.changed(parts)
+        if self._changed[parts]:
+            return False
+        data = read_bytes(Path(file))
+        return version.holds(data) and not any(os.fsencode(name) in data for name in version.gone)
 
     def _fix(self, file: str, text: Text, choose: Any) -> Text:
         path = None if text.entry is not None or is_xacro(text.source) else file_of(text)
@@ -505,11 +528,15 @@ class Run:
         return 2 if self.outcome.unreadable else int(bad)
 
 
+#: Suffixes of MJCF files and of the files that they include.
+_MJCF = (".xml", ".mjcf")
+
+
 def _is_other(file: str) -> bool:
     """Return whether a file is USD or MJCF."""
     if is_usd(file):
         return True
-    if Path(file).suffix.lower() not in (".xml", ".mjcf"):
+    if Path(file).suffix.lower() not in _MJCF:
         return False
     with contextlib.suppress(OSError):
         if b"<mujoco" not in read_start(Path(file), 1 << 16):

@@ -112,8 +112,8 @@ def crash(error: Exception) -> int:
     """Print an unexpected error with its traceback and return its exit code."""
     if isinstance(error, ModuleNotFoundError) and not str(error.name).startswith("urdfkin"):
         # urdfkin was installed with --no-deps, for example by pre-commit.
-        missing = f"{error.name} is not installed; install urdfkin with its dependencies: pip install urdfkin"
-        click.echo(f"urdfkin: error: {missing}", err=True)
+        remedy = "install urdfkin with its dependencies: pip install PATH_OF_THE_CLONE"
+        click.echo(f"urdfkin: error: {error.name} is not installed; {remedy}", err=True)
         return 2
     click.echo("".join(traceback.format_exception(error)), err=True, nl=False)
     click.echo(

@@ -27,6 +27,7 @@ from urdfkin.cli.output import check_writable, compiling, console
 from urdfkin.cli.reports import FILES, report_options, say_written, write_reports
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError, UrdfkinError
+from urdfkin.system.lazy_import import install_remedy
 from urdfkin.urdf.catalogue import examples
 from urdfkin.verify.oracles import ORACLES
 from urdfkin.verify.quantities import compared, not_compared
@@ -289,9 +290,7 @@ def _cluster(scheduler: str | None) -> Iterator[Engine | None]:
     try:
         from urdfkin.validation.cluster import connected  # noqa: PLC0415  an extra
     except ImportError:
-        raise InputError(
-            "--scheduler needs dask.distributed", remedy="pip install 'urdfkin[cluster]'"
-        ) from None
+        raise InputError("--scheduler needs dask.distributed", remedy=install_remedy("cluster")) from None
     with connected(scheduler, lambda line: say(f"urdfkin: {line}", err=True)) as cluster:
         yield cluster
 

@@ -56,7 +56,7 @@ def command(
     """Show a robot in a browser tab, with sliders, shapes, frames, DH frames and arrows.
 
     The viewer starts at --q, or in the neutral configuration moved to within the limits. Pinocchio checks the
-    numbers of the chosen frame as the robot moves. The viewer needs the extra `urdfkin[view]`. Ctrl-C stops
+    numbers of the chosen frame as the robot moves. The viewer needs the package viser. Ctrl-C stops
     it.
 
     With --trajectory, a CSV or .npz file as in `urdfkin plot`, the viewer plays the samples of the file. With

@@ -159,10 +159,17 @@ class Comparator:
         self.robots, self.given, self.bounds, self.boxes = robots, given, bounds, boxes
         self.within = within
         self.trees = a, b = robots[0].tree, robots[1].tree
-        back = {theirs: ours for ours, theirs in given.items()}
-        trees = _with_idle_joints_fixed(a, b, given), _with_idle_joints_fixed(b, a, back)
-        parting = _fixed_here(trees[0], trees[1]), _fixed_here(trees[1], trees[0])
         labels, self.spelled = _spelled_alike(robots)
+        swapped = labels[1], labels[0]
+        names = {**self.spelled, **given}
+        trees = (
+            _with_idle_joints_fixed(a, b, names, labels),
+            _with_idle_joints_fixed(b, a, _reversed(names), swapped),
+        )
+        parting = (
+            _fixed_here(*trees, self.spelled, labels),
+            _fixed_here(trees[1], trees[0], _reversed(self.spelled), swapped),
+        )
         self.mechanisms = (
             Mechanism(trees[0], parting[0], labels[0]),
             Mechanism(trees[1], parting[1], labels[1]),
@@ -450,38 +457,57 @@ def _largest(bounds: Sequence[tuple[float, float]]) -> tuple[float, float]:
     return max((way for way, _ in bounds), default=0.0), max((turn for _, turn in bounds), default=0.0)
 
 
-def _fixed_here(tree: KinematicTree, other: KinematicTree) -> set[int]:
+def _reversed(names: Mapping[str, str]) -> dict[str, str]:
+    return {theirs: ours for ours, theirs in names.items()}
+
+
+def _fixed_here(
+    tree: KinematicTree,
+    other: KinematicTree,
+    names: Mapping[str, str],
+    labels: tuple[Sequence[str], Sequence[str]],
+) -> set[int]:
     """Return the fixed joints of a tree that are moving joints in the other tree.
 
-    Joints are matched by the joint's name or by the name of the child link.
+    Joints are matched by the joint's name or by the label of the child link.
+
+    Args:
+        tree: The tree.
+        other: The other tree.
+        names: For each joint with another name in the other tree: that name.
+        labels: A label for each link of both trees.
     """
     moving = {joint.name for joint in other.joints if joint.kind.nv}
-    ours = {joint.name for joint in tree.joints if joint.kind.nv}
+    ours = {names.get(joint.name, joint.name) for joint in tree.joints if joint.kind.nv}
     children = {
-        other.links[i + 1] for i, joint in enumerate(other.joints) if joint.kind.nv and joint.name not in ours
+        labels[1][i + 1] for i, joint in enumerate(other.joints) if joint.kind.nv and joint.name not in ours
     }
     return {
         i
         for i, joint in enumerate(tree.joints)
-        if not joint.kind.nv and (joint.name in moving or tree.links[i + 1] in children)
+        if not joint.kind.nv and (names.get(joint.name, joint.name) in moving or labels[0][i + 1] in children)
     }
 
 
 def _with_idle_joints_fixed(
-    tree: KinematicTree, other: KinematicTree, given: Mapping[str, str]
+    tree: KinematicTree,
+    other: KinematicTree,
+    names: Mapping[str, str],
+    labels: tuple[Sequence[str], Sequence[str]],
 ) -> KinematicTree:
     """Return a tree in which mimic joints with the multiplier 0 are fixed joints at the rule's offset.
 
     Such a joint never moves. A mimic joint remains a mimic joint if the other model has a moving joint with
-    its name, above its child link, or with the name that the map gives: then the two rules are compared.
+    its name, above its child link, or with the name of `names`: then the two rules are compared. The
+    arguments are those of `_fixed_here`.
     """
     moving = {joint.name for joint in other.joints if joint.kind.nv}
-    children = {other.links[i + 1] for i, joint in enumerate(other.joints) if joint.kind.nv}
+    children = {labels[1][i + 1] for i, joint in enumerate(other.joints) if joint.kind.nv}
     joints = tuple(
         Lock(joint, 0.0).fixed()
         if joint.mimic is not None
         and joint.mimic.multiplier == 0.0
-        and not (given.get(joint.name, joint.name) in moving or tree.links[i + 1] in children)
+        and not (names.get(joint.name, joint.name) in moving or labels[0][i + 1] in children)
         else joint
         for i, joint in enumerate(tree.joints)
     )

@@ -37,6 +37,7 @@ from urdfkin.report.words import (
     verdict_counts,
     worst,
 )
+from urdfkin.system.lazy_import import install_remedy
 from urdfkin.validation.document import Document, Robot, outcome_of
 from urdfkin.validation.robot_summary import chain_disagreement
 from urdfkin.verify.quantities import compared, not_compared
@@ -72,6 +73,7 @@ def environment() -> Environment:
     )
     environment.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False}
     environment.filters["counted"] = counted
+    environment.globals["install_remedy"] = install_remedy
     return environment
 
 

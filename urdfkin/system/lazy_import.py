@@ -2,8 +2,9 @@
 
 `lazy_import` imports a function's module at the first call, so `--help` does not load NumPy. `is_a` tests for
 a class in the same way. The version
-functions read the metadata of a package without importing it. A hook lets a lower package call a function of
-a higher one by name, without importing it; `urdfkin/__init__.py` registers the hooks.
+functions read the metadata of a package without importing it. `EXTRAS` contains the package of each extra.
+A hook lets a lower package call a function of a higher one by name, without importing it;
+`urdfkin/__init__.py` registers the hooks.
 """
 
 from __future__ import annotations
@@ -55,6 +56,29 @@ def installed_version(package: str) -> str | None:
         return metadata.version(package)
     except metadata.PackageNotFoundError:
         return None
+
+
+#: The requirement of each extra of pyproject.toml that users install.
+EXTRAS = {
+    "xacro": "xacrodoc>=2",
+    "plots": "matplotlib>=3.10.7",
+    "view": "viser>=1",
+    "mujoco": "mujoco>=4,<5",
+    "usd": "usd-core>=25.5",
+    "descriptions": "robot_descriptions>=2",
+    "cluster": "distributed>=2024.8",
+}
+
+
+def install_remedy(extra: str) -> str:
+    """Return the command that installs the package of an extra.
+
+    The command names the package, not `urdfkin[...]`: no package index has urdfkin yet.
+
+    >>> install_remedy("usd")
+    "pip install 'usd-core>=25.5'"
+    """
+    return f"pip install '{EXTRAS[extra]}'"
 
 
 def own_version() -> str:

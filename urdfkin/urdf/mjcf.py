@@ -27,7 +27,17 @@ import numpy as np
 
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import rotation_about, rotation_of
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, build_tree, pose
+from urdfkin.model.tree import (
+    LARGEST_ANGLE,
+    FloatArray,
+    Joint,
+    JointKind,
+    KinematicTree,
+    Limit,
+    Mimic,
+    build_tree,
+    pose,
+)
 from urdfkin.system.files import at_home, read_start
 from urdfkin.urdf.mujoco import compiled, library
 
@@ -43,17 +53,19 @@ _HEAD = 65_536
 
 @dataclass(frozen=True, slots=True)
 class Listed:
-    """A part of the file that the tree does not represent, or represents differently.
+    """A part of the file that the tree does not represent or represents differently, or a probable mistake.
 
     Attributes:
         what: A description in one clause.
         where: The element, or None for the file.
         moves: Whether this part affects the motion.
+        remedy: The remedy of a probable mistake; None for a part that is left out.
     """
 
     what: str
     where: str | None = None
     moves: bool = False
+    remedy: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -295,6 +307,7 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
         found = str(error).strip().replace("\n", "; ")
         raise InputError("MuJoCo does not accept this MJCF", where=name, found=found) from None
     notes += [_align_note(body.name, whole=whole) for body in aligned]
+    notes += _angle_unit(mujoco, model) if spec.compiler.degree else ()
     listed = (*reader.listed, *notes)
     return Mjcf(
         tree,
@@ -394,6 +407,19 @@ def _left_out(mujoco: Any, spec: Any) -> Iterator[Listed]:
     if useless:
         counts = ", ".join(f"{len(found)} {words}" for words, found in useless.items())
         yield Listed(f"left out, since kinematics does not use them: {counts}")
+
+
+def _angle_unit(mujoco: Any, model: Any) -> Iterator[Listed]:
+    """Yield a mistake if the limits of the hinges of a file in degrees are probably radians.
+
+    The unit is that of the whole file, so the limits of every hinge must be implausibly small. The opposite
+    mistake is not recognized: some robots have limits of many turns in all hinges.
+    """
+    hinges = (model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited != 0)
+    largest = float(np.degrees(np.abs(model.jnt_range[hinges]).max(initial=0.0)))
+    if 0.0 < largest <= LARGEST_ANGLE:
+        what = f"the largest limit of a hinge is {largest:.4g} degrees: the limits are probably radians"
+        yield Listed(what, "compiler", remedy='write angle="radian" in <compiler>, or the limits in degrees')
 
 
 def _strip(mujoco: Any, spec: Any) -> None:

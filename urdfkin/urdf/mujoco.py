@@ -6,7 +6,7 @@ import warnings
 from typing import Any
 
 from urdfkin.errors import InputError
-from urdfkin.system.lazy_import import installed_version
+from urdfkin.system.lazy_import import install_remedy, installed_version
 
 
 def library() -> Any:
@@ -18,7 +18,7 @@ def library() -> Any:
     try:
         import mujoco  # noqa: PLC0415  an extra, and heavy
     except ImportError:
-        raise InputError("MuJoCo is not installed", remedy="pip install 'urdfkin[mujoco]'") from None
+        raise InputError("MuJoCo is not installed", remedy=install_remedy("mujoco")) from None
     return mujoco
 
 
@@ -32,5 +32,5 @@ def compiled(spec: Any) -> Any:
 def version() -> str:
     """Return the installed version, without importing MuJoCo."""
     if (found := installed_version("mujoco")) is None:
-        raise InputError("MuJoCo is not installed", remedy="pip install 'urdfkin[mujoco]'")
+        raise InputError("MuJoCo is not installed", remedy=install_remedy("mujoco"))
     return found

@@ -42,7 +42,7 @@ from urdfkin.model.tree import (
     pose,
 )
 from urdfkin.system.files import MOST
-from urdfkin.system.lazy_import import installed_version
+from urdfkin.system.lazy_import import install_remedy, installed_version
 from urdfkin.urdf.confinement import Ground
 from urdfkin.urdf.mjcf import UNBOUNDED
 from urdfkin.urdf.sources import USD
@@ -59,6 +59,12 @@ _LARGEST = float(np.finfo(np.float32).max)
 _SHEAR = 14.0
 _NONE = (-math.inf, math.inf)
 _MIMICS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
+#: Words in the names of types and of applied schemas that couple joints or bodies.
+_COUPLINGS = ("Mimic", "Equality", "Tendon")
+#: Ends of the types of joints that a tree cannot represent. If OpenUSD does not know a type, it is no joint.
+_NO_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
+#: Terms of a rule of MuJoCo that a mimic rule does not have.
+_HIGHER = ("mjc:coef2", "mjc:coef3", "mjc:coef4")
 _AXES = {"X": 0, "Y": 1, "Z": 2}
 _FREEDOMS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
 #: Names of Xforms that hold the shapes of a body.
@@ -69,7 +75,7 @@ _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 #: The kind of a remark; `urdfkin.urdf.lint.rules.left_out` has the rule of each.
 Kind = Literal[
     "left-out-of-usd", "unit-scale", "up-axis", "lost-mimic", "limit-unit", "loose-body", "outside-joint",
-    "rest-pose", "mirrored-body", "missing-layer", "unused-in-usd",
+    "rest-pose", "mirrored-body", "missing-layer", "unused-in-usd", "time-samples",
 ]  # fmt: skip
 
 
@@ -156,7 +162,7 @@ def version() -> str:
     """Return the installed version of OpenUSD, without importing it."""
     found = installed_version("usd-core") or installed_version("usd-exchange")
     if found is None:
-        raise InputError("OpenUSD is not installed", remedy="pip install 'urdfkin[usd]'")
+        raise InputError("OpenUSD is not installed", remedy=install_remedy("usd"))
     return found
 
 
@@ -169,7 +175,7 @@ def library() -> Any:
     try:
         from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdPhysics  # noqa: PLC0415  an extra, and heavy
     except ImportError:
-        raise InputError("OpenUSD is not installed", remedy="pip install 'urdfkin[usd]'") from None
+        raise InputError("OpenUSD is not installed", remedy=install_remedy("usd")) from None
     return type(
         "OpenUSD",
         (),
@@ -290,7 +296,7 @@ def read_usd(
     try:
         files = files_of(pxr, path)
         stage = pxr.Usd.Stage.Open(path)
-        _select(pxr, stage, variants, name)
+        opened = _select(pxr, stage, variants, name)
         used = {
             os.path.realpath(layer.realPath.partition("[")[0])
             for layer in stage.GetUsedLayers()
@@ -298,25 +304,34 @@ def read_usd(
         }
         if more := sorted(used - {os.path.realpath(file) for file in files}):
             raise _refused("the stage uses a file that none of its layers names", name, more[0])
-        return _Reader(pxr, stage, name).read(articulation, files)
+        return _Reader(pxr, stage, name, opened).read(articulation, files)
     except pxr.Tf.ErrorException as error:
         words = "; ".join(str(getattr(one, "commentary", one)) for one in error.args)
         found = " ".join(words.split())[:300]
         raise InputError("OpenUSD does not accept this file", where=name, found=found) from None
 
 
-def _select(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str) -> None:
+def _select(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str) -> frozenset[str]:
     """Select variants in the session layer, so that no file changes.
+
+    A variant cannot be selected inside an instance. An instance with such a variant set is expanded, in the
+    session layer too. Return the paths of the expanded instances.
 
     Raises:
         UnknownNameError: no prim has such a variant set, or such a variant.
     """
     stage.SetEditTarget(stage.GetSessionLayer())
+    opened = set[str]()
     for word, variant in variants:
-        sets: dict[str, list[Any]] = {}
-        for prim in stage.TraverseAll():
-            for one in prim.GetVariantSets().GetNames():
-                sets.setdefault(one, []).append(prim)
+        sets = _variant_sets(pxr, stage)
+        while inside := [prim for prim in sets.get(word, []) if prim.IsInstanceProxy()]:
+            for prim in inside:
+                outer = prim.GetParent()
+                while outer.IsInstanceProxy():
+                    outer = outer.GetParent()
+                outer.SetInstanceable(False)
+                opened.add(str(outer.GetPath()))
+            sets = _variant_sets(pxr, stage)
         if word not in sets:
             raise UnknownNameError("variant set", word, list(sets), where=name)
         own = [prim.GetVariantSet(word) for prim in sets[word]]
@@ -325,6 +340,18 @@ def _select(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str
             raise UnknownNameError("variant", variant, own[0].GetVariantNames(), where=f"{name}: {word}")
         for one in known:
             one.SetVariantSelection(variant)
+    return frozenset(opened)
+
+
+def _variant_sets(pxr: Any, stage: Any) -> dict[str, list[Any]]:
+    """Return the prims of each variant set, also those inside instances."""
+    sets: dict[str, list[Any]] = {}
+    for prim in pxr.Usd.PrimRange.Stage(
+        stage, pxr.Usd.TraverseInstanceProxies(pxr.Usd.PrimAllPrimsPredicate)
+    ):
+        for one in prim.GetVariantSets().GetNames():
+            sets.setdefault(one, []).append(prim)
+    return sets
 
 
 @dataclass(slots=True)
@@ -360,11 +387,12 @@ class _Articulation:
 
 @dataclass(slots=True)
 class _Reader:
-    """Read one stage; `source` is its name in messages."""
+    """Read one stage; `source` is its name in messages, `opened` the paths of its expanded instances."""
 
     pxr: Any
     stage: Any
     source: str
+    opened: frozenset[str]
     remarks: list[Remark] = field(default_factory=list)
     _bodies: dict[str, _Body] = field(default_factory=dict)
     _edges: list[_Edge] = field(default_factory=list)
@@ -377,6 +405,8 @@ class _Reader:
     _unit: float = 1.0
     _up: FloatArray = field(default_factory=lambda: np.eye(3))
     _cache: Any = None
+    _instancers: list[str] = field(default_factory=list)
+    _looked_at: set[str] = field(default_factory=set)
 
     def read(self, articulation: str | None, files: tuple[str, ...]) -> Usd:
         """Return the robot."""
@@ -390,7 +420,7 @@ class _Reader:
             self._up = _Y_UP
         self._cache = pxr.UsdGeom.XformCache(pxr.Usd.TimeCode.Default())
         self._missing()
-        prims = list(stage.Traverse(pxr.Usd.TraverseInstanceProxies()))
+        prims = self._prims()
         self._collect(prims)
         found = self._articulations()
         chosen = self._choose(found, articulation)
@@ -399,6 +429,7 @@ class _Reader:
         rest = np.array([self._placed(stage.GetPrimAtPath(path))[0] for path in links.values()])
         rest_q = self._rest(tree, chosen, links, rest)
         self._of_the_stage(rest)
+        self._layers([*links.values(), *self._read])
         self._unused(prims)
         return Usd(
             tree, links, rest, rest_q, self._single, self._read, stage, self._unit, tuple(self.remarks), files
@@ -414,8 +445,85 @@ class _Reader:
             words = " ".join(str(error).split())[:300]
             self._say("missing-layer", "", f"OpenUSD cannot compose a part of this stage: {words}")
 
+    def _prims(self) -> list[Any]:
+        """Return the prims of the stage, without the prototypes of point instancers."""
+        physics, prims = self.pxr.UsdPhysics, list[Any]()
+        inside = self.pxr.Usd.TraverseInstanceProxies()
+        every = iter(self.stage.Traverse(inside))
+        for prim in every:
+            prims.append(prim)
+            if not prim.IsA(self.pxr.UsdGeom.PointInstancer):
+                continue
+            every.PruneChildren()
+            path = str(prim.GetPath())
+            self._instancers.append(path + "/")
+            below = list(self.pxr.Usd.PrimRange(prim, inside))
+            bodies = sum(one.HasAPI(physics.RigidBodyAPI) for one in below)
+            joints = sum(one.IsA(physics.Joint) for one in below)
+            if bodies or joints:
+                what = f"the prototypes of this PointInstancer have {bodies} bodies and {joints} joints"
+                self._say(
+                    "left-out-of-usd", path, f"{what}, which are not read",
+                    "write each copy as a prim of its own, with a reference",
+                )  # fmt: skip
+            else:
+                self._say("unused-in-usd", path, "kinematics does not use this PointInstancer")
+        return prims
+
+    def _value(self, prim: Any, name: str) -> Any:
+        """Return the value of an attribute, or its default; None if there is neither.
+
+        A blocked value counts as one that is not written.
+        """
+        attribute = prim.GetAttribute(name)
+        if not attribute:
+            return None
+        value = attribute.Get()
+        if value is None and attribute.HasFallbackValue():
+            value = prim.GetPrimDefinition().GetAttributeFallbackValue(name)
+        self._timed(attribute, f"urdfkin takes {value}")
+        return value
+
+    def _timed(self, attribute: Any, instead: str) -> None:
+        """Report an attribute that has time samples or a spline, but no default value."""
+        path = str(attribute.GetPath())
+        if path in self._looked_at:
+            return
+        self._looked_at.add(path)
+        kind = "a spline" if getattr(attribute, "HasSpline", lambda: False)() else "time samples"
+        if kind == "time samples" and not attribute.GetNumTimeSamples():
+            return
+        if not attribute.GetResolveInfo(self.pxr.Usd.TimeCode.Default()).HasAuthoredValue():
+            self._say(
+                "time-samples", str(attribute.GetPrim().GetPath()),
+                f"{attribute.GetName()} has {kind}, but no default value, so {instead}",
+                "write a default value",
+            )  # fmt: skip
+
+    def _timed_transform(self, prim: Any) -> None:
+        """Report operations without a default value in the transforms of a prim and of the prims above it."""
+        while prim and (path := str(prim.GetPath())) not in self._looked_at:
+            self._looked_at.add(path)
+            if prim.IsA(self.pxr.UsdGeom.Xformable):
+                placed = self.pxr.UsdGeom.Xformable(prim)
+                for one in placed.GetOrderedXformOps():
+                    self._timed(one.GetAttr(), "urdfkin leaves it out")
+                if placed.GetResetXformStack():
+                    return
+            prim = prim.GetParent()
+
+    def _uneven(self, prim: Any) -> str | None:
+        """Return the nearest prim above a prim whose own scale is not the same in all directions."""
+        while (prim := prim.GetParent()) and not prim.IsPseudoRoot():
+            local = np.array(self._cache.GetLocalTransformation(prim)[0])[:3, :3]
+            scale = np.linalg.norm(local, axis=1)
+            if np.ptp(scale) > _SHEAR * SINGLE * scale.max():
+                return f"the scale {', '.join(f'{x:g}' for x in scale)} of {prim.GetPath()}"
+        return None
+
     def _placed(self, prim: Any) -> tuple[FloatArray, FloatArray]:
         """Return the pose of a prim in the world (4, 4), in m with z up, and its scale (3,)."""
+        self._timed_transform(prim)
         M = np.array(self._cache.GetLocalToWorldTransform(prim)).T
         if not np.isfinite(M).all():
             raise InputError(
@@ -431,6 +539,7 @@ class _Reader:
             raise InputError(
                 "the frame of a prim has shear, so it is no frame of a rigid body",
                 where=f"{self.source}: {prim.GetPath()}",
+                found=self._uneven(prim),
                 remedy="apply the scale to the shapes, not to a parent of a rotated body",
             )
         U, _, V = np.linalg.svd(R)
@@ -440,7 +549,10 @@ class _Reader:
         """Collect the bodies and the joints of the stage."""
         physics = self.pxr.UsdPhysics
         for prim in prims:
-            if not prim.HasAPI(physics.RigidBodyAPI) or _value(prim, "physics:rigidBodyEnabled") is False:
+            if (
+                not prim.HasAPI(physics.RigidBodyAPI)
+                or self._value(prim, "physics:rigidBodyEnabled") is False
+            ):
                 continue
             path = str(prim.GetPath())
             T, scale = self._placed(prim)
@@ -455,6 +567,31 @@ class _Reader:
         for prim in prims:
             if prim.IsA(physics.Joint) and (edge := self._edge(prim)) is not None:
                 self._edges.append(edge)
+            self._couplings(prim)
+
+    def _couplings(self, prim: Any) -> None:
+        """Report what couples joints or bodies, but is neither a joint nor a mimic rule that is read."""
+        path, schemas = str(prim.GetPath()), _schemas(prim)
+        joint = prim.IsA(self.pxr.UsdPhysics.Joint)
+        kind = str(prim.GetTypeName())
+        ends = any(prim.HasRelationship(f"physics:body{i}") for i in (0, 1))
+        if not joint and (ends or any(word in kind for word in _COUPLINGS)):
+            what = f"a tree cannot represent this {kind or 'prim with physics:body0 or physics:body1'}"
+            self._say("left-out-of-usd", path, what)
+        unread = []
+        for schema in schemas:
+            if not any(word in schema for word in _COUPLINGS) or (joint and _is_mimic(schema)):
+                continue
+            if schema == "MjcEqualityJointAPI" and "NewtonMimicAPI" in schemas:
+                # the rule is that of NewtonMimicAPI, with more terms
+                if more := [name for name in _HIGHER if self._value(prim, name)]:
+                    what = f"the terms {', '.join(more)} of this joint's mimic rule are not read"
+                    self._say("left-out-of-usd", path, what)
+                continue
+            unread.append(schema)
+        # a joint that is not in the tree is listed already
+        if unread and not any(one.where == path and one.kind == "left-out-of-usd" for one in self.remarks):
+            self._say("left-out-of-usd", path, f"urdfkin does not read {', '.join(unread)}")
 
     def _owner(self, prim: Any) -> str | None:
         """Return the path of the nearest prim at or above a prim that is the root of an articulation."""
@@ -469,7 +606,7 @@ class _Reader:
     def _edge(self, prim: Any) -> _Edge | None:
         """Return a joint that connects two bodies, or a body and the world; otherwise a remark."""
         path = str(prim.GetPath())
-        if _value(prim, "physics:jointEnabled") is False:
+        if self._value(prim, "physics:jointEnabled") is False:
             self._say("left-out-of-usd", path, "this joint is disabled")
             return None
         sides = []
@@ -480,7 +617,10 @@ class _Reader:
                 return None
             side = self._side(prim, i, str(targets[0]) if targets else None)
             if side is None:
-                what = f"body{i} of this joint names a prim that does not exist: {targets[0]}"
+                lost = (
+                    "is a prototype of a PointInstancer" if self._instanced(targets[0]) else "does not exist"
+                )
+                what = f"body{i} of this joint names a prim that {lost}: {targets[0]}"
                 self._say("outside-joint", path, what, "correct the relationship")
                 return None
             sides.append(side)
@@ -490,7 +630,7 @@ class _Reader:
             self._say("left-out-of-usd", path, f"both ends of this joint are in {where}")
             return None
         called = str(prim.GetTypeName()).removeprefix("Physics")
-        if _value(prim, "physics:excludeFromArticulation") or called == "DistanceJoint":
+        if self._value(prim, "physics:excludeFromArticulation") or called.endswith(_NO_JOINTS):
             what = f"a tree cannot represent this {called}, which is outside the articulation"
             self._say("left-out-of-usd", path, what)
             return None
@@ -520,8 +660,8 @@ class _Reader:
         Then follow the length of the origin's terms (m), and how far rounding to single precision can move
         and turn the frame (m, rad).
         """
-        p = np.array(_value(prim, f"physics:localPos{i}"), float)
-        quaternion = _value(prim, f"physics:localRot{i}")
+        p = np.array(self._value(prim, f"physics:localPos{i}"), float)
+        quaternion = self._value(prim, f"physics:localRot{i}")
         xyzw = np.array([*quaternion.GetImaginary(), quaternion.GetReal()], float)
         size = float(np.linalg.norm(xyzw))
         if not (np.isfinite(p).all() and math.isfinite(size) and size > 0.0):
@@ -535,7 +675,7 @@ class _Reader:
         if target is None:
             return None, pose(self._up @ R, self._up @ p), float(np.linalg.norm(p)), off
         other = self.stage.GetPrimAtPath(target)
-        if not other:
+        if not other or self._instanced(target):
             return None
         T, scale = self._placed(other)
         A, length = pose(R, scale * p), float(np.linalg.norm(scale * p))
@@ -549,6 +689,9 @@ class _Reader:
             off = off[0] + SINGLE * length, off[1] + 2.0 * SINGLE
         return body, A, length, off
 
+    def _instanced(self, path: object) -> bool:
+        return any(str(path).startswith(one) for one in self._instancers)
+
     def _motion(self, prim: Any) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
         """Return the kind, the axis, the limits (rad or m) and the free directions of a joint.
 
@@ -560,10 +703,10 @@ class _Reader:
             return JointKind.FIXED, _unit(0), _NONE, ""
         for schema, turns in ((physics.RevoluteJoint, True), (physics.PrismaticJoint, False)):
             if prim.IsA(schema):
-                letter = str(_value(prim, "physics:axis"))
+                letter = str(self._value(prim, "physics:axis"))
                 if letter not in _AXES:
                     raise InputError("the axis of a joint is X, Y or Z", where=path, found=letter)
-                ends = (float(_value(prim, f"physics:{end}Limit")) for end in ("lower", "upper"))
+                ends = (float(self._value(prim, f"physics:{end}Limit")) for end in ("lower", "upper"))
                 return self._bounded(path, f"{'rot' if turns else 'trans'}{letter}", ends)
         if prim.IsA(physics.SphericalJoint):
             raise InputError(
@@ -591,7 +734,7 @@ class _Reader:
         for freedom in _FREEDOMS:
             low, high = -math.inf, math.inf
             if f"PhysicsLimitAPI:{freedom}" in _schemas(prim):
-                low, high = (float(_value(prim, f"limit:{freedom}:physics:{end}")) for end in ("low", "high"))
+                low, high = (self._end(prim, f"limit:{freedom}:physics:{end}") for end in ("low", "high"))
             if low <= high:
                 free.append(freedom)
                 limits[freedom] = low, high
@@ -611,6 +754,23 @@ class _Reader:
             found=", ".join(free),
             remedy="leave one degree of freedom free, or write several joints with a body between them",
         )
+
+    def _end(self, prim: Any, name: str) -> float:
+        """Return a limit of a joint with limits by direction.
+
+        Raises:
+            InputError: the limit is blocked. OpenUSD's parser of UsdPhysics then reads another number
+                than the default.
+        """
+        attribute = prim.GetAttribute(name)
+        if attribute.HasFallbackValue() and attribute.Get() is None:
+            raise InputError(
+                "a limit of a joint is blocked, and OpenUSD's readers differ in its value",
+                where=f"{self.source}: joint {prim.GetPath()}",
+                found=f"{name} = None",
+                remedy="write a number; -inf and inf mean no limit",
+            )
+        return float(self._value(prim, name))
 
     def _bounded(
         self, path: str, free: str, ends: Iterator[float]
@@ -713,13 +873,15 @@ class _Reader:
                     remedy="choose one with --articulation PATH, or all below the PATH of another prim",
                 )
             return found[0]
+        if not wanted:
+            raise UnknownNameError("articulation", wanted, paths, where=self.source)
         own = [group for group in found if wanted in (group.path, group.path.rpartition("/")[2])]
         if len(own) == 1:
             return own[0]
         below = [group for group in found if group.path.startswith(wanted.rstrip("/") + "/")]
         if own or not below:
             raise UnknownNameError("articulation", wanted, paths, where=self.source)
-        return self._together(below, wanted)
+        return self._together(below, wanted.rstrip("/") or "/")
 
     def _together(self, groups: list[_Articulation], path: str) -> _Articulation:
         """Return one articulation for several that are attached to the world."""
@@ -783,13 +945,18 @@ class _Reader:
         prims = {link: path for path, link in links.items() if path is not None}
         for path, parent in self._frames(list(prims.values())):
             link = self._new("link", path.rpartition("/")[2])
-            T = inverse(self._bodies[parent].T) @ self._placed(self.stage.GetPrimAtPath(path))[0]
+            try:
+                T = inverse(self._bodies[parent].T) @ self._placed(self.stage.GetPrimAtPath(path))[0]
+            except InputError as error:
+                self._say("unused-in-usd", path, f"this Xform is no link: {error.what}", error.remedy)
+                continue
             joint = Joint(self._new("joint", f"{link}_fixed"), JointKind.FIXED, 0, T, _unit(0))
             self._single[joint.name] = SINGLE * joint.length, 2.0 * SINGLE, joint.length, 0.0
             joints.append((joint, links[parent], link))
             prims[link] = path
         self._read = {edge.path: self._read[edge.path] for edge, _ in ordered}
-        top = group.path.split("/")[1]
+        tops = {path.split("/")[1] for path in (group.path, *group.bodies) if path != "/"}
+        top = group.path.split("/")[1] or (tops.pop() if len(tops) == 1 else Path(self.source).stem)
         return build_tree(top, links[root], joints), prims
 
     def _closes(self, edge: _Edge) -> None:
@@ -825,7 +992,7 @@ class _Reader:
         """Yield the joint, and if the child's frame is not on its axis, a link and a fixed joint."""
         (A, B), (parent, child) = edge.frames, edge.ends
         axis = edge.axis
-        shares = SINGLE if _is_mimic(edge.prim) else 0.0
+        shares = SINGLE if any(map(_is_mimic, _schemas(edge.prim))) else 0.0
         self._single[names[edge.path]] = *edge.rounded, edge.size, shares
         if backwards:
             A, B, parent, child, axis = B, A, child, parent, -axis
@@ -875,7 +1042,8 @@ class _Reader:
             (
                 float(x)
                 for x in (
-                    _value(prim, word) for word in ("newton:velocityLimit", "physxJoint:maxJointVelocity")
+                    self._value(prim, word)
+                    for word in ("newton:velocityLimit", "physxJoint:maxJointVelocity")
                 )
                 if x is not None
             ),
@@ -916,7 +1084,8 @@ class _Reader:
 
         def below(prim: Any, body: str) -> Iterator[tuple[str, str]]:
             for child in prim.GetChildren():
-                if child.HasAPI(physics.RigidBodyAPI) or child.IsInstance():
+                opened = str(child.GetPath()) in self.opened
+                if child.HasAPI(physics.RigidBodyAPI) or child.IsInstance() or opened:
                     continue
                 kind = child.GetTypeName()
                 if kind == "Scope":
@@ -977,10 +1146,11 @@ class _Reader:
         prim, schemas = edge.prim, _schemas(edge.prim)
         own = self._factor(edge.kind)
         if "NewtonMimicAPI" in schemas:
-            if _value(prim, "newton:mimicEnabled") is False:
+            if self._value(prim, "newton:mimicEnabled") is False:
+                self._say("left-out-of-usd", edge.path, "the mimic rule of this joint is disabled")
                 return
             leader = _target(prim, "newton:mimicJoint")
-            c0, c1 = _value(prim, "newton:mimicCoef0"), _value(prim, "newton:mimicCoef1")
+            c0, c1 = self._value(prim, "newton:mimicCoef0"), self._value(prim, "newton:mimicCoef1")
             multiplier, offset = 1.0 if c1 is None else float(c1), 0.0 if c0 is None else float(c0)
             yield leader, multiplier * self._ratio(edge, leader), offset * own
             return
@@ -990,7 +1160,7 @@ class _Reader:
                 continue
             leader = _target(prim, f"physxMimicJoint:{freedom}:referenceJoint")
             gearing, offset = (
-                _value(prim, f"physxMimicJoint:{freedom}:{word}") for word in ("gearing", "offset")
+                self._value(prim, f"physxMimicJoint:{freedom}:{word}") for word in ("gearing", "offset")
             )
             multiplier = -1.0 if gearing is None else -float(gearing)
             yield leader, multiplier * self._ratio(edge, leader), -float(offset or 0.0) * own
@@ -1016,7 +1186,7 @@ class _Reader:
     def _loose(self, chosen: _Articulation, found: Sequence[_Articulation]) -> None:
         """Report bodies near the robot that no joint connects with it."""
         joined = {path for group in found for path in group.bodies}
-        top = "/" + chosen.path.split("/")[1] + "/"
+        top = f"/{chosen.path.split('/')[1]}/".replace("//", "/")
         for path in self._bodies:
             if path not in joined and (path + "/").startswith(top):
                 self._say(
@@ -1070,6 +1240,57 @@ class _Reader:
                 'write upAxis = "Z"',
             )
 
+    def _layers(self, paths: Sequence[str]) -> None:
+        """Report layers with another unit or up axis than the stage, if they describe one of these prims."""
+        root = self.stage.GetRootLayer()
+        known = {root, self.stage.GetSessionLayer()}
+        above = {str(one) for path in paths for one in self.pxr.Sdf.Path(path).GetPrefixes()}
+        for path in sorted(above, key=lambda path: (path.count("/"), path)):
+            prim = self.stage.GetPrimAtPath(path)
+            for layer in [spec.layer for spec in prim.GetPrimStack()]:
+                if layer not in known:
+                    known.add(layer)
+                    name = os.path.relpath(layer.identifier, Path(root.realPath).parent)
+                    self._layer(layer.pseudoRoot, name, prim)
+
+    def _layer(self, root: Any, name: str, prim: Any) -> None:
+        """Compare a layer with the stage; `prim` is the first prim that it describes."""
+        tokens, path = self.pxr.UsdGeom.Tokens, str(prim.GetPath())
+        if root.HasInfo(tokens.metersPerUnit):
+            unit = float(root.GetInfo(tokens.metersPerUnit))
+            factor = unit / self._unit
+            if abs(factor - 1.0) > SINGLE and not self._is_scaled(prim, factor):
+                self._say(
+                    "unit-scale",
+                    path,
+                    f"the layer {name} has metersPerUnit {unit:g}, but the stage {self._unit:g};"
+                    " its lengths are not converted",
+                    f"scale this prim by {factor:g}, or write the layer in the unit of the stage",
+                )
+        up = str(self.pxr.UsdGeom.GetStageUpAxis(self.stage))
+        if root.HasInfo(tokens.upAxis) and root.GetInfo(tokens.upAxis) != up and not self._is_resolved(prim):
+            self._say(
+                "up-axis",
+                path,
+                f"the layer {name} has upAxis {root.GetInfo(tokens.upAxis)}, but the stage {up};"
+                " the layer is not turned",
+                "turn this prim, or write the layer with the up axis of the stage",
+            )
+
+    def _is_scaled(self, prim: Any, factor: float) -> bool:
+        """Return whether the scale of a prim in the world is a factor, as far as single precision shows."""
+        M = np.array(self._cache.GetLocalToWorldTransform(prim))[:3, :3]
+        scale = np.linalg.norm(M, axis=1) / factor
+        return bool((np.abs(scale - 1.0) <= _SHEAR * SINGLE * prim.GetPath().pathElementCount).all())
+
+    def _is_resolved(self, prim: Any) -> bool:
+        """Return whether a prim at or above this one is turned to the stage's up axis, by the usual name."""
+        while prim and not prim.IsPseudoRoot():
+            if any(str(name).endswith(":unitsResolve") for name in prim.GetPropertyNames()):
+                return True
+            prim = prim.GetParent()
+        return False
+
     def _unused(self, prims: list[Any]) -> None:
         counts: dict[str, int] = {}
         for prim in prims:
@@ -1077,12 +1298,6 @@ class _Reader:
                 counts["shapes"] = counts.get("shapes", 0) + 1
         if counts:
             self._say("unused-in-usd", "", f"kinematics does not use the {counts['shapes']} shapes")
-
-
-def _value(prim: Any, name: str) -> Any:
-    """Return the value of an attribute, or its default; None if there is neither."""
-    attribute = prim.GetAttribute(name)
-    return attribute.Get() if attribute else None
 
 
 def _rounding(x: FloatArray) -> FloatArray:
@@ -1104,8 +1319,8 @@ def _turned(xyzw: FloatArray) -> float:
     return 2.0 * float(np.linalg.norm(_rounding(xyzw)) / np.linalg.norm(xyzw))
 
 
-def _is_mimic(prim: Any) -> bool:
-    return any(schema.partition(":")[0] in _MIMICS for schema in _schemas(prim))
+def _is_mimic(schema: str) -> bool:
+    return schema.partition(":")[0] in _MIMICS
 
 
 def _target(prim: Any, name: str) -> str:

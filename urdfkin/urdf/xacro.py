@@ -25,6 +25,7 @@ from typing import Any
 
 from urdfkin.errors import Question, SourceError, UnknownNameError, UrdfkinError
 from urdfkin.system.files import read_bytes
+from urdfkin.system.lazy_import import install_remedy
 from urdfkin.system.processes import ask_python, own_python
 from urdfkin.urdf.catalogue import VARIABLES
 from urdfkin.urdf.confinement import Ground
@@ -140,7 +141,7 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
         raise XacroError(
             "a .xacro file needs the package xacrodoc",
             where=str(path),
-            remedy='install xacrodoc with "urdfkin[xacro]", or expand the file with: xacro FILE > robot.urdf',
+            remedy=f"{install_remedy('xacro')}, or expand the file with: xacro FILE > robot.urdf",
             question=Question.XACRO,
         )
     command = own_python("from urdfkin.urdf.expanding import serve; serve()", options=("-B", "-X", "utf8"))

@@ -107,8 +107,10 @@ def _described(physics: Any, one: Any, read: Usd) -> list[Any]:
         frames.append((np.array(p, float) * read.unit, xyzw / np.linalg.norm(xyzw)))
     free = _freedoms(physics, one)
     ends = getattr(one, "limit", None)
-    turns = isinstance(one, physics.RevoluteJointDesc)
-    factor = np.pi / 180.0 if turns else read.unit
+    if isinstance(one, physics.D6JointDesc):
+        own = {str(pair.first).rpartition(".")[2].lower(): pair.second for pair in one.jointLimits}
+        ends = own.get(free.lower())  # None if several directions are free
+    factor = np.pi / 180.0 if free.startswith("rot") else read.unit
     limits = (
         (float(ends.lower) * factor, float(ends.upper) * factor) if ends is not None else (-np.inf, np.inf)
     )

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from urdfkin.errors import InputError
 from urdfkin.errors.escape import printable
+from urdfkin.system.lazy_import import install_remedy
 from urdfkin.system.processes import not_reading
 
 if TYPE_CHECKING:
@@ -90,7 +91,7 @@ def installed() -> bool:
 def _matplotlib() -> Any:
     """Import matplotlib without the settings of a file `matplotlibrc` in the current folder."""
     if not installed():
-        raise InputError("drawing needs matplotlib", remedy="pip install 'urdfkin[plots]'")
+        raise InputError("drawing needs matplotlib", remedy=install_remedy("plots"))
     with not_reading("matplotlibrc"):
         return importlib.import_module("matplotlib")
 

@@ -46,6 +46,7 @@ from pathlib import Path
 from typing import Any
 
 from urdfkin.errors import InputError, UrdfkinError
+from urdfkin.system.lazy_import import install_remedy
 from urdfkin.system.locks import lock_over_forks
 
 
@@ -208,7 +209,7 @@ def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
     try:
         import viser  # noqa: PLC0415  an extra
     except ImportError:
-        raise InputError("the viewer needs viser", remedy="pip install 'urdfkin[view]'") from None
+        raise InputError("the viewer needs viser", remedy=install_remedy("view")) from None
 
     class PrivateServer(viser.ViserServer):
         """Viser's server without sharing."""

@@ -94,6 +94,32 @@ CASES = [
         ),
     ),
     Mjcf(
+        "radians-in-a-file-in-degrees",
+        _two(joint='type="hinge" limited="true" range="-1.5 3.1416"'),
+        (
+            (
+                "MJCF201",
+                "compiler: the largest limit of a hinge is 3.142 degrees: the limits are probably radians",
+            ),
+        ),
+    ),
+    Mjcf(
+        "ten-turns-in-a-file-in-radians",
+        _two(joint='type="hinge" limited="true" range="-63 63"', more='<compiler angle="radian"/>'),
+    ),
+    Mjcf(
+        "radians-in-a-file-in-radians",
+        _two(joint='type="hinge" limited="true" range="-0.1 0.1"', more='<compiler angle="radian"/>'),
+    ),
+    Mjcf("a-hinge-of-90-degrees", _two(joint='type="hinge" limited="true" range="-90 90"')),
+    Mjcf(
+        "a-hinge-of-five-degrees-beside-one-of-90",
+        _two(
+            joint='type="hinge" limited="true" range="-5 5"',
+            inside='<joint name="c" limited="true" range="-90 0"/>',
+        ),
+    ),
+    Mjcf(
         "a-free-body-that-stands-elsewhere",
         _two(joint='type="free"', body='pos="0 0 1"'),
         (

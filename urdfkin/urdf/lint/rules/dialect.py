@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TypeVar
 
+from urdfkin.system.lazy_import import install_remedy
 from urdfkin.urdf import parser
 from urdfkin.urdf.findings import (
     DIFFERS,
@@ -95,7 +96,9 @@ def _check_namespaces(report: Reporter, root: Element, prefixes: dict[str, str])
         _check_expressions(report, root)
 
 
-_EXPAND = "expand the file first: xacro FILE > robot.urdf, or install urdfkin[xacro] and pass the .xacro file"
+_EXPAND = (
+    f"expand the file first: xacro FILE > robot.urdf, or {install_remedy('xacro')} and pass the .xacro file"
+)
 _HARMLESS = "; kinematics does not use it"
 
 
