@@ -46,8 +46,8 @@ class _ImportLock:
     Without this lock, another thread could fork a child during the import. The child would wait for ever for
     the end of that import.
 
-    `logging` has a lock that a fork acquires too. An imported module may need that lock. So a fork must acquire
-    this lock first. Python calls the functions that acquire locks in reverse order of their registration.
+    `logging` has a lock that a fork acquires too. An imported module may need that lock. So a fork must
+    acquire this lock first. Python calls the functions that acquire locks in reverse order of their registration.
     For this reason, the function of this module is registered after `logging` is imported.
     """
 

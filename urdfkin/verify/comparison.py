@@ -16,7 +16,7 @@ from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
 from urdfkin.model.tree import FloatArray
 
 #: The module with the compiled kernels of checks.
-#: `CHECKS` are the kernels that a check of one configuration uses too; only checks of batches use `_OF_BATCHES`.
+#: A check of one configuration uses the kernels `CHECKS`; only checks of batches use the kernel `_OF_BATCHES`.
 KERNELS = "urdfkin.verify.kernels"
 CHECKS = "worst", "coupling"
 _OF_BATCHES = "lengths"
