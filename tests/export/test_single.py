@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -184,6 +185,61 @@ def test_a_file_needs_the_errors_of_its_double_constants(
     assert shares(text, tmp_path)["placement", "float32"] <= 1.0
     monkeypatch.setattr(proof, "EPS", 0.0)
     assert shares(text, tmp_path)["placement", "float32"] > 1.0
+
+
+def shares_of(robot: urdfkin.Robot, quantities: tuple[str, ...], folder: Path, frame: str) -> float:
+    """The largest error of a file in double precision, as a share of its bound."""
+    own = module(file(code(robot, frame, quantities), "array", folder))
+    return max(share for (_, kind), share in own.check().items() if kind == "float64")
+
+
+_TURNED = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
+<joint name="j" type="revolute"><parent link="a"/><child link="b"/><origin rpy="{angle} {angle} 0.1"/>
+<axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
+<joint name="k" type="revolute"><parent link="b"/><child link="c"/><axis xyz="0 1 0"/>
+<origin xyz="1 0 0"/><mimic joint="j" multiplier="{multiplier}" offset="{offset}"/>
+<limit lower="-1e9" upper="1e9" velocity="1" effort="1"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("seed", range(1, 4))
+@pytest.mark.parametrize("large", ["angle", "multiplier", "offset"])
+def test_a_file_of_large_angles_and_rules_needs_the_rounding_of_their_decimals(
+    large: str, seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    usual = {"angle": 0.1, "multiplier": 2.0, "offset": 0.3}
+    text = _TURNED.format(**usual | {large: f"{1e7 + 1e-3 * seed:.4f}"})
+    robot = loaded(text)
+    assert shares_of(robot, ("placement", "jacobian"), tmp_path, "c") <= 1.0
+    held = robot.locked({"j": 0.7})
+    assert shares_of(held, ("placement",), tmp_path, "c") <= 1.0
+    right = proof.conversion
+    monkeypatch.setattr(proof, "conversion", lambda *of: right(*of)._replace(angles=np.zeros(proof.VECTORS)))
+    assert shares_of(robot, ("placement", "jacobian"), tmp_path, "c") > 1.0
+    assert shares_of(held, ("placement",), tmp_path, "c") > 1.0
+
+
+_CANCELLED = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
+<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 1 0"/>
+<limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
+<joint name="k" type="prismatic"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/>
+<mimic joint="i" multiplier="-37.123" offset="{offset}"/>
+<limit lower="-1e9" upper="1e9" velocity="1" effort="1"/></joint>
+<joint name="i" type="prismatic"><parent link="a"/><child link="d"/><axis xyz="0 0 1"/>
+<mimic joint="j" multiplier="0.001" offset="{before}"/>
+<limit lower="-1e9" upper="1e9" velocity="1" effort="1"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("before", ["6732.655", "589262.492", "58731509.822"])
+def test_a_file_of_offsets_that_cancel_needs_the_size_of_each_offset(
+    before: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = loaded(_CANCELLED.format(before=before, offset=Decimal(before) * Decimal("37.123")))
+    right = proof.conversion
+    for one in (robot, robot.locked({"j": 0.7})):
+        with monkeypatch.context() as patch:
+            assert shares_of(one, ("placement",), tmp_path, "c") <= 1.0
+            patch.setattr(proof, "conversion", lambda *of: right(*of)._replace(lengths=0.0))
+            assert shares_of(one, ("placement",), tmp_path, "c") > 1.0
 
 
 @given(st.floats(1e-300, 1e300))

@@ -25,12 +25,20 @@ from urdfkin.model.recursion import Number
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.lazy_import import own_version
+from urdfkin.verify.bounds import Conversion, against_true_values
 from urdfkin.verify.call import Call, Part
 from urdfkin.verify.certificate import Certificate
-from urdfkin.verify.exact.numbers import DIGITS, enough_digits, exact, precision, read_exact
+from urdfkin.verify.exact.numbers import (
+    DIGITS,
+    conversion,
+    enough_digits,
+    exact,
+    precision,
+    read_exact,
+)
 from urdfkin.verify.exact.recursion import move
 from urdfkin.verify.sampling import draw
-from urdfkin.verify.verifier import Verifier, bound_of
+from urdfkin.verify.verifier import Verifier
 
 #: Number of random configurations compared with Pinocchio, besides the neutral one and the limits.
 CHECKED = 100
@@ -159,12 +167,13 @@ def _vectors(
     whole = Call(tree, plan_of, frame, reference, None, inputs)
     part = whole.part(slice(0, VECTORS))
     within, single, most = dict[str, FloatArray](), dict[str, FloatArray](), dict[str, float]()
+    path, found = tree.path(link), []
+    errors = conversion(verifier.text, tree, path, part.q)
     for f in functions:
-        within[f.name], scale = _within(f, part)
+        within[f.name], scale = _within(f, part, errors)
         single[f.name] = single_bounds(f, inputs) + EPS / SINGLE_EPS * within[f.name]
         shares = np.divide(single[f.name], scale, out=np.zeros_like(scale), where=scale > 0.0)
         most[f.name] = float(shares.max(initial=0.0))
-    path, found = tree.path(link), []
     with precision(DIGITS + enough_digits(len(path))):
         joints = read_exact(verifier.text, tree, path)
         for k in range(VECTORS):
@@ -185,9 +194,11 @@ def _single(x: FloatArray) -> FloatArray:
     return x.astype(np.float32).astype(np.float64)
 
 
-def _within(function: Function, part: Part) -> tuple[FloatArray, FloatArray]:
+def _within(function: Function, part: Part, errors: Conversion) -> tuple[FloatArray, FloatArray]:
     """Return the error bounds k * scale, (n, numbers), in eps, and the scales."""
-    bound, n = bound_of(function.quantity, part), len(part.q)
+    v, a = (*part.rates, None, None)[:2]
+    size = against_true_values(part.plan, part.q, v, a, errors)
+    bound, n = function.quantity.bound(part.plan, size, part.reference), len(part.q)
     scale = np.where(bound.scale > 0.0, np.maximum(bound.scale, SMALLEST), 0.0)
     shape = (n, 1, *function.shape)
     within, scale = (np.broadcast_to(x, shape).reshape(n, -1) for x in (scale * bound.k, scale))
