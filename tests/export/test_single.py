@@ -23,6 +23,7 @@ from urdfkin.export.function import Function
 from urdfkin.kinematics.roundings import SINGLE_EPS, SINGLE_OPERATION
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
+from urdfkin.verify.exact.numbers import conversion
 from urdfkin.verify.quantities import JACOBIAN
 
 _N = 4000
@@ -212,7 +213,7 @@ def test_a_file_of_large_angles_and_rules_needs_the_rounding_of_their_decimals(
     assert shares_of(robot, ("placement", "jacobian"), tmp_path, "c") <= 1.0
     held = robot.locked({"j": 0.7})
     assert shares_of(held, ("placement",), tmp_path, "c") <= 1.0
-    right = proof.conversion
+    right = conversion
     monkeypatch.setattr(proof, "conversion", lambda *of: right(*of)._replace(angles=np.zeros(proof.VECTORS)))
     assert shares_of(robot, ("placement", "jacobian"), tmp_path, "c") > 1.0
     assert shares_of(held, ("placement",), tmp_path, "c") > 1.0
@@ -234,11 +235,11 @@ def test_a_file_of_offsets_that_cancel_needs_the_size_of_each_offset(
     before: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     robot = loaded(_CANCELLED.format(before=before, offset=Decimal(before) * Decimal("37.123")))
-    right = proof.conversion
+    right = conversion
     for one in (robot, robot.locked({"j": 0.7})):
         with monkeypatch.context() as patch:
             assert shares_of(one, ("placement",), tmp_path, "c") <= 1.0
-            patch.setattr(proof, "conversion", lambda *of: right(*of)._replace(lengths=0.0))
+            patch.setattr(proof, "conversion", lambda *of: right(*of)._replace(lengths=np.zeros(1)))
             assert shares_of(one, ("placement",), tmp_path, "c") > 1.0
 
 
