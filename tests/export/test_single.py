@@ -191,7 +191,7 @@ def test_a_file_needs_the_errors_of_its_double_constants(
 def shares_of(robot: urdfkin.Robot, quantities: tuple[str, ...], folder: Path, frame: str) -> float:
     """The largest error of a file in double precision, as a share of its bound."""
     own = module(file(code(robot, frame, quantities), "array", folder))
-    return max(share for (_, kind), share in own.check().items() if kind == "float64")
+    return max(float(share) for (_, kind), share in own.check().items() if kind == "float64")
 
 
 _TURNED = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
