@@ -13,6 +13,7 @@ import hashlib
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal, localcontext
 
 import numpy as np
 
@@ -217,10 +218,7 @@ def decimal(x: Number) -> str:
 
 def _rounded_down(x: float) -> str:
     """Return x with six digits, rounded down; for an x that is not finite, return 0.0."""
-    if not np.isfinite(x):
-        return "0.0"
-    text = f"{x:.6g}"
-    return text if float(text) <= x else f"{x * (1.0 - 1e-6):.6g}"
+    return _rounded(x, 6, ROUND_FLOOR)
 
 
 def _rounded_up(x: float) -> str:
@@ -229,7 +227,11 @@ def _rounded_up(x: float) -> str:
     With the bound 0.0, only equal numbers are accepted. The bound must not be rounded down, because the error
     of a constant in single precision can be equal to its bound.
     """
+    return _rounded(x, 7, ROUND_CEILING)
+
+
+def _rounded(x: float, digits: int, towards: str) -> str:
     if not np.isfinite(x):
         return "0.0"
-    text = f"{x:.7g}"
-    return text if float(text) >= x else f"{x * (1.0 + 1e-6):.7g}"
+    with localcontext(prec=digits, rounding=towards):
+        return f"{float(+Decimal(x)):.{digits}g}"
