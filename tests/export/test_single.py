@@ -48,10 +48,24 @@ def inputs(scale: float = 1.0) -> FloatArray:
     return (scale * np.stack([x, y, z], axis=1)).astype(np.float32).astype(np.float64)
 
 
+def least_accurate(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A sine or cosine with the largest error of SLEEF (functions named u35), which PyTorch uses."""
+
+    def off(x: Any) -> Any:
+        true = function(np.float64(x))
+        return true + 3.4999 * np.spacing(np.abs(true).astype(np.float32)).astype(np.float64)
+
+    return off
+
+
 def in_single(of: Function, q: FloatArray) -> FloatArray:
-    """The result with every operation in single precision, as NumPy computes it."""
+    """The result with every operation in single precision, as NumPy computes it.
+
+    Only the results of sine and cosine are not rounded, because their largest error is added to them.
+    """
     numbers: dict[Node, Any] = {}
-    plain: dict[str, Callable[..., Any]] = {"neg": np.negative, "sin": np.sin, "cos": np.cos, "sqrt": np.sqrt}
+    plain: dict[str, Callable[..., Any]] = {"neg": np.negative, "sqrt": np.sqrt}
+    plain |= {"sin": least_accurate(np.sin), "cos": least_accurate(np.cos)}
     plain |= {"+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide}
     for node in of.nodes:
         if node.op == "q":
@@ -88,7 +102,7 @@ OPERATIONS: dict[str, Made] = {
 def test_the_error_of_an_operation_is_within_the_bound_and_not_without_its_term(
     op: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert 0.2 < worst(OPERATIONS[op]) <= 1.0
+    assert (0.9 if op in ("sin", "cos") else 0.2) < worst(OPERATIONS[op]) <= 1.0
     monkeypatch.setitem(SINGLE_OPERATION, op, 0.0)
     monkeypatch.setattr(single, "SINGLE_POLYNOMIAL", 0.0)
     assert worst(OPERATIONS[op]) > 1.0
