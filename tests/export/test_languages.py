@@ -5,6 +5,8 @@ from __future__ import annotations
 import ast
 import importlib.util
 import re
+import shutil
+import subprocess
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -139,6 +141,23 @@ def test_c_touches_nothing_that_is_not_its_own(tmp_path: Path) -> None:
     path = file(code(robot_of("planar_and_floating_in_the_middle"), quantities=_THREE), "c", tmp_path)
     said = built(path, "cc", "-std=c99", "-g", "-fsanitize=address,undefined")
     assert said.count("good ") == len(_THREE)
+
+
+@pytest.mark.parametrize(
+    ("to", "compiler"),
+    [("c", "gcc"), ("c", "clang"), *((to, x) for to in ("cpp", "cuda") for x in ("g++", "clang++"))],
+)
+def test_an_option_that_lets_a_compiler_reorder_sums_is_refused(
+    to: str, compiler: str, tmp_path: Path
+) -> None:
+    if shutil.which(compiler) is None:
+        pytest.skip(f"no {compiler}")
+    path = file(code(urdfkin.load("planar_two_link"), quantities=("placement",)), to, tmp_path)
+    command = [compiler, "-x", "c" if to == "c" else "c++", "-fsyntax-only", str(path)]
+    assert subprocess.run(command, check=False).returncode == 0
+    done = subprocess.run([*command, "-ffast-math"], capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert "-ffast-math" in done.stderr
 
 
 @pytest.mark.slow
