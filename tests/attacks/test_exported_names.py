@@ -112,9 +112,10 @@ def test_python_holds_nothing_but_functions_and_tables(robot: Robot, to: str) ->
     assert [node.name for node in classes] == (["Kinematics"] if to == "torch" else [])
     assert set(kinds) - ({ast.ClassDef} if classes else set()) <= allowed
     assert kinds.count(ast.Expr) == 1, "the docstring"
-    helpers = {"array": ["_namespace", "_stacked"], "jax": ["_stacked"], "torch": ["_stacked"]}.get(to, [])
+    checked = ["_demand", "_stacked"]
+    helpers = {"numpy": ["_demand"], "array": ["_namespace", *checked], "jax": checked, "torch": checked}
     assert [node.name for node in module.body if isinstance(node, ast.FunctionDef)] == [
-        *helpers,
+        *helpers.get(to, []),
         "placement",
         *(["gradients"] if to == "torch" else []),
         "_values",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import urdfkin
@@ -140,6 +141,63 @@ def test_newton_reads_a_usd_file_like_urdfkin(tmp_path: Path, monkeypatch: pytes
     (found,) = compare_readers(robot)
     assert [one.joint for one in found.differences] == ["shoulder"]
     assert found.worst == pytest.approx(1e-3, rel=1e-2)
+
+
+#: A hand that follows the shoulder. The axis does not pass through its origin, so that urdfkin adds a link.
+_HAND = """
+  def Xform "hand" (prepend apiSchemas = ["PhysicsRigidBodyAPI"]) {
+    double3 xformOp:translate = (0.3, 0, 0.4)
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+  }
+  def PhysicsRevoluteJoint "wrist" (prepend apiSchemas = ["NewtonMimicAPI"]) {
+    uniform token physics:axis = "X"
+    rel physics:body0 = </arm/upper>
+    rel physics:body1 = </arm/hand>
+    point3f physics:localPos0 = (0.3, 0, 0)
+    point3f physics:localPos1 = (0, 0, 0.1)
+    rel newton:mimicJoint = </arm/shoulder>
+    float newton:mimicCoef0 = 30
+    float newton:mimicCoef1 = -2
+  }
+}
+"""
+
+
+def test_newton_moves_mimic_joints_and_lacks_no_link_that_urdfkin_added(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("newton")
+    path = tmp_path / "arm.usda"
+    path.write_text(text := USD.rstrip().removesuffix("}") + _HAND)
+    robot = urdfkin.load(str(path))
+    assert set(robot.link_names) == {"base", "upper", "hand", "wrist_link", "world"}
+    (found,) = compare_readers(robot)
+    assert (found.agrees, found.joints, found.missing) == (True, ("shoulder",), ())
+    assert found.same_order
+    path.write_text(text.replace("mimicCoef1 = -2", "mimicCoef1 = -2.1"))
+    monkeypatch.setattr(readers, "_source", lambda _: (str(path), "usd"))
+    assert compare_readers(robot)[0].worst > 0.01
+    plain = text.replace("(0, 0, 0.1)", "(0, 0, 0)").replace("(0.3, 0, 0.4)", "(0.3, 0, 0.5)")
+    path.write_text(plain)
+    robot = urdfkin.load(str(path))
+    path.write_text(plain.replace('(prepend apiSchemas = ["NewtonMimicAPI"])', ""))
+    (one,) = compare_readers(robot)[0].differences
+    assert (one.joint, one.words) == ("wrist", "Newton leaves it free")
+
+
+def test_a_body_that_a_library_lacks_is_missing_and_a_link_without_a_prim_is_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("pxr")
+    path = tmp_path / "arm.usda"
+    path.write_text(USD.rstrip().removesuffix("}") + _HAND)
+    robot = urdfkin.load(str(path))
+    poses = [{"base": np.eye(4).tolist()}] * 3
+    answer = json.dumps({"joints": ["shoulder"], "poses": poses}).encode()
+    monkeypatch.setattr(readers, "version", lambda _: "1.0")
+    monkeypatch.setattr(readers, "ask_python", lambda *_: (answer, 0))
+    (found,) = compare_readers(robot, ["newton"], samples=2)
+    assert found.missing == ("upper", "hand")
 
 
 def test_a_library_that_hangs_or_dies_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:

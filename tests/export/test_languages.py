@@ -5,8 +5,12 @@ from __future__ import annotations
 import ast
 import importlib.util
 import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -141,6 +145,23 @@ def test_c_touches_nothing_that_is_not_its_own(tmp_path: Path) -> None:
     assert said.count("good ") == len(_THREE)
 
 
+@pytest.mark.parametrize(
+    ("to", "compiler"),
+    [("c", "gcc"), ("c", "clang"), *((to, x) for to in ("cpp", "cuda") for x in ("g++", "clang++"))],
+)
+def test_an_option_that_lets_a_compiler_reorder_sums_is_refused(
+    to: str, compiler: str, tmp_path: Path
+) -> None:
+    if shutil.which(compiler) is None:
+        pytest.skip(f"no {compiler}")
+    path = file(code(urdfkin.load("planar_two_link"), quantities=("placement",)), to, tmp_path)
+    command = [compiler, "-x", "c" if to == "c" else "c++", "-fsyntax-only", str(path)]
+    assert subprocess.run(command, check=False).returncode == 0
+    done = subprocess.run([*command, "-ffast-math"], capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert "-ffast-math" in done.stderr
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("to", ["c", "cpp", "cuda", "numpy", "array", "torch"])
 def test_a_constant_that_was_changed_is_noticed(to: str, tmp_path: Path) -> None:
@@ -224,6 +245,100 @@ def test_no_array_is_written_in_place(to: str) -> None:
             assert all(isinstance(x, ast.Name | ast.Tuple) for x in node.targets)
 
 
+@pytest.mark.parametrize("name", NAMESPACES)
+def test_functions_of_any_array_refuse_a_wrong_length_and_whole_numbers(name: str, tmp_path: Path) -> None:
+    xp, robot = namespace(name), urdfkin.load("planar_two_link")
+    own = module(file(code(robot, quantities=("velocity",)), "array", tmp_path))
+    right = xp.zeros((5, 2), dtype=xp.float64)
+    for q, found in ((xp.zeros((5, 3), dtype=xp.float64), r"\(5, 3\)"), (right[:, :1], r"\(5, 1\)")):
+        with pytest.raises(ValueError, match=rf"q needs 2 numbers on its last axis: found the shape {found}"):
+            own.velocity(q, right)
+        with pytest.raises(ValueError, match=r"v needs 2 numbers"):
+            own.velocity(right, q)
+    with pytest.raises(ValueError, match=r"found the shape \(\)"):
+        own.velocity(right[0, 0], right)
+    whole = xp.zeros((5, 2), dtype=xp.int64)
+    for inputs, letter in (((whole, right), "q"), ((right, whole), "v")):
+        with pytest.raises(TypeError, match=f"{letter} needs a floating type: found .*int64"):
+            own.velocity(*inputs)
+    assert own.velocity(right, right[0, :]).shape == (5, 6)
+
+
+def test_numpys_functions_refuse_a_wrong_length_and_convert_whole_numbers(tmp_path: Path) -> None:
+    own = module(file(code(urdfkin.load("planar_two_link"), quantities=("placement",)), "numpy", tmp_path))
+    assert np.array_equal(own.placement([0, 1]), own.placement([0.0, 1.0]))
+    for wrong in ([0.0], [0.0, 1.0, 2.0], 0.0):
+        with pytest.raises(ValueError, match="q needs 2 numbers on its last axis"):
+            own.placement(wrong)
+
+
+def test_a_namespace_that_makes_float32_of_float64_is_an_error_of_the_check(tmp_path: Path) -> None:
+    own = module(file(code(urdfkin.load("planar_two_link"), quantities=("placement",)), "array", tmp_path))
+    narrow = SimpleNamespace(
+        asarray=lambda x, dtype: np.asarray(x, dtype=np.float32), float64=np.float64, float32=np.float32
+    )
+    with pytest.raises(TypeError, match=r"makes float32 of float64.*jax_enable_x64"):
+        own.check(narrow)
+
+
+class _Tensor(np.ndarray):
+    """An array with the method of PyTorch's tensors that exported code calls."""
+
+    def is_floating_point(self) -> bool:
+        return bool(np.issubdtype(self.dtype, np.floating))
+
+
+def _torch(gradcheck: Callable[..., bool]) -> ModuleType:
+    """The functions of PyTorch that exported code calls, computed by NumPy."""
+    made = ModuleType("torch")
+    found = {name: getattr(np, name) for name in ("cos", "sin", "zeros_like", "broadcast_to", "reshape")}
+    found |= {"stack": lambda x, dim: np.stack(x, axis=dim), "float64": np.float64}
+    found |= {"nn": SimpleNamespace(Module=object), "autograd": SimpleNamespace(gradcheck=gradcheck)}
+    found["tensor"] = lambda x, dtype, **_: np.array(x, dtype=dtype).view(_Tensor)
+    made.__dict__.update(found)
+    return made
+
+
+_GEARED = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
+<joint name="end" type="fixed"><parent link="c"/><child link="d"/><origin xyz="0.5 0 0.2"/></joint>
+<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>
+<limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
+<joint name="k" type="revolute"><parent link="b"/><child link="c"/><axis xyz="0 1 0"/>
+<origin xyz="1 0 0"/><mimic joint="j" multiplier="{}"/>
+<limit lower="-1e9" upper="1e9" velocity="1" effort="1"/></joint></robot>"""
+
+
+@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
+@pytest.mark.parametrize("multiplier", [1.0, 30.0, 2000.0])
+def test_the_tolerance_of_difference_quotients_includes_their_truncation(
+    multiplier: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = urdfkin.load(_GEARED.format(multiplier))
+    written = code(robot, "d", ("placement", "jacobian"))
+    slopes = {
+        "placement": lambda q: np.concatenate(
+            (robot.jacobian(q, "d")[..., :3, 0], np.zeros((1, 1))), axis=-1
+        ),
+        "jacobian": lambda q: robot.hessian(q, "d")[..., 0],
+    }
+    seen = []
+
+    def gradcheck(function: Any, inputs: Any, *, eps: float, atol: float, **_: Any) -> bool:
+        (q,), name = inputs, function.__name__
+        quotient = (function(q + eps) - function(q - eps)) / (2.0 * eps)
+        seen.append((name, atol))
+        found = quotient[..., 3] if name == "placement" else quotient
+        return bool(np.all(np.abs(found - slopes[name](np.asarray(q))) <= atol))
+
+    monkeypatch.setitem(sys.modules, "torch", _torch(gradcheck))
+    own = module(file(written, "torch", tmp_path))
+    assert own.gradients() == {"placement": True, "jacobian": True}
+    # The tolerance is still small compared with the derivatives.
+    assert all(atol < 1e-5 * (1.0 + multiplier) ** (1 + (name == "jacobian")) for name, atol in seen)
+    monkeypatch.setitem(slopes, "placement", lambda q: 1.0001 * robot.jacobian(q, "d")[..., :3, 0].sum())
+    assert not own.gradients()["placement"]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMESPACES)
 def test_functions_of_any_array_broadcast_leading_axes_and_keep_the_type(name: str, tmp_path: Path) -> None:
@@ -283,6 +398,19 @@ def test_pytorch_that_is_not_installed_is_one_clear_error(monkeypatch: pytest.Mo
         InputError, match=r"robot\.torch needs PyTorch: found no module torch; pip install torch"
     ):
         urdfkin.load("planar_two_link").torch("tip")
+
+
+@pytest.mark.slow
+def test_the_check_of_an_imported_file_of_jax_computes_in_double_precision(tmp_path: Path) -> None:
+    jax: Any = pytest.importorskip("jax")
+    before = jax.config.jax_enable_x64
+    jax.config.update("jax_enable_x64", False)
+    try:
+        own = module(file(code(urdfkin.load("ur5"), quantities=("placement",)), "jax", tmp_path))
+        assert max(own.check().values()) <= 1.0
+        assert not jax.config.jax_enable_x64
+    finally:
+        jax.config.update("jax_enable_x64", before)
 
 
 @pytest.mark.slow

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 import urdfkin
@@ -22,6 +23,7 @@ from urdfkin.export.function import Function
 from urdfkin.kinematics.roundings import SINGLE_EPS, SINGLE_OPERATION
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
+from urdfkin.verify.exact.numbers import conversion
 from urdfkin.verify.quantities import JACOBIAN
 
 _N = 4000
@@ -46,10 +48,24 @@ def inputs(scale: float = 1.0) -> FloatArray:
     return (scale * np.stack([x, y, z], axis=1)).astype(np.float32).astype(np.float64)
 
 
+def least_accurate(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A sine or cosine with the largest error of SLEEF (functions named u35), which PyTorch uses."""
+
+    def off(x: Any) -> Any:
+        true = function(np.float64(x))
+        return true + 3.4999 * np.spacing(np.abs(true).astype(np.float32)).astype(np.float64)
+
+    return off
+
+
 def in_single(of: Function, q: FloatArray) -> FloatArray:
-    """The result with every operation in single precision, as NumPy computes it."""
+    """The result with every operation in single precision, as NumPy computes it.
+
+    Only the results of sine and cosine are not rounded, because their largest error is added to them.
+    """
     numbers: dict[Node, Any] = {}
-    plain: dict[str, Callable[..., Any]] = {"neg": np.negative, "sin": np.sin, "cos": np.cos, "sqrt": np.sqrt}
+    plain: dict[str, Callable[..., Any]] = {"neg": np.negative, "sqrt": np.sqrt}
+    plain |= {"sin": least_accurate(np.sin), "cos": least_accurate(np.cos)}
     plain |= {"+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide}
     for node in of.nodes:
         if node.op == "q":
@@ -86,7 +102,7 @@ OPERATIONS: dict[str, Made] = {
 def test_the_error_of_an_operation_is_within_the_bound_and_not_without_its_term(
     op: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert 0.2 < worst(OPERATIONS[op]) <= 1.0
+    assert (0.9 if op in ("sin", "cos") else 0.2) < worst(OPERATIONS[op]) <= 1.0
     monkeypatch.setitem(SINGLE_OPERATION, op, 0.0)
     monkeypatch.setattr(single, "SINGLE_POLYNOMIAL", 0.0)
     assert worst(OPERATIONS[op]) > 1.0
@@ -186,10 +202,72 @@ def test_a_file_needs_the_errors_of_its_double_constants(
     assert shares(text, tmp_path)["placement", "float32"] > 1.0
 
 
+def shares_of(robot: urdfkin.Robot, quantities: tuple[str, ...], folder: Path, frame: str) -> float:
+    """The largest error of a file in double precision, as a share of its bound."""
+    own = module(file(code(robot, frame, quantities), "array", folder))
+    return max(float(share) for (_, kind), share in own.check().items() if kind == "float64")
+
+
+_TURNED = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
+<joint name="j" type="revolute"><parent link="a"/><child link="b"/><origin rpy="{angle} {angle} 0.1"/>
+<axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
+<joint name="k" type="revolute"><parent link="b"/><child link="c"/><axis xyz="0 1 0"/>
+<origin xyz="1 0 0"/><mimic joint="j" multiplier="{multiplier}" offset="{offset}"/>
+<limit lower="-1e9" upper="1e9" velocity="1" effort="1"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("seed", range(1, 4))
+@pytest.mark.parametrize("large", ["angle", "multiplier", "offset"])
+def test_a_file_of_large_angles_and_rules_needs_the_rounding_of_their_decimals(
+    large: str, seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    usual = {"angle": 0.1, "multiplier": 2.0, "offset": 0.3}
+    text = _TURNED.format(**usual | {large: f"{1e7 + 1e-3 * seed:.4f}"})
+    robot = loaded(text)
+    assert shares_of(robot, ("placement", "jacobian"), tmp_path, "c") <= 1.0
+    held = robot.locked({"j": 0.7})
+    assert shares_of(held, ("placement",), tmp_path, "c") <= 1.0
+    right = conversion
+    monkeypatch.setattr(proof, "conversion", lambda *of: right(*of)._replace(angles=np.zeros(proof.VECTORS)))
+    assert shares_of(robot, ("placement", "jacobian"), tmp_path, "c") > 1.0
+    assert shares_of(held, ("placement",), tmp_path, "c") > 1.0
+
+
+_CANCELLED = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
+<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 1 0"/>
+<limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
+<joint name="k" type="prismatic"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/>
+<mimic joint="i" multiplier="-37.123" offset="{offset}"/>
+<limit lower="-1e9" upper="1e9" velocity="1" effort="1"/></joint>
+<joint name="i" type="prismatic"><parent link="a"/><child link="d"/><axis xyz="0 0 1"/>
+<mimic joint="j" multiplier="0.001" offset="{before}"/>
+<limit lower="-1e9" upper="1e9" velocity="1" effort="1"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("before", ["6732.655", "589262.492", "58731509.822"])
+def test_a_file_of_offsets_that_cancel_needs_the_size_of_each_offset(
+    before: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = loaded(_CANCELLED.format(before=before, offset=Decimal(before) * Decimal("37.123")))
+    right = conversion
+    for one in (robot, robot.locked({"j": 0.7})):
+        with monkeypatch.context() as patch:
+            assert shares_of(one, ("placement",), tmp_path, "c") <= 1.0
+            patch.setattr(proof, "conversion", lambda *of: right(*of)._replace(lengths=np.zeros(1)))
+            assert shares_of(one, ("placement",), tmp_path, "c") > 1.0
+
+
 @given(st.floats(1e-300, 1e300))
 def test_a_bound_is_written_rounded_up_and_by_less_than_two_millionths(x: float) -> None:
     assert x <= float(proof._rounded_up(x)) <= x * (1.0 + 2e-6)
     assert proof._rounded_up(np.inf) == "0.0"
+
+
+@given(st.floats(1e-300, 1e300))
+@example(3.9268392647265107)
+def test_a_bound_is_written_rounded_down_and_by_less_than_ten_millionths(x: float) -> None:
+    assert x * (1.0 - 1e-5) <= float(proof._rounded_down(x)) <= x
+    assert proof._rounded_down(np.nan) == "0.0"
 
 
 def test_a_file_states_its_bounds_and_what_single_precision_cannot_represent(tmp_path: Path) -> None:

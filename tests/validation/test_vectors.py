@@ -13,7 +13,9 @@ import os
 import shutil
 import subprocess
 import sys
+import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +28,14 @@ from tests.cli.running import urdfkin as run
 from tests.urdf_standard import Robot, mp
 from urdfkin.system.resources import example_robots_dir, robots_dir
 from urdfkin.urdf.catalogue import catalogue
-from urdfkin.validation.vectors import VECTORS, features, stem, write_features, write_sums
+from urdfkin.validation.vectors import (
+    VECTORS,
+    features,
+    stem,
+    write_features,
+    write_robot,
+    write_sums,
+)
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")]
 
@@ -178,17 +187,17 @@ class Sizes:
             if joint.angles is not None:
                 e += sum(map(abs, joint.angles)) / 2
             leader, m, _ = robot.rule(name)
-            _, error, count = self._mimic(name, at, sample)
+            X, error, count = self._mimic(name, at, sample)
             rules += count
             turns = joint.kind in ("revolute", "continuous")
-            e += error if turns else 0.0
+            e += error + (count - 1) / 2 * X if turns and count else 0.0
             q, v, a = (
                 sample[key][slice(*at[leader]["q" if key == "q" else "v"])] if leader in at else []
                 for key in "qva"
             )
             L = float(np.linalg.norm(joint.origin[:3, 3].astype(float)))
             if joint.kind == "prismatic":
-                L += abs(float(m) * q[0]) + abs(float(robot.rule(name)[2]))
+                L += X
             elif joint.kind in ("planar", "floating"):
                 L += float(np.linalg.norm(q[: 2 if joint.kind == "planar" else 3]))
             self.c += (self.d + self.w**2) * L
@@ -220,8 +229,8 @@ class Sizes:
     def _mimic(self, name: str, at: Mapping[str, Any], sample: Mapping[str, Any]) -> tuple[float, float, int]:
         joint = self.robot.joints[name]
         if not joint.leader:
-            q = sample["q"][slice(*at[name]["q"])] if name in at else [0.0]
-            return abs(q[0]), 0.0, 0
+            q = sample["q"][slice(*at[name]["q"])] if name in at else []
+            return abs(q[0]) if q else 0.0, 0.0, 0
         x, error, count = self._mimic(joint.leader, at, sample)
         m, c = abs(float(joint.multiplier)), abs(float(joint.offset))
         return m * x + c, m * error + 1.5 * m * x + c, count + 1
@@ -266,9 +275,7 @@ class Sizes:
         return np.repeat(sizes, 3, axis=0).ravel()
 
 
-@pytest.mark.parametrize("name", features())
-def test_every_tolerance_is_that_of_the_formulas_on_the_page(name: str, folder: Path) -> None:
-    path = folder / f"{stem(name)}.json"
+def demand_the_tolerances_of_the_page(path: Path) -> None:
     data = document(path)
     second = Robot(urdf_of(path, data))
     for sample in data["samples"]:
@@ -278,9 +285,85 @@ def test_every_tolerance_is_that_of_the_formulas_on_the_page(name: str, folder: 
             assert one["k"] == pytest.approx(k, rel=1e-12, abs=1e-6)
             expected = k * EPS * sizes.of(one["quantity"], one["reference"])
             given = np.array(one["tolerance"])
-            where = name, one["quantity"], one["reference"]
+            where = path.stem, one["quantity"], one["reference"]
             assert np.all(given >= expected * (1 - 1e-9)), where
             assert np.all(given <= expected * 1.0101), where
+
+
+@pytest.mark.parametrize("name", features())
+def test_every_tolerance_is_that_of_the_formulas_on_the_page(name: str, folder: Path) -> None:
+    demand_the_tolerances_of_the_page(folder / f"{stem(name)}.json")
+
+
+def chained(rng: np.random.Generator, large: bool) -> str:
+    """Return a URDF with a chain of two to four mimic rules.
+
+    The offsets cancel or, if `large`, the last one is a little above a power of two and rounds the most.
+    """
+    constant, parts, count = Decimal(0), ['<robot name="r"><link name="l0"/>'], int(rng.integers(3, 6))
+    for k in range(count):
+        rule = ""
+        if k:
+            m = Decimal(f"{10 ** rng.uniform(-1 if large else -2, 0 if large else 2):.3f}") * rng.choice(
+                [-1, 1]
+            )
+            c = Decimal(f"{10 ** rng.uniform(0, 4):.3f}")
+            if large:
+                c = Decimal(f"{2**16 + rng.uniform(0, 60):.6f}" if k == count - 1 else "0.3")
+            elif k > 1 and rng.random() < 0.7:
+                c = round(-m * constant, int(rng.integers(2, 7)))
+            constant = m * constant + c
+            rule = f'<mimic joint="j{k - 1}" multiplier="{m}" offset="{c}"/>'
+        most = "1e12" if k else "2"
+        kind = "revolute" if large else rng.choice(["prismatic", "revolute"])
+        parts.append(
+            f'<link name="l{k + 1}"/><joint name="j{k}" type="{kind}">'
+            f'<parent link="l{k}"/><child link="l{k + 1}"/>'
+            f'<origin xyz="0.1 0.2 0" rpy="0 {rng.uniform(-3, 3):.3f} 0"/>'
+            f'<axis xyz="{" ".join(map(str, rng.permutation([1, 0, 0])))}"/>{rule}'
+            f'<limit lower="-{most}" upper="{most}" velocity="1" effort="1"/></joint>'
+        )
+    return "".join(parts) + "</robot>"
+
+
+def one_by_one(text: str) -> Callable[..., Any]:
+    """Return the placements of a program that applies the mimic rules one after the other, in doubles."""
+    free = urdfkin.load(text, verify=False, mimic=False)
+    rules = [
+        (float(rule.get("multiplier", "")), float(rule.get("offset", "")))
+        for rule in ET.fromstring(text).iterfind("joint/mimic")
+    ]
+
+    def answer(quantity: str, frame: str, reference: str, q: Any, v: Any, a: Any) -> Any:
+        values = list(q)
+        for m, c in rules:
+            values.append(m * values[-1] + c)
+        return free.placement(values, frame) if quantity == "placement" else None
+
+    return answer
+
+
+@pytest.mark.parametrize("large", [False, True])
+def test_the_tolerances_of_chains_of_rules_hold_if_offsets_cancel_or_are_large(
+    large: bool, tmp_path: Path
+) -> None:
+    rng, worst = np.random.default_rng(0), 0.0
+    for number in range(40):
+        text = chained(rng, large)
+        robot = urdfkin.load(text, verify=False)
+        (made := tmp_path / str(number)).mkdir()
+        write_robot(made, robot, 5)
+        path = made / "r.json"
+        demand_the_tolerances_of_the_page(path)
+        if number % 20 == 0:
+            assert agree(path) > 0
+        for answer in (own(robot), one_by_one(text)):
+            assert not list(wrong(path, answer)), text
+        for sample in document(path)["samples"]:
+            for one in sample["results"][:1]:
+                error = np.abs(robot.placement(sample["q"], one["frame"]).ravel() - one["value"])
+                worst = max(worst, float((error[:12] / one["tolerance"][:12]).max()))
+    assert worst > 0.3, "the tolerances are not much larger than the errors"
 
 
 # -- the readers ----------------------------------------------------------------------------------------

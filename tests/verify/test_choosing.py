@@ -10,7 +10,7 @@ import pytest
 
 import urdfkin
 from tests.laws.subjects import state
-from urdfkin.errors import InputError
+from urdfkin.errors import InputError, OracleError
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
@@ -273,3 +273,19 @@ def test_what_is_no_choice_is_refused(fresh: Robot, verify: object) -> None:
         with pytest.raises(InputError, match='verify must be True, False or "sample"'):
             fresh.jacobian(fresh.neutral(), "panda_hand", verify=verify)  # type: ignore[arg-type]
     assert fresh.certificate().lines == ()
+
+
+@pytest.mark.parametrize("count", [0, 4, 6])
+def test_an_oracle_that_returns_results_of_too_few_or_too_many_configurations_is_an_error(
+    count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = urdfkin.load("planar_two_link")
+    q, right = robot.sample(5), verifier.oracle_results
+    rows = np.arange(count) % 5
+
+    monkeypatch.setattr(verifier, "oracle_results", lambda *asked: right(*asked)[rows])
+    monkeypatch.setattr(verifier, "oracle_blocks", lambda *asked: iter([right(*asked)[rows]]))
+    for compute in (robot.placement, robot.jacobian):
+        with pytest.raises(OracleError, match=rf"each configuration: found {count} of 5 results"):
+            compute(q, "tip")
+    assert not robot.certificate().lines

@@ -68,7 +68,7 @@ class LibraryReading:
         refused: Reason why the library does not read the file; None if it reads the file.
         joints: The joints with a coordinate in the library, in the library's order.
         same_order: Whether the library has the same joints as urdfkin, in the same order.
-        missing: Links that the library's model does not contain.
+        missing: Links that the library's model does not contain; in USD, only links with a prim of their own.
         worst: Largest difference of a link's pose in the root link; 0 if all link poses are equal within
             rounding.
         differences: The joints that the library reads differently from urdfkin.
@@ -197,7 +197,7 @@ def _reading(
         missing=tuple(
             link
             for i, link in enumerate(links)
-            if i not in shared and (i or not added) and (link, form) != ("world", "usd")
+            if i not in shared and (i or not added) and (form != "usd" or link in robot.prims)
         ),
         worst=0.0 if worst <= equal else worst,
         differences=tuple(_differences(robot, title, ours, poses, elements, own, equal)),

@@ -57,6 +57,8 @@ def _cuda(code: Code) -> str:
         f"               {name}_kinematics::{first.name}_batch(n, {inputs}, out, stream) for a batch;",
         f"               from C: {name}_{first.name}_double(n, {inputs}, out, stream) of the library, with",
         f'               #define {up}_DECLARATIONS, then #include "{name}.cuh"',
+        "Options:       not -use_fast_math: the bounds in float do not allow for it, and nvcc defines no",
+        "               macro by which this file could refuse it.",
         "CMake:         enable_language(CUDA)",
         f"               configure_file({name}.cuh {name}.cu COPYONLY)",
         f"               add_library({name} ${{CMAKE_CURRENT_BINARY_DIR}}/{name}.cu)",

@@ -13,6 +13,7 @@ import hashlib
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal, localcontext
 
 import numpy as np
 
@@ -26,11 +27,19 @@ from urdfkin.model.recursion import Number
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.lazy_import import own_version
+from urdfkin.verify.bounds import Conversion, against_true_values
 from urdfkin.verify.call import Call, Part
 from urdfkin.verify.certificate import Certificate
-from urdfkin.verify.exact.numbers import DIGITS, enough_digits, exact, precision, read_exact
+from urdfkin.verify.exact.numbers import (
+    DIGITS,
+    conversion,
+    enough_digits,
+    exact,
+    precision,
+    read_exact,
+)
 from urdfkin.verify.exact.recursion import move
-from urdfkin.verify.verifier import Verifier, bound_of
+from urdfkin.verify.verifier import Verifier
 
 #: Number of random configurations compared with Pinocchio, besides the neutral one and the limits.
 CHECKED = 100
@@ -159,12 +168,13 @@ def _vectors(
     whole = Call(tree, plan_of, frame, reference, None, inputs)
     part = whole.part(slice(0, VECTORS))
     within, single, most = dict[str, FloatArray](), dict[str, FloatArray](), dict[str, float]()
+    path, found = tree.path(link), []
+    errors = conversion(verifier.text, tree, path, part.q)
     for f in functions:
-        within[f.name], scale = _within(f, part)
+        within[f.name], scale = _within(f, part, errors)
         single[f.name] = single_bounds(f, inputs) + EPS / SINGLE_EPS * within[f.name]
         shares = np.divide(single[f.name], scale, out=np.zeros_like(scale), where=scale > 0.0)
         most[f.name] = float(shares.max(initial=0.0))
-    path, found = tree.path(link), []
     with precision(DIGITS + enough_digits(len(path))):
         joints = read_exact(verifier.text, tree, path)
         for k in range(VECTORS):
@@ -185,9 +195,11 @@ def _single(x: FloatArray) -> FloatArray:
     return x.astype(np.float32).astype(np.float64)
 
 
-def _within(function: Function, part: Part) -> tuple[FloatArray, FloatArray]:
+def _within(function: Function, part: Part, errors: Conversion) -> tuple[FloatArray, FloatArray]:
     """Return the error bounds k * scale, (n, numbers), in eps, and the scales."""
-    bound, n = bound_of(function.quantity, part), len(part.q)
+    v, a = (*part.rates, None, None)[:2]
+    size = against_true_values(part.plan, part.q, v, a, errors)
+    bound, n = function.quantity.bound(part.plan, size, part.reference), len(part.q)
     scale = np.where(bound.scale > 0.0, np.maximum(bound.scale, SMALLEST), 0.0)
     shape = (n, 1, *function.shape)
     within, scale = (np.broadcast_to(x, shape).reshape(n, -1) for x in (scale * bound.k, scale))
@@ -206,10 +218,7 @@ def decimal(x: Number) -> str:
 
 def _rounded_down(x: float) -> str:
     """Return x with six digits, rounded down; for an x that is not finite, return 0.0."""
-    if not np.isfinite(x):
-        return "0.0"
-    text = f"{x:.6g}"
-    return text if float(text) <= x else f"{x * (1.0 - 1e-6):.6g}"
+    return _rounded(x, 6, ROUND_FLOOR)
 
 
 def _rounded_up(x: float) -> str:
@@ -218,7 +227,11 @@ def _rounded_up(x: float) -> str:
     With the bound 0.0, only equal numbers are accepted. The bound must not be rounded down, because the error
     of a constant in single precision can be equal to its bound.
     """
+    return _rounded(x, 7, ROUND_CEILING)
+
+
+def _rounded(x: float, digits: int, towards: str) -> str:
     if not np.isfinite(x):
         return "0.0"
-    text = f"{x:.7g}"
-    return text if float(text) >= x else f"{x * (1.0 + 1e-6):.7g}"
+    with localcontext(prec=digits, rounding=towards):
+        return f"{float(+Decimal(x)):.{digits}g}"

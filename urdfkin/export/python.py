@@ -13,10 +13,12 @@ from typing import Any
 
 import numpy as np
 
+from urdfkin.compiled.plan import CompiledTree, Motion, Step
 from urdfkin.errors import InputError
 from urdfkin.export.code import Code, Writer
 from urdfkin.export.expression import Node
 from urdfkin.export.function import Function
+from urdfkin.verify.bounds import column_weights
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,6 @@ class Dialect:
         helpers: Code of functions that the written functions call; "" if there are none.
         index: Format of the text for an element of an input.
         given: Parameter of the written check, with its default; "" if there is none.
-        before: First line of the written program; "" if there is none.
         single: Whether the functions also compute in single precision.
         closing: Function that returns code after the written functions.
         after: Last lines of the written program; "" if there are none.
@@ -50,7 +51,6 @@ class Dialect:
     helpers: str = ""
     index: str = "{}[{}]"
     given: str = ""
-    before: str = ""
     single: bool = False
     closing: Callable[[Code], str] = lambda code: ""
     after: str = ""
@@ -96,7 +96,7 @@ def _nested(opening: str, closing: str, row: str = "[{}]") -> Callable[[Writer],
 
 def _shapes(writer: Writer) -> list[str]:
     inputs = writer.function.inputs
-    lines = [f"{x} = np.asarray({x}, dtype=np.float64)" for x in inputs]
+    lines = [f"{x} = np.asarray({x}, dtype=np.float64)" for x in inputs] + _demands(writer)
     shapes = ", ".join(f"{x}.shape[:-1]" for x in inputs)
     return [*lines, f"shape = np.broadcast_shapes({shapes})"]
 
@@ -111,10 +111,17 @@ def _zero(writer: Writer, xp: str) -> str:
     return "zero = " + " + ".join(f"{xp}.zeros_like({column})" for column in columns)
 
 
+def _demands(writer: Writer, first: str = "") -> list[str]:
+    """Return the lines of code that check the inputs."""
+    return [
+        f'_demand({first}"{x}", {x}, {width})' for x, width in writer.code.widths(writer.function).items()
+    ]
+
+
 def _in_any_namespace(writer: Writer) -> list[str]:
     used = [name for name in _FUNCTIONS if any(node.op == name for node in writer.function.nodes)]
     names = [f"{', '.join(used)} = {', '.join(f'xp.{name}' for name in used)}"] if used else []
-    return ["xp = _namespace(q)", *names, _zero(writer, "xp")]
+    return ["xp = _namespace(q)", *_demands(writer, "xp, "), *names, _zero(writer, "xp")]
 
 
 def _stacked(xp: str) -> Callable[[Writer], Iterator[str]]:
@@ -140,6 +147,27 @@ def _namespace(x):
     return array_namespace(x)
 '''
 
+_LENGTH = '''
+def _demand({given}name, x, width):
+    """Raise an error if the last axis of an input has another length than `width`{or_type}."""
+    if x.ndim == 0 or x.shape[-1] != width:
+        found = tuple(x.shape)
+        raise ValueError(f"{{name}} needs {{width}} numbers on its last axis: found the shape {{found}}")
+'''
+_FLOATING = (
+    _LENGTH
+    + """    if not {floating}:
+        raise TypeError(f"{{name}} needs a floating type: found {{x.dtype}}")
+"""
+)
+
+
+def _demand(given: str = "", floating: str = "") -> str:
+    """Return code of a function that checks an input; `floating` is a test of its type, or empty."""
+    text, or_type = (_FLOATING, ", or no floating type") if floating else (_LENGTH, "")
+    return text.format(given=given, floating=floating, or_type=or_type)
+
+
 _STACKED = '''
 def _stacked({given}values, zero, shape):
     """Return numbers of the batch shape of `zero`, or of one that broadcasts, as an array (..., *shape)."""
@@ -163,15 +191,19 @@ class Kinematics(torch.nn.Module):
 def gradients(device="cpu"):
     """Return, for each function, whether `torch.autograd.gradcheck` accepts its derivatives in float64.
 
-    A difference quotient has the rounding errors of two values, divided by twice the step. The tolerance is
-    the largest bound of these errors; the quotient's truncation error is smaller.
+    A difference quotient has the rounding errors of two values, divided by twice the step, and a truncation
+    error: a sixth of the squared step times the third derivative. A coordinate rotates each vector by at most
+    r rad for each rad. A term of F vectors, at most 4, has a third derivative of at most (F r)^3 times its
+    size, and its error bound is at least 24 F eps times its size. This is not a bound for a coordinate that
+    moves a prismatic joint and also a revolute one.
     """
-    accepted, step = {{}}, 1e-6
+    accepted, step = {{}}, 1e-6 / {rate!r}  # r
     for function in ({all}):
         name = function.__name__
         kind = {{"dtype": torch.float64, "device": device, "requires_grad": True}}
         inputs = [torch.tensor(GIVEN[letter][:1], **kind) for letter in INPUTS[name]]
-        within = {{"eps": step, "atol": max(WITHIN[name][0]) * 2.0**-52 / step, "rtol": 0.0}}
+        most = max(WITHIN[name][0]) * (2.0**-52 / step + step**2 * {rate!r} ** 3 / 9.0)
+        within = {{"eps": step, "atol": most, "rtol": 0.0}}
         accepted[name] = torch.autograd.gradcheck(function, inputs, raise_exception=False, **within)
     return accepted
 
@@ -188,7 +220,20 @@ def _torch_module(code: Code) -> str:
         inputs=", ".join(first.inputs),
         functions="\n".join(f"    {f.name} = staticmethod({f.name})" for f in code.functions),
         all=_all(code),
+        rate=_rate(code.functions[0].plan),
     ).lstrip("\n")
+
+
+def _rate(plan: CompiledTree) -> float:
+    """Return a bound on the rotation of all vectors for each rad of a coordinate, at least 1.
+
+    It is the sum of the multipliers of the revolute joints that follow a coordinate. A number of a unit
+    quaternion that changes by t turns the body about a fixed axis. With the angle x between the quaternion
+    and the change, the angle of the turn has the derivatives 2 sin x, -2 sin 2x and 4 sin 3x. The third
+    derivative of a product of F vectors is then at most (2 F)^3 + 3 (2 F)(2 F) + 4 F <= (3 F)^3.
+    """
+    floats = bool((plan.steps[:, Step.KIND] == Motion.FLOATING).any())
+    return max(3.0 if floats else 1.0, float(column_weights(plan)[0].max(initial=0.0)))
 
 
 def _all(code: Code) -> str:
@@ -203,6 +248,7 @@ DIALECTS = {
     "numpy": Dialect(
         about="Arrays q (..., {nq}), v and a (..., {nv}), which broadcast; so do results.",
         imports="import numpy as np\nfrom numpy import {}",
+        helpers=_demand(),
         entering=_shapes,
         index="{}[..., {}]",
         result=_in_array("np.empty((*shape, {1}))", "..., "),
@@ -213,11 +259,19 @@ DIALECTS = {
         "they broadcast. PyTorch's tensors need array-api-compat. No array is written in place.\n"
         "check(xp) runs the test vectors in a namespace, for example check(jax.numpy).",
         imports="import numpy",
-        helpers=_NAMESPACE + "\n" + _STACKED.format(given="xp, ", xp="xp", axis="axis"),
+        helpers=_NAMESPACE
+        + "\n"
+        + _demand("xp, ", 'xp.isdtype(x.dtype, "real floating")')
+        + "\n"
+        + _STACKED.format(given="xp, ", xp="xp", axis="axis"),
         entering=_in_any_namespace,
         index="{}[..., {}]",
         result=_stacked("xp, "),
-        values="found = function(*(xp.asarray(x, dtype=getattr(xp, kind)) for x in inputs))\n"
+        values="arrays = [xp.asarray(x, dtype=getattr(xp, kind)) for x in inputs]\n"
+        "    if arrays[0].dtype != getattr(xp, kind):\n"
+        '        raise TypeError(f"the namespace makes {arrays[0].dtype} of {kind}; in JAX, first call "\n'
+        "                        \"jax.config.update('jax_enable_x64', True)\")\n"
+        "    found = function(*arrays)\n"
         "    found = xp.reshape(found, (len(inputs[0]), -1))\n"
         "    return [[float(found[i, k]) for k in range(found.shape[1])] for i in range(found.shape[0])]",
         given="xp=numpy",
@@ -236,26 +290,34 @@ DIALECTS = {
         "XLA's fusion pass takes minutes to compile long chains; this disables it:\n"
         'jax.jit(function, compiler_options={{"xla_disable_hlo_passes": "fusion"}})',
         imports="import jax\nimport jax.numpy as jnp\nfrom jax.numpy import {}",
-        helpers=_STACKED.format(given="", xp="jnp", axis="axis"),
+        helpers=_demand("", "jnp.issubdtype(x.dtype, jnp.floating)")
+        + "\n"
+        + _STACKED.format(given="", xp="jnp", axis="axis"),
         entering=lambda writer: [
             *(f"{x} = jnp.asarray({x})" for x in writer.function.inputs),
+            *_demands(writer),
             _zero(writer, "jnp"),
         ],
         index="{}[..., {}]",
         result=_stacked(""),
-        values='unfused = {"xla_disable_hlo_passes": "fusion"}\n'
-        "    compiled = jax.jit(function, compiler_options=unfused)\n"
-        "    found = compiled(*(jnp.array(x, dtype=kind) for x in inputs))\n"
-        "    return found.reshape(len(inputs[0]), -1).tolist()",
+        values='unfused, wide = {"xla_disable_hlo_passes": "fusion"}, jax.config.jax_enable_x64\n'
+        '    jax.config.update("jax_enable_x64", True)  # otherwise JAX computes float64 in float32\n'
+        "    try:\n"
+        "        compiled = jax.jit(function, compiler_options=unfused)\n"
+        "        found = compiled(*(jnp.array(x, dtype=kind) for x in inputs))\n"
+        "        return found.reshape(len(inputs[0]), -1).tolist()\n"
+        "    finally:\n"
+        '        jax.config.update("jax_enable_x64", wide)',
         single=True,
-        before='jax.config.update("jax_enable_x64", True)',
     ),
     "torch": Dialect(
         about="Tensors q (..., {nq}), v and a (..., {nv}) of any floating type and device, which broadcast;\n"
         "for autograd, torch.func, vmap and compile. Kinematics() has the functions as a module.",
         imports="import torch\nfrom torch import {}",
-        helpers=_STACKED.format(given="", xp="torch", axis="dim"),
-        entering=lambda writer: [_zero(writer, "torch")],
+        helpers=_demand("", "x.is_floating_point()")
+        + "\n"
+        + _STACKED.format(given="", xp="torch", axis="dim"),
+        entering=lambda writer: [*_demands(writer), _zero(writer, "torch")],
         index="{}[..., {}]",
         result=_stacked(""),
         values="tensors = [torch.tensor(x, dtype=getattr(torch, kind), device=device) for x in inputs]\n"
@@ -356,7 +418,7 @@ def check({given}):
 
 
 if __name__ == "__main__":
-{before}    wrong = False
+    wrong = False
     for (name, kind), worst in check().items():
         good = worst <= 1.0
         wrong |= not good
@@ -406,7 +468,6 @@ def _check(code: Code, dialect: Dialect) -> Iterator[str]:
         functions=_all(code),
         classes=dialect.closing(code),
         after=dialect.after,
-        before=f"    {dialect.before}\n" if dialect.before else "",
     ).rstrip()
 
 

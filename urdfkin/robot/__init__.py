@@ -165,6 +165,8 @@ class Robot(Displayable):
         #: (links, 2) bounds of the translation (m) and rotation (rad) of each link by single precision.
         #: None if the file's numbers have double precision.
         self.single: FloatArray | None = None
+        #: The path of the prim of each link of a USD stage that has one.
+        self.prims: Mapping[str, str] = {}
         self.base_frame = base_frame or tree.frame_name(0)
         self._tip_frame = tip_frame
         self._has_one_tip = tip_frame is not None or len(list(tree.leaves())) == 1

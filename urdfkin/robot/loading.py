@@ -255,6 +255,7 @@ def _load_usd(
     listed = tuple(of_usd(one, name) for one in (*read.remarks, *remarks))
     robot = robot_of(text, **how, listed=listed, made=True)
     robot.single = single_precision(robot.tree, read.answer["single"])
+    robot.prims = read.answer["prims"]
     if wanted:
         robot.verifier.reading = line
     return robot

@@ -47,8 +47,8 @@ class _ImportLock:
     the end of that import.
 
     `logging` has a lock that a fork acquires too. An imported module may need that lock. So a fork must
-    acquire this lock first. Python calls the functions that acquire locks in reverse order of their registration.
-    For this reason, the function of this module is registered after `logging` is imported.
+    acquire this lock first. Python calls the functions that acquire locks in reverse order of their
+    registration. For this reason, the function of this module is registered after `logging` is imported.
     """
 
     def __init__(self) -> None:

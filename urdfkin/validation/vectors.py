@@ -24,7 +24,6 @@ import numpy as np
 
 from urdfkin.errors.escape import json_text, log_line
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
-from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.configuration import coordinate_ranges, neutral
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree
@@ -33,12 +32,18 @@ from urdfkin.robot.loading import load
 from urdfkin.system.documents import Count, Layout, Sha256, Size, of_length, says
 from urdfkin.system.files import MOST_DATA, read_bytes, read_text, write_file
 from urdfkin.system.lazy_import import lazy_import
-from urdfkin.system.plain_xml import plain_xml
 from urdfkin.system.resources import robots_dir
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import UrdfWarning
-from urdfkin.verify.bounds import against_true_values, magnitudes
-from urdfkin.verify.exact.numbers import DIGITS, decimal, enough_digits, precision, read_exact
+from urdfkin.verify.bounds import against_true_values
+from urdfkin.verify.exact.numbers import (
+    DIGITS,
+    conversion,
+    decimal,
+    enough_digits,
+    precision,
+    read_exact,
+)
 from urdfkin.verify.exact.recursion import move
 from urdfkin.verify.quantities import (
     ACCELERATION,
@@ -266,37 +271,6 @@ def configuration(tree: KinematicTree, name: str, sample: int) -> tuple[FloatArr
 # -- tolerances -----------------------------------------------------------------------------------------
 
 
-class _Decimals:
-    """The angles and mimic rules of a URDF, for the errors that their conversion to doubles causes."""
-
-    def __init__(self, text: str) -> None:
-        self.elements = {str(joint.get("name")): joint for joint in plain_xml(text).findall("joint")}
-
-    def of(self, tree: KinematicTree, path: Sequence[int], q: FloatArray) -> tuple[float, int]:
-        """Return the errors of angles on a path, in eps rad, and the number of mimic rules."""
-        at = {joint.name: q[i] for joint, i in zip(tree.joints, tree.q_index, strict=True) if joint.nq == 1}
-        angles, rules = 0.0, 0
-        for i in path:
-            joint = tree.joints[i]
-            if (element := self.elements.get(joint.name)) is None:
-                continue
-            if (origin := element.find("origin")) is not None and "quat_xyzw" not in origin.attrib:
-                angles += math.fsum(abs(float(x)) for x in origin.get("rpy", "0").split()) / 2.0
-            if joint.mimic is not None:
-                _, error, count = self._value(joint.name, at)
-                angles, rules = angles + (error if joint.kind.turns else 0.0), rules + count
-        return angles, rules
-
-    def _value(self, name: str, at: Mapping[str, float]) -> tuple[float, float, int]:
-        """Return a joint value's size, its error in eps, and the number of mimic rules that determine it."""
-        rule = self.elements[name].find("mimic")
-        if rule is None or name in at:
-            return abs(at[name]), 0.0, 0
-        m, c = abs(float(rule.get("multiplier", "1"))), abs(float(rule.get("offset", "0")))
-        x, error, count = self._value(str(rule.get("joint")), at)
-        return m * x + c, m * error + 1.5 * m * x + c, count + 1
-
-
 def _tolerance(k: float, scale: float) -> str:
     """Return k eps scale as a decimal, rounded up; 0 if the scale is 0."""
     if scale == 0.0:
@@ -471,12 +445,11 @@ def _results(
 ) -> Iterator[dict[str, Any]]:
     """Yield the results of a sample; a value that is not proven to 17 digits is None."""
     tree, (q, v, a) = robot.tree, inputs
-    decimals = _Decimals(robot.urdf)
     for frame in frames:
         link = tree.frame_link(frame)
         plan, path = robot.plan((link,)), tree.path(link)
-        size = magnitudes(plan, q[np.newaxis], v[np.newaxis], a[np.newaxis], STILL_STATE)
-        size = against_true_values(size, *decimals.of(tree, path, q))
+        rows = q[np.newaxis], v[np.newaxis], a[np.newaxis]
+        size = against_true_values(plan, *rows, conversion(robot.urdf, tree, path, rows[0]))
         with precision(digits):
             motion = move(tree, read_exact(robot.urdf, tree, path), q, v, a)
             for row in QUANTITIES:

@@ -373,7 +373,7 @@ def read_skrobot(text: str) -> Reading:
 
 
 def read_newton(path: str) -> Reading:
-    """Read a USD stage with Newton, which computes in single precision."""
+    """Read a USD stage with Newton, which computes in single precision; `eval_mimic` moves mimic joints."""
     import newton  # noqa: PLC0415
 
     builder = newton.ModelBuilder()
@@ -381,13 +381,14 @@ def read_newton(path: str) -> Reading:
     model = builder.finalize(device="cpu")
     state, starts = model.state(), model.joint_q_start.numpy()
     counts = np.diff(np.append(starts[: len(builder.joint_label)], model.joint_coord_count))
-    # Newton adds a free joint to a body without a joint, so such a joint is not in the file.
+    # Newton adds a free joint to a body without a joint, so such a joint is not in the file. `eval_mimic`
+    # computes the coordinates of mimic joints.
     places = {
         str(label).rpartition("/")[2]: (int(start), int(count))
-        for label, kind, start, count in zip(
-            builder.joint_label, builder.joint_type, starts, counts, strict=False
+        for label, kind, leader, start, count in zip(
+            builder.joint_label, builder.joint_type, builder.joint_mimic_joint, starts, counts, strict=False
         )
-        if count and int(kind) != int(newton.JointType.FREE)
+        if count and leader < 0 and int(kind) != int(newton.JointType.FREE)
     }
     bodies = [str(label).rpartition("/")[2] for label in builder.body_label]
 
@@ -397,6 +398,7 @@ def read_newton(path: str) -> Reading:
             start, count = places[name]
             q[start : start + count] = values[name]
         state.joint_q.assign(q)
+        newton.eval_mimic(model, state)
         newton.eval_fk(model, state.joint_q, state.joint_qd, state)
         rotations = (quaternion / np.linalg.norm(quaternion) for quaternion in state.body_q.numpy()[:, 3:])
         return {

@@ -55,6 +55,7 @@ from urdfkin.kinematics.lengths import State
 from urdfkin.kinematics.number_kinds import Length, counted, norm, product
 from urdfkin.kinematics.number_kinds import length_equations as eq
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, MUJOCO, ROUNDINGS, of_joints
+from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.comparison import KERNELS
@@ -326,8 +327,24 @@ def about_the_root(size: Magnitudes) -> Magnitudes:
     )
 
 
-def against_true_values(size: Magnitudes, angles: float, rules: int) -> Magnitudes:
-    """Return the magnitudes for a comparison of one program with true values.
+class Conversion(NamedTuple):
+    """The errors of converting a URDF's decimals to doubles (`urdfkin.verify.exact.numbers.conversion`).
+
+    Attributes:
+        angles: (n,) sum of the errors of angles over the joints of the path, in eps rad.
+        rules: Number of mimic rules on the path; each rule in a chain of rules counts.
+        lengths: (steps + 1,) what the sizes of displacements exceed `CompiledTree.lengths` by, m.
+    """
+
+    angles: FloatArray
+    rules: int
+    lengths: FloatArray
+
+
+def against_true_values(
+    plan: CompiledTree, q: FloatArray, v: FloatArray | None, a: FloatArray | None, errors: Conversion
+) -> Magnitudes:
+    """Return the magnitudes for a comparison of one program with true values, rounded to 17 digits.
 
     The true values are those of the decimals in the URDF and of the doubles q, v and a. They are rounded to
     17 digits. `ROUNDINGS` = 24 roundings are allowed for each joint, and one program has at most 16.8
@@ -335,21 +352,35 @@ def against_true_values(size: Magnitudes, angles: float, rules: int) -> Magnitud
     an eps each for an offset, an axis and the true value itself. An axis is used in two rotations, so it
     counts twice. Two kinds of numbers need additional roundings:
 
-    - Roll, pitch and yaw have an error of half an eps of their size, so all vectors after the joint are
-      rotated by at most (|roll| + |pitch| + |yaw|) / 2 eps.
-    - A mimic joint's value is m x + c. The roundings of m, of the product and of the sum add at most (3 |m x|
-      + |c|) / 2 eps. The rounding of c adds at most |c| / 2 eps. The error of x is multiplied by
-      |m|. After a revolute mimic joint, all vectors are rotated by the sum of these errors. Each mimic rule
-      adds a relative error of 3/2 eps to a displacement or a joint velocity.
+    - Roll, pitch and yaw have an error of half an eps of their size, so all vectors after the joint turn by
+      at most (|roll| + |pitch| + |yaw|) / 2 eps.
+    - A mimic joint's value is m x + c. The roundings of m, of the product and of the sum have an error of at
+      most (3 |m x| + |c|) / 2 eps. The rounding of c has an error of at most |c| / 2 eps, and the error of x
+      is multiplied by |m|.
 
-    An error of 1 eps rad changes each factor by at most 1 eps of its length.
+    A program may also first multiply out a chain of r rules, from either end, to M q + C. Each number then
+    has the same roundings, except that sums are rounded: r - 1 sums of C and one sum with M q. None exceeds
+    X, the size of the value with the sizes of all terms added up: |q| for an independent joint, |m| X' + |c|
+    for a mimic joint. The error of the value is therefore at most (r - 1) / 2 X eps more.
+
+    A revolute mimic joint rotates all vectors after the joint by its error. An error of 1 eps rad changes
+    each factor by at most 1 eps of its length.
+
+    The displacement of a prismatic mimic joint has an error of at most 3/2 r X eps, because no term of X has
+    more than 3 r roundings, neither with the rules one by one nor multiplied out. If the offsets of a chain
+    cancel, |M q| + |C| is far below X. The lengths of the path therefore contain X. Then 3/2 eps for each
+    rule are enough, also for rates, which have fewer roundings.
 
     Args:
-        size: Magnitudes for two programs.
-        angles: Sum of the above errors of angles over the joints of the path, in eps.
-        rules: Number of mimic rules on the path; each rule in a chain of rules counts.
+        plan: The compiled tree of one frame.
+        q: (n, nq) rad, m.
+        v: (n, nv) or None.
+        a: (n, nv) or None.
+        errors: The errors of the conversions, for the same path and the same q.
     """
-    return replace(size, roundings=size.roundings + angles + 1.5 * rules)
+    size = magnitudes(replace(plan, lengths=plan.lengths + errors.lengths), q, v, a, STILL_STATE)
+    own = errors.angles[:, np.newaxis] + 1.5 * errors.rules
+    return replace(size, roundings=size.roundings + own)
 
 
 def placement_scale(plan: CompiledTree, size: Magnitudes) -> FloatArray:

@@ -104,12 +104,14 @@ class Comparison:
     def __add__(self, other: Comparison) -> Comparison:
         """Return the combined comparison of two batches.
 
-        The `index` of the result belongs to the batch with the larger ratio.
+        The `index` of the result belongs to the batch with the larger ratio. A ratio that is not a number
+        counts as larger than any number.
         """
-        first, second = (self, other) if self.share >= other.share else (other, self)
+        second_is_larger = other.share > self.share or (np.isnan(other.share) and not np.isnan(self.share))
+        first, second = (other, self) if second_is_larger else (self, other)
         return Comparison(
             self.results + other.results,
-            max(self.worst, other.worst),
+            float(np.maximum(self.worst, other.worst)),
             first.share,
             first.index or second.index,
         )

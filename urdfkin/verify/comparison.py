@@ -16,7 +16,8 @@ from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
 from urdfkin.model.tree import FloatArray
 
 #: The module with the compiled kernels of checks.
-#: A check of one configuration uses the kernels `CHECKS`; only checks of batches use the kernel `_OF_BATCHES`.
+#: A check of one configuration uses the kernels `CHECKS`.
+#: Only checks of batches use the kernel `_OF_BATCHES`.
 KERNELS = "urdfkin.verify.kernels"
 CHECKS = "worst", "coupling"
 _OF_BATCHES = "lengths"

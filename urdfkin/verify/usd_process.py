@@ -72,10 +72,10 @@ def answer_of(request: Mapping[str, Any]) -> dict[str, Any]:
         "single": read.single,
         "remarks": [astuple(one) for one in read.remarks],
         "files": read.files,
+        "prims": read.prims,
     }
     if request["check"]:
         answer |= {
-            "prims": read.prims,
             "rest": packed(read.rest[:, :3]),
             "rest_q": read.rest_q.tolist(),
             "joints": _second_reading(read),

@@ -416,17 +416,34 @@ def comparison_with_oracle(
     """Compare urdfkin's results (n, frames, ...) for some configurations with the results of an oracle.
 
     Large results are compared in blocks, while the oracle's results are still in the cache.
+
+    Raises:
+        OracleError: the oracle returns results for more or fewer configurations.
     """
     if quantity.blocks is None:
         theirs, bound = oracle_results_with_bound(quantity, oracle, x, ours, by)
+        _demand_all(quantity, by, len(theirs), len(ours))
         return compare(ours, theirs, bound, 2)
     bound, units, first = bound_of(quantity, x, by), np.empty(ours.shape[:2]), 0
     with _not_finite_is_known():
         for theirs in oracle_blocks(quantity, oracle, x.query):
             part = slice(first, first + len(theirs))
+            if part.stop > len(ours):
+                _demand_all(quantity, by, part.stop, len(ours))
             scale = bound.scale if len(bound.scale) == 1 else bound.scale[part]
             units[part], first = worst_of_each(ours[part], theirs, scale, 2), part.stop
-    return comparison_of(units[:first], bound)
+    _demand_all(quantity, by, first, len(ours))
+    return comparison_of(units, bound)
+
+
+def _demand_all(quantity: Quantity, by: OracleLibrary, found: int, wanted: int) -> None:
+    """Raise an error if an oracle does not return a result for each configuration."""
+    if found != wanted:
+        raise OracleError(
+            f"{by.title} does not return the {quantity.name} of each configuration",
+            found=f"{found} of {wanted} results",
+            remedy="please report this as an error of urdfkin, with the URDF",
+        )
 
 
 def oracle_results_with_bound(

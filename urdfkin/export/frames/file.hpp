@@ -2,6 +2,9 @@
 #ifndef @UP@_HPP
 #define @UP@_HPP
 #include <cmath>
+#ifdef __FAST_MATH__
+#error "-ffast-math reorders sums and rounds sines more; the error bounds of this file do not allow for it"
+#endif
 
 namespace @title@_kinematics {
 @functions@

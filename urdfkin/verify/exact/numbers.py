@@ -11,21 +11,24 @@ come from the tree. `urdfkin.urdf.lint` has already checked the text.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from decimal import ROUND_HALF_EVEN, Decimal, localcontext
 from functools import lru_cache
+from typing import Any, NamedTuple
 from xml.etree.ElementTree import Element
 
+import numpy as np
 from flint import arb, ctx
 
 from urdfkin.errors import InputError
 from urdfkin.kinematics import equations as eq
 from urdfkin.model.recursion import IDENTITY, ZERO, Matrix, Number, Vector
-from urdfkin.model.tree import Joint, JointKind, KinematicTree, Lock
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Lock
 from urdfkin.system.locks import lock_over_forks
 from urdfkin.system.plain_xml import plain_xml
+from urdfkin.verify.bounds import Conversion
 
 #: Number of digits in the accuracy study.
 #: A double has 16 digits, so fifty digits are enough to measure an error in its last digit.
@@ -210,6 +213,18 @@ def read_exact(text: str, tree: KinematicTree, among: Iterable[int] | None = Non
     }
 
 
+def conversion(text: str, tree: KinematicTree, path: Sequence[int], q: FloatArray) -> Conversion:
+    """Return the errors that converting a URDF's decimals to doubles causes (`against_true_values`).
+
+    Args:
+        text: The URDF text.
+        tree: The tree of the same text.
+        path: Indices of the joints of a frame's path, from the root.
+        q: (n, nq) configurations.
+    """
+    return _Text(text).conversion(tree, path, q)
+
+
 @lru_cache(maxsize=1)  # parsing a large text takes longer than the enclosure of a sample
 class _Text:
     """Reader of the joints of a URDF text."""
@@ -258,9 +273,13 @@ class _Text:
         x, y, z = self.numbers(element, name, default)
         return x, y, z
 
+    def has_quaternion(self, origin: Element | None) -> bool:
+        """Return whether an origin's rotation is `quat_xyzw`; before URDF 1.1 this attribute is ignored."""
+        return self.quaternions and origin is not None and "quat_xyzw" in origin.attrib
+
     def rotation(self, origin: Element | None) -> Matrix:
         """Return the rotation of `rpy` or, from URDF 1.1 on, of the quaternion `quat_xyzw` of any length."""
-        if self.quaternions and origin is not None and "quat_xyzw" in origin.attrib:
+        if origin is not None and self.has_quaternion(origin):
             return from_quaternion(self.numbers(origin, "quat_xyzw", ""))
         return from_rpy(self.vector(origin, "rpy", "0 0 0"))
 
@@ -273,3 +292,55 @@ class _Text:
             multiplier, offset = multiplier * factor, offset + multiplier * constant
             name = str(rule.get("joint"))
         return multiplier, offset
+
+    def conversion(self, tree: KinematicTree, path: Sequence[int], q: FloatArray) -> Conversion:
+        at: dict[str, Any] = {
+            joint.name: q[:, i] for joint, i in zip(tree.joints, tree.q_index, strict=True) if joint.nq == 1
+        }
+        at |= {joint.name: joint.lock.q for joint in tree.joints if joint.lock and not joint.lock.joint.mimic}
+        angles, rules, lengths, step = np.zeros(len(q)), 0, [0.0], 0
+        for i in path:
+            joint, own = tree.joints[i], tree.joints[i].unlocked
+            if (element := self.elements.get(joint.name)) is not None:
+                origin = element.find("origin")
+                if not self.has_quaternion(origin):
+                    angles += math.fsum(abs(float(x)) for x in self.numbers(origin, "rpy", "0")) / 2.0
+                if own.mimic is not None:
+                    value = self.value(joint.name, at)
+                    rules += value.rules
+                    if own.kind.turns:
+                        angles += value.error + 0.5 * (value.rules - 1) * (value.moved + value.offset)
+                    elif joint.lock is None:
+                        lengths[step] += max(0.0, value.offset - abs(own.mimic.offset))
+                    else:
+                        lengths[step] += max(0.0, value.moved + value.offset - abs(joint.lock.value))
+            if joint.kind.nv:
+                lengths.append(0.0)
+                step += 1
+        return Conversion(angles, rules, np.array(lengths))
+
+    def value(self, name: str, at: Mapping[str, Any]) -> _Value:
+        """Return the size of a joint's value and its error, from the values of the independent joints."""
+        rule = self.elements[name].find("mimic")
+        if rule is None or name in at:
+            return _Value(abs(at[name]), 0.0, 0.0, 0)
+        m, c = abs(float(rule.get("multiplier", "1"))), abs(float(rule.get("offset", "0")))
+        x = self.value(str(rule.get("joint")), at)
+        error = m * x.error + 1.5 * m * (x.moved + x.offset) + c
+        return _Value(m * x.moved, m * x.offset + c, error, x.rules + 1)
+
+
+class _Value(NamedTuple):
+    """The size of a joint's value M q + C, and its error.
+
+    Attributes:
+        moved: |M q|.
+        offset: Sum of the sizes of the offsets, each multiplied by the multipliers after it; at least |C|.
+        error: Error of the value if the rules are applied one by one, in eps.
+        rules: Number of rules.
+    """
+
+    moved: Any
+    offset: float
+    error: Any
+    rules: int
