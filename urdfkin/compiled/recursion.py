@@ -253,8 +253,9 @@ def _read(m, x, n, b, width, stride, blocks, begin, end, s, row):
     """Read the needed blocks of eight numbers of `m` configurations, from configuration b on.
 
     If x has one row, all configurations use this row. A block of eight numbers is read faster than a shorter
-    block. If a configuration has fewer than eight numbers, the numbers after it are therefore read too, unless
-    they are beyond the end of x. They are written to the rows of the inputs that are read next, or of the base.
+    block. If a configuration ends within a block, numbers of the next configuration are therefore read too,
+    unless they are beyond the end of x. These numbers are written to the scratch rows of inputs that are read
+    later.
     """
     for i in range(begin, end):
         at = blocks[i]
