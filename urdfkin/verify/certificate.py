@@ -351,6 +351,8 @@ class Ledger:
 
     def account(self, quantity: str) -> Account:
         """Return the account of a quantity. Code that counts results often can store and reuse it."""
+        if (known := self._accounts.get(quantity)) is not None:
+            return known
         with _entering:
             return self._accounts.setdefault(quantity, Account())
 
