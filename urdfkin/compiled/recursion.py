@@ -195,6 +195,11 @@ def _floating(axes, state, s, q, v, a):
     return free(axes, state, o, u, _vector_if(alpha, s, a + 3), _vector_if(alpha, s, a))
 
 
+def _shifted(state, d):
+    R, p, w, vel, alpha, acc = state
+    return R, eq.plus(p, d), w, vel, alpha, acc
+
+
 # -- constants -----------------------------------------------------------------------------------------
 
 
@@ -371,6 +376,10 @@ def _block(axes, m, task, program, g, s, b, reference, orders, follow, keep, col
     state = follow(_start(axes, m, s, task, program[_ROW_BASE], b))
     at, stage = program[_CODE], task[_STAGE]
     to, first = (numbers_at(stage), 0) if stage else (numbers_at(task[_OUT]), b)
+    if task[_BASE] == 0 and _CARRY_X <= program[at] <= _CARRY:
+        # The base is at rest at the world's origin: the first translation changes only the position.
+        state = _shifted(state, _vector(g, program[at + 4]))
+        at += WIDTH
     while program[at] != _END:
         op, x, y, z, c = program[at], program[at + 1], program[at + 2], program[at + 3], program[at + 4]
         at += WIDTH
