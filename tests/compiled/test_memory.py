@@ -118,12 +118,12 @@ def test_a_batch_is_read_to_its_last_number_and_no_further(name: str) -> None:
     frame = robot.link_frames[-1]
     for n in (1, LANES - 1, LANES, LANES + 1, 2 * LANES, 3 * LANES + 5):
         inputs = state(robot, n, 5)
-        expected = robot.acceleration(*inputs, frame, verify=False)
+        expected = robot.acceleration(inputs[0], inputs[1], inputs[2], frame, verify=False)
         with ExitStack() as stack, only("compiled"):
-            copies = [stack.enter_context(before_closed_memory(x)) for x in inputs]
-            found = robot.acceleration(*copies, frame, verify=False)
+            q, v, a = (stack.enter_context(before_closed_memory(x)) for x in inputs)
+            found = robot.acceleration(q, v, a, frame, verify=False)
             assert found.tobytes() == expected.tobytes()
-            del copies
+            del q, v, a
 
 
 @pytest.mark.slow

@@ -114,10 +114,15 @@ def test_arrays_that_need_no_conversion_give_the_bits_and_the_errors_of_all_othe
     q, v, a = robot.sample(n, seed=1), *np.random.default_rng(1).standard_normal((2, n, 6))
     expected, out = fast.acceleration(q.tolist(), v.tolist(), a.tolist()), np.empty((n, 6))
     before = robot.certificate().lines[0].unchecked
-    for given in ((q, v, a), (np.asfortranarray(q), v[:], a), (q, v, a.astype(">f8")), (q.tolist(), v, a)):
+    for one, two, three in (
+        (q, v, a),
+        (np.asfortranarray(q), v[:], a),
+        (q, v, a.astype(">f8")),
+        (q.tolist(), v, a),
+    ):
         for threads in (None, 1, 2):
             out[:] = np.nan
-            assert fast.acceleration(*given, out=out, threads=threads) is out
+            assert fast.acceleration(one, two, three, out=out, threads=threads) is out
             assert out.tobytes() == expected.tobytes()
     assert robot.certificate().lines[0].unchecked == before + 12 * n
     with pytest.warns(urdfkin.DegreesWarning):

@@ -381,7 +381,7 @@ class CompiledFrame:
             return self._robot.compute(
                 name, inputs, self.frame, self.reference, out=out, threads=threads, verify=False
             )
-        if out is not None and self._are_plain(row, inputs, out):
+        if out is not None and self._are_plain(inputs, row, out):
             # If an input is not finite, the code below raises an error that names the number.
             with suppress(NotFiniteError):
                 self._run(made, row, inputs, out, threads)
@@ -395,7 +395,7 @@ class CompiledFrame:
         return call.in_shape(found) if out is None else out
 
     def _are_plain(
-        self, row: Quantity, inputs: Sequence[Given], out: FloatArray
+        self, inputs: Sequence[Given], row: Quantity, out: FloatArray
     ) -> TypeGuard[Sequence[FloatArray]]:
         """Return whether all arguments are arrays whose memory the machine code can use as it is.
 

@@ -315,7 +315,8 @@ def _eight(context: Any, x: Any, at: Any) -> Any:
     """Return eight consecutive numbers, one in each lane."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.load(_vector_at(builder, *arguments, LANES), align=8)
+        x, at = arguments
+        return builder.load(_vector_at(builder, x, at, LANES), align=8)
 
     return NUMBER(_NUMBERS, types.intp), generate
 
