@@ -1,8 +1,12 @@
 """Kernels work with addresses: they write what is theirs and nothing beside it, and read nothing beyond."""
 
+import ctypes
 import gc
+import mmap
 import pickle
+import sys
 from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 
 import numpy as np
 import pytest
@@ -11,6 +15,7 @@ import urdfkin
 from tests.laws.subjects import robot_of, state
 from urdfkin.compiled import evaluate
 from urdfkin.compiled.plan import LANES, CompiledTree, compile_tree, program_of
+from urdfkin.compiled.preload import only
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
@@ -86,6 +91,38 @@ def test_so_are_all_frames_and_each_part_of_each_thread(n: int) -> None:
         evaluate.accelerations(plan, q, v, a, Reference.LOCAL, out=six, threads=threads)
         assert kept(memory)
         assert not (six == GUARD).any()
+
+
+@contextmanager
+def before_closed_memory(x: FloatArray) -> Iterator[FloatArray]:
+    """A copy of an array. Reading the byte after its last number is a segmentation fault."""
+    whole = -(-max(x.nbytes, 1) // mmap.PAGESIZE) * mmap.PAGESIZE
+    memory = mmap.mmap(-1, whole + mmap.PAGESIZE)
+    numbers = np.frombuffer(memory)
+    closed = ctypes.c_void_p(numbers.ctypes.data + whole)
+    protect, size = ctypes.CDLL(None, use_errno=True).mprotect, ctypes.c_size_t(mmap.PAGESIZE)
+    copy = numbers[whole // 8 - x.size : whole // 8].reshape(x.shape)
+    copy[...] = x
+    assert protect(closed, size, 0) == 0
+    try:
+        yield copy
+    finally:
+        assert protect(closed, size, mmap.PROT_READ | mmap.PROT_WRITE) == 0
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="mprotect of the C library")
+@pytest.mark.parametrize("name", ["planar_two_link", "ur5", "panda", "talos"])
+def test_a_batch_is_read_to_its_last_number_and_no_further(name: str) -> None:
+    robot = urdfkin.load(name, verify=False)
+    frame = robot.link_frames[-1]
+    for n in (1, LANES - 1, LANES, LANES + 1, 2 * LANES, 3 * LANES + 5):
+        inputs = state(robot, n, 5)
+        expected = robot.acceleration(inputs[0], inputs[1], inputs[2], frame, verify=False)
+        with ExitStack() as stack, only("compiled"):
+            q, v, a = (stack.enter_context(before_closed_memory(x)) for x in inputs)
+            found = robot.acceleration(q, v, a, frame, verify=False)
+            assert found.tobytes() == expected.tobytes()
+            del q, v, a
 
 
 @pytest.mark.slow

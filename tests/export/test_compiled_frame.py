@@ -16,6 +16,7 @@ from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.export import c, compiled_frame
 from urdfkin.export.code import exported
 from urdfkin.export.compiled_frame import NoCompilerError, library
+from urdfkin.model.tree import frozen
 from urdfkin.robot import Robot
 from urdfkin.verify.certificate import VerificationError
 from urdfkin.verify.quantities import quantity
@@ -105,6 +106,45 @@ def test_what_is_no_configuration_is_refused_as_everywhere(arm: Robot) -> None:
         fast.jacobian(np.zeros(2), out=np.empty(3))
     with pytest.raises(UnknownNameError):
         arm.compiled("nowhere")
+
+
+def test_arrays_that_need_no_conversion_give_the_bits_and_the_errors_of_all_others() -> None:
+    robot = urdfkin.load("ur5", verify=False)
+    fast, n = robot.compiled("tool0"), 37
+    q, v, a = robot.sample(n, seed=1), *np.random.default_rng(1).standard_normal((2, n, 6))
+    expected, out = fast.acceleration(q.tolist(), v.tolist(), a.tolist()), np.empty((n, 6))
+    before = robot.certificate().lines[0].unchecked
+    for one, two, three in (
+        (q, v, a),
+        (np.asfortranarray(q), v[:], a),
+        (q, v, a.astype(">f8")),
+        (q.tolist(), v, a),
+    ):
+        for threads in (None, 1, 2):
+            out[:] = np.nan
+            assert fast.acceleration(one, two, three, out=out, threads=threads) is out
+            assert out.tobytes() == expected.tobytes()
+    assert robot.certificate().lines[0].unchecked == before + 12 * n
+    with pytest.warns(urdfkin.DegreesWarning):
+        fast.acceleration(np.full((n, 6), 90.0), v, a, out=out)
+    shared = np.zeros((2 * n, 6))
+    for bad, to, words in (
+        ((q, v, a), np.empty((n, 5)), "out must be"),
+        ((q, v, a), np.empty((6, n)).T, "out must be"),
+        ((q, v, a), frozen(np.zeros((n, 6))), "out must be"),
+        ((shared[:n], v, a), shared[1 : n + 1], "share memory"),
+        ((q[:, :5], v, a), out, "needs 6 numbers"),
+        ((q[:5], v, a), out, "broadcast"),
+    ):
+        with pytest.raises(InputError, match=words):
+            fast.acceleration(*bad, out=to)
+    for x in (q, v, a):
+        x[n - 1, 5], kept = np.nan, x[n - 1, 5]
+        with pytest.raises(InputError, match="finite"):
+            fast.acceleration(q, v, a, out=out)
+        x[n - 1, 5] = kept
+    with pytest.raises(InputError, match="threads"):
+        fast.acceleration(q, v, a, out=out, threads=0)
 
 
 def test_so_is_every_number_of_rows_that_no_register_divides() -> None:

@@ -29,6 +29,7 @@ from urdfkin.compiled.plan import (
     CompiledTree,
     KernelArgs,
     Program,
+    address,
     lines,
     program_of,
     scratch,
@@ -238,7 +239,7 @@ def _compiled(
 
     def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
         task, kept = task_of(program, reference, parts, part, staged=staged)
-        outcome: int = core(task.ctypes.data)
+        outcome: int = core(address(task))
         del kept
         return outcome
 
@@ -269,12 +270,12 @@ def task_of(
     width, memory, task = out[0].size, scratch(program), np.zeros(len(KernelArgs), dtype=np.int64)
     stage = lines(LANES * width if staged else 0)
     task[KernelArgs.PROGRAM], task[KernelArgs.CONSTANTS] = program.addresses
-    task[KernelArgs.SCRATCH], task[KernelArgs.OUT] = memory.ctypes.data, out.ctypes.data
+    task[KernelArgs.SCRATCH], task[KernelArgs.OUT] = address(memory), address(out)
     task[KernelArgs.N], task[KernelArgs.WIDTH] = len(out), width
     task[KernelArgs.REFERENCE] = REFERENCES[reference]
-    task[KernelArgs.STAGE] = stage.ctypes.data if staged else 0
+    task[KernelArgs.STAGE] = address(stage) if staged else 0
     for place, of_place, x in zip(_PLACES, _STRIDES, inputs, strict=False):
-        task[place], task[of_place] = x.ctypes.data, 0 if len(x) == 1 else x.shape[1]
+        task[place], task[of_place] = address(x), 0 if len(x) == 1 else x.shape[1]
     if inputs[0] is STILL_STATE:
         task[KernelArgs.BASE] = 0
     return task, (memory, stage)
@@ -348,9 +349,11 @@ def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, t
     threads = default_threads(n) if threads is None else whole_number(threads, "threads", 1)
     if n == 0:
         return 0
-    parts = _parts(n, min(threads, max(n // LANES, 1), _processors()))
-    if len(parts) == 1:
+    if (threads := min(threads, n // LANES)) > 1:
+        threads = min(threads, _processors())
+    if threads <= 1:
         return compute(inputs, out)
+    parts = _parts(n, threads)
     work = [_pool().submit(compute, _rows(inputs, n, *part), out[slice(*part)]) for part in parts]
     return max([future.result() for future in work])  # this waits until all threads have finished
 

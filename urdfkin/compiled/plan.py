@@ -389,7 +389,7 @@ class Program:
     @cached_property
     def addresses(self) -> tuple[int, int]:
         """The memory addresses of `words` and `constants`, which are valid while the program exists."""
-        return self.words.ctypes.data, self.constants.ctypes.data
+        return address(self.words), address(self.constants)
 
     @cached_property
     def lists(self) -> tuple[list[int], list[Number]]:
@@ -661,6 +661,13 @@ class KernelArgs(IntEnum):
     COUNT = auto()
 
 
+def address(x: NDArray[Any]) -> int:
+    """Return the address of an array's first number."""
+    # `x.ctypes.data` runs Python code, which takes longer after a batch has displaced it from the caches.
+    found: int = x.__array_interface__["data"][0]
+    return found
+
+
 def scratch(program: Program) -> FloatArray:
     """Return memory for the intermediate results of one run of a program."""
     return lines(program.rows * LANES)
@@ -669,5 +676,5 @@ def scratch(program: Program) -> FloatArray:
 def lines(count: int) -> FloatArray:
     """Return memory for `count` numbers that begins at the start of a cache line."""
     numbers = np.empty(count + _LINE // 8)
-    first = -numbers.ctypes.data % _LINE // 8
+    first = -address(numbers) % _LINE // 8
     return numbers[first : first + count]

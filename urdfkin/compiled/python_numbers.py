@@ -279,19 +279,21 @@ def write_rows(
     to[at : at + count] = [s[row].x for row in rows[first : first + count]]
 
 
-def ordinary(x: Sequence[float], at: int, count: int) -> bool:
-    """Return whether `count` numbers from `x[at]` on are ordinary.
-
-    Ordinary means that no number is nan and that no absolute value exceeds `LARGE`.
-    """
-    return sum(map(abs, x[at : at + count])) < LARGE
+def add_squares(total: Number, x: Sequence[float], at: int, count: int) -> Number:
+    """Add the squares of `count` numbers from `x[at]` on to `total`."""
+    return Number(total.x + sum(y * y for y in x[at : at + count]))
 
 
-def fetch(*_: object) -> None:
-    """Do nothing, because there is no next block whose inputs could be loaded in advance."""
+def ordinary(total: Number) -> bool:
+    """Return whether a sum of squares is below the square of `LARGE`; it is not if a number was nan."""
+    return total.x < LARGE * LARGE
 
 
-stream = all_written = fetch
+def all_written(*_: object) -> None:
+    """Do nothing, because interpreted code does not write past the caches."""
+
+
+stream = all_written
 
 
 # -- sine and cosine -------------------------------------------------------------------------------------

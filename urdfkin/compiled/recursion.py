@@ -35,9 +35,9 @@ from urdfkin.compiled.plan import (
     Op,
 )
 from urdfkin.compiled.python_numbers import (
+    add_squares,
     all_written,
     constant,
-    fetch,
     number,
     number_if,
     numbers_at,
@@ -195,6 +195,11 @@ def _floating(axes, state, s, q, v, a):
     return free(axes, state, o, u, _vector_if(alpha, s, a + 3), _vector_if(alpha, s, a))
 
 
+def _shifted(state, d):
+    R, p, w, vel, alpha, acc = state
+    return R, eq.plus(p, d), w, vel, alpha, acc
+
+
 # -- constants -----------------------------------------------------------------------------------------
 
 
@@ -249,16 +254,20 @@ def _resume(s, row, state):
 # -- inputs --------------------------------------------------------------------------------------------
 
 
-def _read(m, x, b, width, stride, blocks, begin, end, s, row):
+def _read(m, x, n, b, width, stride, blocks, begin, end, s, row):
     """Read the needed blocks of eight numbers of `m` configurations, from configuration b on.
 
-    If x has one row, all configurations use this row.
+    If x has one row, all configurations use this row. A block of eight numbers is read faster than a shorter
+    block. If a configuration ends within a block, numbers of the next configuration are therefore read too,
+    unless they are beyond the end of x. These numbers are written to the scratch rows of inputs that are read
+    later.
     """
     for i in range(begin, end):
         at = blocks[i]
-        wide = width - at
-        read_rows(m if stride else 1, x, b * stride + at, stride, 8 if wide > 8 else wide, s, row + at)
-    fetch(x, (b + m) * stride, m * stride)
+        first, wide = b * stride + at, width - at
+        if wide > 8 or first + (m - 1) * stride + 8 <= n * stride:
+            wide = 8
+        read_rows(m if stride else 1, x, first, stride, wide, s, row + at)
 
 
 def _start(axes, m, s, task, row, b):
@@ -332,32 +341,32 @@ def _over_joint(axes, op, state, s, x, v, a, z, g, c):
 
 def _read_inputs(m, task, program, s, b, orders):
     """Read the coordinates and, if needed, the joint velocities and accelerations."""
-    q, nq, nv = numbers_at(task[_Q]), program[_NQ], program[_NV]
+    q, n, nq, nv = numbers_at(task[_Q]), task[_N], program[_NQ], program[_NV]
     edge, end = program[_BLOCKS_V], program[_BLOCKS_END]
-    _read(m, q, b, nq, task[_STRIDE_Q], program, program[_BLOCKS_Q], edge, s, program[_ROW_Q])
+    _read(m, q, n, b, nq, task[_STRIDE_Q], program, program[_BLOCKS_Q], edge, s, program[_ROW_Q])
     if orders > 1:
         v = numbers_at(task[_V])
-        _read(m, v, b, nv, task[_STRIDE_V], program, edge, end, s, program[_ROW_V])
+        _read(m, v, n, b, nv, task[_STRIDE_V], program, edge, end, s, program[_ROW_V])
     if orders > 2:
         a = numbers_at(task[_A])
-        _read(m, a, b, nv, task[_STRIDE_A], program, edge, end, s, program[_ROW_A])
+        _read(m, a, n, b, nv, task[_STRIDE_A], program, edge, end, s, program[_ROW_A])
 
 
-def _ordinary(m, task, program, b, orders):
-    """Return whether no input of a block is nan, infinite or too large.
+def _squares(total, m, task, program, b, orders):
+    """Add the squares of all inputs of a block to `total`.
 
-    Inputs that the recursion does not need are tested too.
+    Inputs that the recursion does not need are added too.
     """
-    good = _rows_are_ordinary(m, numbers_at(task[_Q]), b, program[_NQ], task[_STRIDE_Q])
+    total = _added(total, m, numbers_at(task[_Q]), b, program[_NQ], task[_STRIDE_Q])
     if orders > 1:
-        good = good and _rows_are_ordinary(m, numbers_at(task[_V]), b, program[_NV], task[_STRIDE_V])
+        total = _added(total, m, numbers_at(task[_V]), b, program[_NV], task[_STRIDE_V])
     if orders > 2:
-        good = good and _rows_are_ordinary(m, numbers_at(task[_A]), b, program[_NV], task[_STRIDE_A])
-    return good
+        total = _added(total, m, numbers_at(task[_A]), b, program[_NV], task[_STRIDE_A])
+    return total
 
 
-def _rows_are_ordinary(m, x, b, width, stride):
-    return ordinary(x, b * stride, (m if stride else 1) * width)
+def _added(total, m, x, b, width, stride):
+    return add_squares(total, x, b * stride, (m if stride else 1) * width)
 
 
 def _block(axes, m, task, program, g, s, b, reference, orders, follow, keep, column, emit):
@@ -367,6 +376,10 @@ def _block(axes, m, task, program, g, s, b, reference, orders, follow, keep, col
     state = follow(_start(axes, m, s, task, program[_ROW_BASE], b))
     at, stage = program[_CODE], task[_STAGE]
     to, first = (numbers_at(stage), 0) if stage else (numbers_at(task[_OUT]), b)
+    if task[_BASE] == 0 and _CARRY_X <= program[at] <= _CARRY:
+        # The base is at rest at the world's origin: the first translation changes only the position.
+        state = _shifted(state, _vector(g, program[at + 4]))
+        at += WIDTH
     while program[at] != _END:
         op, x, y, z, c = program[at], program[at + 1], program[at + 2], program[at + 3], program[at + 4]
         at += WIDTH
@@ -409,11 +422,11 @@ def forward_recursion(address, axes, orders, follow, keep, column, emit):
     put(s, ONE_ROW, one())
     n = task[_N]
     m = LANES if n >= LANES else 1
-    good = True
+    total = same(0.0)
     for first in range(0, n, m):
         b = min(first, n - m)  # the last block may overlap the block before it
+        total = _squares(total, m, task, program, b, orders)
         _block(axes, m, task, program, g, s, b, task[_REFERENCE], orders, follow, keep, column, emit)
-        good &= _ordinary(m, task, program, b, orders)
     if task[_STAGE]:
         all_written()
-    return 0 if good else 1
+    return 0 if ordinary(total) else 1

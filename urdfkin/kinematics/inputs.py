@@ -25,6 +25,7 @@ ROTATION_TOLERANCE = 2e-9
 #: Kinds of NumPy types that NumPy converts to floats without an error, although they are not real numbers:
 #: complex, bytes, text, timedelta, datetime, void.
 _NOT_NUMBERS = "cSUmMV"
+_DOUBLE = np.dtype(np.float64)
 
 
 def floats(value: ArrayLike, name: str) -> FloatArray:
@@ -32,6 +33,8 @@ def floats(value: ArrayLike, name: str) -> FloatArray:
 
     Raise InputError if `value` does not consist of real numbers.
     """
+    if type(value) is np.ndarray and value.dtype is _DOUBLE:
+        return value
     if _is_masked(value):
         raise InputError(f"{name} must be real numbers", found="a masked value")
     try:

@@ -354,6 +354,8 @@ class Ledger:
 
     def account(self, quantity: str) -> Account:
         """Return the account of a quantity. The caller may keep the account and use it again."""
+        if (known := self._accounts.get(quantity)) is not None:
+            return known
         with _entering:
             return self._accounts.setdefault(quantity, Account())
 

@@ -12,13 +12,14 @@ remaining values are transferred in blocks of four, two and one.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 from typing import Any
 
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from urdfkin.compiled.machine.compiling import compiled, helper
+from urdfkin.compiled.machine.compiling import compiled
 from urdfkin.compiled.machine.numbers import NOTHING, Known, Lanes, as_number, in_all_lanes
 from urdfkin.compiled.plan import LANES
 from urdfkin.compiled.python_numbers import LARGE
@@ -278,20 +279,6 @@ def write_rows(m, s, rows, first, count, to, at, stride):
             _write_1(s, rows, first + i, to, at + i, stride)
 
 
-@helper(fastmath={"reassoc"})
-def ordinary(x, at, count):
-    """Return whether `count` numbers from `x[at]` on are ordinary.
-
-    Ordinary means that no number is nan and that no absolute value exceeds `LARGE`.
-
-    The compiler may reorder the additions of this function.
-    """
-    total = 0.0
-    for i in range(count):
-        total += abs(x[at + i])
-    return total < LARGE
-
-
 @intrinsic
 def _fetch(context: Any, x: Any, at: Any) -> Any:
     """Load the memory around `x[at]` into the cache. An address beyond the end of the array is harmless."""
@@ -317,6 +304,66 @@ def fetch(x, at, count):
     if count <= _MOST_FETCHED:
         for number in range(at, at + count, LANES):
             _fetch(x, number)
+
+
+#: Number of doubles from a number that is read to the number that is loaded into the cache in advance.
+_AHEAD = 512
+
+
+@intrinsic
+def _eight(context: Any, x: Any, at: Any) -> Any:
+    """Return eight consecutive numbers, one in each lane."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        x, at = arguments
+        return builder.load(_vector_at(builder, x, at, LANES), align=8)
+
+    return NUMBER(_NUMBERS, types.intp), generate
+
+
+@compiled
+def _plus_squares(total, x, at):
+    _fetch(x, at + _AHEAD)
+    eight = _eight(x, at)
+    return total + eight * eight
+
+
+@compiled
+def add_squares(total, x, at, count):
+    """Add the squares of `count` numbers from `x[at]` on to `total`, and load later numbers into the cache.
+
+    Each of the last `count % 8` numbers is added in every lane, that is, eight times.
+    """
+    # Four independent sums take a quarter of the time of one sum.
+    second, third, fourth = same(0.0), same(0.0), same(0.0)
+    end = at + count
+    while at + 4 * LANES <= end:
+        total, second = _plus_squares(total, x, at), _plus_squares(second, x, at + LANES)
+        third, fourth = _plus_squares(third, x, at + 2 * LANES), _plus_squares(fourth, x, at + 3 * LANES)
+        at += 4 * LANES
+    while at + LANES <= end:
+        total = _plus_squares(total, x, at)
+        at += LANES
+    for i in range(at, end):
+        total = total + same(x[i]) * same(x[i])
+    return (total + second) + (third + fourth)
+
+
+@intrinsic
+def _sum(context: Any, x: Any) -> Any:
+    """Return the sum of the lanes."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        lanes = [builder.extract_element(arguments[0], ir.IntType(32)(i)) for i in range(LANES)]
+        return reduce(builder.fadd, lanes)
+
+    return types.float64(x), generate
+
+
+@compiled
+def ordinary(total):
+    """Return whether a sum of squares is below the square of `LARGE`; it is not if a number was nan."""
+    return _sum(total) < LARGE * LARGE
 
 
 @intrinsic
