@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import json
 import os
 import pickle
@@ -24,7 +25,7 @@ import numpy as np
 import psutil
 import pytest
 import yaml
-from distributed import LocalCluster
+from distributed import Client, LocalCluster
 from distributed.comm.core import CommClosedError
 from distributed.core import Status
 
@@ -376,6 +377,29 @@ def test_another_version_is_refused_before_anything_is_sent(
 def test_a_local_cluster_has_a_number_of_workers(word: str) -> None:
     with pytest.raises(InputError, match="N in local:N must be the number"), connected(word):
         pass
+
+
+def test_a_client_that_finds_no_scheduler_is_deleted_at_once() -> None:
+    """If the garbage collector deletes it in Dask's next thread, that thread waits for ever."""
+    import dask  # noqa: PLC0415
+
+    gc.collect()
+    before = _clients()
+    gc.disable()
+    try:
+        with (
+            dask.config.set({"distributed.comm.timeouts.connect": "0.5s"}),
+            pytest.raises(ClusterError, match="no Dask scheduler answers at this address"),
+            connected("tcp://127.0.0.1:9"),
+        ):
+            pass
+        assert _clients() <= before
+    finally:
+        gc.enable()
+
+
+def _clients() -> set[int]:
+    return {id(thing) for thing in gc.get_objects() if type(thing) is Client}
 
 
 def test_where_nobody_answers_is_said(monkeypatch: pytest.MonkeyPatch) -> None:

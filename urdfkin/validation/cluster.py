@@ -5,6 +5,7 @@ The number of workers may change during the run.
 
 from __future__ import annotations
 
+import gc
 import logging
 import pickle
 import sys
@@ -80,16 +81,20 @@ def _client(scheduler: str) -> Iterator[Client]:
         try:
             client = Client(scheduler, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:  # TypeError: tls:// without a certificate
-            keyed = "; give Dask the cluster's certificate and key, as docs/campaigns.md describes"
-            raise ClusterError(
-                "no Dask scheduler answers at this address",
-                where=scheduler,
-                found=str(error),
-                remedy="start a scheduler with: dask scheduler" + (keyed if kind == "tls" else ""),
-            ) from error
-        with client:
-            yield client
-        return
+            found = str(error)
+        else:
+            with client:
+                yield client
+            return
+        # Delete the client that failed: if the next client's thread deletes it, Dask waits for ever.
+        gc.collect()
+        keyed = "; give Dask the cluster's certificate and key, as docs/campaigns.md describes"
+        raise ClusterError(
+            "no Dask scheduler answers at this address",
+            where=scheduler,
+            found=found,
+            remedy="start a scheduler with: dask scheduler" + (keyed if kind == "tls" else ""),
+        )
     if not number.isdecimal() or not int(number):
         raise InputError(
             "`scheduler`: N in local:N must be the number of workers",
