@@ -303,7 +303,7 @@ def test_workers_killed_at_random_times_cost_time_and_nothing_else(
         if standing.chunks_done in times:
             time.sleep(rng.uniform(0.0, 0.2))
             deadline = time.monotonic() + 60
-            while not (workers := _running(there)):
+            while not (workers := [worker for worker in _running(there) if worker not in killed]):
                 assert time.monotonic() < deadline, "Dask replaced no worker"
                 time.sleep(0.05)
             killed.append(int(rng.choice(workers)))
