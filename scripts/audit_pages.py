@@ -427,10 +427,17 @@ def audit(browser: Browser, page: Page, output: Path | None, axe: str | None, ja
 def main() -> None:
     """Audit all pages, print their faults, and exit with 1 if there is one."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--only", nargs="*", default=[], help="beginnings of names: good, same, site, viewer")
+    parser.add_argument(
+        "--only",
+        nargs="*",
+        default=[],
+        help="pages to audit, by the beginnings of their names: good, same, site, viewer",
+    )
     parser.add_argument("--output", type=Path, help="folder for pictures and printed pages")
     parser.add_argument(
-        "--fleet", type=Path, help="report of many robots; by default all robots are validated"
+        "--fleet",
+        type=Path,
+        help="report of many robots to audit; by default the script validates all robots and writes one",
     )
     given = parser.parse_args()
     axe, jar, only = axe_script(), html_checker(), given.only

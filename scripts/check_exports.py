@@ -160,7 +160,8 @@ def check_library(library: str, environment: Path, package: str | None, keep: Pa
         found = {way: share for way, share in checked.items() if isinstance(share, float)}
         wrong += not all(share <= 1.0 for share in found.values())
         worst |= {way: max(share, worst.get(way, 0.0)) for way, share in found.items()}
-    print(f"{len(stored)} of {len(paths)} files, {wrong} with an error outside the bound; worst share of it:")
+    print(f"{len(stored)} of {len(paths)} files, {wrong} with an error outside the bound")
+    print("largest ratio of an error to its bound:")
     print(", ".join(f"{way} {share:.2g}" for way, share in worst.items()))
     return int(wrong > 0 or len(stored) < len(paths) or process.returncode != 0)
 

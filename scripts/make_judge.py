@@ -68,10 +68,11 @@ eps*scale: the worst error of all numbers, and the typical error (root mean squa
 is usually not exactly a double, so the error of reading it is included. For one sample, [interval
 arithmetic](enclosures.md) proves bounds of the true values.
 
-The analytical Jacobians are those of the twelve sequences of Euler angles together, and of quaternions, away
-from singularities. (Sequences about fixed axes have the same numbers, last row first.) Pinocchio computes no
-analytical Jacobians, so its rotation and Jacobian are inserted into equation (7.122), as urdfkin's are. With
-`--judge-moving-base` the root link has a random motion; the last robots on this page were studied so.
+The analytical Jacobians are computed for all twelve sequences of Euler angles, which share one line, and for
+quaternions, away from singularities. (Sequences about fixed axes have the same numbers, last row first.)
+Pinocchio computes no analytical Jacobians, so its rotation and Jacobian are inserted into equation (7.122),
+as urdfkin's are. With `--judge-moving-base` the root link has a random motion; the last robots on this page
+were studied with this option.
 
 The study used {SAMPLES} samples of each robot, seed {SEED}, every link and Pinocchio {version()}. By the
 typical error

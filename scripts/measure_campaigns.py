@@ -46,7 +46,7 @@ def cluster(*robots: Any, **how: Any) -> ValidationReport:
         report = validate(*robots, executor=two, **how)
         own = 1e3 * (time.process_time() - before) / chunks
         print(f"    {time.perf_counter() - begin:.1f} s without start and end")
-        print(f"    {own:.1f} ms of processor a chunk in client and scheduler, {chunks} chunks")
+        print(f"    {own:.1f} ms of processor time per chunk in client and scheduler, {chunks} chunks")
         return report
 
 

@@ -366,7 +366,7 @@ def test_calibration_of_a_locked_robot_writes_the_origins_of_the_whole_text() ->
         ({"panda_joint1": math.nan}, "finite value"),
         ({"panda_joint1": "soon"}, "not a finite number"),
         ("1, 2", "give each number with its name"),
-        ("ready", "a pose alone does not choose the joints to lock"),
+        ("ready", "a pose does not state which joints to lock"),
         (7, "lock must be a mapping"),
         ({3: 4}, "must be text"),
     ],

@@ -536,7 +536,7 @@ def _doubts(found: Calibration) -> Iterator[str]:
         yield (
             "poorly observable: "
             + _list(f"{name[k]} ({ratio:.0f} times the usual uncertainty)" for k, ratio in worst)
-            + "; the usual uncertainty is that with as many random configurations"
+            + "; the usual uncertainty is that of the same number of random configurations"
         )
     if not fitted.is_judged:
         yield "the fit cannot be checked, because there are as many parameters as measured numbers"

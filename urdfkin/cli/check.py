@@ -121,7 +121,8 @@ def _print_terminal(outcome: Outcome, *, excerpts: bool) -> None:
     if any(finding.fix and finding.fix.is_safe for finding in outcome.findings):
         say("[*] --fix fixes these findings; --diff prints the changes")
     if unsafe := sum(bool(finding.fix and not finding.fix.is_safe) for finding in outcome.findings):
-        say(f"--unsafe-fixes fixes {unsafe} more, but rotates joints by more than rounding")
+        many = "s" * (unsafe != 1)
+        say(f"--unsafe-fixes also fixes {unsafe} finding{many}, but rotates joints by more than rounding")
     worst = next((f.code for f in outcome.findings if f.severity is Severity.ERROR), None)
     if worst is not None:
         say(f"run 'urdfkin explain {worst}' for details: {page(worst).title}")
@@ -274,7 +275,7 @@ limit_options = together(
     is_flag=True,
     help="Print each finding on its own line. Default: one line for many findings of one kind.",
 )
-@mimic_option("Check the file for use with mimic joints coupled, or free.  [default: mimic]")
+@mimic_option("Check the file for coupled (--mimic) or free (--no-mimic) mimic joints.  [default: mimic]")
 @root_joint_option("Also check that no name of the robot collides with this root joint.")
 @source_options
 @settings_options

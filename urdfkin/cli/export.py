@@ -42,7 +42,7 @@ EXAMPLE = "urdfkin export panda --frame panda_hand --to c -o panda_hand.c"
     type=click.Choice(tuple(FORMS)),
     default="tree",
     show_default=True,
-    help="Steps of the code: the URDF's joints, or the table or screws from the base frame to the frame.",
+    help="Steps of the code: the joints of the URDF, the rows of a Denavit-Hartenberg table, or screws.",
 )
 @click.option(
     "--name", metavar="WORD", help="Prefix of the function names. Default: names of the robot and the frame."

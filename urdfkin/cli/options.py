@@ -217,7 +217,7 @@ usd_options = together(
         metavar="PATH",
         expose_value=False,
         callback=_remember_articulation,
-        help="Articulation of a USD stage with several.",
+        help="Path of the articulation to load, if a USD stage has several.",
     ),
 )
 #: The options that concern the source of a robot, not its joints.

@@ -231,9 +231,10 @@ def _document(found: Structure) -> TextDocument:
             rows.append((f"{pair.first}, {pair.second}", angle, apart))
         parts += ["", Table(("axes", "angle [deg]", "apart [mm]"), rows)]
     parts += ["", *(_kind(kind) for kind in found.kinds)] if found.kinds else []
+    start = "from the point of the first axis nearest to the second axis"
     far = "" if math.isinf(found.reach) else f", at most {found.reach:.6g} m"
     parts += [
-        f"reach: {found.reached:.4g} m on samples{far}, from the first axis where the second is nearest",
+        f"reach: {found.reached:.4g} m on samples{far}, {start}",
         *(f"closed form: {solver}" for solver in found.solvers),
         "",
     ]

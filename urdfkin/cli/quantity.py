@@ -65,7 +65,9 @@ if TYPE_CHECKING:
 _F = TypeVar("_F", bound=Callable[..., Any])
 _VALUES = {"q": q_option, "v": v_option, "a": a_option}
 _BASE = ("base_placement", "base_velocity", "base_acceleration")
-_trajectory = trajectory_option("Samples in place of --q, --v and --a; CSV output has a row for each time.")
+_trajectory = trajectory_option(
+    "Read q, v and a from a file instead of --q, --v and --a. CSV output has a row for each time."
+)
 #: Number of samples of a batch that a table shows.
 _SHOWN = 5
 

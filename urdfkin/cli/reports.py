@@ -166,7 +166,7 @@ def show(
     type=NumberFrom(1.0),
     default=2.0,
     show_default=True,
-    help="Factor by which a worst disagreement may grow before it counts as a regression.",
+    help="A worst disagreement that grows by more than this factor counts as a regression.",
 )
 @click.option(
     "--markdown",

@@ -58,7 +58,7 @@ _QUANTITIES = ("placement", "velocity", "jacobian", "jacobian-rate", "hessian", 
     type=NumberFrom(min=0, min_open=True),
     default=1.0,
     show_default=True,
-    help="Multiply the derived bound, for a function that rounds more than the textbook's recursion.",
+    help="Factor of the derived bound, for a function that rounds more often than the textbook's recursion.",
 )
 @click.option("--batch", is_flag=True, help="The function takes q (n, nq) and returns n results.")
 @click.option("--program", is_flag=True, help="TARGET is the command of a program that answers JSON lines.")

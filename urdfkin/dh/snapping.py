@@ -301,6 +301,6 @@ def snap_hint(table: DHTable, snapped: Callable[[float], DHTable]) -> str | None
     unit = "m" if cell in ("a", "d") else "rad"
     many = f"{len(noisy)} cells look" if len(noisy) > 1 else "a cell looks"
     return (
-        f"{many} like angles that the file rounded ({cell} of {joint}: {size:.2g} {unit}):"
+        f"{many} like the effect of rounded angles in the file ({cell} of {joint}: {size:.2g} {unit}):"
         f" --snap {best:.0e} leaves {left[best] or 'none'} of them and reports the effect on the tip"
     )

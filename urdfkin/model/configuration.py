@@ -352,7 +352,7 @@ def locked_values(
     elif pose is not None:
         remedy = "write NAME=VALUE, or name the joints that remain movable in joints (--joints)"
         raise InputError(
-            "a pose alone does not choose the joints to lock",
+            "a pose does not state which joints to lock",
             where="lock",
             remedy=remedy,
             question=Question.LOCKED_JOINTS,

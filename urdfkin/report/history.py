@@ -103,7 +103,7 @@ class HistoryDocument(Header):
     runs: Annotated[list[Run], says("The runs, the oldest first.")]
     robots: Annotated[list[RobotHistory], says("The robots; worse verdicts first.")]
     unusable: Annotated[list[Unused], says("Files that cannot be used, each with the reason.")]
-    repeated: Annotated[list[Unused], says("Files with a validation run that another file also contains.")]
+    repeated: Annotated[list[Unused], says("Files that repeat a validation run of another file.")]
 
 
 #: The layout of the document.

@@ -37,7 +37,7 @@ EQUIVALENT = Question()
 #: is larger than 1 because a sum adds the rounding errors of its terms.
 DUST = 1.001
 #: Heading of the list of joints whose mimic joints leave their limits.
-NARROWED = "limits of mimic joints, which the bounds of the distance ignore"
+NARROWED = "limits of mimic joints (the bounds of the distance ignore these limits)"
 
 
 def headline(found: Sameness, question: Question = EQUIVALENT) -> str:
@@ -155,7 +155,8 @@ def renamed(found: Sameness) -> list[str]:
     guessed = [one for one in pairs if one.b not in spellings(one.a) and one.a not in spellings(one.b)]
     joints = [f"joint {one.a} is {one.b}" for one in pairs]
     joints += [
-        f"joints of B have another order, which their axes allow; compared in the order {', '.join(names)}"
+        "joints of B have another order, which has no effect on the motion; compared in the order "
+        + ", ".join(names)
         for names in found.orders
     ]
     if (guessed or found.orders) and not found:

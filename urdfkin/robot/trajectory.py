@@ -369,7 +369,7 @@ def _error(fine: FloatArray, coarse: FloatArray, order: int) -> float:
 
 def _time_notes(t: FloatArray, *, given: bool) -> Iterator[str]:
     if not given:
-        yield "there is no time: the samples are taken as one second apart"
+        yield "there are no times: the samples are assumed to be one second apart"
         return
     step, rounding = float(np.diff(t).min()), float(np.spacing(np.abs(t).max()))
     if rounding > _TIME_ROUNDING * step:

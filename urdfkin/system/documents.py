@@ -68,8 +68,8 @@ class Header(TypedDict):
     command: Annotated[
         str | None,
         says(
-            "Command that makes the document again; null: unknown. Each set of options has its own line, "
-            "and so has each robot that was given as text (`-`: standard input)."
+            "Command that makes the document again; null: unknown. It has a line for each set of options, "
+            "and a line for each robot that was given as text (`-`: standard input)."
         ),
     ]
 

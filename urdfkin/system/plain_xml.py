@@ -43,7 +43,7 @@ def order_words(urdf: str, joints: Sequence[str]) -> str:
     known = set(joints)
     written = [e.get("name", "") for e in plain_xml(urdf) if e.tag == "joint" and e.get("name") in known]
     ours = [name for name in joints if name in set(written)]
-    ours_is = "order of joints: Pinocchio's (depth first, siblings by name), for q, v and columns"
+    ours_is = "order of joints in q, v and columns: Pinocchio's (depth first, siblings by name)"
     first = next((k for k, pair in enumerate(zip(written, ours, strict=False)) if pair[0] != pair[1]), None)
     if first is None:
         return f"{ours_is}; the file has the same order"

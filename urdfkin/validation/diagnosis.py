@@ -174,7 +174,7 @@ class Mistakes:
         for other in Reference if self.reference is not None else ():
             if other is not self.reference:
                 assert self.reference is not None
-                words = f"the result is in {other.name}; {self.reference.name} was asked for"
+                words = f"the result is in {other.name} instead of {self.reference.name}"
                 yield words, partial(case.compute, case.inputs, reference=other)
 
     def _of_accelerations(self, case: Diagnosis) -> Iterator[Mistake]:
@@ -230,9 +230,7 @@ class Mistakes:
         for link in self.robot.link_names[:64]:
             base = self.robot.placement(q, f"link:{link}", verify=False)
             if not np.allclose(base, np.eye(4)):
-                words = (
-                    f"the placement is relative to the link {link!r}; relative to the root link was asked for"
-                )
+                words = f"the placement is relative to the link {link!r} instead of the root link"
                 yield words, partial(np.linalg.solve, base, case.expected)
 
     def _of_axes(self, case: Diagnosis) -> Iterator[Mistake]:
@@ -431,7 +429,7 @@ class Mistakes:
         for k, name in enumerate(names):
             title = name.removeprefix("link:")
             yield (
-                f"the result is that of the frame {title!r}; {self.frame!r} was asked for",
+                f"the result is that of the frame {title!r} instead of {self.frame!r}",
                 partial(np.asarray, every[:, k]),
             )
 

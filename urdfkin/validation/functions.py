@@ -524,7 +524,7 @@ class _Run:
             return scale
         if not conversion.is_constant and name != "jacobian":
             raise InputError(
-                f"the bound of the {name} is not derived for a base velocity in other axes",
+                f"urdfkin has no bound of the {name} for a base velocity in axes other than its own",
                 where=conversion.convention.name,
                 remedy="check the Jacobian in this convention, or use urdfkin's convention",
             )

@@ -132,7 +132,7 @@ class Sample(TypedDict):
     q: Annotated[list[float], says("Coordinates: rad, m, quaternion x y z w.")]
     v: Annotated[
         list[float],
-        says("Joint velocities. Those of a planar or floating joint are in the child link's axes."),
+        says("Joint velocities. The velocities of a planar or floating joint are in the child link's axes."),
     ]
     a: Annotated[list[float], says("Joint accelerations: the time derivatives of v.")]
     results: list[Result]
@@ -153,7 +153,7 @@ class Vectors(TypedDict):
         str | None,
         says("The rule of the URDF standard that this robot tests, or null."),
     ]
-    note: Annotated[str | None, says("How libraries differ, or how the file was read.")]
+    note: Annotated[str | None, says("How libraries differ, or how the file was loaded; null: no remark.")]
     joints: list[JointEntry]
     samples: list[Sample]
 

@@ -195,7 +195,7 @@ class UnguardedError(UrdfkinError, RuntimeError):
         super().__init__(
             f"the viewer cannot be secured: {what}",
             where=f"viser {_version()}",
-            remedy="pip install 'viser==1.1.1', which can be secured, and report this as an error of urdfkin",
+            remedy="pip install 'viser==1.1.1', which can be secured, and report this error to urdfkin",
         )
 
 

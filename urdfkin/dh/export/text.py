@@ -141,7 +141,7 @@ def snap_lines(table: DHTable) -> list[str]:
     measured = f"{snap.measured_metres:.2e} m and {snap.measured_radians:.2e} rad"
     lines = [
         f"Snapped within {snap.tolerance:.3g} rad: the tip moves by at most {metres} m and turns by at most",
-        f"{radians} rad, guaranteed within the limits of prismatic joints",
+        f"{radians} rad; this is guaranteed if prismatic joints are within their limits",
         f"({measured} measured on {snap.samples} samples).",
     ]
     for change in snap.changes:
