@@ -88,6 +88,52 @@ def test_the_command_says_it_in_every_form(tmp_path: Path) -> None:
     assert run("diff", old, "nowhere.urdf").code == 2
 
 
+MJCF = """<mujoco model="arm"><compiler angle="radian"/><worldbody>
+  <body name="upper"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+    <joint name="shoulder" axis="0 0 1" range="-2 1.5" limited="true"/>
+    <body name="lower" pos="0.425 0 0"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+      <joint name="elbow" axis="0 0.1 1" range="-2 2" limited="true"/></body></body>
+</worldbody></mujoco>"""
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_between_two_formats_each_difference_is_told_at_its_joint(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco", reason="MuJoCo reads MJCF")
+    found = urdfkin.diff(OLD, MJCF)
+    said = [str(change) for change in found.changes]
+    assert said[:2] == ["joint elbow: origin 25 mm off", "joint elbow: axis turned by 99.67 mrad"]
+    assert "joint shoulder: limits -2 to 2 -> -2 to 1.5" in said
+    assert "joint shoulder: velocity 1 -> none" in said
+    assert "link world: new" not in said  # it is the link base, at the same place
+    [effect] = found.effects
+    assert effect.element == "joint elbow"
+    assert effect.interval.lower == pytest.approx(0.025, rel=1e-6)
+    assert found.total is not None
+    old, new = tmp_path / "old.urdf", tmp_path / "new.xml"
+    old.write_text(OLD)
+    new.write_text(MJCF)
+    assert "joint elbow: origin 25 mm off\n" in run("diff", str(old), str(new)).text
+    assert not urdfkin.diff(MJCF, MJCF)
+    same_robot = MJCF.replace("0.425", "0.4").replace("0 0.1 1", "0 0 1").replace("-2 1.5", "-2 2")
+    assert {change.what for change in urdfkin.diff(OLD, same_robot).changes} == {"velocity", "effort"}
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_between_two_formats_limits_are_compared_as_they_are_written() -> None:
+    pytest.importorskip("mujoco", reason="MuJoCo reads MJCF")
+    # The zero of the elbow is 0.5 rad off. `same` converts its limits; `diff` lists what the files state.
+    turned = MJCF.replace('pos="0.425 0 0"', 'pos="0.4 0 0" euler="0 0 0.5"').replace("0 0.1 1", "0 0 1")
+    three = OLD.replace("</robot>", FIXED.format("wrist", "tip", 0.3))
+    site = '<site name="tip" pos="0.3 0 0"/>'
+    found = urdfkin.diff(three, turned.replace("</body></body>", f"{site}</body></body>"))
+    elbow = [str(one) for one in found.changes if one.element == "joint elbow"]
+    assert elbow[0] == "joint elbow: origin turned by 500 mrad"
+    assert elbow[1:] == [f"joint elbow: {what} 1 -> none" for what in ("velocity", "effort")]
+    assert [str(one) for one in found.changes if one.what == "limits"] == [
+        "joint shoulder: limits -2 to 2 -> -2 to 1.5"
+    ]
+
+
 @pytest.mark.filterwarnings("ignore")
 def test_a_strangers_names_stay_names_in_markdown() -> None:
     found = urdfkin.diff(OLD, OLD.replace('"lower"', '"&lt;b&gt;|@all"'), effects=False)

@@ -18,11 +18,13 @@ pytest.importorskip("pxr")
 
 import urdfkin
 from tests.cli.running import urdfkin as command
+from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Question
 from urdfkin.errors import InputError, OracleError, SourceError
-from urdfkin.kinematics.rotation import quaternion_of, rotation_of
+from urdfkin.kinematics.rotation import quaternion_of, rotation_about, rotation_of
 from urdfkin.model.conventions.convention import transcoded
 from urdfkin.model.tree import LARGEST_ANGLE, Joint, KinematicTree, pose
+from urdfkin.report.diff import as_data, headline
 from urdfkin.urdf import usd
 from urdfkin.verify import usd_check
 
@@ -881,6 +883,15 @@ def _joint_in_usd(
     A, B = one.T_parent_joint @ pose(R), pose(R)
     if kind == "centimetres":
         A = pose(A[:3, :3], 100.0 * A[:3, 3])
+    if kind == "a micrometre":
+        A = A @ pose(p=(0.6e-6, 0.8e-6, 0.0))
+    if kind == "a microradian":
+        A = A @ pose(rotation_about(np.array([0.6, 0.8, 0.0]), 1e-6))
+    if kind == "another zero":
+        A = A @ pose(rotation_about(np.array([1.0, 0.0, 0.0]), 1e-6))
+    if kind == "other frames on the axis":
+        on = pose(rotation_about(np.array([1.0, 0.0, 0.0]), 0.7), (0.25, 0.0, 0.0))
+        A, B = A @ on, B @ on
     if kind == "mirrored frame":
         mirror = np.diag([1.0, -1.0, 1.0])
         A = pose(A[:3, :3], mirror @ A[:3, 3])
@@ -898,7 +909,8 @@ def _joint_in_usd(
         schemas = ' (prepend apiSchemas = ["NewtonMimicAPI"])'
         words.append(f"rel newton:mimicJoint = </arm/joints/{spell(one.mimic.leader)}>")
         words.append(f"float newton:mimicCoef0 = {one.mimic.offset * factor!r}")
-        words.append(f"float newton:mimicCoef1 = {one.mimic.multiplier!r}")
+        factor = 1.000001 if kind == "a millionth" else 1.0
+        words.append(f"float newton:mimicCoef1 = {one.mimic.multiplier * factor!r}")
     if one.limit is not None and one.kind.bounded:
         factor = 180.0 / math.pi if turns and kind != "radians" else 1.0
         words.append(f"float physics:lowerLimit = {one.limit.lower * factor!r}")
@@ -935,9 +947,12 @@ def test_rounding_to_single_precision_explains_the_difference_from_the_urdf(writ
     found = urdfkin.same(robot, loaded(write(as_usd(robot, transcoded))), boxes=0)
     assert found.single is not None
     assert found.up_to_single
+    assert (found.unexplained, found.within_single) == ((), False)
     assert 0.0 < found.written[0] <= found.single[0] < 5e-6
-    assert not found.holds(Question())
+    assert found.holds(Question())
+    assert found.holds(Question(strict=True)) is not bool(found.remarks)
     assert found.holds(Question(within=5e-6))
+    assert not found.holds(Question(within=0.0))
 
 
 def loaded_name(name: str) -> urdfkin.Robot:
@@ -980,6 +995,85 @@ def test_a_joint_that_never_moves_or_is_fixed_is_matched_by_its_spelling_in_usd(
         for a, b in ((robots[name], free), (free, robots[name])):
             found = urdfkin.same(a, b, boxes=0)
             assert [one.what for one in found.differences] == [one.what for one in as_named.differences]
+
+
+#: A slide whose long range multiplies the rounding of its rotation, and an elbow after it.
+LONG_SLIDE = (
+    '<robot name="arm"><link name="rail"/><link name="carriage"/><link name="forearm"/><link name="tip"/>'
+    '<joint name="slide" type="prismatic"><parent link="rail"/><child link="carriage"/>'
+    '<origin xyz="0 0 0.1" rpy="0.3 0.4 0.5"/><axis xyz="0.6 0.8 0"/>'
+    '<limit lower="-1000" upper="1000" effort="1" velocity="1"/></joint>'
+    '<joint name="elbow" type="revolute"><parent link="carriage"/><child link="forearm"/>'
+    '<origin xyz="0.333 0 0" rpy="0.1 0.2 0.3"/><axis xyz="0 0.6 0.8"/>'
+    '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+    '<joint name="wrist" type="continuous"><parent link="forearm"/><child link="tip"/>'
+    '<origin xyz="0.25 0.1 0"/><axis xyz="0 0 1"/></joint></robot>'
+)
+
+
+def test_an_error_below_the_rounding_of_a_long_slide_is_found_and_its_joint_named(write: Write) -> None:
+    robot = urdfkin.load(LONG_SLIDE)
+    text = as_usd(robot)
+    assert urdfkin.same(robot, loaded(write(text)), boxes=0).up_to_single
+    assert "(0.333," in text
+    stage_file = write(text.replace("(0.333,", "(0.33305,"))
+    found = urdfkin.same(robot, loaded(stage_file), boxes=0)
+    assert found.single is not None
+    assert 4e-5 < found.written[0] < found.single[0]  # the sum of all roundings does not exclude the error
+    assert found.within_single
+    assert not found.up_to_single
+    assert not found.holds(Question())
+    [one] = map(str, found.unexplained)
+    assert one == "joint elbow: origin 50.01 µm off, rounding explains at most 14.9 nm"
+    done = command("same", "-", str(stage_file), "--boxes", "0", stdin=LONG_SLIDE)
+    assert done.code == 1, done.text + done.err
+    assert "joint elbow" in " ".join(done.text.split())
+
+
+@pytest.mark.parametrize("kind", ["a micrometre", "a microradian", "another zero"])
+@pytest.mark.parametrize("name", ["slide", "elbow", "wrist"])
+def test_an_error_beyond_the_rounding_of_its_own_joint_is_never_explained(
+    write: Write, kind: str, name: str
+) -> None:
+    if (kind, name) == ("another zero", "slide"):
+        kind = "a microradian"
+    robot = urdfkin.load(LONG_SLIDE)
+    found = urdfkin.same(robot, loaded(write(as_usd(robot, slip=Slip(kind, name)))), bounds=False)
+    assert not found
+    assert [one.place for one in found.unexplained] == [f"joint {name}"]
+
+
+def test_a_joint_frame_elsewhere_on_the_axis_is_the_same_joint(write: Write) -> None:
+    robot = urdfkin.load(LONG_SLIDE)
+    for name in ("slide", "elbow", "wrist"):
+        stage_text = as_usd(robot, slip=Slip("other frames on the axis", name))
+        found = urdfkin.same(robot, loaded(write(stage_text)), boxes=0)
+        assert found.up_to_single, found.unexplained
+        assert not urdfkin.same(loaded(write(stage_text)), robot, bounds=False).unexplained
+
+
+def test_a_mimic_multiplier_that_is_off_by_a_millionth_is_not_explained(write: Write) -> None:
+    robot = loaded_name("panda")
+    name = next(one.name for one in robot.tree.joints if one.mimic is not None)
+    found = urdfkin.same(robot, loaded(write(as_usd(robot, slip=Slip("a millionth", name)))), bounds=False)
+    assert not found
+    assert str(found.unexplained[0]).startswith(f"joint {name}: mimic multiplier 1.00000")
+
+
+def test_a_robot_at_another_place_in_the_stage_is_not_explained_by_rounding(write: Write) -> None:
+    robot = urdfkin.load(LONG_SLIDE)
+    mount = joint("mount", "Fixed", "", "rail", "point3f physics:localPos0 = (0, 0, 0.5)")
+    found = urdfkin.same(robot, loaded(write(as_usd(robot) + mount)), bounds=False)
+    assert [str(one) for one in found.unexplained] == ["link rail: base at another place"]
+
+
+def test_a_certificate_up_to_single_precision_is_rechecked(write: Write) -> None:
+    robots = urdfkin.load(LONG_SLIDE), loaded(write(as_usd(urdfkin.load(LONG_SLIDE))))
+    document = certificate(urdfkin.same(*robots, boxes=0))
+    assert document["verdict"] == "same up to single precision"
+    assert recheck(document, *robots) == []
+    document["verdict"] = "same"
+    assert recheck(document, *robots) == ["`verdict`: the models give same up to single precision, not same"]
 
 
 SLIPS = {
@@ -1050,11 +1144,54 @@ def test_three_formats_are_compared_in_pairs(
     files = [str(file.relative_to(tmp_path)) for file in (urdf, mjcf, stage_file)]
     done = command("same", *files, "--boxes", "0")
     assert done.code == 0, done.text + done.err
-    assert done.text.count("equivalent") == 2
+    assert done.text.count("same up to single precision") == 2
     assert done.text.count("arm.urdf") == 2
     done = command("same", *files, "--map", "a=b")
     assert done.code == 2
     assert "more than two robots" in done.err
+
+
+def test_diff_with_a_stage_lists_a_slip_at_its_joint_and_not_the_rounding(
+    write: Write, tmp_path: Path
+) -> None:
+    text = LONG_SLIDE.replace("elbow", "elbow-1").replace("forearm", "forearm.1")
+    robot = urdfkin.load(text)
+    plain = urdfkin.diff(robot, loaded(write(as_usd(robot, transcoded))))
+    assert (plain.changes, plain.total) == ((), None)
+    assert plain.rounding is not None
+    assert 0.0 < plain.rounding[0] < 1e-3
+    unbounded = urdfkin.diff(robot, loaded(write(as_usd(robot, transcoded))), effects=False)
+    assert headline(unbounded) == "nothing changed, apart from rounding to single precision"
+    assert as_data(unbounded)["rounding"] == {"metres": None, "radians": None}
+    stage_file = write(as_usd(robot, transcoded, Slip("a micrometre", "elbow-1")))
+    found = urdfkin.diff(robot, loaded(stage_file))
+    assert [str(one) for one in found.changes] == ["joint elbow-1: origin 0.997 µm off"]
+    assert [one.element for one in found.effects] == ["joint elbow-1"]
+    assert 0.9e-6 < found.effects[0].interval.lower < 1.3e-6
+    assert found.rounding is None
+    flipped = urdfkin.diff(robot, loaded(write(as_usd(robot, transcoded, Slip("axis sign", "elbow-1")))))
+    assert [str(one) for one in flipped.changes] == ["joint elbow-1: axis turned by 3.142 rad"]
+
+
+def test_diff_compares_all_pairs_of_three_formats(write: Write, tmp_path: Path) -> None:
+    robot = urdfkin.load(LONG_SLIDE)
+    files = [tmp_path / "arm.urdf", tmp_path / "new.urdf"]
+    files[0].write_text(LONG_SLIDE)
+    files[1].write_text(LONG_SLIDE.replace('"0.25 0.1 0"', '"0.26 0.1 0"'))
+    words = ["diff", *map(str, files), str(write(as_usd(robot)))]
+    done = command(*words, "--format", "json")
+    assert done.code == 1
+    sizes = [[(one["what"], one["size"]) for one in pair["changes"]] for pair in done.data["pairs"]]
+    assert sizes == [[("origin x", None)], [], [("origin", "10 mm off")]]
+    rounding = [pair["rounding"] is not None for pair in done.data["pairs"]]
+    assert rounding == [False, True, False]
+    table = command(*words, "--no-effects", "--format", "csv").text.splitlines()
+    assert table[0] == "A,B,element,what,old,new,alone"
+    assert len(table) == 3
+    markdown = command(*words, "--format", "markdown").text
+    assert markdown.count("| joint wrist |") == 2
+    assert "nothing changed, apart from rounding to single precision" in markdown
+    assert command("diff", str(files[0]), words[-1]).code == 0
 
 
 def test_check_states_the_place_of_a_finding(write: Write) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -87,10 +87,10 @@ def same_command(
     all joints and the zero-configuration poses of all links agree. A different base pose, joint zeros and
     senses, fixed links, names and order are allowed. If they differ, the command prints an interval for the
     largest distance of each frame over all configurations within limits. Its lower bound is attained at a
-    printed configuration; its upper bound is proven. The numbers of a USD file have single precision. The
-    command prints how far this rounding can move a frame; models that differ by less count as different too.
+    printed configuration; its upper bound is proven. The numbers of a USD file have single precision. Models
+    are the same up to single precision if each joint differs by the rounding of its own numbers only.
 
-    Exit 0: same, or equivalent up to the printed changes. 1: different; with
+    Exit 0: same, also up to single precision, or equivalent up to the printed changes. 1: different; with
     --strict also if only equivalent. With --within: 0 if all frames stay within the distance as written, else
     1. 2: bad input.
     """
@@ -184,6 +184,7 @@ def _recheck(robots: tuple[Robot, Robot], path: Path) -> Answer:
 @click.command("diff", epilog="Example: urdfkin diff arm.urdf my.urdf --markdown comment.md")
 @click.argument("a", metavar="OLD", shell_complete=complete_robot)
 @click.argument("b", metavar="NEW", shell_complete=complete_robot)
+@click.argument("more", metavar="[C]...", nargs=-1, shell_complete=complete_robot)
 @click.option(
     "--effects/--no-effects",
     default=True,
@@ -192,31 +193,56 @@ def _recheck(robots: tuple[Robot, Robot], path: Path) -> Answer:
 @click.option("--markdown", type=_PATH, help="Write the result as Markdown for a pull request comment.")
 @source_options
 @answering()
-def diff_command(a: str, b: str, effects: bool, markdown: Path | None) -> Answer:
+def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown: Path | None) -> Answer:
     """List the changes from OLD to NEW, attribute by attribute, and how far they move the robot's frames.
 
     For each changed joint, the command prints how far its changes alone move the most affected frame. This is
     the maximum over all configurations within limits, at equal coordinates. The last line is for all changes
-    together.
+    together. Between URDF, MJCF and USD, the changes are the differences that `same` finds. With C, all pairs
+    are compared.
 
     Exit 0: no changes. 1: changes. 2: bad input.
     """
-    from urdfkin.comparison.diff import diff  # noqa: PLC0415  keeps --help fast
-    from urdfkin.report.diff import HEADS, as_data, document, lines_of, markdown_of, rows_of  # noqa: PLC0415
+    from itertools import combinations  # noqa: PLC0415  keeps --help fast
+
+    from urdfkin.comparison.diff import diff  # noqa: PLC0415
+    from urdfkin.report.diff import (  # noqa: PLC0415
+        HEADS,
+        as_data,
+        document,
+        lines_of,
+        markdown_of,
+        pairs_document,
+        pairs_markdown,
+        rows_of,
+    )
 
     check_writable(markdown)
-    old, new = load_several(a, b)
+    robots = load_several(a, b, *more)
     with compiling():
-        found = diff(old, new, effects=effects)
+        found = [diff(*two, effects=effects) for two in combinations(robots, 2)]
+
+    def as_markdown() -> str:
+        return pairs_markdown(found) if more else markdown_of(found[0])
+
     if markdown is not None:
-        write_file(markdown, markdown_of(found).encode())
+        write_file(markdown, as_markdown().encode())
+    code = int(any(found))
+    if more:
+        rows = [(*one.sources, *row) for one in found for row in rows_of(one)]
+        several: dict[str, Any] = {
+            "json": lambda: {"pairs": [as_data(one) for one in found]},
+            "csv": lambda: [("A", "B", *HEADS), *(map(csv_value, row) for row in rows)],
+            "markdown": as_markdown,
+        }
+        return Answer(lambda: pairs_document(found), several, code=code)
     return Answer(
-        lambda: document(found),
+        lambda: document(found[0]),
         {
-            "json": lambda: as_data(found),
-            "csv": lambda: [HEADS, *(map(csv_value, row) for row in rows_of(found))],
-            "markdown": lambda: markdown_of(found),
+            "json": lambda: as_data(found[0]),
+            "csv": lambda: [HEADS, *(map(csv_value, row) for row in rows_of(found[0]))],
+            "markdown": as_markdown,
         },
-        code=1 if found else 0,
-        fitted=lambda _: TextDocument("", lines_of(found)),
+        code=code,
+        fitted=lambda _: TextDocument("", lines_of(found[0])),
     )

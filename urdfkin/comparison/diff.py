@@ -1,4 +1,9 @@
-"""List the changes between two versions of a robot description, and bound how far they move the frames."""
+"""List the changes between two versions of a robot description, and bound how far they move the frames.
+
+Two files of one format are compared attribute by attribute. The attributes of two formats have no common
+names, and each format has links, frames and numbers of its own. The changes between files of two formats are
+therefore the differences that `same` finds: they do not depend on the format.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +11,28 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from xml.etree.ElementTree import Element
 
-from urdfkin.comparison.result import Interval, angle, length, up_to
+from urdfkin.comparison.result import (
+    BOUNDED,
+    Difference,
+    Interval,
+    Sameness,
+    angle,
+    length,
+    limit_differences,
+    up_to,
+)
 from urdfkin.comparison.verdict import same
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
 from urdfkin.errors.escape import log_line
 from urdfkin.errors.numbers import parse_float
-from urdfkin.model.tree import Joint, KinematicTree
+from urdfkin.kinematics.roundings import SINGLE
+from urdfkin.model.conventions.convention import spellings
+from urdfkin.model.tree import Joint, KinematicTree, Mimic
 from urdfkin.robot import Robot
-from urdfkin.robot.loading import load
+from urdfkin.robot.loading import load, robot_of
 from urdfkin.system.plain_xml import plain_xml
-from urdfkin.urdf.sources import Source
+from urdfkin.urdf.sources import Source, Text, is_usd
 from urdfkin.urdf.writer import to_urdf
 
 #: Attributes in a URDF that consist of several numbers, each with the names of its numbers.
@@ -26,7 +42,9 @@ _DEFAULTS = {f"origin {part}": 0.0 for parts in _PARTS.values() for part in part
 _AXIS = {"axis x": 1.0, "axis y": 0.0, "axis z": 0.0}
 _RULE = {"mimic multiplier": 1.0, "mimic offset": 0.0}
 #: Attributes of a joint that affect the motion of links.
-_MOVING = ("", "origin", "axis", "mimic", "type", "parent", "child")
+_MOVING = ("", "origin", "axis", "mimic", "type", "parent", "child", "fixed", "kind")
+#: Changes of a link between two formats that affect its motion.
+_MOVING_LINKS = ("origin", "place", "base", "carried by")
 
 Value = float | str
 
@@ -40,21 +58,29 @@ class Change:
         what: The attribute, for example "origin x" or "mass"; "" if the whole element was added or removed.
         old: The value in the old version; None if the old version has no value.
         new: The value in the new version; None if the new version has no value.
+        size: The size of the change in words, if the two formats have no common values; else empty.
     """
 
     element: str
     what: str
     old: Value | None
     new: Value | None
+    size: str = ""
 
     @property
     def moves(self) -> bool:
         """Whether the change can affect the motion of links."""
+        if self.element.startswith("link "):
+            return self.what in _MOVING_LINKS
+        if self.element == "robot":
+            return self.what == "as a whole"
         return self.element.startswith("joint ") and self.what.split(" ")[0] in _MOVING
 
     def __str__(self) -> str:
         if not self.what:
             return log_line(f"{self.element}: {'new' if self.old is None else 'gone'}")
+        if self.size:
+            return log_line(f"{self.element}: {self.what} {self.size}")
         return log_line(f"{self.element}: {self.what} {word(self.old)} -> {word(self.new)}")
 
 
@@ -97,12 +123,16 @@ class Changes:
         changes: The changes of the robot's name, then of joints, then of links, in the order of the file.
         effects: For each joint with changes that move links, the effect of the changes of this joint alone.
         total: The frame that all changes together move most; None if no frame moves.
+        rounding: (m, rad) how far rounding to single precision in a USD file moves a frame, if there is no
+            further difference in motion; else None. This rounding is not among the changes. It is infinite if
+            no bound was computed.
     """
 
     sources: tuple[str, str]
     changes: tuple[Change, ...]
     effects: tuple[Effect, ...]
     total: Interval | None
+    rounding: tuple[float, float] | None = None
 
     def __bool__(self) -> bool:
         """Whether anything changed."""
@@ -116,6 +146,9 @@ class Changes:
 
 def diff(a: Robot | Source | DHTable, b: Robot | Source | DHTable, *, effects: bool = True) -> Changes:
     """List the changes from one version of a description to another, attribute by attribute.
+
+    If the versions have different formats (URDF, MJCF, USD), the changes are the differences that `same`
+    finds, with the names of the old version.
 
     Args:
         a: The old version: a robot, or a source for `load`.
@@ -133,11 +166,119 @@ def diff(a: Robot | Source | DHTable, b: Robot | Source | DHTable, *, effects: b
         joint shoulder_pan_joint: limit lower -6.28318530718 -> -3.14159265359
     """
     old, new = (source if isinstance(source, Robot) else load(source) for source in (a, b))
+    if _format(old) != _format(new):
+        return _across_formats(old, new, effects=effects)
     changes = tuple(_changes(old.urdf, new.urdf))
     moving = list(dict.fromkeys(change.element for change in changes if change.moves)) if effects else []
-    some = (_effect(old, new, element) for element in moving)
+    some = (_effect(old.tree, new.tree, element, element.removeprefix("joint ")) for element in moving)
     total = same(old, new).worst_as_written if moving else None
     return Changes((old.source, new.source), changes, tuple(one for one in some if one is not None), total)
+
+
+def _format(robot: Robot) -> str:
+    """Return the format of a robot's source; a table counts as a URDF."""
+    if is_usd(robot.source):
+        return "USD"
+    return "MJCF" if robot.origin.sha256 else "URDF"
+
+
+def _across_formats(old: Robot, new: Robot, *, effects: bool) -> Changes:
+    """Return the differences that `same` finds as changes."""
+    found = same(old, new, bounds=effects)
+    changes = tuple(_changes_of(found, (_format(old), _format(new))))
+    moving = [one.element for one in changes if one.moves and one.element != "robot"]
+    some = list[Effect | None]()
+    if effects:
+        tree = _renamed(found)
+        for element in dict.fromkeys(moving):
+            kind, _, name = element.partition(" ")
+            if kind == "link" and (link := old.tree.link_index(name)):
+                name = old.tree.joints[link - 1].name
+            some.append(_effect(old.tree, tree, element, name))
+    total = found.worst_as_written if any(change.moves for change in changes) else None
+    rounding = found.written if found.up_to_single else None
+    all_effects = tuple(one for one in some if one is not None)
+    return Changes((old.source, new.source), changes, all_effects, total, rounding)
+
+
+def _changes_of(found: Sameness, formats: tuple[str, str]) -> Iterator[Change]:
+    """Yield the differences joint by joint, then those that no joint has, names and remarks."""
+    for at in found.unexplained:
+        if at.what and at.a is None:
+            yield Change(at.place, at.what, None, None, str(at.b))
+        elif at.what:
+            yield Change(at.place, at.what, at.a, at.b)
+    yield from _not_compared(found)
+    for one in found.differences:
+        if one.what not in BOUNDED or one.what == "fixed":
+            yield from _change_of(one)
+    for pair in found.joints:
+        if pair.b not in spellings(pair.a) and pair.a not in spellings(pair.b):
+            yield Change(f"joint {pair.a}", "name", pair.a, pair.b)
+        a, b = (
+            tree.joints[tree.joint_index(name)]
+            for tree, name in zip(found.trees, (pair.a, pair.b), strict=True)
+        )
+        if a.kind.nv == b.kind.nv and a.kind.turns == b.kind.turns:
+            single = SINGLE if found.single else 0.0
+            for one in limit_differences(a, b, found.rounding[1], single):
+                yield from _change_of(one)
+    for one in found.remarks:
+        if one.what in ("idle", "only in A", "only in B"):
+            yield from (change for change in _change_of(one) if not _is_world(found, formats, change))
+
+
+def _not_compared(found: Sameness) -> Iterator[Change]:
+    """Yield the differences that `same` finds, if the models cannot be compared at each joint."""
+    if found.up_to_single or (found.unexplained and all(one.what for one in found.unexplained)):
+        return
+    listed = {one.place for one in found.unexplained if one.what}
+    for words in found.after:
+        yield Change("robot", "as a whole", None, None, words)
+    for one in found.differences:
+        if one.what in BOUNDED - {"fixed"} and one.place not in listed:
+            sizes = [f"{length(one.metres)} off"] if one.metres else []
+            sizes += [f"turned by {angle(one.radians)}"] if one.radians else []
+            yield Change(one.place, one.what, *one.values, " and ".join(sizes))
+
+
+def _is_world(found: Sameness, formats: tuple[str, str], change: Change) -> bool:
+    """Return whether a change is the root link that the reader of MJCF or USD adds for the world."""
+    roots = [tree.links[0] for tree, name in zip(found.trees, formats, strict=True) if name != "URDF"]
+    return change.element == "link world" and "world" in roots
+
+
+def _change_of(one: Difference) -> Iterator[Change]:
+    if one.what not in ("only in A", "only in B"):
+        yield Change(one.place, one.what, *one.values)
+        return
+    names = [one.place]
+    if one.place.startswith("links "):
+        there = one.a if one.what == "only in A" else one.b
+        names = [f"link {name}" for name in there] if isinstance(there, tuple) else []
+    for name in names:
+        tag = name.partition(" ")[0]
+        old, new = (tag, None) if one.what == "only in A" else (None, tag)
+        yield Change(name, "", old, new)
+
+
+def _renamed(found: Sameness) -> KinematicTree:
+    """Return B's tree, in which each matched joint and link has A's name."""
+    tree = found.trees[1]
+    links = {theirs: ours for ours, theirs in found.links}
+    joints = {one.b: one.a for one in found.joints}
+    for i, joint in enumerate(tree.joints):  # a fixed joint has the name of A's joint to the same link
+        link = links.get(tree.links[i + 1])
+        if joint.name not in joints and link in found.trees[0].links[1:]:
+            joints[joint.name] = found.trees[0].joints[found.trees[0].link_index(link) - 1].name
+
+    def rule(joint: Joint) -> Mimic | None:
+        return joint.mimic and replace(joint.mimic, leader=joints.get(joint.mimic.leader, joint.mimic.leader))
+
+    made = tuple(
+        replace(joint, name=joints.get(joint.name, joint.name), mimic=rule(joint)) for joint in tree.joints
+    )
+    return KinematicTree(tree.name, tuple(links.get(link, link) for link in tree.links), made)
 
 
 def _changes(old: str, new: str) -> Iterator[Change]:
@@ -149,7 +290,8 @@ def _changes(old: str, new: str) -> Iterator[Change]:
         for name in dict.fromkeys([*was, *now]):
             element = f"{tag} {name}"
             if name not in was or name not in now:
-                yield Change(element, "", *(tag if name in there else None for there in (was, now)))
+                old_tag, new_tag = (tag if name in there else None for there in (was, now))
+                yield Change(element, "", old_tag, new_tag)
                 continue
             facts, others = (_facts(e, tag) for e in (was[name], now[name]))
             for what in dict.fromkeys([*facts, *others]):
@@ -190,13 +332,18 @@ def _value(text: str) -> Value:
     return text if found is None else found
 
 
-def _effect(old: Robot, new: Robot, element: str) -> Effect | None:
+def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> Effect | None:
     """Compute the distances by which the changes of a single joint move the frames.
 
     The old robot is compared with a copy of the old robot in which only this joint is the new robot's.
+
+    Args:
+        old: The tree of the old robot.
+        new: The tree of the new robot.
+        element: The changed element.
+        name: The name of the joint.
     """
-    name = element.removeprefix("joint ")
-    trees = old.tree, new.tree
+    trees = old, new
     if any(name not in {joint.name for joint in tree.joints} for tree in trees):
         return None
     at, there = (tree.joint_index(name) for tree in trees)
@@ -208,12 +355,17 @@ def _effect(old: Robot, new: Robot, element: str) -> Effect | None:
     if ends[0] != ends[1] or (joint.mimic and joint.mimic.leader not in {j.name for j in trees[0].joints}):
         return None
     try:
-        changed = load(to_urdf(_with_joint(trees[0], at, joint)), verify=False)
-        plain = load(to_urdf(trees[0]), verify=False)
+        changed, plain = (_quietly(tree) for tree in (_with_joint(trees[0], at, joint), trees[0]))
     except InputError:  # this copy cannot be written as a URDF, so no effect is computed
         return None
     worst = same(plain, changed).worst_as_written
     return None if worst is None else Effect(element, worst)
+
+
+def _quietly(tree: KinematicTree) -> Robot:
+    """Return the robot of a tree, without warnings about the URDF that is written for it."""
+    text = Text(to_urdf(tree).encode(), tree.name, tree.name)
+    return robot_of(text, verify=False, made=True, quiet=True)
 
 
 def _with_joint(tree: KinematicTree, at: int, joint: Joint) -> KinematicTree:

@@ -44,10 +44,15 @@ _TENTH, _NINE = 0.09995, 9.0
 
 
 class Verdict(Enum):
-    """The verdict: two models are the same, the same after the changes in `Sameness.up_to`, or different."""
+    """The verdict: two models are the same, the same after the changes in `Sameness.up_to`, or different.
+
+    They are the same up to single precision if they are the same as written, except that each joint of one
+    differs by the rounding of its own numbers.
+    """
 
     SAME = "same"
     SAME_AFTER = "same after"
+    UP_TO_SINGLE = "same up to single precision"
     DIFFERS = "differs"
 
 
@@ -128,6 +133,16 @@ class Difference:
     detail: str = ""
 
     @property
+    def values(self) -> tuple[str | float | None, str | float | None]:
+        """The parameter's value in A and in B, each as a number or in words; None if there is none."""
+        if self.what == "limits":
+            return _range(self.a), _range(self.b)
+        if self.what == "idle":
+            return "fixed by its rule" if self.a else None, "fixed by its rule" if self.b else None
+        a, b = (x if isinstance(x, str | float) else None for x in (self.a, self.b))
+        return a, b
+
+    @property
     def words(self) -> str:  # noqa: PLR0911  a line for each parameter
         """The difference as one line of text."""
         place, what, a, b = self.place, self.what, self.a, self.b
@@ -188,6 +203,31 @@ def _number(x: object, infinity: float = math.inf) -> float:
 def _range(ends: Value) -> str:
     lower, upper = ends if isinstance(ends, tuple) else (None, None)
     return f"{_number(lower, -math.inf):.12g} to {_number(upper):.12g}"
+
+
+@dataclass(frozen=True, slots=True)
+class JointDifference:
+    """A difference of two models as they are written, at one joint or link, that rounding does not explain.
+
+    Attributes:
+        place: The joint or link of A, for example "joint elbow".
+        what: The parameter: "origin", "axis", "mimic multiplier", "mimic offset", "mimic joint" or "base";
+            empty if the models cannot be compared at this joint or link.
+        a: The parameter's value in A; None if the value has no meaning without that in B.
+        b: The parameter's value in B, the size of the difference, or the reason why there is no comparison.
+        explained: The largest difference that rounding explains, in words; empty without rounded numbers.
+    """
+
+    place: str
+    what: str
+    a: float | str | None
+    b: float | str
+    explained: str = ""
+
+    def __str__(self) -> str:
+        old = "" if self.a is None else f" instead of {self.a}"
+        explained = f", rounding explains at most {self.explained}" if self.explained else ""
+        return f"{self.place}: {self.what} {self.b}{old}".replace("  ", " ") + explained
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,7 +298,7 @@ class Sameness(Displayable):
         names: The robots' names.
         sources: The sources of A and B, as the user gave them.
         digests: SHA-256 of the two texts.
-        verdict: `Verdict.SAME`, `SAME_AFTER` the changes in `after`, or `DIFFERS`.
+        verdict: `Verdict.SAME`, `SAME_AFTER` the changes in `after`, `UP_TO_SINGLE`, or `DIFFERS`.
         after: The changes that bring B closest to A, with one line of text for each change. The changes are
             listed even if the models still differ after these changes.
         up_to: The kinds of the changes in `after`: "base", "zeros", "senses", "free joints", "tools".
@@ -277,6 +317,8 @@ class Sameness(Displayable):
         rounding: (m, rad) largest distance and angle between matching frames that count as rounding.
         single: (m, rad) largest distance and angle between matching frames that rounding the numbers of a USD
             file to single precision can cause; None if both files have double precision.
+        unexplained: The differences of the models as they are written, joint by joint, beyond rounding. The
+            numbers of a USD file are rounded to single precision.
         frames: The interval for each pair of matching links, after the changes in `after`.
         as_written: The interval for the frame that is farthest apart without the changes in `after`. None if
             there are no changes.
@@ -310,6 +352,7 @@ class Sameness(Displayable):
     base_links: tuple[str, str]
     rounding: tuple[float, float]
     single: tuple[float, float] | None
+    unexplained: tuple[JointDifference, ...]
     frames: tuple[Interval, ...]
     as_written: Interval | None
     written: tuple[float, float]
@@ -318,7 +361,7 @@ class Sameness(Displayable):
     trees: tuple[KinematicTree, KinematicTree]
 
     def __bool__(self) -> bool:
-        """Whether the models are the same or equivalent."""
+        """Whether the models are the same, equivalent, or the same up to single precision."""
         return self.verdict is not Verdict.DIFFERS
 
     def __repr__(self) -> str:
@@ -363,12 +406,23 @@ class Sameness(Displayable):
 
     @property
     def up_to_single(self) -> bool:
-        """Whether the models differ, but no frame by more than single precision can move any frame.
-
-        The models are compared as they are written.
+        """Whether each joint of the models differs by no more than its rounding to single precision.
 
         >>> import urdfkin
         >>> urdfkin.same("ur5", "ur10").up_to_single
+        False
+        """
+        return self.verdict is Verdict.UP_TO_SINGLE
+
+    @property
+    def within_single(self) -> bool:
+        """Whether the models differ, but no frame by more than single precision can move any frame.
+
+        The models are compared as they are written. The sum of the roundings of all joints can be larger than
+        an error in one of them, so this does not prove that rounding is the cause: see `up_to_single`.
+
+        >>> import urdfkin
+        >>> urdfkin.same("ur5", "ur10").within_single
         False
         """
         if self.single is None or self.verdict is not Verdict.DIFFERS:
@@ -787,9 +841,8 @@ def remarks(
     some = list[Difference]()
     for step in found.steps:
         if not step.unlike:
-            some += _of_limits(
-                step, found.a.tree.joints[step.a], found.b.tree.joints[step.b], tolerance, single
-            )
+            a, b = found.a.tree.joints[step.a], found.b.tree.joints[step.b]
+            some += limit_differences(a, b, tolerance.angle, single, (step.sense, step.offset))
     for tree, which in ((found.a.tree, "A"), (found.b.tree, "B")):
         for lock in filter(None, map(idle, tree.joints)):
             value = lock.joint.kind.value, lock.value
@@ -814,18 +867,29 @@ def idle(joint: Joint) -> Lock | None:
     return lock if lock and lock.joint.mimic and lock.joint.mimic.multiplier == 0.0 else None
 
 
-def _of_limits(step: Step, a: Joint, b: Joint, tolerance: Tolerance, single: float) -> Iterator[Difference]:
-    place = f"joint {a.name}"
+def limit_differences(
+    a: Joint, b: Joint, tolerance: float, single: float, zero: tuple[int, float] = (1, 0.0)
+) -> Iterator[Difference]:
+    """Yield the differences between two joints' kinds and limits.
+
+    Args:
+        a: The joint of A.
+        b: The joint of B.
+        tolerance: Tolerance of a limit (rad or m), as a share of its size or of 1.
+        single: The relative error of rounding a limit to single precision; 0 if it is not rounded so.
+        zero: Sense and offset of B's coordinate; its limits are converted to A's.
+    """
+    place, (sense, offset) = f"joint {a.name}", zero
     if a.kind is not b.kind:
         yield Difference(place, "kind", a.kind.value, b.kind.value)
-    back = sorted(step.sense * (end - step.offset) for end in limits(b))
+    back = sorted(sense * (end - offset) for end in limits(b))
     ours = limits(a)
-    if any(not _close(x, y, tolerance.angle, single) for x, y in zip(ours, back, strict=True)):
-        detail = "converted" if step.sense < 0 or step.offset else ""
+    if any(not _close(x, y, tolerance, single) for x, y in zip(ours, back, strict=True)):
+        detail = "converted" if sense < 0 or offset else ""
         yield Difference(place, "limits", tuple(map(_finite, ours)), tuple(map(_finite, back)), detail=detail)
     for what in ("velocity", "effort"):
         x, y = (getattr(joint.limit, what, math.inf) for joint in (a, b))
-        if not _close(x, y, tolerance.angle, single):
+        if not _close(x, y, tolerance, single):
             yield Difference(place, what, _finite(x), _finite(y))
 
 

@@ -11,9 +11,11 @@ import numpy as np
 
 from urdfkin.comparison.bounds import MOST, Search, pinocchios, tightened
 from urdfkin.comparison.result import (
+    BOUNDED,
     FREE,
     Confirmation,
     Interval,
+    JointDifference,
     JointMap,
     Sameness,
     Tool,
@@ -23,6 +25,7 @@ from urdfkin.comparison.result import (
     put_right,
     remarks,
 )
+from urdfkin.comparison.single import JointComparison
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.validators import real_number, whole_number
@@ -217,11 +220,15 @@ class Comparator:
         free = {what for what, _ in after}
         wrong = differences(found, variables)
         single = self.single(found, variables)
+        verdict = Verdict.DIFFERS if wrong else Verdict.SAME_AFTER if after else Verdict.SAME
+        unexplained = () if verdict is Verdict.SAME else self.unexplained(found)
+        if single is not None and verdict is not Verdict.SAME and not unexplained:
+            verdict = Verdict.UP_TO_SINGLE if {one.what for one in wrong} <= BOUNDED else verdict
         return Sameness(
             names=(self.robots[0].name, self.robots[1].name),
             sources=(self.robots[0].source, self.robots[1].source),
             digests=(self.robots[0].sha256, self.robots[1].sha256),
-            verdict=Verdict.DIFFERS if wrong else Verdict.SAME_AFTER if after else Verdict.SAME,
+            verdict=verdict,
             after=tuple(dict.fromkeys(words for _, words in after)),
             up_to=tuple(what for what in FREE if what in free),
             differences=wrong,
@@ -238,6 +245,7 @@ class Comparator:
             base_links=(links[0][found.base[0]], links[1][found.base[1]]),
             rounding=self.rounding(found, variables),
             single=single,
+            unexplained=unexplained,
             frames=(),
             as_written=None,
             written=(math.inf, math.inf),
@@ -262,9 +270,18 @@ class Comparator:
         off = np.zeros((len(pairs), 2))
         for which, robot in enumerate(self.robots):
             if robot.single is not None and pairs:
-                off += robot.single[[pair[which] for pair in pairs]]
+                off += robot.single.links[[pair[which] for pair in pairs]]
         metres, radians = (most + off.max(axis=0, initial=0.0)).tolist()
         return metres, radians
+
+    def unexplained(self, found: Alignment) -> tuple[JointDifference, ...]:
+        """Return the differences of the models as they are written, joint by joint, beyond rounding."""
+        off = [
+            np.zeros((len(tree.joints), 3)) if robot.single is None else robot.single.joints
+            for tree, robot in zip(self.trees, self.robots, strict=True)
+        ]
+        base = base_as_written(*self.mechanisms)
+        return tuple(JointComparison(found, (off[0], off[1]), base, self.tolerance).differences())
 
     def as_written(self, found: Alignment) -> Alignment:
         """Return the alignment of the models as they are written, for the joint and link pairs of `found`.

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from math import isfinite
 from typing import Any
 
 from urdfkin.comparison.diff import Change, Changes, motion_words, word
+from urdfkin.comparison.result import angle, length
 from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.errors.escape import markdown_text as text
 from urdfkin.report.markdown import LIMIT, shortened
@@ -19,9 +22,14 @@ def headline(found: Changes) -> str:
 
     The text has the number of changes, and the distance by which all changes together move a frame.
     """
+    rounding = ""
+    if found.rounding is not None:
+        metres, radians = found.rounding
+        most = f": at most {length(metres)} and {angle(radians)}" if isfinite(metres) else ""
+        rounding = f", apart from rounding to single precision{most}"
     if not found:
-        return "nothing changed"
-    head = counted(len(found.changes), "change")
+        return f"nothing changed{rounding}"
+    head = counted(len(found.changes), "change") + rounding
     if found.total is None:
         return f"{head}, no effect on motion" if not any(c.moves for c in found.changes) else head
     return f"{head}; together they {motion_words(found.total)}"
@@ -32,6 +40,27 @@ def _by_element(found: Changes) -> dict[str, list[Change]]:
     for change in found.changes:
         grouped.setdefault(change.element, []).append(change)
     return grouped
+
+
+#: Columns of the table of several pairs.
+PAIRS = ("old", "new", "changes")
+
+
+def pairs_document(found: Sequence[Changes]) -> TextDocument:
+    """Return a table with a row for each pair of robots, and the changes of each pair."""
+    rows = [(*one.sources, headline(one)) for one in found]
+    return TextDocument(
+        "", [Table(PAIRS, rows, left=3), *(line for one in found if one for line in lines_of(one))]
+    )
+
+
+def pairs_markdown(found: Sequence[Changes]) -> str:
+    """Return the table of all pairs, and a table of the changes of each pair, as Markdown."""
+    lines = [f"| {' | '.join(PAIRS)} |", f"|{' --- |' * len(PAIRS)}"]
+    lines += [f"| {' | '.join(map(text, (*one.sources, headline(one))))} |" for one in found]
+    parts = ["\n".join([*lines, ""])]
+    parts += [markdown_of(one, LIMIT // len(found)) for one in found if one]
+    return "\n".join(parts)
 
 
 def lines_of(found: Changes) -> list[str]:
@@ -58,6 +87,7 @@ def rows_of(found: Changes, longest: int | None = None) -> list[tuple[str, ...]]
         effect = found.effect_of.get(change.element)
         said = effect.words if effect and change.moves else ""
         old, new = ("" if value is None else word(value) for value in (change.old, change.new))
+        new = change.size or new
         if longest is not None:
             old, new = shortened(old, longest), shortened(new, longest)
         cells = (change.element, change.what, old, new) if change.what else (str(change), "", "", "")
@@ -93,9 +123,21 @@ def as_data(found: Changes) -> dict[str, Any]:
     return {
         "sources": list(found.sources),
         "changes": [
-            {"element": c.element, "what": c.what, "old": c.old, "new": c.new, "moves": c.moves}
+            {
+                "element": c.element,
+                "what": c.what,
+                "old": c.old,
+                "new": c.new,
+                "size": c.size or None,
+                "moves": c.moves,
+            }
             for c in found.changes
         ],
         "effects": [{"element": e.element, **(far(e.interval) or {})} for e in found.effects],
         "total": far(found.total),
+        "rounding": found.rounding
+        and {
+            name: size if isfinite(size) else None
+            for name, size in zip(("metres", "radians"), found.rounding, strict=True)
+        },
     }

@@ -46,15 +46,21 @@ def headline(found: Sameness, question: Question = EQUIVALENT) -> str:
     besides = f"; limits of {counted(limits, 'joint')} differ" if limits else ""
     if question.within is not None:
         return _within(found, question.within) + besides
-    if found.up_to_single and found.single is not None:
+    off = "the distance of the frames has no bound"
+    if math.isfinite(max(found.written)):
         off = f"in every configuration no frame is off by more than {_both(*found.written)}"
+    if found.up_to_single:
+        cause = "each joint differs by no more than the rounding of its own numbers"
+        return f"SAME UP TO SINGLE PRECISION: {off}; {cause}{besides}"
+    if found.within_single and found.single is not None:
         single = f"rounding to single precision can move a frame by up to {_both(*found.single)}"
-        return f"DIFFERS WITHIN SINGLE PRECISION: {off}; {single}{besides}"
+        return f"DIFFERS WITHIN SINGLE PRECISION: {off}; {single}, but {found.unexplained[0]}{besides}"
     if found.verdict is Verdict.DIFFERS:
         by = _by(found.frames, found.rounding)
         if found.frames and not by:
             by = ", although no common frame is off by more than rounding"
         single = "" if found.single is None else f"; single precision explains up to {_both(*found.single)}"
+        single += f", but {found.unexplained[0]}" if single and found.unexplained else ""
         return f"DIFFERS{by}; first difference: {found.differences[0].words}{single}{besides}"
     metres, radians = found.rounding
     off = f"no frame is off by more than rounding, {length(metres)} and {angle(radians)}"
@@ -177,10 +183,10 @@ def document(found: Sameness, question: Question = EQUIVALENT, *, all_: bool = F
     head = headline(found, question)
     parts.append(Strong(head, "bold green" if found.holds(question) else "bold red"))
     some = None if all_ else SHOWN
-    parts += _lines("changes of B", found.after, some)
-    if found.after and as_written(found) not in head:
+    after, words = ((), []) if found.up_to_single and not all_ else _reasons(found)
+    parts += _lines("changes of B", after, some)
+    if after and as_written(found) not in head:
         parts += _lines("", [as_written(found)], some)
-    words = [one.words for one in found.differences]
     parts += _lines("differences", words[1:] if words and words[0] in head else words, some)
     frames = far_frames(found)
     if frames:
@@ -194,6 +200,11 @@ def document(found: Sameness, question: Question = EQUIVALENT, *, all_: bool = F
     return TextDocument("", [*parts, str(found.checked)])
 
 
+def _reasons(found: Sameness) -> tuple[tuple[str, ...], list[str]]:
+    """Return the changes of B and the differences as lines."""
+    return found.after, [one.words for one in found.differences]
+
+
 #: Columns of the table of several pairs.
 PAIRS = ("A", "B", "verdict", "at most apart", "single precision")
 
@@ -202,8 +213,8 @@ def _pair_rows(found: Sequence[Sameness], question: Question) -> list[tuple[str,
     """Return a row for each pair: sources, verdict, largest distance, largest single-precision distance."""
     rows = list[tuple[str, ...]]()
     for one in found:
-        words = "differs" if not one else "same" if one.verdict is Verdict.SAME else "equivalent"
-        if one.up_to_single:
+        words = "equivalent" if one.verdict is Verdict.SAME_AFTER else one.verdict.value
+        if one.within_single:
             words = "differs within single precision"
         if question.within is not None:
             words = f"{'' if one.within(question.within) else 'not '}within {question.within:g}"
@@ -236,9 +247,10 @@ def as_document(found: Sameness) -> TextDocument:
     """Return the answer, the reasons and the farthest frames, for `print` and notebooks."""
     a, b = (f"{name} ({source})" for name, source in zip(found.names, found.sources, strict=True))
     parts: list[str | Table] = [f"A: {a}", f"B: {b}"]
+    after, words = ((), []) if found.up_to_single else _reasons(found)
     for head, lines in (
-        ("Change of B", [*found.after, as_written(found)] if found.after else []),
-        ("Difference", [one.words for one in found.differences]),
+        ("Change of B", [*after, as_written(found)] if after else []),
+        ("Difference", words),
         ("Without effect on motion", [one.words for one in found.remarks]),
     ):
         parts += [f"{head}: {line}" for line in lines[:SHOWN] if line]
@@ -282,9 +294,10 @@ def markdown_of(found: Sameness, question: Question = EQUIVALENT) -> str:
         text(f"{name} ({source})") for name, source in zip(found.names, found.sources, strict=True)
     )
     lines = [f"## {mark} {text(headline(found, question))}", "", names, ""]
+    after, reasons = ((), []) if found.up_to_single else _reasons(found)
     for head, words in (
-        ("Changes of B", [*found.after, as_written(found)] if found.after else []),
-        ("Differences", [one.words for one in found.differences]),
+        ("Changes of B", [*after, as_written(found)] if after else []),
+        ("Differences", reasons),
         (NARROWED.capitalize(), found.narrowed),
         ("Different names", renamed(found)),
         ("Differences without effect on motion", [one.words for one in found.remarks]),

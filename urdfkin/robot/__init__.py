@@ -76,6 +76,7 @@ if TYPE_CHECKING:
     from urdfkin.model.conventions import Convention, Conversion
     from urdfkin.robot.convention_robot import ConventionRobot
     from urdfkin.verify.exact.enclosure import Enclosures
+    from urdfkin.verify.usd_check import SinglePrecision
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 #: Gravity in m/s^2, in world axes. Pinocchio and MuJoCo have the same default.
@@ -162,9 +163,9 @@ class Robot(Displayable):
             urdf, tree, origin, policy=verify, mimic=mimic, unverifiable=unverifiable, oracle=oracle
         )
         self.findings = Findings(findings)
-        #: (links, 2) bounds of the translation (m) and rotation (rad) of each link by single precision.
-        #: None if the file's numbers have double precision.
-        self.single: FloatArray | None = None
+        #: Bounds of the changes of links and joints by single precision. None if the file's numbers have
+        #: double precision.
+        self.single: SinglePrecision | None = None
         #: The path of the prim of each link of a USD stage that has one.
         self.prims: Mapping[str, str] = {}
         self.base_frame = base_frame or tree.frame_name(0)

@@ -201,8 +201,23 @@ def _angle(R: FloatArray) -> float:
 Single = Mapping[str, tuple[float, float, float, float]]
 
 
-def single_precision(tree: KinematicTree, single: Single) -> FloatArray:
-    """Return bounds (links, 2) on the displacement (m) and rotation (rad) of each link by rounding.
+@dataclass(frozen=True, slots=True, eq=False)
+class SinglePrecision:
+    """How far rounding to single precision can change the links and the joints of a robot.
+
+    Attributes:
+        links: (links, 2) how far it can move (m) and turn (rad) each link, over all configurations.
+        joints: (joints, 3) how far it can move (m) and turn (rad) the frame after each joint in the zero
+            configuration, seen from the frame before it; and the share of its value by which it can change
+            each number of the joint's mimic rule.
+    """
+
+    links: FloatArray
+    joints: FloatArray
+
+
+def single_precision(tree: KinematicTree, single: Single) -> SinglePrecision:
+    """Return how far single precision can move and turn each link and the frame after each joint.
 
     The numbers of a stage are rounded to single precision. The error of a stored number is at most half of
     the distance to the next number in single precision; a zero is exact. The three errors of an origin's
@@ -211,13 +226,23 @@ def single_precision(tree: KinematicTree, single: Single) -> FloatArray:
     at most the angle times the length of the path to this link. The error of a mimic rule m q + c is 2^-24
     (|m q| + |c|), for the largest |q| within the limits.
 
+    In the zero configuration a joint of the tree places the next frame at A B^-1, the joint's frame A in one
+    body and B in the other. Let w be the sum of the errors of both origins, and e the sum of the errors of
+    both rotations. The rotation is off by at most e. The place is off by at most w + e |p|, with the origin p
+    of B. A revolute joint of the tree has no such term: the reader writes B as a fixed joint of its own if
+    its origin is not zero. That fixed joint has no entry, because the entry of the revolute joint counts both
+    frames. For other joints, the length in the entry is at least |p|. In a locked joint the two frames are
+    apart by the value q too, and |q| is at most the length of the constant plus that of the two origins.
+
     Args:
         tree: The robot.
         single: The errors of each joint. A joint without an entry is exact.
     """
-    out = np.zeros((len(tree.links), 2))
+    out, own = np.zeros((len(tree.links), 2)), np.zeros((len(tree.joints), 3))
     for i, joint in enumerate(tree.joints):
         way, angle, size, share = single.get(joint.name, (0.0, 0.0, 0.0, 0.0))
+        lever = size + (joint.length if joint.lock else 0.0)
+        own[i] = way + angle * (0.0 if joint.kind.turns else lever), angle, share
         length = max(joint.length, size)
         slides = joint.kind is JointKind.PRISMATIC
         if slides:
@@ -228,7 +253,7 @@ def single_precision(tree: KinematicTree, single: Single) -> FloatArray:
             way, angle = (way + off, angle) if slides else (way, angle + off)
         above = out[joint.parent]
         out[i + 1] = above[0] + way + (above[1] + angle) * length, above[1] + angle
-    return out
+    return SinglePrecision(out, own)
 
 
 def _largest(joint: Joint) -> float:
@@ -247,7 +272,7 @@ def _at_rest(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple
     if tree.links[0] in prims:  # the root is a body, wherever the stage places it
         at = list(prims).index(tree.links[0])
         rest = inverse(rest[at]) @ rest
-    own = single_precision(tree, answer["single"])
+    own = single_precision(tree, answer["single"]).links
     far = float(np.linalg.norm(unpacked(answer["rest"])[:, :, 3], axis=1).max(initial=0.0))
     remarks, worst = [], (0.0, 0.0)
     shares = []
