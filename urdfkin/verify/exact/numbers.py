@@ -69,7 +69,10 @@ def precision(digits: int) -> Iterator[None]:
 
 
 def exact(value: Number) -> Number:
-    """Return a double or an integer as an interval of width 0; return an interval unchanged."""
+    """Return a double, an integer or a decimal in text as an interval; return an interval unchanged.
+
+    The interval of a double or an integer has width 0.
+    """
     return arb(value)
 
 
@@ -128,7 +131,7 @@ class Kind(NamedTuple):
 
 
 #: Balls.
-BALLS = Kind(arb, lambda angle: exact(angle).sin_cos(), lambda x: exact(x).sqrt())
+BALLS = Kind(exact, lambda angle: exact(angle).sin_cos(), lambda x: exact(x).sqrt())
 
 
 def unit(x: Vector, kind: Kind = BALLS) -> Vector:
