@@ -21,12 +21,12 @@ from urdfkin.dh.units import fraction_text, pi_fraction
 from urdfkin.export.expression import Graph, Node, Number
 from urdfkin.export.function import INPUTS, Function, function_of
 from urdfkin.export.proof import CHECKED, Proof
+from urdfkin.model.configuration import draw
 from urdfkin.model.recursion import IDENTITY, ZERO, Matrix, Vector
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.verify.call import Call
 from urdfkin.verify.exact.numbers import DIGITS, Kind, enough_digits, exact, precision, read_exact
-from urdfkin.verify.sampling import draw
 from urdfkin.verify.verifier import Verifier
 
 #: Largest angle that can be a multiple of pi, rad. Neighbouring doubles are far closer than two multiples.
