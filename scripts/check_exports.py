@@ -6,7 +6,7 @@
     python scripts/check_exports.py --tips       # only the leaf with the longest path of each robot
     python scripts/check_exports.py --sizes      # write the sizes of the code to docs/export.md
     python scripts/check_exports.py --library torch --environment /tmp/torch  # the tips, in PyTorch
-    python scripts/check_exports.py --library jax --environment /tmp/jax      # the tips, in JAX
+    python scripts/check_exports.py --library jax --environment /tmp/jax --keep jax.jsonl  # in JAX; continues
 
 `--library` creates a virtual environment and installs the library there by pip, unless it is there already;
 `--package torch==2.13.0+cpu` chooses the version. `scripts/run_exported.py` describes the checks.
@@ -143,11 +143,11 @@ def check_library(library: str, environment: Path, package: str | None, keep: Pa
         subprocess.run([str(python), "-m", "pip", "install", "--quiet", "numpy", *packages], check=True)
     version = [str(python), "-c", f"import {library}; print('{library}', {library}.__version__)"]
     print(subprocess.run(version, capture_output=True, text=True, check=True).stdout.strip(), flush=True)
-    stored = lines_of(keep)
+    stored = [line for line in lines_of(keep) if line["library"] == library]
     with tempfile.TemporaryDirectory() as folder:
         paths = list(_files(library, Path(folder)))
         left = [path for path in paths if path.stem not in {line["file"] for line in stored}]
-        command = [str(python), str(Path(__file__).with_name("run_exported.py")), *map(str, left)]
+        command = [str(python), str(Path(__file__).with_name("run_exported.py")), library, *map(str, left)]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=folder) as process:
             for line in process.stdout or ():
                 print(line, end="", flush=True)
@@ -167,13 +167,13 @@ def check_library(library: str, environment: Path, package: str | None, keep: Pa
 
 
 def _files(library: str, folder: Path) -> Iterator[Path]:
-    """Write the files of all tips in a library's language, and for PyTorch also as `array`."""
+    """Write the files of all tips in a library's language, and as `array`."""
     for number, (_, robot, frame) in enumerate(subjects(tips=True)):
         wanted = ("placement", "jacobian", "velocity", "acceleration") if robot.nv else ("placement",)
         if 0 < robot.nv <= _HESSIANS and all(joint.nv <= 1 for joint in robot.tree.joints):
             wanted = (*wanted, "hessian")
         written = code(robot, frame, wanted)
-        for to in (library, "array") if library == "torch" else (library,):
+        for to in (library, "array"):
             path = folder / f"{written.name}_{number}{LANGUAGES[to][1]}"
             path.write_text(write(written, to), encoding="utf-8")
             yield path

@@ -1,14 +1,17 @@
 """Run exported Python files in this interpreter, which needs no urdfkin, and print one JSON line for each.
 
-    python scripts/run_exported.py robot_torch.py robot_jax.py robot_array.py
+    python scripts/run_exported.py torch robot_torch.py robot_array.py
+    python scripts/run_exported.py jax robot_jax.py robot_array.py
 
-It runs each file's own check. Derivatives of the Jacobian by PyTorch and JAX are compared with the Hessian's
-true values in the file, within the Hessian's bound, if the file has a Hessian. The functions of the first
-file of PyTorch are also compiled by `torch.compile`. `scripts/check_exports.py --library` calls this script.
+It runs each file's own check; a file for any array library runs in the namespace of the named library.
+Derivatives of the Jacobian by PyTorch and JAX are compared with the Hessian's true values in the file, within
+the Hessian's bound, if the file has a Hessian. The functions of the first file of PyTorch are also compiled
+by `torch.compile`. `scripts/check_exports.py --library` calls this script.
 """
 
 from __future__ import annotations
 
+import importlib
 import json
 import runpy
 import sys
@@ -17,28 +20,29 @@ from pathlib import Path
 from typing import Any
 
 
-def shares(path: str, compiled: bool) -> Iterator[tuple[str, float]]:
+def shares(path: str, library: str, compiled: bool) -> Iterator[tuple[str, float]]:
     """Yield the largest error of each check as a share of its bound; 0 or inf for a check without one."""
     scope = runpy.run_path(path)
-    if path.endswith("_array.py"):
-        from array_api_compat import torch as namespace  # noqa: PLC0415
-
-        for (_, kind), share in scope["check"](namespace).items():
-            yield f"array {kind}", share
-        return
-    to = "torch" if path.endswith("_torch.py") else "jax"
-    if to == "jax":
+    if library == "jax":
         import jax  # noqa: PLC0415
 
         jax.config.update("jax_enable_x64", True)
-    for (_, kind), share in scope["check"]().items():
-        yield f"{to} {kind}", share
+    any_library = path.endswith("_array.py")
+    checked = scope["check"](*([_namespace(library)] if any_library else []))
+    for (_, kind), share in checked.items():
+        yield f"{'array' if any_library else library} {kind}", share
+    if any_library:
+        return
     for good in scope.get("gradients", dict)().values():
         yield "gradcheck", 0.0 if good else float("inf")
     if "hessian" in scope["TRUE"]:
-        yield f"{to} gradient", of_hessian(scope, *(_torch if to == "torch" else _jax)())
-    if compiled and to == "torch":
+        yield f"{library} gradient", of_hessian(scope, *(_torch if library == "torch" else _jax)())
+    if compiled and library == "torch":
         yield "torch.compile", of_compiled(scope)
+
+
+def _namespace(library: str) -> Any:
+    return importlib.import_module("jax.numpy" if library == "jax" else "array_api_compat.torch")
 
 
 def _torch() -> tuple[Callable[..., Any], Callable[..., Any]]:
@@ -92,16 +96,16 @@ def worst(found: Any, true: Any, within: Any, eps: float) -> float:
     return largest
 
 
-def main(paths: list[str]) -> None:
-    """Print a line for each file: its name, and the largest share of each check."""
+def main(library: str, paths: list[str]) -> None:
+    """Print a line for each file: its name, the library, and the largest share of each check."""
     compiled = True
     for path in paths:
         found: dict[str, float] = {}
-        for name, share in shares(path, compiled):
+        for name, share in shares(path, library, compiled):
             found[name] = share if not share <= found.get(name, 0.0) else found.get(name, 0.0)
         compiled = compiled and not path.endswith("_torch.py")
-        print(json.dumps({"file": Path(path).stem, **found}), flush=True)
+        print(json.dumps({"file": Path(path).stem, "library": library, **found}), flush=True)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main(sys.argv[1], sys.argv[2:])

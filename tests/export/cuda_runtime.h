@@ -2,6 +2,7 @@
    threads of the host, and the threads of a warp wait for each other. */
 #pragma once
 #include <barrier>
+#include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <memory>
@@ -22,7 +23,7 @@ struct dim3 {
 };
 typedef struct CUstream_st *cudaStream_t;
 typedef int cudaError_t;
-enum { cudaSuccess = 0, cudaMemcpyHostToDevice, cudaMemcpyDeviceToHost };
+enum { cudaSuccess = 0, cudaMemcpyHostToDevice, cudaMemcpyDeviceToHost, cudaMemcpyDeviceToDevice };
 
 inline thread_local dim3 threadIdx(0), blockIdx(0), gridDim(0);
 inline thread_local std::barrier<> *own_warp = nullptr;
@@ -50,6 +51,21 @@ cudaError_t cudaLaunchKernel(void (*kernel)(Given...), dim3 grid, dim3 block, vo
     return cudaSuccess;
 }
 
+/* A launch ends before the function that starts it returns. */
+typedef std::chrono::steady_clock::time_point *cudaEvent_t;
+inline cudaError_t cudaEventCreate(cudaEvent_t *at)
+{
+    return *at = new std::chrono::steady_clock::time_point, cudaSuccess;
+}
+inline cudaError_t cudaEventDestroy(cudaEvent_t at) { return delete at, cudaSuccess; }
+inline cudaError_t cudaEventRecord(cudaEvent_t at) { return *at = std::chrono::steady_clock::now(), cudaSuccess; }
+inline cudaError_t cudaEventSynchronize(cudaEvent_t) { return cudaSuccess; }
+inline cudaError_t cudaEventElapsedTime(float *time, cudaEvent_t start, cudaEvent_t end)
+{
+    return *time = std::chrono::duration<float, std::milli>(*end - *start).count(), cudaSuccess;
+}
+inline const char *cudaGetErrorString(cudaError_t) { return "an error"; }
+
 inline cudaError_t cudaGetDeviceCount(int *count) { return *count = 1, cudaSuccess; }
 inline cudaError_t cudaGetLastError() { return cudaSuccess; }
 inline cudaError_t cudaMalloc(void **at, size_t bytes) { return *at = std::malloc(bytes), cudaSuccess; }
@@ -61,3 +77,7 @@ inline cudaError_t cudaMemcpy(void *to, const void *from, size_t bytes, int)
 inline cudaError_t cudaStreamCreate(cudaStream_t *stream) { return *stream = nullptr, cudaSuccess; }
 inline cudaError_t cudaStreamSynchronize(cudaStream_t) { return cudaSuccess; }
 inline cudaError_t cudaStreamDestroy(cudaStream_t) { return cudaSuccess; }
+inline cudaError_t cudaMemcpyAsync(void *to, const void *from, size_t bytes, int kind)
+{
+    return cudaMemcpy(to, from, bytes, kind);
+}

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import subprocess
+from itertools import product
 from pathlib import Path
 
 import pytest
 
 import urdfkin
+from scripts import benchmark_gpu
 from tests.export.writing import ALL, code, file
 from tests.laws.subjects import robot_of
 from urdfkin.export import check as checking
@@ -114,6 +117,57 @@ def test_cudas_compiler_compiles_it_without_a_warning(real: str, tmp_path: Path)
     said = subprocess.run([str(built)], capture_output=True, text=True, check=True).stdout
     assert said.count("good ") >= 2  # without a GPU, only the functions of the host
     assert "WRONG" not in said
+
+
+@pytest.mark.slow
+def test_the_benchmarks_program_prints_a_time_of_each_quantity_precision_and_batch(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(benchmark_gpu, "SIZES", (1, 40))
+    written = code(urdfkin.load("planar_two_link"), quantities=("jacobian", "acceleration"))
+    file(written, "cuda", tmp_path)
+    program = tmp_path / "measure.cpp"
+    text = benchmark_gpu.program(written)
+    assert "@" not in text
+    program.write_text(text.replace("(1) << 28", "(1) << 16"), "utf-8")
+    lines = ran(program, "-fsanitize=address,undefined", f"-I{tmp_path}").splitlines()
+    measured = list(benchmark_gpu.rows(written, lines))
+    found = [(x["real"], x["n"], x["quantity"]) for x in measured]
+    assert sorted(found) == sorted(product(("double", "float"), (1, 40), ("jacobian", "acceleration")))
+    assert all(x["a_second"] > 0.0 and x["share"] > 0.0 for x in measured)
+    assert benchmark_gpu.table(measured).count("\n") == 1 + len(measured)
+
+
+def test_the_share_of_the_bandwidth_counts_the_bytes_of_inputs_and_results() -> None:
+    written = code(urdfkin.load("planar_two_link"), quantities=("jacobian", "acceleration"))
+    jacobian, acceleration = written.functions
+    assert benchmark_gpu.bytes_of(written, jacobian, "double") == 8 * (2 + 12)
+    assert benchmark_gpu.bytes_of(written, acceleration, "float") == 4 * (3 * 2 + 6)
+    row = {"by": "urdfkin", "quantity": "jacobian", "real": "double", "n": 1000, "s": 1e-3}
+    (found,) = benchmark_gpu.rows(written, [json.dumps({"bandwidth": 1.12e9}), json.dumps(row)])
+    assert found["a_second"] == pytest.approx(1e6)
+    assert found["share"] == pytest.approx(0.1)
+    with pytest.raises(ValueError, match="no bandwidth"):
+        list(benchmark_gpu.rows(written, [json.dumps(row)]))
+
+
+@pytest.mark.parametrize(
+    ("compiler", "said"), [(None, "nvcc is not installed"), ("/bin/false", "CUDA's driver finds no GPU here")]
+)
+def test_the_benchmark_refuses_a_machine_without_compiler_or_gpu(
+    compiler: str | None, said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(benchmark_gpu, "nvcc", lambda: compiler)
+    monkeypatch.setattr(benchmark_gpu, "gpus", lambda: 0)
+    assert benchmark_gpu.main(["planar_two_link"]) == 2
+    assert said in capsys.readouterr().err
+
+
+@_NVCC
+@pytest.mark.long
+def test_cudas_compiler_compiles_the_benchmark(capsys: pytest.CaptureFixture[str]) -> None:
+    assert benchmark_gpu.main(["planar_two_link", "--compile-only"]) == 0
+    assert capsys.readouterr().out == "compiled, not run: measure, double, float\n"
 
 
 @_NVCC

@@ -19,7 +19,7 @@ from urdfkin.robot import Robot
 ALL = tuple(row.method for row in exported())
 #: What a file in a language needs to run.
 PROGRAMS = {"c": "cc", "cpp": "c++", "cuda": "c++", "matlab": "octave-cli"}
-LIBRARIES = ("numba", "jax", "torch", "casadi", "sympy")
+LIBRARIES = ("numba", "jax", "torch", "casadi", "sympy", "sympy-exact")
 
 
 def code(
@@ -44,7 +44,7 @@ def need(to: str) -> None:
     """Skip where a language is not there."""
     if (program := PROGRAMS.get(to)) and shutil.which(program) is None:
         pytest.skip(f"no {program}")
-    if to in LIBRARIES and importlib.util.find_spec(to) is None:
+    if to in LIBRARIES and importlib.util.find_spec(to.partition("-")[0]) is None:
         pytest.skip(f"no {to}")
 
 

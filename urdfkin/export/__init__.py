@@ -23,6 +23,7 @@ LANGUAGES: dict[str, tuple[str, str, str]] = {
     "torch": ("urdfkin.export.python", "_torch.py", "Python on PyTorch, a module and functions"),
     "casadi": ("urdfkin.export.python", "_casadi.py", "Python on CasADi's SX, MX and DM"),
     "sympy": ("urdfkin.export.python", "_sympy.py", "Python on SymPy's symbols"),
+    "sympy-exact": ("urdfkin.export.python", "_sympy_exact.py", "Python on SymPy's symbols, exact numbers"),
     "matlab": ("urdfkin.export.matlab", "_kinematics.m", "MATLAB and Octave"),
     "latex": ("urdfkin.export.latex", ".tex", "LaTeX formulas in the textbook's symbols"),
 }

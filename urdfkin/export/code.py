@@ -42,6 +42,7 @@ class Code:
         words: Identifiers for the numbers of each input, by the input's letter, and for the path's joints.
         about: Lines for the header that describe the table or the screws of the chain; empty for a URDF.
         vouched: The proof; None for code that urdfkin compiles for itself.
+        exact: Function that returns the same code with exact constants; None if there is none.
     """
 
     name: str
@@ -55,6 +56,7 @@ class Code:
     words: dict[str, list[str]]
     about: tuple[str, ...] = ()
     vouched: Proof | None = None
+    exact: Callable[[], Code] | None = None
 
     @property
     def proof(self) -> Proof:
@@ -137,7 +139,17 @@ def code_of(
         )
     code = bare(tree, plan, frame, rows, reference, title("", name) if name else title(tree.name, frame))
     proof = prove(verifier, plan_of, frame, reference, code.functions, verify)
-    return replace(code, vouched=proof, about=tuple(map(quiet, about.splitlines())))
+    code = replace(code, vouched=proof, about=tuple(map(quiet, about.splitlines())))
+
+    def exact() -> Code:
+        from urdfkin.export.exact import exact_functions  # noqa: PLC0415  only for computer algebra
+
+        functions, vouched = exact_functions(
+            verifier, plan_of, frame, reference, code.functions, proof, verify
+        )
+        return replace(code, functions=functions, vouched=vouched)
+
+    return replace(code, exact=exact)
 
 
 def bare(
@@ -208,7 +220,7 @@ class Writer:
         words = self.code.words
         if node.op in words:
             return f"{node.op}_{words[node.op][node.of[0]]}"
-        if node.op in ("sin", "cos"):
+        if node.op in ("sin", "cos") and node.place >= 0:
             return f"{node.op[0]}_{words['s'][node.place]}"
         return node.name or f"t{k}"
 
@@ -229,6 +241,8 @@ class Writer:
 
     def _place(self, place: int) -> str:
         joints, steps = self.code.joints, self.function.plan.steps
+        if place < 0:
+            return "constants"
         if place < len(joints):
             kind = ("is revolute", "is prismatic", "is planar", "is floating")[steps[place, Step.KIND]]
             return f"{joints[place]} {kind}"
@@ -241,7 +255,7 @@ class Writer:
     def text(self, x: Number, level: int = _SUM) -> str:
         """Return an expression as an operand, in brackets if its precedence is below `level`."""
         if not isinstance(x, Node):
-            return self.literal(float(x))
+            return self.literal(float(x) if isinstance(x, int) else x)
         if x in self.own or x.op in self.code.words:
             return self.words[x]
         return self.defined(x, level)

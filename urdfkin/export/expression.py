@@ -68,6 +68,9 @@ class Node:
     def __truediv__(self, other: Number) -> Number:
         return self.graph.made("/", self, other)
 
+    def __rtruediv__(self, other: Number) -> Number:
+        return other if _is(other, 0.0) else self.graph.made("/", other, self)
+
     def __neg__(self) -> Number:
         return self.of[0] if self.op == "neg" else self.graph.made("neg", self)
 
@@ -86,6 +89,9 @@ class Graph:
         chapter: The textbook's equations as functions. Each function records its equation numbers in the
             nodes that it creates.
     """
+
+    #: The result of a product with zero, and of x - x.
+    zero: float = 0.0
 
     def __init__(self) -> None:
         self._made: dict[tuple[Any, ...], Node] = {}
@@ -126,7 +132,7 @@ class Graph:
     def difference(self, x: Number, y: Number) -> Number:
         """Return x - y."""
         if x is y or _is(y, 0.0):
-            return 0.0 if x is y else x
+            return self.zero if x is y else x
         if _is(x, 0.0):
             return -y
         if (positive := _without_minus(y)) is not None:
@@ -140,7 +146,7 @@ class Graph:
     def product(self, x: Number, y: Number) -> Number:
         """Return the product of x and y."""
         if _is(x, 0.0) or _is(y, 0.0):
-            return 0.0
+            return self.zero
         for one, other in ((x, y), (y, x)):
             if _is(one, 1.0):
                 return other

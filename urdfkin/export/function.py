@@ -152,15 +152,18 @@ def _without_minus(node: Node) -> Node:
     return node.of[0] if node.op == "neg" else node
 
 
-def function_of(plan: CompiledTree, quantity: Quantity, reference: Reference) -> Function:
+def function_of(
+    plan: CompiledTree, quantity: Quantity, reference: Reference, graph: Graph | None = None
+) -> Function:
     """Return the function that computes a quantity for the only frame of a compiled tree.
 
     Args:
         plan: The compiled tree of the path.
         quantity: A quantity that can be exported.
         reference: The reference frame.
+        graph: The graph of the compiled tree's exact constants; None: the constants are doubles.
     """
-    graph = Graph()
+    graph = graph or Graph()
 
     def entering(place: int) -> None:
         graph.place = place
@@ -173,7 +176,10 @@ def function_of(plan: CompiledTree, quantity: Quantity, reference: Reference) ->
         for letter in INPUTS
     ]
     results = recursion.QUANTITIES[quantity.name](plan, kind, inputs, reference)
-    return Function(quantity, reference, plan, tuple(x if isinstance(x, Node) else x + 0.0 for x in results))
+    # -0.0 + 0.0 is 0.0
+    return Function(
+        quantity, reference, plan, tuple(x + 0.0 if isinstance(x, int | float) else x for x in results)
+    )
 
 
 def _name(place: int, state: State) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 from urdfkin.compiled.plan import CompiledTree, Motion, Step
 from urdfkin.errors import InputError
 from urdfkin.export.code import Code, Writer
-from urdfkin.export.expression import Node
+from urdfkin.export.expression import Node, Number
 from urdfkin.export.function import Function
 from urdfkin.verify.bounds import column_weights
 
@@ -40,6 +40,7 @@ class Dialect:
         single: Whether the functions also compute in single precision.
         closing: Function that returns code after the written functions.
         after: Last lines of the written program; "" if there are none.
+        exact: Whether constants are exact.
     """
 
     about: str
@@ -54,6 +55,7 @@ class Dialect:
     single: bool = False
     closing: Callable[[Code], str] = lambda code: ""
     after: str = ""
+    exact: bool = False
 
 
 def _rows(values: Sequence[str], width: int) -> list[Sequence[str]]:
@@ -344,6 +346,21 @@ DIALECTS = {
         result=_nested("sympy.Matrix([", "])"),
         values=_ONE_BY_ONE.format("[float(x) for x in function(*one)]"),
     ),
+    "sympy-exact": Dialect(
+        about="Lists of symbols or numbers: q ({nq}), v and a ({nv}). Each result is a Matrix of exact\n"
+        "numbers. A Hessian has {nv} times 6 rows and {nv} columns.\n"
+        "For example: placement(sympy.symbols('q:{nq}'))",
+        imports="import types\n\nimport mpmath\nfrom sympy import Matrix, Rational, pi\nfrom sympy import {}",
+        result=_nested("Matrix([", "])"),
+        # SymPy simplifies large expressions slowly, so the check runs the same code with mpmath's numbers.
+        values='numbers = {name: getattr(mpmath, name) for name in ("cos", "sin", "sqrt", "pi")}\n'
+        '    numbers |= {"Rational": lambda x, y: mpmath.mpf(x) / y, "Matrix": mpmath.matrix}\n'
+        "    with mpmath.workdps(60):\n"
+        "        same = types.FunctionType(function.__code__, numbers)\n"
+        "        return [[float(x) for x in same(*([mpmath.mpf(x) for x in y] for y in one))]"
+        " for one in zip(*inputs)]",
+        exact=True,
+    ),
 }
 
 
@@ -353,13 +370,15 @@ def write(code: Code, to: str) -> str:
     The module also contains a check, which `python FILE` runs.
     """
     dialect = DIALECTS[to]
+    if dialect.exact and code.exact is not None:
+        code = code.exact()
     about = dialect.about.format(nq=code.nq, nv=code.nv)
     lines = [
         '"""' + code.head[0],
         *code.head[1:],
         "",
         about,
-        f"To try it: python {code.name}_{to}.py",
+        f"To try it: python {code.name}_{to.replace('-', '_')}.py",
         '"""',
         "",
     ]
@@ -376,8 +395,14 @@ def _imports(code: Code, dialect: Dialect) -> str:
     return "\n".join(lines).strip().format(used)
 
 
+def _exact(x: Number) -> str:
+    from urdfkin.export.exact import literal  # noqa: PLC0415  only for computer algebra
+
+    return literal(x)
+
+
 def _function(code: Code, function: Function, dialect: Dialect) -> Iterator[str]:
-    writer = Writer(code, function)
+    writer = Writer(code, function, _exact if dialect.exact else repr)
     if dialect.decorator:
         yield dialect.decorator
     yield f"def {function.name}({', '.join(function.inputs)}):"

@@ -91,7 +91,7 @@ class TreeRecursion(Recursion):
         return self.turned(self.carried(s, _without_rounding(d)), (x, y, z))
 
     def _about_z(self, angle: Number) -> Matrix:
-        found: Matrix = self.eq.about_z(*self.kind.sine_cosine(angle), 0.0, 1.0)
+        found: Matrix = self.eq.about_z(*self.kind.sine_cosine(angle), 0, 1)
         return found
 
     def _move(self, i: int, s: State) -> State:
@@ -136,8 +136,10 @@ def _without_rounding(x: Sequence[float]) -> Vector:
 
     For example, the cosine of the double nearest to pi/2 is 6e-17. Without this function, the exported code
     would contain useless products with such numbers. The bound of `urdfkin.kinematics.roundings` includes the
-    error of this change.
+    error of this change. Exact constants have no rounding.
     """
+    if not all(isinstance(c, float) for c in x):
+        return x[0], x[1], x[2]
     least = EPS / 2.0 * max(map(abs, x))
     first, second, third = (c if abs(c) > least else 0.0 for c in x)
     return first, second, third
@@ -183,7 +185,7 @@ def hessian(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -
     The terms are those whose sum is equation 7.126.
     """
     path, nv = TreeRecursion(plan, kind, inputs, own=False), plan.nv
-    out: list[Number] = [0.0] * (6 * nv**2)
+    out: list[Number] = [0] * (6 * nv**2)
     for of, by, factor, six in path.hessian(path.end, path.columns, reference):
         for row, x in enumerate(six):
             out[(row * nv + of) * nv + by] = out[(row * nv + of) * nv + by] + factor * x

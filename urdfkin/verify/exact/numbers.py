@@ -11,7 +11,7 @@ come from the tree. `urdfkin.urdf.lint` has already checked the text.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from decimal import ROUND_HALF_EVEN, Decimal, localcontext
@@ -69,7 +69,10 @@ def precision(digits: int) -> Iterator[None]:
 
 
 def exact(value: Number) -> Number:
-    """Return a double or an integer as an interval of width 0; return an interval unchanged."""
+    """Return a double, an integer or a decimal in text as an interval; return an interval unchanged.
+
+    The interval of a double or an integer has width 0.
+    """
     return arb(value)
 
 
@@ -113,15 +116,33 @@ def decimal(x: Number, negligible: float) -> str | None:
     return f"{rounded:f}" if -7 < rounded.adjusted() < _SIGNIFICANT else str(rounded)
 
 
-def unit(x: Vector) -> Vector:
+class Kind(NamedTuple):
+    """A kind of number to read a URDF's decimals as.
+
+    Attributes:
+        number: Function that reads a decimal, or the value of a locked joint.
+        sine_cosine: Function that returns sine and cosine of an angle.
+        root: Function that returns the square root.
+    """
+
+    number: Callable[[str | float], Number]
+    sine_cosine: Callable[[Number], tuple[Number, Number]]
+    root: Callable[[Number], Number]
+
+
+#: Balls.
+BALLS = Kind(exact, lambda angle: exact(angle).sin_cos(), lambda x: exact(x).sqrt())
+
+
+def unit(x: Vector, kind: Kind = BALLS) -> Vector:
     """Return `x` divided by its length."""
-    length = eq.dot(x, x).sqrt()
+    length = kind.root(eq.dot(x, x))
     return x[0] / length, x[1] / length, x[2] / length
 
 
-def about(axis: Vector, angle: Number) -> Matrix:
+def about(axis: Vector, angle: Number, kind: Kind = BALLS) -> Matrix:
     """Return the rotation about a unit axis, R_k(phi) (eq. 7.28)."""
-    s, c = exact(angle).sin_cos()
+    s, c = kind.sine_cosine(angle)
     columns = (
         eq.plus(
             eq.plus(eq.times(c, e), eq.times((1 - c) * eq.dot(axis, e), axis)), eq.times(s, eq.cross(axis, e))
@@ -132,16 +153,16 @@ def about(axis: Vector, angle: Number) -> Matrix:
     return found
 
 
-def from_rpy(rpy: Vector) -> Matrix:
+def from_rpy(rpy: Vector, kind: Kind = BALLS) -> Matrix:
     """Return Rz(yaw) Ry(pitch) Rx(roll)."""
-    x, y, z = ((*angle.sin_cos(), 0, 1) for angle in rpy)
+    x, y, z = ((*kind.sine_cosine(angle), 0, 1) for angle in rpy)
     found: Matrix = eq.product(eq.product(eq.about_z(*z), eq.about_y(*y)), eq.about_x(*x))
     return found
 
 
-def from_quaternion(quaternion: Sequence[Number]) -> Matrix:
+def from_quaternion(quaternion: Sequence[Number], kind: Kind = BALLS) -> Matrix:
     """Return the rotation of a quaternion (x, y, z, w) of any length."""
-    length = sum(x * x for x in quaternion).sqrt()
+    length = kind.root(sum(x * x for x in quaternion))
     found: Matrix = eq.rotation_of_quaternion(*(x / length for x in quaternion))
     return found
 
@@ -195,18 +216,21 @@ class ExactJoint:
     offset: Number
 
 
-def read_exact(text: str, tree: KinematicTree, among: Iterable[int] | None = None) -> dict[int, ExactJoint]:
+def read_exact(
+    text: str, tree: KinematicTree, among: Iterable[int] | None = None, kind: Kind = BALLS
+) -> dict[int, ExactJoint]:
     """Read the exact numbers of joints from the URDF text; return them by the joints' index in the tree.
 
     Args:
         text: The URDF text.
         tree: The tree of the same text. If the tree has a `root_joint`, this joint is not in the text.
         among: Indices of the joints to read; None: all.
+        kind: The kind of number.
 
     Raises:
         InputError: a joint of the tree is not in the text.
     """
-    words = _Text(text)
+    words = _Text(text, kind)
     return {
         i: words.joint_of(tree.joints[i], tree.name)
         for i in (range(len(tree.joints)) if among is None else among)
@@ -229,7 +253,8 @@ def conversion(text: str, tree: KinematicTree, path: Sequence[int], q: FloatArra
 class _Text:
     """Reader of the joints of a URDF text."""
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text: str, kind: Kind = BALLS) -> None:
+        self.kind = kind
         root = plain_xml(text)
         self.elements = {str(element.get("name")): element for element in root.findall("joint")}
         self.quaternions = tuple(map(int, root.get("version", "1.0").split("."))) >= _WITH_QUATERNIONS
@@ -247,9 +272,9 @@ class _Text:
     def locked(self, free: ExactJoint, lock: Lock) -> ExactJoint:
         """Return a joint that is locked at the exact value of a double."""
         R, p = free.R, free.p
-        value = free.multiplier * exact(lock.q) + free.offset
+        value = free.multiplier * self.kind.number(lock.q) + free.offset
         if lock.joint.kind.turns:
-            R = eq.product(R, about(free.axis, value))
+            R = eq.product(R, about(free.axis, value, self.kind))
         else:
             p = eq.plus(p, eq.rotate(R, eq.times(value, free.axis)))
         return ExactJoint(R, p, free.axis, 1, 0)
@@ -260,14 +285,14 @@ class _Text:
         return ExactJoint(
             R=self.rotation(element.find("origin")),
             p=self.vector(element.find("origin"), "xyz", "0 0 0"),
-            axis=unit(axis) if has_axis else axis,
+            axis=unit(axis, self.kind) if has_axis else axis,
             multiplier=multiplier,
             offset=offset,
         )
 
     def numbers(self, element: Element | None, name: str, default: str) -> tuple[Number, ...]:
         written = default if element is None else element.get(name, default)
-        return tuple(arb(word) for word in written.split())
+        return tuple(map(self.kind.number, written.split()))
 
     def vector(self, element: Element | None, name: str, default: str) -> Vector:
         x, y, z = self.numbers(element, name, default)
@@ -280,12 +305,12 @@ class _Text:
     def rotation(self, origin: Element | None) -> Matrix:
         """Return the rotation of `rpy` or, from URDF 1.1 on, of the quaternion `quat_xyzw` of any length."""
         if origin is not None and self.has_quaternion(origin):
-            return from_quaternion(self.numbers(origin, "quat_xyzw", ""))
-        return from_rpy(self.vector(origin, "rpy", "0 0 0"))
+            return from_quaternion(self.numbers(origin, "quat_xyzw", ""), self.kind)
+        return from_rpy(self.vector(origin, "rpy", "0 0 0"), self.kind)
 
     def rule(self, name: str) -> tuple[Number, Number]:
         """Return the multiplier and the offset of a mimic joint relative to its independent joint."""
-        multiplier, offset = exact(1), exact(0)
+        multiplier, offset = self.kind.number(1.0), self.kind.number(0.0)
         elements = self.elements
         while (rule := elements[name].find("mimic")) is not None and elements[name].get("type") != "fixed":
             (factor,), (constant,) = self.numbers(rule, "multiplier", "1"), self.numbers(rule, "offset", "0")

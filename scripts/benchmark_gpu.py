@@ -1,0 +1,210 @@
+"""Measure the CUDA code of a robot on a GPU: configurations a second against batch size, in both precisions.
+
+    python scripts/benchmark_gpu.py panda --json gpu.jsonl      # needs nvcc, a C++ compiler and a GPU
+    python scripts/benchmark_gpu.py panda --compile-only        # needs no GPU
+
+The program first runs the file's test vectors on the GPU; a wrong number ends the run. Each time is the
+median of several launches. The share of the memory's bandwidth is the number of bytes that a configuration
+reads and writes, divided by the bytes that a copy in the GPU's memory reads and writes in the same time. If
+PyTorch with CUDA is installed, its export is measured too, called directly and by `torch.compile`.
+
+nvcc of the package registry is enough; all its packages must have one version:
+pip install nvidia-cuda-nvcc nvidia-nvvm nvidia-cuda-crt nvidia-cuda-runtime nvidia-cuda-cccl
+
+Exit 1: a number is outside its bound. 2: no GPU, no nvcc, or the program does not compile.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import importlib.util
+import json
+import shutil
+import statistics
+import subprocess
+import sys
+import sysconfig
+import tempfile
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
+
+import urdfkin
+from urdfkin.export import QUANTITIES, write
+from urdfkin.export.code import Code
+from urdfkin.export.forms import code_of_robot
+from urdfkin.export.function import Function
+
+#: Sizes of batches, and the number of measured launches of each.
+SIZES = (1, 64, 1024, 4096, 65_536, 1_048_576)
+LAUNCHES = 21
+_BYTES = {"double": 8, "float": 4}
+
+_PROGRAM = Path(__file__).parent / "benchmarking" / "gpu.cu"
+_MEASURED = r"""    std::printf("{\"by\": \"urdfkin\", \"quantity\": \"@name@\", \"real\": \"%s\", ", real);
+    std::printf("\"n\": %zu, \"s\": %.6g}\n", n,
+                seconds([&] { return @title@_kinematics::@name@_batch<T>(n, @given@, out); }));"""
+
+
+def nvcc() -> str | None:
+    """Return the path of CUDA's compiler, on the PATH or from a package of this interpreter."""
+    packages = Path(sysconfig.get_path("purelib"), "nvidia").glob("cu*/bin/nvcc")
+    return shutil.which("nvcc") or next(map(str, sorted(packages)), None)
+
+
+def gpus() -> int:
+    """Return the number of GPUs that CUDA's driver finds."""
+    try:
+        driver, count = ctypes.CDLL("libcuda.so.1"), ctypes.c_int(0)
+    except OSError:
+        return 0
+    found = driver.cuInit(0) == 0 and driver.cuDeviceGetCount(ctypes.byref(count)) == 0
+    return count.value if found else 0
+
+
+def bytes_of(code: Code, function: Function, real: str) -> int:
+    """Return the number of bytes that one configuration reads and writes."""
+    return _BYTES[real] * (sum(code.widths(function).values()) + len(function.results))
+
+
+def program(code: Code) -> str:
+    """Return the text of the program that prints one JSON line for each measurement."""
+    measured = "\n".join(
+        _filled(_MEASURED, name=f.name, title=code.name, given=", ".join(f.inputs)) for f in code.functions
+    )
+    return _filled(
+        _PROGRAM.read_text("utf-8").partition("\n")[2],
+        UP=code.name.upper(),
+        file=f"{code.name}.cuh",
+        launches=LAUNCHES,
+        nq=code.nq,
+        nv=code.nv,
+        most=max(len(f.results) for f in code.functions),
+        measured=measured,
+        sizes=", ".join(map(str, SIZES)),
+    )
+
+
+def _filled(text: str, **values: object) -> str:
+    for name, value in values.items():
+        text = text.replace(f"@{name}@", str(value))
+    return text
+
+
+def compiled(code: Code, folder: Path, compiler: str) -> dict[str, Path]:
+    """Compile the program and the checks in both precisions; return the paths."""
+    header, source = folder / f"{code.name}.cuh", folder / "measure.cu"
+    header.write_text(write(code, "cuda"), encoding="utf-8")
+    source.write_text(program(code), encoding="utf-8")
+    libraries = Path(compiler).resolve().parents[1] / "lib"
+    arch = ["-arch=native"] if gpus() else []
+    command = [compiler, "-O3", "-std=c++17", *arch, f"-I{folder}", f"-L{libraries}", "-x", "cu"]
+    up, found = code.name.upper(), {"measure": folder / "measure"}
+    subprocess.run([*command, str(source), "-o", str(found["measure"])], check=True)
+    for real in _BYTES:
+        found[real] = folder / f"check_{real}"
+        macros = [f"-D{up}_MAIN", f"-D{up}_REAL={real}"]
+        subprocess.run([*command, *macros, str(header), "-o", str(found[real])], check=True)
+    return found
+
+
+def rows(code: Code, lines: Iterable[str]) -> Iterator[dict[str, Any]]:
+    """Yield the measurements with configurations a second and the share of the bandwidth.
+
+    Raises:
+        ValueError: the first line is not the bandwidth.
+    """
+    found = [json.loads(line) for line in lines]
+    if not found or "bandwidth" not in found[0]:
+        raise ValueError("the program printed no bandwidth of the memory")
+    functions = {f.name: f for f in code.functions}
+    for row in found[1:]:
+        a_second = row["n"] / row["s"]
+        moved = bytes_of(code, functions[row["quantity"]], row["real"])
+        yield {**row, "a_second": a_second, "share": a_second * moved / found[0]["bandwidth"]}
+
+
+def table(measured: Iterable[dict[str, Any]]) -> str:
+    """Return the measurements as a Markdown table."""
+    lines = [
+        "| by | quantity | precision | batch | configurations/s | share of bandwidth |",
+        "|---|---|---|---:|---:|---:|",
+    ]
+    lines += [
+        f"| {x['by']} | {x['quantity']} | {x['real']} | {x['n']:,} | {x['a_second']:.3g} | {x['share']:.1%} |"
+        for x in measured
+    ]
+    return "\n".join(lines)
+
+
+def of_torch(code: Code) -> Iterator[str]:
+    """Yield the measurements of PyTorch's export on the GPU as JSON lines; none without PyTorch and CUDA."""
+    if importlib.util.find_spec("torch") is None:
+        return
+    import torch  # noqa: PLC0415  optional
+
+    if not torch.cuda.is_available():
+        return
+    scope: dict[str, Any] = {"__name__": "measured"}
+    exec(compile(write(code, "torch"), "<torch>", "exec"), scope)
+    for function in code.functions:
+        ways = {"PyTorch": scope[function.name], "torch.compile": torch.compile(scope[function.name])}
+        for (by, call), real, n in ((x, real, n) for x in ways.items() for real in _BYTES for n in SIZES):
+            kind = {"dtype": getattr(torch, real), "device": "cuda"}
+            inputs = [torch.rand((n, width), **kind) for width in code.widths(function).values()]
+            times = []
+            for _ in range(LAUNCHES + 3):
+                start, end = (torch.cuda.Event(enable_timing=True) for _ in range(2))
+                start.record(), call(*inputs), end.record()
+                end.synchronize()
+                times.append(1e-3 * start.elapsed_time(end))
+            time = statistics.median(times[3:])
+            yield json.dumps({"by": by, "quantity": function.name, "real": real, "n": n, "s": time})
+
+
+def main(words: list[str] | None = None) -> int:
+    """Measure, and print a table."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
+    parser.add_argument("robot", nargs="?", default="panda", help="path or name of a robot")
+    parser.add_argument("--frame", help="link or joint; the default is the robot's tip")
+    parser.add_argument("--json", type=Path, help="file for the measurements, one per line")
+    parser.add_argument("--compile-only", action="store_true", help="compile the programs, and run none")
+    arguments = parser.parse_args(words)
+    if (compiler := nvcc()) is None:
+        return _refused("nvcc is not installed. Install CUDA, or nvcc of the package registry.")
+    if not arguments.compile_only and not gpus():
+        return _refused("CUDA's driver finds no GPU here. Run on a machine with one, or use --compile-only.")
+    robot = urdfkin.load(arguments.robot)
+    code = code_of_robot(robot, arguments.frame or robot.tip_frame, QUANTITIES, "local_world_aligned")
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            programs = compiled(code, Path(folder), compiler)
+        except subprocess.CalledProcessError as error:
+            return _refused(f"the program does not compile: {compiler} exits with {error.returncode}.")
+        if arguments.compile_only:
+            print(f"compiled, not run: {', '.join(programs)}")
+            return 0
+        for real in _BYTES:
+            done = subprocess.run([str(programs[real])], capture_output=True, text=True, check=False)
+            print(done.stdout, end="")
+            if done.returncode or done.stdout.count(" on the GPU") != len(code.functions):
+                print(f"the check in {real} precision failed on the GPU: {done.stderr}", file=sys.stderr)
+                return 1
+        lines = subprocess.run([str(programs["measure"])], capture_output=True, text=True, check=True).stdout
+    measured = list(rows(code, [*lines.splitlines(), *of_torch(code)]))
+    print(table(measured))
+    if arguments.json:
+        arguments.json.write_text("".join(f"{json.dumps(row)}\n" for row in measured), encoding="utf-8")
+    return 0
+
+
+def _refused(reason: str) -> int:
+    print(f"benchmark_gpu.py: {reason}", file=sys.stderr)
+    return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())

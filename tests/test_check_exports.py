@@ -1,0 +1,60 @@
+"""The check of exported files in a library's own environment."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import urdfkin
+from scripts import check_exports
+
+#: An interpreter whose library accepts every file; of each run it stores the files that it was given.
+_INTERPRETER = """#!/bin/sh
+if [ "$1" = -c ]; then echo 'jax 1.0'; exit; fi
+shift
+library="$1"
+shift
+for path in "$@"; do
+    name=$(basename "$path" .py)
+    echo "$name" >> {folder}/ran
+    echo "{{\\"file\\": \\"$name\\", \\"library\\": \\"$library\\", \\"share\\": {share}}}"
+done
+"""
+
+
+def environment(folder: Path, share: float) -> Path:
+    """Return an environment with such an interpreter, which reports one share of the bound."""
+    python = folder / "bin" / "python"
+    python.parent.mkdir(exist_ok=True)
+    python.write_text(_INTERPRETER.format(folder=folder, share=share), encoding="utf-8")
+    python.chmod(0o755)
+    return folder
+
+
+@pytest.mark.slow
+def test_a_stopped_run_in_a_library_continues_with_the_files_that_are_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot, keep = urdfkin.load("planar_two_link"), tmp_path / "jax.jsonl"
+    monkeypatch.setattr(check_exports, "subjects", lambda tips: iter([("arm", robot, "tip")]))
+    kept = [
+        {"file": "planar_two_link_tip_0_jax", "library": "jax", "share": 0.5},
+        {"file": "planar_two_link_tip_0_array", "library": "torch", "share": 7.0},
+    ]
+    keep.write_text("".join(f"{json.dumps(line)}\n" for line in kept), encoding="utf-8")
+    assert check_exports.check_library("jax", environment(tmp_path, 0.9), None, keep) == 0
+    assert (tmp_path / "ran").read_text("utf-8").split() == ["planar_two_link_tip_0_array"]
+    assert len(check_exports.lines_of(keep)) == 3
+    assert check_exports.check_library("jax", environment(tmp_path, 0.9), None, keep) == 0
+    assert len(check_exports.lines_of(keep)) == 3
+
+
+@pytest.mark.slow
+def test_a_number_outside_the_bound_fails_the_run_in_a_library(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = urdfkin.load("planar_two_link")
+    monkeypatch.setattr(check_exports, "subjects", lambda tips: iter([("arm", robot, "tip")]))
+    assert check_exports.check_library("jax", environment(tmp_path, 1.5), None, None) == 1

@@ -1,0 +1,265 @@
+"""Make exported functions with exact constants, for computer algebra.
+
+The constants are fractions: the URDF's decimals. If the double of an angle is the double of a multiple of
+pi/12, the angle is this multiple of pi. Roots, and sines and cosines of other angles, remain expressions. The
+recursion is that of `urdfkin.export.recursion`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from urdfkin.compiled.plan import Column, CompiledTree, Geometry
+from urdfkin.dh.units import fraction_text, pi_fraction
+from urdfkin.export.expression import Graph, Node, Number
+from urdfkin.export.function import INPUTS, Function, function_of
+from urdfkin.export.proof import CHECKED, Proof
+from urdfkin.model.configuration import draw
+from urdfkin.model.recursion import IDENTITY, ZERO, Matrix, Vector
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import FloatArray, KinematicTree
+from urdfkin.verify.call import Call
+from urdfkin.verify.exact.numbers import DIGITS, Kind, enough_digits, exact, precision, read_exact
+from urdfkin.verify.verifier import Verifier
+
+#: Largest angle that can be a multiple of pi, rad. Neighbouring doubles are far closer than two multiples.
+_LARGEST = 100.0
+#: Sine and cosine of a number of right angles.
+_RIGHT = ((0, 1), (1, 0), (0, -1), (-1, 0))
+
+
+@dataclass(frozen=True)
+class PiMultiple:
+    """The constant angle `factor` * pi."""
+
+    factor: Fraction
+
+    def __neg__(self) -> PiMultiple:
+        return PiMultiple(-self.factor)
+
+    def __lt__(self, other: float) -> bool:
+        return self.factor < other
+
+    def __radd__(self, other: Number) -> Number:
+        return other.graph.sum(other, self) if isinstance(other, Node) else self  # a constant is 0
+
+
+class ExactGraph(Graph):
+    """The expressions of a function with exact constants.
+
+    Attributes:
+        recognised: The angles of the URDF that became multiples of pi, and these multiples.
+    """
+
+    zero = 0
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.recognised: dict[Fraction, PiMultiple] = {}
+
+    def made(self, op: str, *of: Any) -> Node:
+        """Return the node of an operation.
+
+        Raises:
+            TypeError: an operand is a double.
+        """
+        if any(isinstance(x, float) for x in of):
+            raise TypeError(f"an operand of {op} is a double")
+        return super().made(op, *of)
+
+    def angle(self, x: Fraction) -> Fraction | PiMultiple:
+        """Return a constant angle, as a multiple of pi if it is one."""
+        factor = pi_fraction(float(x)) if 0 < abs(x) < _LARGEST else None
+        return x if factor is None else self.recognised.setdefault(x, PiMultiple(factor))
+
+    def sine_cosine(self, x: Number) -> tuple[Number, Number]:
+        """Return the sine and the cosine of an angle, which may be a constant."""
+        if not isinstance(x, Node | PiMultiple):
+            x = self.angle(Fraction(x))
+        if x == 0:
+            return 0, 1
+        if isinstance(x, PiMultiple) and (2 * x.factor).denominator == 1:
+            return _RIGHT[int(2 * x.factor) % 4]
+        return self.made("sin", x), self.made("cos", x)
+
+    def root(self, x: Number) -> Number:
+        """Return the square root of x, which may be a constant."""
+        if not isinstance(x, Node):
+            x = Fraction(x)
+            root = Fraction(math.isqrt(x.numerator), math.isqrt(x.denominator))
+            if root * root == x:
+                return root
+        return self.made("sqrt", x)
+
+
+def exact_plan(
+    graph: ExactGraph, text: str, tree: KinematicTree, plan: CompiledTree, link: int
+) -> CompiledTree:
+    """Return a link's compiled tree with the exact constants of the URDF text.
+
+    Args:
+        graph: The graph of the function that uses the compiled tree.
+        text: The URDF text.
+        tree: The tree of the same text.
+        plan: The compiled tree of the link.
+        link: Index of the link.
+    """
+    graph.place = -1
+    eq, path = graph.chapter, tree.path(link)
+    joints = read_exact(text, tree, path, Kind(Fraction, graph.sine_cosine, graph.root))
+    R, p, rows = IDENTITY, ZERO, list[tuple[Number, ...]]()
+    for i in path:
+        joint, own = tree.joints[i], joints[i]
+        R, p = eq.product(R, own.R), eq.point_position(p, R, own.p)
+        if joint.kind.nv:
+            A = _aligning(own.axis, float(joint.axis[2])) if joint.kind.has_axis else IDENTITY
+            offset = graph.angle(Fraction(own.offset)) if joint.kind.turns else own.offset
+            rows.append((*(x for row in eq.product(R, A) for x in row), *p, own.multiplier, offset))
+            R, p = eq.transposed(A), ZERO
+    geometry = np.array(rows, dtype=object).reshape(-1, len(plan.geometry.T))
+    offsets = np.array([(*(x for row in R for x in row), *p)], dtype=object)
+    multipliers = geometry[plan.columns[:, Column.STEP], Geometry.MULTIPLIER]
+    return replace(plan, geometry=geometry, offsets=offsets, multipliers=multipliers)
+
+
+def _aligning(axis: Vector, z: float) -> Matrix:
+    """Return the rotation of `axis_aligning`, with the unit axis as its third column."""
+    x, y, own = axis
+    sign = 1 if z >= 0.0 else -1
+    scale = -1 / (sign + own)
+    rows: Matrix = (
+        (1 + sign * x * x * scale, x * y * scale, x),
+        (sign * x * y * scale, sign + y * y * scale, y),
+        (-sign * x, -y, own),
+    )
+    return rows
+
+
+def ball(x: Number) -> Number:
+    """Return an exact constant as a ball."""
+    if isinstance(x, PiMultiple):
+        return exact(0).pi() * ball(x.factor)
+    return exact(x.numerator) / x.denominator if isinstance(x, Fraction) else exact(x)
+
+
+#: The operations on balls.
+_OPERATIONS: dict[str, Callable[..., Number]] = {
+    "+": lambda x, y: x + y,
+    "-": lambda x, y: x - y,
+    "*": lambda x, y: x * y,
+    "/": lambda x, y: x / y,
+    "neg": lambda x: -x,
+    "sin": lambda x: x.sin(),
+    "cos": lambda x: x.cos(),
+    "sqrt": lambda x: x.sqrt(),
+}
+
+
+def balls(function: Function, inputs: Sequence[Sequence[float]]) -> list[Number]:
+    """Return the results of a function with exact constants, for one configuration, as balls."""
+    value: dict[Any, Number] = {}
+
+    def of(x: Number) -> Number:
+        return value[x] if isinstance(x, Node) else ball(x)
+
+    for node in function.nodes:
+        if node.op in INPUTS:
+            value[node] = exact(inputs[INPUTS.index(node.op)][node.of[0]])
+        else:
+            value[node] = _OPERATIONS[node.op](*map(of, node.of))
+    return [of(x) for x in function.results]
+
+
+@dataclass(frozen=True)
+class ExactProof(Proof):
+    """The proof of a file with exact constants.
+
+    Attributes:
+        angles: Number of different angles of the URDF that became multiples of pi.
+        most: Largest change of such an angle, rad.
+    """
+
+    angles: int = 0
+    most: float = 0.0
+
+    @property
+    def lines(self) -> list[str]:
+        """The proof in words."""
+        found = [line.replace("in double precision", f"at {DIGITS} digits") for line in super().lines]
+        change = f", changed by at most {self.most:.1e} rad" if self.angles else ""
+        return [
+            *found,
+            f"Constants are the URDF's decimals; {self.angles} different angles are multiples of pi{change}",
+        ]
+
+
+def exact_functions(
+    verifier: Verifier,
+    plan_of: Callable[[Sequence[int]], CompiledTree],
+    frame: str,
+    reference: Reference,
+    functions: Sequence[Function],
+    proof: Proof,
+    verify: bool | None,
+) -> tuple[tuple[Function, ...], ExactProof]:
+    """Return functions with exact constants, and their proof.
+
+    The expressions are evaluated at fifty digits and compared with Pinocchio. The test vectors are those of
+    the other functions.
+
+    Args:
+        verifier: Verifier of the robot.
+        plan_of: Function that returns the compiled tree for some links.
+        frame: Name of a link or joint.
+        reference: Reference frame.
+        functions: The functions with constants in double precision.
+        proof: Their proof.
+        verify: As in `Robot.export`.
+
+    Raises:
+        VerificationError: Pinocchio computes another result.
+    """
+    tree, checker = verifier.tree, copy(verifier)  # with a separate ledger
+    link, found, angles = tree.frame_link(frame), list[Function](), dict[Fraction, PiMultiple]()
+    drawn = draw(tree, CHECKED, np.random.default_rng(0), with_special=True)
+    with precision(DIGITS):
+        for other in functions:
+            graph = ExactGraph()
+            plan = exact_plan(graph, verifier.text, tree, other.plan, link)
+            found.append(function_of(plan, other.quantity, reference, graph))
+            angles |= graph.recognised
+        most = max((float(abs(ball(x) - ball(y)).upper()) for x, y in angles.items()), default=0.0)
+    for function in found:
+        inputs = (drawn.q, drawn.v, drawn.a)[: len(function.inputs)]
+        call = Call(tree, plan_of, frame, reference, None, inputs)
+        values = _evaluated(function, (call.q, *call.rates))
+        checker.check(function.quantity, call, values, bool(checker.wanted(verify)))
+    fields = {name: getattr(proof, name) for name in ("sha256", "urdfkin", "vectors", "lock")}
+    return tuple(found), ExactProof(
+        **fields, certificate=checker.certificate(), single={}, angles=len(angles), most=most
+    )
+
+
+def _evaluated(function: Function, inputs: Sequence[FloatArray]) -> FloatArray:
+    """Return the results (n, ...), computed at fifty digits and rounded."""
+    with precision(DIGITS + enough_digits(len(function.plan.steps))):
+        rows = [
+            list(map(float, balls(function, one))) for one in zip(*(x.tolist() for x in inputs), strict=True)
+        ]
+    return np.array(rows).reshape(-1, *function.shape)
+
+
+def literal(x: Number) -> str:
+    """Return a constant as SymPy writes it: `2`, `Rational(17, 40)`, `pi/2`."""
+    if isinstance(x, PiMultiple):
+        text = fraction_text(abs(x.factor)).replace("pi", "*pi").removeprefix("*")
+        return text if x.factor > 0 else f"(-{text})"
+    x = Fraction(x)
+    return str(x) if x.denominator == 1 else f"Rational({x.numerator}, {x.denominator})"
