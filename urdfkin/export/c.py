@@ -138,7 +138,7 @@ def spare(code: Code, function: Function) -> int:
 
 
 def advance(code: Code, function: Function) -> str:
-    """Return C code that moves the pointers to the next LANES configurations."""
+    """Return C code that moves each pointer by `LANES` configurations, which are computed together."""
     return ", ".join(f"{x} += LANES * {width}" for x, width in code.widths(function).items())
 
 

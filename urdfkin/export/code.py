@@ -269,13 +269,15 @@ class Writer:
         else:
             own = _LEVEL[x.op]
             left, right = x.of
-            # a + (b + c) keeps its brackets, so that it rounds in the same way as in the comparison with
-            # Pinocchio.
+            # The brackets of a + (b + c) are written, so that the code rounds like the compared expression.
             text = f"{self.text(left, own)} {x.op} {self.text(right, own + 1)}"
         return text if own >= level else f"({text})"
 
     def whole(self, x: Number, given: Callable[[Node], str], level: int = _SUM) -> str:
-        """Return an expression that uses no statements, for an angle computed before the statements."""
+        """Return the text of an expression in terms of inputs only, without the names of statements.
+
+        Angles need this form, because the code computes them before its statements.
+        """
         if not isinstance(x, Node):
             return self.literal(float(x))
         if x.op in self.code.words:

@@ -27,13 +27,13 @@ class Dialect:
 
     Attributes:
         about: Description of a function's inputs and results.
-        imports: Import lines. A placeholder stands for the functions among `cos`, `sin` and `sqrt` that the
-            code uses. A line with a placeholder is left out if the code uses none.
+        imports: Import lines. The placeholder `{}` is replaced by the functions `cos`, `sin` and `sqrt` that
+            the code uses. If the code uses none of them, the lines with a placeholder are removed.
         result: Function that yields the lines of code that return the results of a written function.
         values: Body of the written function `_values(function, inputs)`, which returns the results for a list
             of configurations.
         decorator: The decorator's line before each written function; "" if there is none.
-        entering: Function that returns the first lines of a written function, given its writer.
+        entering: Function that takes the writer of a function and returns the function's first lines.
         helpers: Code of functions that the written functions call; "" if there are none.
         index: Format of the text for an element of an input.
         given: Parameter of the written check, with its default; "" if there is none.
@@ -76,7 +76,7 @@ def _in_array(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
 
 
 def _nested(opening: str, closing: str, row: str = "[{}]") -> Callable[[Writer], Iterator[str]]:
-    """Return a function that yields code which creates the matrix of results in one call, row by row.
+    """Return a function that yields the code `return matrix([[...], ...])`, with a list for each row.
 
     The rows of a Hessian (6, nv, nv) are written as one matrix.
     """
@@ -165,7 +165,10 @@ _FLOATING = (
 
 
 def _demand(given: str = "", floating: str = "") -> str:
-    """Return code of a function that checks an input; `floating` is a test of its type, or empty."""
+    """Return the code of a function that checks the length of an input.
+
+    If `floating` is not empty, it is an expression that tests for a floating type, and the code uses it.
+    """
     text, or_type = (_FLOATING, ", or no floating type") if floating else (_LENGTH, "")
     return text.format(given=given, floating=floating, or_type=or_type)
 
@@ -215,7 +218,7 @@ def gradients(device="cpu"):
 
 def _torch_module(code: Code) -> str:
     """Return code of a `torch.nn.Module` with the functions, and of their check by `gradcheck`."""
-    # The module's method `forward` has the input q only, if the code has a function of q only.
+    # The method `forward` computes the function with the fewest inputs, so that q suffices if possible.
     first = min(code.functions, key=lambda function: len(function.inputs))
     return _MODULE.format(
         first=first.name,

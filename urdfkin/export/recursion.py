@@ -33,10 +33,10 @@ class Kind:
         chapter: The textbook's equations for this kind of number.
         sine_cosine: Function that returns sine and cosine of an angle.
         root: Function that returns the square root.
-        entering: Function that is called before each step, before the frame after the last step, and before
-            the frame's results. Its argument is the index of the step.
-        reached: Function that is called for each new state. Its arguments are the number of steps so far and
-            the state.
+        entering: Function that is called before each step, then before the final frame, and then before the
+            results. Its argument counts these calls from 0.
+        reached: Function that is called after each step and after the final frame. Its arguments are the
+            index of the call and the new state.
     """
 
     chapter: Any
@@ -81,7 +81,7 @@ class TreeRecursion(Recursion):
         kind.entering(len(self.states) + 1)
 
     def turned(self, s: State, S: Matrix) -> State:
-        """Return a state for a rotated frame, and store the rotation in `turns`."""
+        """Rotate the frame of a state by S, and append S to `turns`."""
         self.turns.append(S)
         return super().turned(s, S)
 

@@ -43,8 +43,8 @@ _SLOPES: dict[str, Callable[..., tuple[FloatArray | float, ...]]] = {
 def single_bounds(function: Function, inputs: Sequence[FloatArray]) -> FloatArray:
     """Return the bounds (n, results) on the errors in single precision, in eps = 2^-23.
 
-    They do not contain the errors of the code's double constants. A bound is inf if a number of the code is
-    beyond the range of single precision.
+    The bounds do not include the rounding errors of the code's constants in double precision. A bound is inf
+    if a number of the code is beyond the range of single precision.
 
     Args:
         function: The function.
@@ -86,7 +86,10 @@ def _part(function: Function, value: dict[Node, FloatArray], results: Sequence[N
 
 
 def _own(node: Node, x: FloatArray) -> FloatArray:
-    """Return the error of an operation itself, in eps, for its values (n,)."""
+    """Return the rounding error (n,) of one operation with exact operands, in eps.
+
+    The results of the operation are x (n,).
+    """
     size = np.abs(x)
     if node.op in INPUTS:
         error = np.zeros_like(size)
@@ -104,6 +107,6 @@ def _constant(x: float) -> float:
 
 
 def _in_range(error: FloatArray, size: FloatArray) -> FloatArray:
-    """Return the errors with those of numbers near zero; inf for numbers beyond the largest."""
+    """Add the errors of numbers that underflow; set the errors of numbers that overflow to inf."""
     small = np.where((size > 0.0) & (size < 2.0 * SINGLE_SMALLEST), SINGLE_SMALLEST / SINGLE_EPS, 0.0)
     return np.where(size <= SINGLE_LARGEST, error + small, np.inf)

@@ -152,9 +152,9 @@ def _text(root: Any) -> str:
 
 
 _ROOT = "universe"
-#: Pattern for the class names of joints whose axis is the x, y or z axis of their own frame. R stands for a
-#: revolute joint, RUB for a revolute joint without limits, and P for a prismatic joint. `_KINDS` contains the
-#: class names of all other joints.
+#: Pattern for the class names of joints whose axis is the x, y or z axis of the joint frame.
+#: R is a revolute joint, RUB a revolute joint without limits, and P a prismatic joint.
+#: `_KINDS` contains the class names of all other joints.
 _ALIGNED = re.compile(r"JointModel(R|RUB|P)([XYZ])")
 _KINDS = {
     "R": JointKind.REVOLUTE,
@@ -195,7 +195,7 @@ def tree_of_model(source: Any) -> Modelled:
     """Return the tree of a model or of a `RobotWrapper`.
 
     Raises:
-        InputError: URDF has no equivalent of a joint.
+        InputError: the model has a joint of a type that URDF does not have.
     """
     model = getattr(source, "model", source)
     return _ModelReader(model).read()

@@ -57,8 +57,8 @@ DECLARED_ASCII = Rule("URDF104", "declared-encoding-unused", WARNING)
 XML_VERSION = Rule("URDF111", "xml-version", WARNING)
 BYTE_ORDER_MARK = Rule("URDF113", "byte-order-mark", NOTE)
 
-#: Byte order marks of encodings other than UTF-8. Longer marks come first, because a shorter one may be their
-#: beginning.
+#: Byte order marks of encodings other than UTF-8.
+#: The UTF-32 marks come first, because one of them begins with a UTF-16 mark.
 _MARKS = (
     (codecs.BOM_UTF32_LE, "UTF-32"),
     (codecs.BOM_UTF32_BE, "UTF-32"),
@@ -194,8 +194,8 @@ NAME_TOO_LONG = Rule("URDF117", "name-too-long", ERROR)
 INSTRUCTION = Rule("URDF118", "processing-instruction", WARNING, REFUSES)
 MARKUP_TOO_LONG = Rule("URDF119", "markup-too-long", ERROR)
 
-#: Largest number of nested elements that older versions of libxml2 accept. Programs that use such a version
-#: accept no more.
+#: Largest number of nested elements that older versions of libxml2 accept.
+#: Programs that use such a version accept no more.
 COMMON_DEPTH = 256
 _COMMON = ("older readers built on libxml2 refuse", COMMON_DEPTH)
 
@@ -805,8 +805,8 @@ class JointReader:
             element: The element.
             attribute: The name of the attribute.
             example: An example for the remedy.
-            number: Whether the attribute is a number. Then an empty value is not reported here, because
-                `NumberReader` reports it.
+            number: Whether the attribute is a number. This method does not report an empty value of such an
+                attribute, because `NumberReader` reports it.
         """
         value = element.attributes.get(attribute)
         if value is None or not (value or number):
@@ -883,7 +883,7 @@ class JointReader:
         if axis is None:
             return
         if joint.kind in ("fixed", "floating"):
-            # No reader uses the axis of such a joint. An invalid number in it is reported only as URDF510.
+            # No reader uses the axis of such a joint. An invalid number in the axis is reported as URDF510.
             numbers = NumberReader(self.report, IGNORED, IGNORED)
             numbers.vector(axis, "xyz")
             return
@@ -891,7 +891,7 @@ class JointReader:
             joint.axis = self.numbers.vector(axis, "xyz")
             return
         if not axis.attributes and (axis.text or any(x.tag == "xyz" and x.text for x in axis.children)):
-            return  # URDF212 already reports a value between the tags
+            return  # URDF212 reports the value between the tags
         self.report.add(
             EMPTY_AXIS,
             "<axis> without xyz is 1 0 0 to some readers and 0 0 0 to urdfdom",
@@ -967,8 +967,8 @@ def nearest_tag(word: str, known: frozenset[str]) -> str | None:
     return _nearest_tag(word, known) if len(word) <= _LONGEST_WORD else None
 
 
-#: Largest length of a word that is compared with the words of URDF. A longer word is not similar to any of
-#: them.
+#: Largest length of a word that is compared with the words of URDF.
+#: No longer word is similar to a word of URDF.
 _LONGEST_WORD = 32
 
 

@@ -10,8 +10,8 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-#: Largest number of nested elements that Pinocchio accepts. Its XML parser, tinyxml2, stops at level 500.
-#: That count includes the document itself and the level that the parser refuses.
+#: Largest number of nested elements that Pinocchio accepts.
+#: Its XML parser, tinyxml2, counts the document as level 1 and refuses level 500.
 ORACLE_DEPTH = 498
 
 

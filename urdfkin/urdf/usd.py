@@ -2,15 +2,17 @@
 
 - A prim with `PhysicsRigidBodyAPI` becomes a link with the prim's frame, without its scale. A plain `Xform`
   of a body becomes a link on a fixed joint.
-- A joint prim gives its frame in each of its two bodies: A in the first and B in the second. With the motion
-  J(q), the second body is at A J(q) B^-1 in the first. If the tree reaches the joint from its second body,
-  the first is at B J(q)^-1 A^-1 in the second: the same form with the opposite axis.
+- A joint prim contains the pose A of the joint frame in the first body, and its pose B in the second body.
+  With the joint's motion J(q), the pose of the second body in the first body is A J(q) B^-1. If the second
+  body is the parent in the tree, the pose of the first body in the second body is B J(q)^-1 A^-1: the same
+  form with the opposite axis.
 - Lengths are multiplied by `metersPerUnit`, angles are converted from degrees. A stage whose up axis is Y is
   rotated, so that z is up.
 - Joints that close a loop, point to nothing or are excluded from the articulation are findings.
 
-A stage may consist of many files. `files_of` reads each layer alone and refuses a layer that refers to a file
-outside the robot's folder, package and repository, or to an address, before the layers are composed.
+A stage may consist of many files, its layers. Before OpenUSD composes the layers, `files_of` reads each layer
+alone. It refuses a layer with a reference to a network address, or to a file outside the robot's folder,
+package and repository.
 """
 
 from __future__ import annotations
@@ -51,17 +53,19 @@ from urdfkin.urdf.sources import USD
 _LAYERS = 1_000
 #: Largest number in single precision. Files write it, or infinity, for a missing limit.
 _LARGEST = float(np.finfo(np.float32).max)
-#: Largest cosine between two axes of a frame without shear, for each prim on the path, in roundings to
-#: single precision. A rotation matrix of rounded numbers has entries that are off by one rounding. The
-#: product of two such matrices in single precision adds three roundings to each entry. An entry of the
-#: columns' products is then off by at most 2 sqrt(3) times as much, 14. A rounded quaternion changes its
-#: length by one rounding, and the cosine by four.
+#: Largest cosine between two axes of a frame without shear, for each prim on the path.
+#: The unit is one rounding to single precision.
+#: In a rotation matrix of rounded numbers, each entry has an error of one rounding.
+#: The product of two such matrices in single precision adds three roundings to each entry.
+#: The scalar product of two columns then has an error of at most 4 * 2 sqrt(3) roundings, which is below 14.
+#: Rounding a quaternion changes its length by one rounding and the cosine by four roundings.
 _SHEAR = 14.0
 _NONE = (-math.inf, math.inf)
 _MIMICS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
 #: Words in the names of types and of applied schemas that couple joints or bodies.
 _COUPLINGS = ("Mimic", "Equality", "Tendon")
-#: Ends of the types of joints that a tree cannot represent. If OpenUSD does not know a type, it is no joint.
+#: Endings of the type names of joints that a tree cannot represent.
+#: These names are needed because OpenUSD does not recognize the unknown types of plugins as joints.
 _NO_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
 #: Terms of a rule of MuJoCo that a mimic rule does not have.
 _HIGHER = ("mjc:coef2", "mjc:coef3", "mjc:coef4")
@@ -72,7 +76,7 @@ _SHAPES = ("visual", "visuals", "collision", "collisions")
 #: Rotates the up axis y to z.
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
-#: The kind of a remark; `urdfkin.urdf.lint.rules.left_out` has the rule of each.
+#: The kinds of remarks; `urdfkin.urdf.lint.rules.left_out` defines a rule for each kind.
 Kind = Literal[
     "left-out-of-usd", "unit-scale", "up-axis", "lost-mimic", "limit-unit", "loose-body", "outside-joint",
     "rest-pose", "mirrored-body", "missing-layer", "unused-in-usd", "time-samples",
@@ -109,7 +113,7 @@ class JointReading:
         p1: (3,) origin of the joint's frame in the second body, m.
         quat1: (4,) its unit quaternion, scalar last.
         limits: Lower and upper limit, rad or m.
-        size: Sum of the lengths (m) of the terms of both origins.
+        size: Sum of the lengths (m) of the vectors that were added to compute `p0` and `p1`.
     """
 
     free: str
@@ -136,9 +140,9 @@ class Usd:
         prims: The path of the prim of each link that has one.
         rest: (n, 4, 4) placement in the world of each prim of `prims` by UsdGeom, in m with z up.
         rest_q: (nq,) coordinates of the tree in which the stage shows the robot.
-        single: For each joint of the tree by name: how far rounding to single precision can move and turn its
-            frames (m, rad), the length (m) that turns with them, and the share of its value that the rounding
-            of its mimic rule can change.
+        single: For each joint of the tree by name: four bounds on the effect of rounding to single precision.
+            They are the translation (m) and the rotation (rad) of its frames, the length (m) of the vectors
+            that rotate with the frames, and the relative change of the joint's value by its mimic rule.
         joints: The numbers of each joint prim of the tree, by its path.
         stage: The stage.
         unit: metersPerUnit.
@@ -314,8 +318,8 @@ def read_usd(
 def _select(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str) -> frozenset[str]:
     """Select variants in the session layer, so that no file changes.
 
-    A variant cannot be selected inside an instance. An instance with such a variant set is expanded, in the
-    session layer too. Return the paths of the expanded instances.
+    OpenUSD cannot select a variant inside an instance. Instances that contain the variant set are therefore
+    expanded, also in the session layer. Return the paths of the expanded instances.
 
     Raises:
         UnknownNameError: no prim has such a variant set, or such a variant.
@@ -364,7 +368,11 @@ class _Body:
 
 @dataclass(slots=True)
 class _Edge:
-    """A joint prim: `ends` are its bodies (None: the world), `frames` the joint's frame in each."""
+    """A joint prim.
+
+    `ends` contains the paths of its two bodies (None: the world). `frames` contains the poses of the joint
+    frame in the two bodies.
+    """
 
     prim: Any
     name: str
@@ -513,7 +521,7 @@ class _Reader:
             prim = prim.GetParent()
 
     def _uneven(self, prim: Any) -> str | None:
-        """Return the nearest prim above a prim whose own scale is not the same in all directions."""
+        """Return a text about the nearest ancestor of a prim that has a non-uniform scale, or None."""
         while (prim := prim.GetParent()) and not prim.IsPseudoRoot():
             local = np.array(self._cache.GetLocalTransformation(prim)[0])[:3, :3]
             scale = np.linalg.norm(local, axis=1)
@@ -570,7 +578,7 @@ class _Reader:
             self._couplings(prim)
 
     def _couplings(self, prim: Any) -> None:
-        """Report what couples joints or bodies, but is neither a joint nor a mimic rule that is read."""
+        """Report prims and schemas that couple joints or bodies and that urdfkin does not read."""
         path, schemas = str(prim.GetPath()), _schemas(prim)
         joint = prim.IsA(self.pxr.UsdPhysics.Joint)
         kind = str(prim.GetTypeName())
@@ -583,7 +591,7 @@ class _Reader:
             if not any(word in schema for word in _COUPLINGS) or (joint and _is_mimic(schema)):
                 continue
             if schema == "MjcEqualityJointAPI" and "NewtonMimicAPI" in schemas:
-                # the rule is that of NewtonMimicAPI, with more terms
+                # this schema describes the rule of NewtonMimicAPI again, with terms of higher degree
                 if more := [name for name in _HIGHER if self._value(prim, name)]:
                     what = f"the terms {', '.join(more)} of this joint's mimic rule are not read"
                     self._say("left-out-of-usd", path, what)
@@ -649,16 +657,17 @@ class _Reader:
         return edge
 
     def _in_stage(self, body: str | None, T: FloatArray) -> FloatArray:
-        """Return a pose in a body, or in the world with the stage's axes instead of z up."""
+        """Return a pose in the axes of the stage. Only a pose in the world (`body` is None) changes."""
         return T if body is not None else pose(self._up.T) @ T
 
     def _side(
         self, prim: Any, i: int, target: str | None
     ) -> tuple[str | None, FloatArray, float, tuple[float, float]] | None:
-        """Return a joint's body and its frame in it (m); None if the target does not exist.
+        """Return one body of a joint, and data of the joint frame; None if the target does not exist.
 
-        Then follow the length of the origin's terms (m), and how far rounding to single precision can move
-        and turn the frame (m, rad).
+        The data are the pose of the joint frame in the body (m), and the sum of the lengths (m) of the
+        vectors in its origin. Two bounds follow: the translation (m) and the rotation (rad) of the frame by
+        rounding to single precision.
         """
         p = np.array(self._value(prim, f"physics:localPos{i}"), float)
         quaternion = self._value(prim, f"physics:localRot{i}")
@@ -724,12 +733,15 @@ class _Reader:
         return self._six(prim, path)
 
     def _unlimited(self, path: str, limits: Mapping[str, tuple[float, float]]) -> None:
-        """Report limits of a planar or floating joint, for which a tree has no place."""
+        """Report the limits of a planar or floating joint, which a tree cannot represent."""
         if any(math.isfinite(end) for ends in limits.values() for end in ends):
             self._say("unused-in-usd", path, "the limits of this planar or floating joint are not read")
 
     def _six(self, prim: Any, path: str) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
-        """Return a joint of any degrees of freedom as one of ours, as `_motion` does."""
+        """Return the result of `_motion` for a generic joint, which has a limit for each direction.
+
+        A direction whose lower limit is above its upper limit is locked.
+        """
         free, limits = [], {}
         for freedom in _FREEDOMS:
             low, high = -math.inf, math.inf
@@ -756,11 +768,11 @@ class _Reader:
         )
 
     def _end(self, prim: Any, name: str) -> float:
-        """Return a limit of a joint with limits by direction.
+        """Return the lower or upper limit of one direction of a generic joint.
 
         Raises:
-            InputError: the limit is blocked. OpenUSD's parser of UsdPhysics then reads another number
-                than the default.
+            InputError: the stage blocks the limit. For a blocked limit, OpenUSD's parser of UsdPhysics does
+                not read the default.
         """
         attribute = prim.GetAttribute(name)
         if attribute.HasFallbackValue() and attribute.Get() is None:
@@ -793,7 +805,7 @@ class _Reader:
     def _articulations(self) -> list[_Articulation]:
         """Return the groups of bodies that joints connect.
 
-        A joint between two articulations connects no groups; it is a remark.
+        A joint between two articulations is reported and does not merge their groups.
         """
         above: dict[str, str] = {path: path for path in self._bodies}
 
@@ -832,7 +844,7 @@ class _Reader:
         for path in self._bodies:
             if (key := top(path)) in groups:
                 groups[key].bodies.append(path)
-        # a body without own joints to other bodies, fixed to the world, is scenery
+        # a single body that is fixed to the world is not a robot
         found = [
             group
             for group in groups.values()
@@ -840,7 +852,7 @@ class _Reader:
         ]
         for group in found:
             self._name(group)
-        # an articulation whose base is no rigid body consists of several groups at the world
+        # if the base of an articulation is not a rigid body, several groups are attached to the world
         merged: dict[str, list[_Articulation]] = {}
         for group in found:
             merged.setdefault(self._root(group) or group.path, []).append(group)
@@ -1078,7 +1090,7 @@ class _Reader:
     def _frames(self, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:
         """Yield each plain Xform of a body that marks a frame, with the path of the body.
 
-        An Xform that only groups shapes, or that is an instance, is none.
+        An Xform that only groups shapes does not mark a frame. An instance does not mark a frame either.
         """
         physics, geom = self.pxr.UsdPhysics, self.pxr.UsdGeom
 
@@ -1142,7 +1154,7 @@ class _Reader:
             yield names[path], Mimic(names[leader_path], multiplier, offset)
 
     def _rules(self, edge: _Edge) -> Iterator[tuple[str, float, float]]:
-        """Yield the leader's path, the multiplier and the offset (rad or m) of each rule of a joint."""
+        """Yield the mimic rules of a joint: path of the mimicked joint, multiplier, offset (rad or m)."""
         prim, schemas = edge.prim, _schemas(edge.prim)
         own = self._factor(edge.kind)
         if "NewtonMimicAPI" in schemas:
@@ -1169,7 +1181,7 @@ class _Reader:
         return self._unit if kind is JointKind.PRISMATIC else math.pi / 180.0
 
     def _ratio(self, edge: _Edge, leader: str) -> float:
-        """Return the factor 1 of a multiplier; report a rule between an angle and a length."""
+        """Return the unit factor of a multiplier, which is 1; report a rule between an angle and a length."""
         kinds = {edge.path: edge.kind for edge in self._edges}
         slides = {kind is JointKind.PRISMATIC for kind in (edge.kind, kinds.get(leader, edge.kind))}
         if len(slides) > 1:
@@ -1278,13 +1290,16 @@ class _Reader:
             )
 
     def _is_scaled(self, prim: Any, factor: float) -> bool:
-        """Return whether the scale of a prim in the world is a factor, as far as single precision shows."""
+        """Return whether the world scale of a prim is equal to a factor, up to single-precision rounding."""
         M = np.array(self._cache.GetLocalToWorldTransform(prim))[:3, :3]
         scale = np.linalg.norm(M, axis=1) / factor
         return bool((np.abs(scale - 1.0) <= _SHEAR * SINGLE * prim.GetPath().pathElementCount).all())
 
     def _is_resolved(self, prim: Any) -> bool:
-        """Return whether a prim at or above this one is turned to the stage's up axis, by the usual name."""
+        """Return whether a prim or an ancestor has the operation `unitsResolve`.
+
+        By convention, this operation corrects the unit and the up axis of a referenced layer.
+        """
         while prim and not prim.IsPseudoRoot():
             if any(str(name).endswith(":unitsResolve") for name in prim.GetPropertyNames()):
                 return True
@@ -1301,18 +1316,19 @@ class _Reader:
 
 
 def _rounding(x: FloatArray) -> FloatArray:
-    """Return how far each number may be from the one that was rounded to it; a zero is exact.
+    """Return the largest error of each number by rounding to single precision; a zero is exact.
 
-    It is half of the distance to the next number in single precision.
+    The error is half of the distance to the next number in single precision.
     """
     half = 0.5 * np.spacing(np.abs(x).astype(np.float32)).astype(np.float64)
     return np.asarray(np.where(x == 0.0, 0.0, half))
 
 
 def _turned(xyzw: FloatArray) -> float:
-    """Return the angle (rad) that rounding its numbers can turn a quaternion: twice that of the 4-vector.
+    """Return a bound (rad) on the change of a rotation when its quaternion's numbers are rounded.
 
-    A quaternion with one number has the same direction for every value of this number.
+    The rotation changes by twice the angle between the quaternions. A quaternion with only one nonzero number
+    describes the same rotation for every value of this number.
     """
     if np.count_nonzero(xyzw) == 1:
         return 0.0
