@@ -130,7 +130,7 @@ def _compile(text: str, command: list[str]) -> bytes:
 
 
 def _load(data: bytes) -> ctypes.CDLL:
-    if not hasattr(os, "memfd_create"):  # macOS: a file in a private folder, removed once it is loaded
+    if not hasattr(os, "memfd_create"):  # macOS needs a file; it is removed after loading
         with tempfile.TemporaryDirectory() as folder:
             library = Path(folder, f"robot{next(_names)}.so")
             library.write_bytes(data)
@@ -176,7 +176,7 @@ _compiling = lock_over_forks()
 
 
 def _is_plain(x: object, shape: tuple[int, ...]) -> bool:
-    """Return whether x is an array of this shape whose memory machine code can use as it is."""
+    """Return whether x is an array of this shape that machine code can use without a copy."""
     return (
         type(x) is np.ndarray
         and x.shape == shape
@@ -233,7 +233,7 @@ class CompiledFrame:
         self._acceleration: Fast = partial(self._first, "acceleration")
 
     def __reduce__(self) -> tuple[Callable[..., CompiledFrame], tuple[str, Reference]]:
-        # The object contains memory addresses of this process, so unpickling makes the object again.
+        # The object contains memory addresses of this process, so unpickling creates the object again.
         return self._robot.compiled, (self.frame, self.reference)
 
     def placement(self, q: Given, out: FloatArray | None = None, *, threads: int | None = None) -> FloatArray:
@@ -329,7 +329,7 @@ class CompiledFrame:
 
         own = (
             self._tree.floating_joints or self._plan.is_large
-        )  # a quaternion's norm, or the range of results, must be checked
+        )  # the norm of a quaternion or the range of the results must be checked
         if own or not (isinstance(q, np.ndarray) and q.ndim == 1 and arrays_are_known()):
             return None
         row = QUANTITIES[name]
@@ -339,7 +339,7 @@ class CompiledFrame:
         self._robot.verifier.ledger.account(name).counters.append((task, KernelArgs.COUNT))
         setattr(self, f"_{row.method}", compute)
         if (found := compute(q, *others)) is not None:
-            warn_of_degrees(self._tree, q)  # the first configuration only: later calls cost nothing more
+            warn_of_degrees(self._tree, q)  # only for the first call, so that later calls stay fast
         return found
 
     def _machine_code(self, row: Quantity) -> Any:
@@ -394,10 +394,10 @@ class CompiledFrame:
     def _are_plain(
         self, inputs: Sequence[Given], row: Quantity, out: FloatArray
     ) -> TypeGuard[Sequence[FloatArray]]:
-        """Return whether all arguments are arrays whose memory the machine code can use as it is.
+        """Return whether all arguments are arrays that the machine code can use without a copy.
 
-        For such arrays the general conversion of arguments (`Call`) is skipped. It takes a tenth of the time
-        of 100,000 accelerations, because a large batch removes the conversion's code from the processor's
+        For such arrays the general conversion of arguments (`Call`) is skipped. The conversion takes a tenth
+        of the time of 100,000 accelerations, because a large batch removes its code from the processor's
         caches.
         """
         n = len(out) if type(out) is np.ndarray and out.ndim else 0

@@ -23,7 +23,7 @@ from urdfkin.verify.bounds import column_weights
 
 @dataclass(frozen=True)
 class Dialect:
-    """The parts of a file that are different for each library.
+    """The parts of an exported file that differ between the Python libraries.
 
     Attributes:
         about: Description of a function's inputs and results.
@@ -127,7 +127,7 @@ def _in_any_namespace(writer: Writer) -> list[str]:
 
 
 def _stacked(xp: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a function that yields code which creates the results without writing into an array."""
+    """Return a function that yields code which stacks the results, for libraries with immutable arrays."""
 
     def result(writer: Writer) -> Iterator[str]:
         function = writer.function
@@ -230,12 +230,14 @@ def _torch_module(code: Code) -> str:
 
 
 def _rate(plan: CompiledTree) -> float:
-    """Return a bound on the rotation of all vectors for each rad of a coordinate, at least 1.
+    """Return a bound, at least 1, on the rotation (rad) of any vector when a coordinate changes by 1 rad.
 
-    It is the sum of the multipliers of the revolute joints that follow a coordinate. A number of a unit
-    quaternion that changes by t turns the body about a fixed axis. With the angle x between the quaternion
-    and the change, the angle of the turn has the derivatives 2 sin x, -2 sin 2x and 4 sin 3x. The third
-    derivative of a product of F vectors is then at most (2 F)^3 + 3 (2 F)(2 F) + 4 F <= (3 F)^3.
+    The bound is the sum of the multipliers of all revolute joints whose values depend on the coordinate.
+
+    The bound for floating joints is at least 3. If one number of a unit quaternion changes by t, the body
+    rotates about a fixed axis. Let x be the angle between the quaternion and the direction of the change. The
+    derivatives of the rotation angle with respect to t are 2 sin x, -2 sin 2x and 4 sin 3x. For a product of
+    F vectors, the third derivative is then at most (2 F)^3 + 3 (2 F)(2 F) + 4 F <= (3 F)^3.
     """
     floats = bool((plan.steps[:, Step.KIND] == Motion.FLOATING).any())
     return max(3.0 if floats else 1.0, float(column_weights(plan)[0].max(initial=0.0)))

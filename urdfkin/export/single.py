@@ -1,9 +1,11 @@
 """Bound the rounding errors of an exported function in single precision, for each number of its result.
 
-The code in a file is a list of operations. To first order in eps, the error of a result is the sum of the
-errors that the operations and the constants cause, each multiplied by the derivative of the result with
-respect to that operation or constant. The bound is the sum of the absolute values: the error if all roundings
-add up. One backward pass over the operations computes the derivatives of all results.
+The code in a file is a list of operations. Each operation and each constant has a rounding error. To first
+order in eps, the error of a result is a sum over the operations and constants. Each term is the rounding
+error, multiplied by the derivative of the result with respect to that operation or constant. The bound is the
+sum of the absolute values of the terms. One backward pass over the operations computes the derivatives of all
+results.
+
 `urdfkin.kinematics.roundings` derives the error of one operation.
 """
 
@@ -63,7 +65,10 @@ def _part(function: Function, value: dict[Node, FloatArray], results: Sequence[N
     bound, slopes = np.zeros((n, len(results))), dict[Node, FloatArray]()
 
     def reach(x: Number, slope: FloatArray, columns: slice | int) -> None:
-        """Add the derivatives of some results with respect to a node, or the errors of a constant."""
+        """Add the slopes to the derivatives of some results with respect to a node.
+
+        For a constant, add its error to the bounds.
+        """
         if not isinstance(x, Node):
             bound[:, columns] += np.abs(slope) * _constant(x)
         elif x in slopes:

@@ -45,7 +45,7 @@ def serve() -> None:
         answer = {"error": f"{type(error).__name__}: {error}"[:2000]}
     sys.stdout.write("\n" + json.dumps(answer) + "\n")
     sys.stdout.flush()
-    os._exit(0)  # the confinement may forbid the interpreter's normal exit
+    os._exit(0)  # the confinement may prevent a normal exit of Python
 
 
 def _expand(

@@ -184,7 +184,7 @@ class Finding:
         element: The tag of the element (`joint`, `link`, `origin`, ...); None for the whole file.
         name: The name of the link, joint or material, or None.
         oracle: Pinocchio's behaviour, if Pinocchio refuses the file for this reason or reads it differently;
-            otherwise None. If it is set, no result of this robot can be verified with Pinocchio.
+            otherwise None. If it is not None, no result of this robot can be verified with Pinocchio.
         also: The lines of further findings of the same kind, which are combined into this finding.
         width: Number of marked characters from `column` on; 0: no position in the text.
         fix: The automatic fix, or None.
@@ -298,7 +298,7 @@ def _lines(lines: tuple[int, ...], shown: int = 4) -> str:
 
 
 class UrdfError(UrdfkinError, ValueError):
-    """A URDF has errors. The message of this exception lists the errors like a linter.
+    """A URDF has errors. The message lists the errors, each with file, line and column.
 
     Attributes:
         findings: All findings of the file by line, warnings and notes included.
@@ -311,7 +311,7 @@ class UrdfError(UrdfkinError, ValueError):
     URDF402
     """
 
-    #: Number of errors that the message lists. For further errors it only states their number.
+    #: Number of errors that the message lists. The message only counts further errors.
     SHOWN = 5
 
     def __init__(self, findings: Iterable[Finding]) -> None:
@@ -472,11 +472,11 @@ SEARCHES, CANDIDATES, WORK = 20, 5_000, 250_000
 #: The second number is for the codes URDF7xx, which concern content that kinematics does not use.
 FOLDED, FOLDED_EXTRAS = 4, 2
 
-#: Number of errors with one code that are reported separately. Of further errors, only the lines are listed.
+#: Number of errors with one code that are reported separately. Only the lines of further errors are listed.
 ERRORS_SHOWN = 100
 
 #: Largest number of findings with one code that are stored completely.
-#: Of each further finding, only its line is stored.
+#: Only the line of each further finding is stored.
 WRITTEN_OUT = 10_000
 
 

@@ -186,13 +186,16 @@ class Modelled:
 
 
 def is_model(source: object) -> TypeGuard[Any]:
-    """Return whether an object is Pinocchio's Model or RobotWrapper, by its class name, without imports."""
+    """Return whether an object is Pinocchio's `Model` or `RobotWrapper`.
+
+    The function compares class names, so that it does not import Pinocchio.
+    """
     kinds = [(kind.__module__.partition(".")[0], kind.__name__) for kind in type(source).__mro__]
     return ("pinocchio", "Model") in kinds or ("pinocchio", "RobotWrapper") in kinds
 
 
 def tree_of_model(source: Any) -> Modelled:
-    """Return the tree of a model or of a `RobotWrapper`.
+    """Convert Pinocchio's `Model` or `RobotWrapper` to a kinematic tree.
 
     Raises:
         InputError: the model has a joint of a type that URDF does not have.

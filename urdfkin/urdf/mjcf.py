@@ -118,8 +118,8 @@ class Mjcf:
     def placements(self, q: FloatArray) -> FloatArray:
         """Return the placements (n, frames, 4, 4) of `frames` for q (n, nq), by `mj_kinematics`.
 
-        If there is a fused model, the placements come from this model. A frame that the fused model does not
-        contain has its placement in `model`.
+        If there is a fused model, the placements come from the fused model. The placements of frames that it
+        does not contain come from `model`.
         """
         qpos = self.qpos(q)
         out = _placements(self.model, qpos, dict(enumerate(self.frames.values())))
@@ -169,7 +169,7 @@ class Mjcf:
         return self._of_frames(at_body, np.zeros(m.nsite))
 
     def _joints_of(self, body: int) -> Iterator[tuple[int, str, int]]:
-        """Yield the joints of a body. Each has an index in the model, a kind, and an index in qpos."""
+        """Yield the index in the model, the kind, and the index in qpos of each joint of a body."""
         m, kinds = self.model, library().mjtJoint
         words = {int(kinds.mjJNT_FREE): "free", int(kinds.mjJNT_SLIDE): "slide"}
         first = int(m.body_jntadr[body])
@@ -412,7 +412,7 @@ def _left_out(mujoco: Any, spec: Any) -> Iterator[Listed]:
 
 
 def _angle_unit(mujoco: Any, model: Any) -> Iterator[Listed]:
-    """Yield a mistake if the limits of the hinges of a file in degrees are probably radians.
+    """Yield a finding if a file is in degrees, but the limits of its hinges are probably in radians.
 
     The unit applies to the whole file, so the limits of every hinge must be implausibly small. The opposite
     mistake, degrees in a file in radians, is not reported: all hinges of some robots turn several times.

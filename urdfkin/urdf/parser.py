@@ -620,7 +620,7 @@ _NOT_ZERO = "123456789"
 #: Elements whose tag messages omit.
 _PLAIN = ("origin", "axis", "limit")
 
-#: Leading zeros of a character reference. Python cannot convert a reference with thousands of them.
+#: Leading zeros of a character reference. Python cannot convert a number with thousands of zeros.
 _LEADING_ZEROS = re.compile(r"(&#[xX]?)0+")
 
 #: For each pattern of an invalid number: the remedy. The remedy of the first matching pattern is used.
@@ -675,7 +675,7 @@ SHORTEST, LONGEST = 1e-150, 1e150
 def read_robot(report: Reporter, root: Element) -> RobotRecord | None:
     """Return the links and joints of a document, or None if the document is not a URDF.
 
-    Everything that cannot be read is reported.
+    Each value that cannot be read is reported.
     """
     if root.tag != "robot":
         _other_format(report, root)
@@ -935,7 +935,7 @@ class JointReader:
     def _others(self, joint: JointRecord) -> None:
         """Check elements of a joint that kinematics does not use.
 
-        If they are invalid, urdfdom refuses the file.
+        If such an element is invalid, urdfdom refuses the file.
         """
         dynamics = joint.element.first("dynamics")
         if dynamics is not None:

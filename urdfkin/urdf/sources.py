@@ -165,7 +165,8 @@ def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, objec
     Args:
         source: One of the sources in the module docstring.
         most: Size limit in bytes; for an open text file, in characters. At most one byte or character more is
-            read. So the checks detect a source that is too long, and reading a device without an end stops.
+            read. This is enough to detect a source that is too long, and it stops the reading of endless
+            devices.
         xacro_args: Arguments for a .xacro file, which is expanded.
 
     Raises:
@@ -297,7 +298,7 @@ def _read_file(path: Path, most: int) -> Text:
 def as_word(path: Path) -> str:
     """Return a path as an argument of `load`.
 
-    `./` is added before a path that `load` would read as an option, a text or a catalogue name.
+    `./` is added before a path that would be read as an option, a URDF text or a catalogue name.
     """
     word = str(path)
     return f"./{word}" if word.startswith(("-", "<")) or entry_of(word) is not None else word

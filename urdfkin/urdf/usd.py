@@ -67,7 +67,7 @@ _COUPLINGS = ("Mimic", "Equality", "Tendon")
 #: Endings of the type names of joints that a tree cannot represent.
 #: These names are needed because OpenUSD does not recognize the unknown types of plugins as joints.
 _NO_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
-#: Terms of a rule of MuJoCo that a mimic rule does not have.
+#: Coefficients of a MuJoCo joint equality whose terms a mimic rule does not have.
 _HIGHER = ("mjc:coef2", "mjc:coef3", "mjc:coef4")
 _AXES = {"X": 0, "Y": 1, "Z": 2}
 _FREEDOMS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
@@ -139,7 +139,7 @@ class Usd:
         tree: The links and joints.
         prims: The path of the prim of each link that has one.
         rest: (n, 4, 4) placement in the world of each prim of `prims` by UsdGeom, in m with z up.
-        rest_q: (nq,) coordinates of the tree in which the stage shows the robot.
+        rest_q: (nq,) configuration of the robot in the stage.
         single: For each joint of the tree by name: four bounds on the effect of rounding to single precision.
             They are the translation (m) and the rotation (rad) of its frames, the length (m) of the vectors
             that rotate with the frames, and the relative change of the joint's value by its mimic rule.
@@ -289,7 +289,8 @@ def read_usd(
     Args:
         path: The file.
         name: The name of the file in messages.
-        variants: (variant set, variant) to select, wherever the stage has that set, in this order.
+        variants: Pairs (variant set, variant). In this order, each variant is selected in all prims that have
+            the variant set.
         articulation: Path or name of the articulation to read; None if there is only one.
 
     Raises:
@@ -395,7 +396,10 @@ class _Articulation:
 
 @dataclass(slots=True)
 class _Reader:
-    """Read one stage; `source` is its name in messages, `opened` the paths of its expanded instances."""
+    """Reader of one stage.
+
+    `source` is the stage's name in messages. `opened` contains the paths of the expanded instances.
+    """
 
     pxr: Any
     stage: Any
@@ -481,7 +485,7 @@ class _Reader:
     def _value(self, prim: Any, name: str) -> Any:
         """Return the value of an attribute, or its default; None if there is neither.
 
-        A blocked value counts as one that is not written.
+        A blocked value counts as a missing value.
         """
         attribute = prim.GetAttribute(name)
         if not attribute:
@@ -867,7 +871,10 @@ class _Reader:
         group.path = group.path or self._root(group) or group.bodies[0]
 
     def _choose(self, found: list[_Articulation], wanted: str | None) -> _Articulation:
-        """Return the articulation with a path or name; all articulations below the path of another prim."""
+        """Return the articulation with the path or name `wanted`.
+
+        If `wanted` is the path of another prim, merge all articulations below it.
+        """
         if not found:
             raise InputError(
                 "this stage has no joint between bodies",
@@ -896,7 +903,7 @@ class _Reader:
         return self._together(below, wanted.rstrip("/") or "/")
 
     def _together(self, groups: list[_Articulation], path: str) -> _Articulation:
-        """Return one articulation for several that are attached to the world."""
+        """Merge several articulations that are attached to the world into one articulation."""
         for group in groups:
             if len(groups) > 1 and self._root(group) is not None:
                 raise InputError(
@@ -984,7 +991,7 @@ class _Reader:
         return len(set(below)) > 1
 
     def _short(self, path: str) -> str:
-        """Return the name of a prim; with the names above it if another body has the same name."""
+        """Return a prim's name, preceded by names of its ancestors if other bodies have the same name."""
         parts, same = path.split("/")[1:], [other.split("/")[1:] for other in self._bodies]
         for n in range(1, len(parts) + 1):
             if sum(other[-n:] == parts[-n:] for other in same) <= 1:
@@ -1001,7 +1008,7 @@ class _Reader:
     def _joints(
         self, edge: _Edge, names: Mapping[str, str], links: Mapping[str | None, str], *, backwards: bool
     ) -> Iterator[tuple[Joint, str, str]]:
-        """Yield the joint, and if the child's frame is not on its axis, a link and a fixed joint."""
+        """Yield the joint; also a link and a fixed joint if the child's frame is not on the joint axis."""
         (A, B), (parent, child) = edge.frames, edge.ends
         axis = edge.axis
         shares = SINGLE if any(map(_is_mimic, _schemas(edge.prim))) else 0.0
@@ -1211,7 +1218,7 @@ class _Reader:
     def _rest(
         self, tree: KinematicTree, group: _Articulation, links: Mapping[str, str], rest: FloatArray
     ) -> FloatArray:
-        """Return the coordinates (nq,) in which the stage shows the robot."""
+        """Return the configuration (nq,) of the robot in the stage."""
         q = np.zeros(tree.nq)
         placed = dict(zip(links.values(), rest, strict=True))
         values = {}

@@ -4,8 +4,9 @@ A fix is accepted under three conditions:
 
 - The new file has fewer findings with the code of the fix.
 - The new file has no new findings.
-- The new file describes the same robot. Every name, number and limit that has a meaning is equal. The
-  direction of an axis may differ by rounding, and the angles of an origin by at most `Fix.turns`.
+- The new file describes the same robot. All names, limits and other numbers that URDF readers use are equal,
+  with two exceptions. The direction of an axis may differ by rounding. The angles of an origin may differ by
+  at most `Fix.turns`.
 
 
 Write the changes of `--fix` as a patch for `git apply` that is safe to print.

@@ -142,7 +142,7 @@ def _check_expressions(report: Reporter, root: Element) -> None:
 
 
 def _moves(element: Element) -> bool:
-    """Return whether kinematics uses an element, as it uses `<link>` and everything in a `<joint>`."""
+    """Return whether kinematics uses an element: a link, a joint, or an element inside a joint."""
     holder = element.holder
     return holder.tag == "joint" or (holder is element and element.tag == "link")
 

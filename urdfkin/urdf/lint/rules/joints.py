@@ -260,7 +260,7 @@ def tilts(robot: RobotRecord) -> dict[str, float]:
 def _snap(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
     """Return the coordinate axis that Pinocchio uses for an axis, and the angle between them (rad).
 
-    The result is None if Pinocchio uses the axis itself.
+    Return None if Pinocchio uses the axis unchanged.
     """
     if axis is None:
         return None
@@ -306,7 +306,7 @@ def check_ranges(report: Reporter, robot: RobotRecord) -> None:
 
 
 def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, version: tuple[int, int]) -> None:
-    strict = version >= (1, 2)  # from 1.2 on urdfdom has the same rules for all joint types
+    strict = version >= (1, 2)  # for URDF 1.2 or newer, urdfdom has the same rules for all joint types
     for attribute in ("effort", "velocity", *FURTHER_LIMITS):
         value = getattr(limit, attribute)
         if value is not None and value < 0.0:
