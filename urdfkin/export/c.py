@@ -44,7 +44,7 @@ def unit(code: Code, head: str = "", main: str = "") -> str:
 
 
 def framed(name: str, /, **parts: str | int) -> str:
-    """Return a template in which each `@name@` is replaced by a text. `@name@` in such a text is kept."""
+    """Return a template in which each `@name@` is replaced by a text. A `@name@` in such a text stays."""
     text = (_FRAMES / name).read_text(encoding="utf-8")
     return _PLACE.sub(lambda found: str(parts[found[1]]), text)
 

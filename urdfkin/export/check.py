@@ -1,8 +1,8 @@
 """Check an exported file: compile or import it, and run its test vectors.
 
 The check runs the file as code. Before you check a file from another person, consider whether you would run
-that person's programs. The check runs a copy of the file in a separate folder. A file such as `math.py` in
-the original folder can therefore not be imported by accident.
+that person's programs. The check runs a copy of the file in a separate folder, so that the copy cannot import
+other files of the original folder, such as a `math.py`, by accident.
 """
 
 from __future__ import annotations

@@ -269,7 +269,7 @@ class Writer:
         else:
             own = _LEVEL[x.op]
             left, right = x.of
-            # The brackets of a + (b + c) are written, so that the code rounds like the compared expression.
+            # The brackets of a + (b + c) are kept, so that the code rounds as in the check with Pinocchio.
             text = f"{self.text(left, own)} {x.op} {self.text(right, own + 1)}"
         return text if own >= level else f"({text})"
 

@@ -155,9 +155,9 @@ class Graph:
         return self.made("*", *_in_order(x, y))
 
     def _record_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
-        """Return a copy of an equation's function that records its equation numbers in the nodes it creates.
+        """Return a function for an equation that also stores the equation's numbers in each new node.
 
-        If another equation calls this function, the numbers of the calling equation are recorded.
+        If another equation calls this function, the numbers of the calling equation are stored.
         """
         found = _EQUATIONS.match(equation.__doc__ or "")
         if found is None:
@@ -191,7 +191,7 @@ def _without_minus(x: Number) -> Number:
 def _in_order(x: Number, y: Number) -> tuple[Number, Number]:
     """Return two operands in a fixed order, so that x + y and y + x are the same node.
 
-    A constant comes before a node, and an older node comes before a newer one.
+    The order is: constants first, then nodes in the order of their creation.
     """
     first, second = sorted((x, y), key=lambda z: z.index if isinstance(z, Node) else -1)
     return first, second

@@ -207,9 +207,9 @@ def _within(function: Function, part: Part, errors: Conversion) -> tuple[FloatAr
 
 
 def decimal(x: Number) -> str:
-    """Return fifty digits of an exact number, without zeros at the end.
+    """Return fifty decimal digits of a number that is known as an interval, without zeros at the end.
 
-    The number is an interval. Return 0 if the interval contains 0.
+    Return 0 if the interval contains 0.
     """
     ball = exact(x)
     if ball.contains(0):

@@ -1,7 +1,7 @@
 """Write Python code for NumPy, any array API namespace, Numba, JAX, PyTorch, CasADi or SymPy.
 
-The expressions are the same for all libraries. The code for JAX and PyTorch is that for any array API
-namespace, with the library's own names.
+The expressions are the same for all libraries. The code for JAX and PyTorch is the code for any array API
+namespace, with the function names of JAX or PyTorch.
 """
 
 from __future__ import annotations
@@ -218,7 +218,7 @@ def gradients(device="cpu"):
 
 def _torch_module(code: Code) -> str:
     """Return code of a `torch.nn.Module` with the functions, and of their check by `gradcheck`."""
-    # The method `forward` computes the function with the fewest inputs, so that q suffices if possible.
+    # `forward` computes the function with the fewest inputs, so that q is its only input if possible.
     first = min(code.functions, key=lambda function: len(function.inputs))
     return _MODULE.format(
         first=first.name,

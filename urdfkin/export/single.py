@@ -65,9 +65,9 @@ def _part(function: Function, value: dict[Node, FloatArray], results: Sequence[N
     bound, slopes = np.zeros((n, len(results))), dict[Node, FloatArray]()
 
     def reach(x: Number, slope: FloatArray, columns: slice | int) -> None:
-        """Add the slopes to the derivatives of some results with respect to a node.
+        """Add `slope` to the derivatives of the results `columns` with respect to x.
 
-        For a constant, add its error to the bounds.
+        If x is a constant, add the effect of its error to the bounds of these results.
         """
         if not isinstance(x, Node):
             bound[:, columns] += np.abs(slope) * _constant(x)

@@ -1,9 +1,9 @@
 """Confine the current process, so that it can only compute and read allowed files.
 
 The operating system limits the memory and time of the process. It also prevents the process from writing
-files and from starting other processes. Python raises an audit event for each opened file, new process, socket
-and import. An audit hook refuses every event that is not allowed. The process can remove neither the limits
-nor the hook. A program with full control of the interpreter may evade the hook, but not the limits.
+files and from starting other processes. Python raises an audit event for each opened file, new process,
+socket and import. An audit hook refuses every event that is not allowed. The process can remove neither the
+limits nor the hook. A program with full control of the interpreter may evade the hook, but not the limits.
 
 This confinement is the second defence. The first defence is the module `expressions`, which evaluates the
 expressions of a file without Python's `eval`.

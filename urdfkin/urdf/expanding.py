@@ -1,8 +1,8 @@
 """Expand a xacro file with xacrodoc, inside the confined process. No other module imports xacrodoc.
 
-xacro alone lets a file run Python code and read environment variables. In the confined process the module
-`expressions` evaluates the expressions, there are no environment variables, and the module `confinement`
-limits the files that the process can read.
+Without this module, xacro lets a file run Python code and read environment variables. In the confined process
+the module `expressions` evaluates the expressions. The process has no environment variables, and the module
+`confinement` limits the files that it can read.
 """
 
 from __future__ import annotations

@@ -465,7 +465,7 @@ class Silences:
 
 
 #: Limits of the search for suggestions for a misspelt name.
-#: The limits are: searches in a file, known names in a search, and the argument `work` of `nearest`.
+#: The limits are: misspelt names per file, known names per search, and the argument `work` of `nearest`.
 SEARCHES, CANDIDATES, WORK = 20, 5_000, 250_000
 
 #: If a file has at least this number of warnings or notes with one code, they are combined into one finding.

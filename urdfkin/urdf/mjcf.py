@@ -11,7 +11,7 @@ MuJoCo compiles the file, which resolves defaults and classes. The tree is built
 Parts of the file that a tree cannot represent are listed in the result.
 
 MuJoCo can align the frame of a free body with its inertial frame (`align`, `alignfree`). The inertial frame
-depends on the shapes, so MuJoCo needs the meshes to compile such a file.
+depends on the shapes. To compile a file with this option, MuJoCo therefore needs the meshes.
 """
 
 from __future__ import annotations
@@ -80,8 +80,8 @@ class Mjcf:
         coordinates: For each moving joint, including mimic joints: its index in MuJoCo's qpos.
         rules: The equalities that are mimic rules. Each has its index in the model and the name of the mimic
             joint.
-        apart: The other active equalities between joints, which the tree does not represent, by their index
-            in the model.
+        apart: Indices in the model of the other active equalities between joints. The tree does not represent
+            these equalities.
         listed: The parts of the file that the tree does not represent.
         whole: Whether `model` contains the shapes and inertias of the file.
         aligns: Whether MuJoCo aligns the frame of a free body with its inertial frame.
@@ -207,7 +207,7 @@ class Mjcf:
         return out
 
     def rule_sizes(self, q: FloatArray) -> FloatArray:
-        """Return the size (n, equalities) of the terms in each mimic rule, for error bounds.
+        """Return the sum (n, equalities) of the sizes of the terms in each mimic rule, for error bounds.
 
         The size of y = y0 + c0 + c1 (x - x0) is |y0| + |c0| + |c1| (size of x + |x0|). This size is
         multiplied by the number of rules in the chain plus one.

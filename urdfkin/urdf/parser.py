@@ -209,7 +209,7 @@ _STORED = 2 * QUOTED
 _NAMES = frozenset({"name", "link", "joint"})
 
 
-class _Stop(Exception):  # noqa: N818 - control flow, not an error
+class _Stop(Exception):  # noqa: N818  only for control flow
     """Stop the parser after a finding that makes the rest of the file meaningless."""
 
 

@@ -74,7 +74,7 @@ class Element:
     text: str = ""
 
     def append(self, child: Element) -> None:
-        """Add a child. An element gets its list of children with the first child, which saves memory."""
+        """Add a child. The list of children is created with the first child, which saves memory."""
         if isinstance(self.children, list):
             self.children.append(child)
         else:

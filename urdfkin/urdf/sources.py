@@ -165,8 +165,7 @@ def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, objec
     Args:
         source: One of the sources in the module docstring.
         most: Size limit in bytes; for an open text file, in characters. At most one byte or character more is
-            read. This is enough to detect a source that is too long, and it stops the reading of endless
-            devices.
+            read, which shows that a source is too long. Reading from a device without an end therefore stops.
         xacro_args: Arguments for a .xacro file, which is expanded.
 
     Raises:

@@ -140,9 +140,10 @@ class Usd:
         prims: The path of the prim of each link that has one.
         rest: (n, 4, 4) placement in the world of each prim of `prims` by UsdGeom, in m with z up.
         rest_q: (nq,) configuration of the robot in the stage.
-        single: For each joint of the tree by name: four bounds on the effect of rounding to single precision.
-            They are the translation (m) and the rotation (rad) of its frames, the length (m) of the vectors
-            that rotate with the frames, and the relative change of the joint's value by its mimic rule.
+        single: For each joint of the tree by name: four numbers for the effect of rounding to single
+            precision. The first two are bounds on the translation (m) and the rotation (rad) of the joint's
+            frames. The third is the length (m) of the vectors that rotate with the frames. The fourth is a
+            bound on the relative change of the joint's value by its mimic rule.
         joints: The numbers of each joint prim of the tree, by its path.
         stage: The stage.
         unit: metersPerUnit.
@@ -191,8 +192,9 @@ def files_of(pxr: Any, path: str) -> tuple[str, ...]:
     """Return the files of a stage. Each layer is read alone, before its references are followed.
 
     Raises:
-        InputError: a layer refers to an address, to a file outside the robot's folder, package and
-            repository, to an expression, or to a file that is not USD; or there are too many layers.
+        InputError: there are too many layers, or a layer has a reference that is not allowed. These are
+            network addresses, expressions, files that are not USD, and files outside the robot's folder,
+            package and repository.
         SourceError: a file is too large, or not a regular file.
     """
     ground = Ground.around(Path(path), [], [])
@@ -257,7 +259,7 @@ def _address(pxr: Any, layer: Any, asset: str, ground: Ground, where: str) -> st
         )
     if Path(inner or outer).suffix.lower() not in USD:
         raise _refused("a reference names a file that is not USD", where, written)
-    return address if os.path.exists(outer) else None  # noqa: PTH110  a name may be no path
+    return address if os.path.exists(outer) else None  # noqa: PTH110  not every name is a path
 
 
 def _refused(what: str, where: str, found: str) -> InputError:
@@ -271,7 +273,7 @@ def _refused(what: str, where: str, found: str) -> InputError:
 
 def _size(path: str, where: str) -> int:
     try:
-        found = os.stat(path)  # noqa: PTH116  a name may be no path
+        found = os.stat(path)  # noqa: PTH116  not every name is a path
     except OSError as error:
         raise SourceError("the file cannot be read", where=path, found=error.strerror) from None
     if not stat.S_ISREG(found.st_mode):
@@ -606,7 +608,7 @@ class _Reader:
             self._say("left-out-of-usd", path, f"urdfkin does not read {', '.join(unread)}")
 
     def _owner(self, prim: Any) -> str | None:
-        """Return the path of the nearest prim at or above a prim that is the root of an articulation."""
+        """Return the path of the articulation root that contains a prim: the prim or its nearest ancestor."""
         while prim and str(prim.GetPath()) != "/":
             if prim.HasAPI(self.pxr.UsdPhysics.ArticulationRootAPI):
                 return str(prim.GetPath())
@@ -670,8 +672,8 @@ class _Reader:
         """Return one body of a joint, and data of the joint frame; None if the target does not exist.
 
         The data are the pose of the joint frame in the body (m), and the sum of the lengths (m) of the
-        vectors in its origin. Two bounds follow: the translation (m) and the rotation (rad) of the frame by
-        rounding to single precision.
+        vectors in its origin. The other data are bounds on the translation (m) and the rotation (rad) of the
+        frame that rounding to single precision causes.
         """
         p = np.array(self._value(prim, f"physics:localPos{i}"), float)
         quaternion = self._value(prim, f"physics:localRot{i}")
@@ -863,7 +865,7 @@ class _Reader:
         return [own[0] if len(own) == 1 else self._together(own, path) for path, own in merged.items()]
 
     def _name(self, group: _Articulation) -> None:
-        """Name a group by the root of its articulation; without one, by its root body."""
+        """Name a group by its articulation root, or by its root body if it has no articulation root."""
         api = self.pxr.UsdPhysics.ArticulationRootAPI
         for edge in group.edges:
             if edge.prim.HasAPI(api):
@@ -983,7 +985,7 @@ class _Reader:
         self._say("left-out-of-usd", edge.path, what)
 
     def _is_outside(self, edge: _Edge, group: _Articulation) -> bool:
-        """Return whether a joint leads from a body below the articulation's root to another body."""
+        """Return whether a joint connects a body below the articulation's root with a body outside it."""
         inside = group.path + "/"
         if group.path in self._bodies or not any(path.startswith(inside) for path in group.bodies):
             return False

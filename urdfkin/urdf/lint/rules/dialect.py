@@ -194,7 +194,7 @@ _ADDED = (
 EXTENSIONS = frozenset(_ADDED.split())
 
 #: Each line is `element: attributes > child elements`.
-#: The attributes of an element without a colon are not checked. An element without a line is not checked.
+#: The attributes of an element without a colon are not checked. No other element is checked.
 _TABLE = """
 robot: name version > link joint material
 link: name type > inertial visual collision

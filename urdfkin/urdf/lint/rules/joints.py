@@ -540,7 +540,10 @@ class _MimicChecker:
 
 
 def _range_of(joint: JointRecord) -> tuple[float, float] | None:
-    """Return the range of a joint, which is its limits or one revolution; None if it has no valid limits."""
+    """Return the limits of a joint; for a continuous joint, one revolution.
+
+    Return None if the joint has no valid limits.
+    """
     if joint.kind == "continuous":
         return -math.pi, math.pi
     if joint.limit is None or joint.kind not in ("revolute", "prismatic"):
@@ -590,7 +593,8 @@ NOTICEABLE = 1e-3
 #: If an angle differs from a multiple of pi by less than this (rad), it is not reported.
 ANGLE_ROUNDING = 1e-10
 
-#: Multiples of pi that are recognized, each with the smallest number of decimals that this needs.
+#: Multiples of pi that are recognized in rounded numbers.
+#: With each: the smallest number of decimals that a rounded number must have.
 _MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
@@ -683,9 +687,9 @@ def _replace_words(raw: str | None, words: list[str]) -> str:
 
 
 def rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
-    """Return the multiple of pi whose rounding a decimal probably is, and the multiple's value.
+    """Return the multiple of pi that was probably rounded to a decimal, and the multiple's value.
 
-    Otherwise None.
+    Return None if there is no such multiple.
 
     >>> rounded_pi("1.5708", 1.5708)
     (Fraction(1, 2), 1.5707963267948966)
