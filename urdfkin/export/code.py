@@ -81,7 +81,10 @@ class Code:
 
     @property
     def head(self) -> list[str]:
-        """The lines of a file's header, without comment marks; the verdict is first if it is UNVERIFIED."""
+        """The lines of a file's header, without comment marks.
+
+        If the code is not verified, the first line says UNVERIFIED.
+        """
         verdict, *rest = self.proof.lines
         lines = [verdict] if not self.proof.certificate.verified else []
         lines += [

@@ -196,7 +196,10 @@ def _single(x: FloatArray) -> FloatArray:
 
 
 def _within(function: Function, part: Part, errors: Conversion) -> tuple[FloatArray, FloatArray]:
-    """Return the error bounds k * scale, (n, numbers), in eps, and the scales."""
+    """Return two arrays (n, numbers) for a function's results: the error bounds and the scales.
+
+    An error bound is k * scale, in eps.
+    """
     v, a = (*part.rates, None, None)[:2]
     size = against_true_values(part.plan, part.q, v, a, errors)
     bound, n = function.quantity.bound(part.plan, size, part.reference), len(part.q)

@@ -35,7 +35,7 @@ def serve() -> None:
     request = json.load(sys.stdin)
     limit(request["seconds"])
     os.environ.clear()
-    os.chdir(Path(request["path"]).parent)  # includes without a package are relative to it
+    os.chdir(Path(request["path"]).parent)  # an include without a package is relative to this folder
     ground = Ground(**request["ground"])
     try:
         answer = _expand(Path(request["path"]), request["arguments"], request["search"], ground)

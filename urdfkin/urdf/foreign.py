@@ -302,7 +302,8 @@ class _ModelReader:
             )
         axis = np.eye(3)["XYZ".index(aligned[2])] if aligned else np.array([1.0, 0.0, 0.0])
         if class_name.endswith("Unaligned"):
-            # Some joint classes have no `axis` in Python (4.1). The motion subspace S contains it.
+            # Some joint classes of Pinocchio 4.1 have no attribute `axis` in Python.
+            # The motion subspace S contains the axis.
             linear, angular = np.split(np.ravel(joint.createData().S), 2)
             axis = linear + angular
         if not kind.has_axis:

@@ -2,12 +2,12 @@
 
 `read_document` checks that the bytes are UTF-8 and parses the XML to elements with positions. The
 XML parser is expat. It does not change names (`xacro:macro`), reports the position of every start tag, needs
-no stack for deep nesting, and opens no file. A document type definition with content stops it before it
-expands an entity.
+no stack for deep nesting, and opens no file. A document type definition with content stops the parser before
+it expands an entity.
 
-`read_robot` reads links and joints into records, once and strictly. Numbers are ASCII, finite, and of the
-right count: the grammar is `xs:double` without its special values, as in urdfdom. Nothing is guessed or
-repaired; every problem is a finding. `urdfkin.urdf.lint` checks the records further.
+`read_robot` reads links and joints into records. Each attribute must have the right count of numbers, which
+are ASCII and finite: the grammar is `xs:double` without its special values, as in urdfdom. Nothing is guessed
+or repaired; every problem is a finding. `urdfkin.urdf.lint` checks the records further.
 """
 
 from __future__ import annotations

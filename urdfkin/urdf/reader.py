@@ -58,7 +58,7 @@ def root_link(name: str, links: Iterable[str], joints: Sequence[JointRecord]) ->
     """Return the link without a parent.
 
     Raises:
-        InputError: there is none, or more than one.
+        InputError: there is no link without a parent, or more than one.
     """
     roots = set(links) - {joint.child for joint in joints}
     if len(roots) != 1:

@@ -103,7 +103,7 @@ class Element:
 
     @property
     def owner(self) -> str:
-        """The tag of the holder. For example, it is `joint` for every element inside a joint."""
+        """The tag of the holder; for example, the tag `joint` for every element inside a joint."""
         return self.holder.tag
 
     @property

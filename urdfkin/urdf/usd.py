@@ -51,7 +51,7 @@ from urdfkin.urdf.sources import USD
 
 #: Largest number of layers of a stage.
 _LAYERS = 1_000
-#: Largest number in single precision. Files write it, or infinity, for a missing limit.
+#: Largest number in single precision. In a file, this number or infinity means that there is no limit.
 _LARGEST = float(np.finfo(np.float32).max)
 #: Largest cosine between two axes of a frame without shear, for each prim on the path.
 #: The unit is one rounding to single precision.
@@ -73,7 +73,7 @@ _AXES = {"X": 0, "Y": 1, "Z": 2}
 _FREEDOMS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
 #: Names of Xforms that hold the shapes of a body.
 _SHAPES = ("visual", "visuals", "collision", "collisions")
-#: Rotates the up axis y to z.
+#: Rotation matrix that turns the up axis y to z.
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 #: The kinds of remarks; `urdfkin.urdf.lint.rules.left_out` defines a rule for each kind.
@@ -109,9 +109,9 @@ class JointReading:
         body0: Path of the first body; empty for the world.
         body1: Path of the second body; empty for the world.
         p0: (3,) origin of the joint's frame in the first body, m.
-        quat0: (4,) its unit quaternion, scalar last.
+        quat0: (4,) unit quaternion of the joint's frame in the first body, scalar last.
         p1: (3,) origin of the joint's frame in the second body, m.
-        quat1: (4,) its unit quaternion, scalar last.
+        quat1: (4,) unit quaternion of the joint's frame in the second body, scalar last.
         limits: Lower and upper limit, rad or m.
         size: Sum of the lengths (m) of the vectors that were added to compute `p0` and `p1`.
     """
@@ -137,7 +137,7 @@ class Usd:
 
     Attributes:
         tree: The links and joints.
-        prims: The path of the prim of each link that has one.
+        prims: For each link with a prim: the prim's path.
         rest: (n, 4, 4) placement in the world of each prim of `prims` by UsdGeom, in m with z up.
         rest_q: (nq,) configuration of the robot in the stage.
         single: For each joint of the tree by name: four numbers for the effect of rounding to single
@@ -618,7 +618,10 @@ class _Reader:
     # -- joints --------------------------------------------------------------------------------------
 
     def _edge(self, prim: Any) -> _Edge | None:
-        """Return a joint that connects two bodies, or a body and the world; otherwise a remark."""
+        """Return a joint that connects two bodies, or a body and the world.
+
+        If the prim is not such a joint, report it and return None.
+        """
         path = str(prim.GetPath())
         if self._value(prim, "physics:jointEnabled") is False:
             self._say("left-out-of-usd", path, "this joint is disabled")
