@@ -44,7 +44,10 @@ def unit(code: Code, head: str = "", main: str = "") -> str:
 
 
 def framed(name: str, /, **parts: str | int) -> str:
-    """Return a template in which each `@name@` is replaced by a text. A `@name@` in such a text stays."""
+    """Return a template in which each `@name@` is replaced by the text `parts[name]`.
+
+    A `@name@` inside an inserted text is not replaced.
+    """
     text = (_FRAMES / name).read_text(encoding="utf-8")
     return _PLACE.sub(lambda found: str(parts[found[1]]), text)
 

@@ -204,8 +204,8 @@ class Writer:
     """Writer of a function's expressions as text, for any language with infix operators.
 
     Args:
-        code: The code with the names to use.
-        function: One of its functions.
+        code: The exported code, which contains the names.
+        function: A function of this code.
         literal: Function that writes a constant.
         sine: Whether to write sine and cosine as operations; if not, they are inputs.
     """

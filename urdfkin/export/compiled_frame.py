@@ -1,7 +1,8 @@
 """Compile one frame of one robot to machine code, the fastest form, for one configuration or a batch.
 
-The first call of a quantity compiles the C of `export` with the system's compiler. The result is compared
-with Pinocchio before it is used. Without a C compiler, the forward recursion that Numba compiles is used.
+The first call of a quantity exports C code and compiles the code with the system's compiler. The result is
+compared with Pinocchio before it is used. Without a C compiler, the forward recursion that Numba compiles is
+used.
 
 The machine code is stored in a cache with checksums. The key consists of the C code, the compiler and the
 processor. The code is loaded from memory, because a file could be changed after its checksum was tested.

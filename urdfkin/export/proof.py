@@ -72,7 +72,7 @@ class Proof:
     Attributes:
         sha256: SHA-256 of the URDF's text.
         urdfkin: Version of urdfkin.
-        certificate: The record of the comparison with Pinocchio, as JSON (`urdfkin.verify.certificate`).
+        certificate: The certificate of the comparison of the expressions with Pinocchio.
         vectors: The test vectors.
         single: For each quantity, the largest bound in single precision, in multiples of eps * scale; inf if
             a number is beyond the range of single precision.

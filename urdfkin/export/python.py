@@ -35,7 +35,7 @@ class Dialect:
         decorator: The decorator's line before each written function; "" if there is none.
         entering: Function that takes the writer of a function and returns the function's first lines.
         helpers: Code of functions that the written functions call; "" if there are none.
-        index: Format of the text for an element of an input.
+        index: Format of an element of an input in the code: the default `{}[{}]` gives, for example, `q[0]`.
         given: Parameter of the written check, with its default; "" if there is none.
         single: Whether the functions also compute in single precision.
         closing: Function that returns code after the written functions.

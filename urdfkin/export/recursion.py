@@ -4,8 +4,8 @@ The compiled tree of a frame is a sequence of steps. Each step is a translation 
 rotation and the motion of a joint about or along z. Placements and Jacobians are computed in the axes of the
 world frame, as in the textbook. Velocities and accelerations are computed in the axes of each link's frame,
 where joint axes are (0, 0, 1) and link vectors are constant. If a result is needed in the axes of the world
-frame, it is then rotated joint by joint. This takes a third fewer operations than a computation of the
-rotation matrix R.
+frame, it is then rotated joint by joint. These rotations take a third fewer operations than a computation of
+the rotation matrix R.
 
 `urdfkin.model.recursion` contains the recursion; this module applies it to a compiled tree.
 """
@@ -182,7 +182,7 @@ def jacobian_rate(plan: CompiledTree, kind: Kind, inputs: Any, reference: Refere
 def hessian(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
     """Return the derivative of each Jacobian entry with respect to each coordinate.
 
-    The terms are those whose sum is equation 7.126.
+    The terms are those of equation 7.126, the time derivative of the Jacobian.
     """
     path, nv = TreeRecursion(plan, kind, inputs, own=False), plan.nv
     out: list[Number] = [0] * (6 * nv**2)
@@ -213,7 +213,7 @@ def _by_row(columns: Sequence[Sequence[Number]]) -> list[Number]:
     return [x for row in zip(*columns, strict=True) for x in row]
 
 
-#: Functions by the names of the table of quantities.
+#: For each quantity by its name: the function that computes it.
 QUANTITIES: dict[str, Callable[[CompiledTree, Kind, Any, Reference], list[Number]]] = {
     "placement": placement,
     "velocity": velocity,

@@ -20,7 +20,7 @@ from urdfkin.urdf.confinement import MEMORY, Ground, confine, limit
 from urdfkin.urdf.expressions import RefusedError, evaluate
 from urdfkin.urdf.xacro import arguments_of
 
-#: Functions of xacro that give an expression access to more than values.
+#: Functions of xacro that are removed, because they give an expression access to types and attributes.
 _NEVER = ("type", "vars")
 
 #: An expression that xacro's function evaluates and that urdfkin's function refuses.

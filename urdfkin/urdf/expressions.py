@@ -66,7 +66,7 @@ def evaluate(expression: str, names: Mapping[str, Any], functions: Collection[ob
         functions: The functions that the expression may call. It may also call the allowed methods.
 
     Raises:
-        RefusedError: the expression contains more than values, operators and allowed calls.
+        RefusedError: the expression contains something other than values, operators and allowed calls.
         SyntaxError: the text is not an expression.
 
     >>> evaluate("2 * a[1] + max(a)", {"a": [1, 2], "max": max}, [max])

@@ -257,7 +257,7 @@ class _ModelReader:
     def _attachment(self, frame: Any, joint: int, T: FloatArray) -> tuple[str, FloatArray]:
         """Return the parent link of a frame, and the frame's pose in this link.
 
-        T is the frame's pose in the frame of the joint that carries it.
+        T is the frame's pose in the frame of its parent joint.
         """
         i = -1 if frame is None else int(frame.parentFrame)
         if i < 0 or i not in self.links or int(self.frames[i].parentJoint) != joint:

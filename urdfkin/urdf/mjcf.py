@@ -78,8 +78,8 @@ class Mjcf:
         fused: The compiled model with fused static bodies if the file sets `fusestatic`; otherwise None.
         frames: For each link: "body" or "site", and the index of this body or site in MuJoCo's model.
         coordinates: For each moving joint, including mimic joints: its index in MuJoCo's qpos.
-        rules: The equalities that are mimic rules. Each has its index in the model and the name of the mimic
-            joint.
+        rules: The equalities that are mimic rules. Each entry is the index of the equality in the model and
+            the name of the mimic joint.
         apart: Indices in the model of the other active equalities between joints. The tree does not represent
             these equalities.
         listed: The parts of the file that the tree does not represent.

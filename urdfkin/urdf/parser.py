@@ -968,7 +968,7 @@ def nearest_tag(word: str, known: frozenset[str]) -> str | None:
 
 
 #: Largest length of a word that is compared with the words of URDF.
-#: No longer word is similar to a word of URDF.
+#: Words that are longer than this are not similar to any word of URDF.
 _LONGEST_WORD = 32
 
 

@@ -65,7 +65,7 @@ _MIMICS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
 #: Words in the names of types and of applied schemas that couple joints or bodies.
 _COUPLINGS = ("Mimic", "Equality", "Tendon")
 #: Endings of the type names of joints that a tree cannot represent.
-#: These names are needed because OpenUSD does not recognize the unknown types of plugins as joints.
+#: OpenUSD recognizes such a type as a joint only if the plugin that defines it is installed.
 _NO_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
 #: Coefficients of a MuJoCo joint equality whose terms a mimic rule does not have.
 _HIGHER = ("mjc:coef2", "mjc:coef3", "mjc:coef4")
@@ -675,8 +675,8 @@ class _Reader:
         """Return one body of a joint, and data of the joint frame; None if the target does not exist.
 
         The data are the pose of the joint frame in the body (m), and the sum of the lengths (m) of the
-        vectors in its origin. The other data are bounds on the translation (m) and the rotation (rad) of the
-        frame that rounding to single precision causes.
+        vectors in its origin. The other data are two bounds on the effect of rounding to single precision:
+        the translation (m) and the rotation (rad) of the frame.
         """
         p = np.array(self._value(prim, f"physics:localPos{i}"), float)
         quaternion = self._value(prim, f"physics:localRot{i}")

@@ -99,7 +99,7 @@ def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> It
     """Yield the reasons why a fix must not be applied."""
     code = fixable[0].code
     # Only a limited number of findings of one code is stored, so codes with more findings are skipped.
-    # After a fix other findings of such a code would be stored, and they would look new.
+    # For such a code, findings that are first stored after a fix would look new.
     many = {finding.code for finding in before.findings if finding.also}
     old, new = (
         Counter((f.code, f.element, f.name) for f in seen.findings if f.code not in many)
