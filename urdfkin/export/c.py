@@ -1,9 +1,10 @@
 """Write C99 code in double or single precision, for one configuration and for batches.
 
-The written code allocates no memory and has no global variables. A function is straight-line code. In its
-arrays, two successive numbers of one configuration are `L` elements apart. For one configuration L is 1. For
-a batch L is the number of configurations that are computed together, and a compiler turns each line of code
-into one vector instruction. The parts of a file that do not depend on the robot are templates in `frames/`.
+The exported code allocates no memory and has no global variables. Each function is straight-line code. In the
+arrays of a function, successive numbers of one configuration are `L` elements apart. For one configuration,
+L is 1. For a batch, L is the number of configurations that are computed together. A compiler then turns each
+line of code into one vector instruction. The parts of a file that do not depend on the robot are templates in
+`frames/`.
 """
 
 from __future__ import annotations
@@ -43,7 +44,10 @@ def unit(code: Code, head: str = "", main: str = "") -> str:
 
 
 def framed(name: str, /, **parts: str | int) -> str:
-    """Return a template in which each `@name@` is replaced. A name in inserted text is not replaced."""
+    """Return a template in which each `@name@` is replaced by the text `parts[name]`.
+
+    A `@name@` inside an inserted text is not replaced.
+    """
     text = (_FRAMES / name).read_text(encoding="utf-8")
     return _PLACE.sub(lambda found: str(parts[found[1]]), text)
 
@@ -138,7 +142,7 @@ def spare(code: Code, function: Function) -> int:
 
 
 def advance(code: Code, function: Function) -> str:
-    """Return C code that moves the pointers to the next LANES configurations."""
+    """Return C code that moves each pointer by `LANES` configurations, which are computed together."""
     return ", ".join(f"{x} += LANES * {width}" for x, width in code.widths(function).items())
 
 

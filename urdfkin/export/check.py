@@ -1,8 +1,8 @@
 """Check an exported file: compile or import it, and run its test vectors.
 
 The check runs the file as code. Before you check a file from another person, consider whether you would run
-that person's programs. The check runs a copy of the file in a separate folder. A file such as `math.py` in
-the original folder can therefore not be imported by accident.
+that person's programs. The check runs a copy of the file in a separate folder, so that the copy cannot import
+other files of the original folder, such as a `math.py`, by accident.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _COMPILE = {
     ".hpp": ("c++", "-std=c++11", "-x", "c++", *_STRICT),
     ".cuh": ("c++", "-std=c++11", "-x", "c++", *_STRICT),
 }
-#: The same for CUDA with its kernels.
+#: The command that compiles a file for CUDA with its kernels.
 _COMPILE_FOR_GPU = ("nvcc", "-Xcompiler", "-Wall,-Wextra,-Werror", "-x", "cu")
 #: Number of characters at the start of a file that are searched for `_MARK` and for the word UNVERIFIED.
 _HEAD = 2000

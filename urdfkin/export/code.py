@@ -81,7 +81,10 @@ class Code:
 
     @property
     def head(self) -> list[str]:
-        """The lines of a file's header, without comment marks; the verdict is first if it is UNVERIFIED."""
+        """The lines of a file's header, without comment marks.
+
+        If the code is not verified, the first line says UNVERIFIED.
+        """
         verdict, *rest = self.proof.lines
         lines = [verdict] if not self.proof.certificate.verified else []
         lines += [
@@ -201,8 +204,8 @@ class Writer:
     """Writer of a function's expressions as text, for any language with infix operators.
 
     Args:
-        code: The code with the names to use.
-        function: One of its functions.
+        code: The exported code, which contains the names.
+        function: A function of this code.
         literal: Function that writes a constant.
         sine: Whether to write sine and cosine as operations; if not, they are inputs.
     """
@@ -269,13 +272,15 @@ class Writer:
         else:
             own = _LEVEL[x.op]
             left, right = x.of
-            # a + (b + c) keeps its brackets, so that it rounds in the same way as in the comparison with
-            # Pinocchio.
+            # The brackets of a + (b + c) are kept, so that the code rounds as in the check with Pinocchio.
             text = f"{self.text(left, own)} {x.op} {self.text(right, own + 1)}"
         return text if own >= level else f"({text})"
 
     def whole(self, x: Number, given: Callable[[Node], str], level: int = _SUM) -> str:
-        """Return an expression that uses no statements, for an angle computed before the statements."""
+        """Return the text of an expression in terms of inputs only, without the names of statements.
+
+        Angles need this form, because the code computes them before its statements.
+        """
         if not isinstance(x, Node):
             return self.literal(float(x))
         if x.op in self.code.words:

@@ -1,7 +1,8 @@
 """Compile one frame of one robot to machine code, the fastest form, for one configuration or a batch.
 
-The first call of a quantity compiles the C of `export` with the system's compiler. The result is compared
-with Pinocchio before it is used. Without a C compiler, the forward recursion that Numba compiles is used.
+The first call of a quantity exports C code and compiles the code with the system's compiler. The result is
+compared with Pinocchio before it is used. Without a C compiler, the forward recursion that Numba compiles is
+used.
 
 The machine code is stored in a cache with checksums. The key consists of the C code, the compiler and the
 processor. The code is loaded from memory, because a file could be changed after its checksum was tested.
@@ -42,8 +43,7 @@ from urdfkin.verify.quantities import QUANTITIES, Quantity
 from urdfkin.verify.verifier import Verifier
 
 _FLAGS = ("-std=c99", "-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fPIC", "-shared")
-#: By default GCC uses only half of each vector register on many processors, although the whole register is as
-#: fast.
+#: Options for the full width of vector registers. By default, GCC uses half of the width on many processors.
 _WHOLE_REGISTERS = {"x86_64": ("-mprefer-vector-width=512",)}
 _TIME_LIMIT = 600.0
 _names = count()
@@ -54,10 +54,10 @@ class NoCompilerError(Exception):
 
 
 def library(code: Code) -> ctypes.CDLL:
-    """Return the library of the code's only function.
+    """Compile code that consists of one function, and load it as a library.
 
-    Its entry point is `task`. The function takes an array with the fields of `KernelArgs`, and returns 0, or
-    1 for an input that is not finite.
+    The library's entry point is `task`. It takes an array with the fields of `KernelArgs`. It returns 0, or 1
+    if an input is not finite.
 
     Raises:
         NoCompilerError: there is no C compiler, or it fails.
@@ -131,7 +131,7 @@ def _compile(text: str, command: list[str]) -> bytes:
 
 
 def _load(data: bytes) -> ctypes.CDLL:
-    if not hasattr(os, "memfd_create"):  # macOS: a file in a private folder, removed once it is loaded
+    if not hasattr(os, "memfd_create"):  # macOS needs a file; it is removed after loading
         with tempfile.TemporaryDirectory() as folder:
             library = Path(folder, f"robot{next(_names)}.so")
             library.write_bytes(data)
@@ -164,10 +164,10 @@ def _processor() -> str:
 
 #: Number of random configurations compared with Pinocchio, besides the neutral one and the limits.
 CHECKED = 100
-#: Largest number of results of one configuration. The results of eight configurations are on the stack and
-#: take at most half a megabyte.
+#: Largest number of results of one configuration.
+#: The code stores the results of eight configurations on the stack, in at most half a megabyte.
 _MOST_RESULTS = 8192
-# Plain integers: an enumeration's member takes several times as long as an index.
+# These are plain integers, because indexing with a member of an enumeration takes several times as long.
 _N, _OUT, _STAGE, *_PLACES = map(
     int, (KernelArgs.N, KernelArgs.OUT, KernelArgs.STAGE, KernelArgs.Q, KernelArgs.V, KernelArgs.A)
 )
@@ -177,7 +177,7 @@ _compiling = lock_over_forks()
 
 
 def _is_plain(x: object, shape: tuple[int, ...]) -> bool:
-    """Return whether x is an array of this shape whose memory machine code can use as it is."""
+    """Return whether x is an array of this shape that machine code can use without a copy."""
     return (
         type(x) is np.ndarray
         and x.shape == shape
@@ -205,9 +205,9 @@ class CompiledFrame:
 
     Results agree with the results of `Robot` within the error bound, but not to the last bit. A batch gives
     the same bits as its configurations one by one. Inputs are checked: a wrong shape or a number that is not
-    finite is an error. Pinocchio does not check each call, and the ledger counts the calls as unchecked.
-    Pinocchio checks the machine code once, on a hundred configurations, unless the robot is loaded with
-    `verify=False`.
+    finite is an error. The machine code is compared with Pinocchio once, on a hundred configurations, unless
+    the robot is loaded with `verify=False`. The results of later calls are not compared, and the certificate
+    counts them as unchecked.
 
     Attributes:
         frame: The frame's name.
@@ -234,7 +234,7 @@ class CompiledFrame:
         self._acceleration: Fast = partial(self._first, "acceleration")
 
     def __reduce__(self) -> tuple[Callable[..., CompiledFrame], tuple[str, Reference]]:
-        # The object contains memory addresses of this process, so unpickling makes the object again.
+        # The object contains memory addresses of this process, so unpickling creates the object again.
         return self._robot.compiled, (self.frame, self.reference)
 
     def placement(self, q: Given, out: FloatArray | None = None, *, threads: int | None = None) -> FloatArray:
@@ -330,7 +330,7 @@ class CompiledFrame:
 
         own = (
             self._tree.floating_joints or self._plan.is_large
-        )  # a quaternion's norm, or the range of results, must be checked
+        )  # the norm of a quaternion or the range of the results must be checked
         if own or not (isinstance(q, np.ndarray) and q.ndim == 1 and arrays_are_known()):
             return None
         row = QUANTITIES[name]
@@ -340,7 +340,7 @@ class CompiledFrame:
         self._robot.verifier.ledger.account(name).counters.append((task, KernelArgs.COUNT))
         setattr(self, f"_{row.method}", compute)
         if (found := compute(q, *others)) is not None:
-            warn_of_degrees(self._tree, q)  # the first configuration only: later calls cost nothing more
+            warn_of_degrees(self._tree, q)  # only for the first call, so that later calls stay fast
         return found
 
     def _machine_code(self, row: Quantity) -> Any:
@@ -380,7 +380,7 @@ class CompiledFrame:
                 name, inputs, self.frame, self.reference, out=out, threads=threads, verify=False
             )
         if out is not None and self._are_plain(inputs, row, out):
-            # If an input is not finite, the code below raises an error that names the number.
+            # If an input is not finite, the code below this block raises an error with the number's position.
             with suppress(NotFiniteError):
                 self._run(made, row, inputs, out, threads)
                 warn_of_degrees(self._tree, inputs[0])
@@ -395,10 +395,11 @@ class CompiledFrame:
     def _are_plain(
         self, inputs: Sequence[Given], row: Quantity, out: FloatArray
     ) -> TypeGuard[Sequence[FloatArray]]:
-        """Return whether all arguments are arrays whose memory the machine code can use as it is.
+        """Return whether all arguments are arrays that the machine code can use without a copy.
 
-        The general conversion of arguments (`Call`) takes a tenth of the time of 100,000 accelerations,
-        because a large batch displaces the conversion's code from the caches.
+        For such arrays the general conversion of arguments (`Call`) is skipped. The conversion takes a tenth
+        of the time of 100,000 accelerations, because a large batch removes its code from the processor's
+        caches.
         """
         n = len(out) if type(out) is np.ndarray and out.ndim else 0
         plain = not (self._tree.floating_joints or self._plan.is_large) and _is_plain(
@@ -426,8 +427,7 @@ class CompiledFrame:
         def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
             task = _Task()
             task[_N], task[_OUT] = len(part), address(part)
-            # The last row may be shorter than a vector register. A register is then written past the end of
-            # the row.
+            # If the last row is shorter than a vector register, the code writes past the end of the row.
             stage = lines(LANES * part[0].size + LANES) if row.columns and is_staged(out) else None
             task[_STAGE] = 0 if stage is None else address(stage)
             for place, x in zip(_PLACES, parts, strict=False):

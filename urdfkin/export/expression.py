@@ -2,11 +2,11 @@
 
 Arithmetic with these numbers builds a graph of expressions, from which code is written.
 
-The textbook's equations (`urdfkin.kinematics.equations`) run on these numbers as on any others. The graph
-simplifies each expression when it is made. Constants are Python floats, and operations on constants are
-computed at once. Products with 0 and 1 and sums with 0 are removed. A minus sign is moved out of products,
-and turns a sum into a difference. Equal expressions are the same node, so the sine and the cosine of each
-joint occur once.
+The functions of the textbook's equations (`urdfkin.kinematics.equations`) accept these numbers like floats.
+The graph simplifies each expression when it is created. Constants are Python floats, and operations on
+constants are computed at once. Products with 0 and 1 and sums with 0 are removed. A minus sign is moved out
+of products, and turns a sum into a difference. Equal expressions are the same node, so the sine and the
+cosine of each joint occur once.
 
 >>> graph = Graph()
 >>> x, y = graph.input("q", 0), graph.input("q", 1)
@@ -24,7 +24,7 @@ from typing import Any
 
 from urdfkin.kinematics.arithmetic import bound
 
-#: A number in an equation: a constant or an expression of a graph.
+#: A number in an equation: a float, or a node of the graph.
 Number = Any
 _EQUATIONS = re.compile(r"(?:7\.\d+(?:, )?)+")
 
@@ -34,7 +34,7 @@ class Node:
 
     Attributes:
         op: "q", "v" or "a" for an input; "+", "-", "*", "/", "neg", "sin", "cos" or "sqrt".
-        of: The operands, which are nodes and constants. For an input it is the input's index in q, v or a.
+        of: The operands, which are nodes and constants. An input has one operand: its index in q, v or a.
         index: Order of creation; operands have smaller indices.
         place: Index of the step of the recursion that created it.
         equation: Numbers of the equation that created it; "" if it has none.
@@ -155,9 +155,9 @@ class Graph:
         return self.made("*", *_in_order(x, y))
 
     def _record_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
-        """Return a copy of an equation's function that records its equation numbers in the nodes it creates.
+        """Return a function for an equation that also stores the equation's numbers in each new node.
 
-        If another equation calls this function, the numbers of the calling equation are recorded.
+        If another equation calls this function, the numbers of the calling equation are stored.
         """
         found = _EQUATIONS.match(equation.__doc__ or "")
         if found is None:
@@ -191,7 +191,7 @@ def _without_minus(x: Number) -> Number:
 def _in_order(x: Number, y: Number) -> tuple[Number, Number]:
     """Return two operands in a fixed order, so that x + y and y + x are the same node.
 
-    A constant comes before a node, and an older node comes before a newer one.
+    The order is: constants first, then nodes in the order of their creation.
     """
     first, second = sorted((x, y), key=lambda z: z.index if isinstance(z, Node) else -1)
     return first, second

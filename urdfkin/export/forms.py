@@ -1,7 +1,7 @@
 """The code of a chain in one of its forms: the URDF's joints, a Denavit-Hartenberg table, or screws.
 
-A table or a product of exponentials becomes a robot, as by `urdfkin.load`. The joints of this robot are the
-rows or the screws, and the code is made of this robot.
+`urdfkin.load` converts a table or a product of exponentials to a robot, with one joint for each row or screw.
+The code is generated from this robot.
 """
 
 from __future__ import annotations
@@ -36,7 +36,10 @@ def code_of_robot(
     name: str | None = None,
     verify: bool | None = None,
 ) -> Code:
-    """Return the code of a frame of a `Robot`, with its proof; arguments and errors as in `Robot.export`."""
+    """Return the exported code of a robot's frame, with its proof.
+
+    The arguments and the errors are those of `Robot.export`.
+    """
     if form not in FORMS:
         raise UnknownNameError("form", form, FORMS)
     verify = bool(robot.verifier.wanted(verify))
@@ -55,14 +58,15 @@ def code_of_chain(
     name: str | None = None,
     verify: bool = True,
 ) -> Code:
-    """Return the code of a table's tip, or of the tip of screws, with its proof.
+    """Return the exported code of a chain's last frame, with its proof.
 
-    The steps of the code are the rows of the table or the screws. Results are in the axes of the chain's
+    The code has one step for each row of the table, or for each screw. Results are in the axes of the chain's
     base.
 
     Args:
         chain: A table, or a product of exponentials.
-        quantities: As in `Robot.export`. None: its default, or the placement if no joint moves.
+        quantities: As in `Robot.export`. None: the default of `Robot.export`, but only the placement if no
+            joint moves.
         reference: As in `Robot.export`.
         name: As in `Robot.export`.
         verify: Whether to compare the code with Pinocchio.
@@ -76,7 +80,7 @@ def code_of_chain(
     else:
         text = screws_document(chain).text()
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UrdfWarning)  # about a URDF that only the code is made of
+        warnings.simplefilter("ignore", UrdfWarning)  # the user does not see this intermediate URDF
         robot = hook("a robot of a source")(chain, verify=verify)
     tip = link_names(chain)[-1] if isinstance(chain, DHTable) else chain.tip_frame
     frame = robot.tree.frame_name(robot.link_names.index(tip))
@@ -95,7 +99,7 @@ def code_of_chain(
 
 
 def _with_safe_names(table: DHTable) -> DHTable:
-    """Return the table with names that a URDF can contain, whatever a stranger's file has as names."""
+    """Replace the names of joints and frames that a URDF cannot contain."""
     names = [table.base_frame, *(row.joint for row in table.rows), *table.joint_names, table.tip_frame]
     to = dict(zip(dict.fromkeys(names), all_safe(dict.fromkeys(names)), strict=True))
     rows = tuple(

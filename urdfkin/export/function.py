@@ -41,7 +41,7 @@ class Function:
         quantity: The quantity's row in the table of quantities.
         reference: The reference frame.
         plan: The compiled tree of the path.
-        results: The numbers of the result, row by row. Each is a constant or an expression.
+        results: The numbers of the result, row by row. Each number is a constant or an expression.
     """
 
     quantity: Quantity

@@ -1,8 +1,8 @@
 """Compare exported expressions with Pinocchio, and make the test vectors of an exported file.
 
 The expressions are evaluated exactly as they are printed, and the results are compared with Pinocchio's.
-Wherever the file is used, the test vectors then check the file together with the language, the compiler and
-the library of that place. The test vectors contain true values at fifty digits, computed from the URDF's
+When a user runs the file, its test vectors check the file and also the user's compiler, language version and
+libraries. The test vectors contain true values at fifty digits, computed from the URDF's
 decimals. For each number they also contain the error bound of a correct computation, in eps of the precision
 used. The inputs are single-precision numbers, so they are equal in single and in double precision.
 """
@@ -72,7 +72,7 @@ class Proof:
     Attributes:
         sha256: SHA-256 of the URDF's text.
         urdfkin: Version of urdfkin.
-        certificate: The certificate of the printed expressions.
+        certificate: The certificate of the comparison of the expressions with Pinocchio.
         vectors: The test vectors.
         single: For each quantity, the largest bound in single precision, in multiples of eps * scale; inf if
             a number is beyond the range of single precision.
@@ -196,7 +196,10 @@ def _single(x: FloatArray) -> FloatArray:
 
 
 def _within(function: Function, part: Part, errors: Conversion) -> tuple[FloatArray, FloatArray]:
-    """Return the error bounds k * scale, (n, numbers), in eps, and the scales."""
+    """Return two arrays (n, numbers) for a function's results: the error bounds and the scales.
+
+    An error bound is k * scale, in eps.
+    """
     v, a = (*part.rates, None, None)[:2]
     size = against_true_values(part.plan, part.q, v, a, errors)
     bound, n = function.quantity.bound(part.plan, size, part.reference), len(part.q)
@@ -207,7 +210,10 @@ def _within(function: Function, part: Part, errors: Conversion) -> tuple[FloatAr
 
 
 def decimal(x: Number) -> str:
-    """Return the first fifty digits of a ball, without zeros at the end; a ball around 0 is 0."""
+    """Return fifty decimal digits of a number that is known as an interval, without zeros at the end.
+
+    Return 0 if the interval contains 0.
+    """
     ball = exact(x)
     if ball.contains(0):
         return "0.0"

@@ -1,7 +1,7 @@
 """Write Python code for NumPy, any array API namespace, Numba, JAX, PyTorch, CasADi or SymPy.
 
-The expressions are the same for all libraries. The code for JAX and PyTorch is that for any array API
-namespace, with the library's own names.
+The expressions are the same for all libraries. The code for JAX and PyTorch is the code for any array API
+namespace, with the function names of JAX or PyTorch.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from urdfkin.verify.bounds import column_weights
 
 @dataclass(frozen=True)
 class Dialect:
-    """The parts of a file that are different for each library.
+    """The parts of an exported file that differ between the Python libraries.
 
     Attributes:
         about: Description of a function's inputs and results.
-        imports: Import lines. A placeholder stands for the functions among `cos`, `sin` and `sqrt` that the
-            code uses. A line with a placeholder is left out if the code uses none.
+        imports: Import lines. The placeholder `{}` is replaced by the functions `cos`, `sin` and `sqrt` that
+            the code uses. If the code uses none of them, the lines with a placeholder are removed.
         result: Function that yields the lines of code that return the results of a written function.
         values: Body of the written function `_values(function, inputs)`, which returns the results for a list
             of configurations.
         decorator: The decorator's line before each written function; "" if there is none.
-        entering: Function that returns the first lines of a written function, given its writer.
+        entering: Function that takes the writer of a function and returns the function's first lines.
         helpers: Code of functions that the written functions call; "" if there are none.
-        index: Format of the text for an element of an input.
+        index: Format of an element of an input in the code: the default `{}[{}]` gives, for example, `q[0]`.
         given: Parameter of the written check, with its default; "" if there is none.
         single: Whether the functions also compute in single precision.
         closing: Function that returns code after the written functions.
@@ -76,7 +76,7 @@ def _in_array(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
 
 
 def _nested(opening: str, closing: str, row: str = "[{}]") -> Callable[[Writer], Iterator[str]]:
-    """Return a function that yields code which creates the matrix of results in one call, row by row.
+    """Return a function that yields the code `return matrix([[...], ...])`, with a list for each row.
 
     The rows of a Hessian (6, nv, nv) are written as one matrix.
     """
@@ -127,7 +127,7 @@ def _in_any_namespace(writer: Writer) -> list[str]:
 
 
 def _stacked(xp: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a function that yields code which creates the results without writing into an array."""
+    """Return a function that yields code which stacks the results, for libraries with immutable arrays."""
 
     def result(writer: Writer) -> Iterator[str]:
         function = writer.function
@@ -165,7 +165,10 @@ _FLOATING = (
 
 
 def _demand(given: str = "", floating: str = "") -> str:
-    """Return code of a function that checks an input; `floating` is a test of its type, or empty."""
+    """Return the code of a function that checks the length of an input.
+
+    If `floating` is not empty, it is an expression that tests for a floating type, and the code uses it.
+    """
     text, or_type = (_FLOATING, ", or no floating type") if floating else (_LENGTH, "")
     return text.format(given=given, floating=floating, or_type=or_type)
 
@@ -215,7 +218,7 @@ def gradients(device="cpu"):
 
 def _torch_module(code: Code) -> str:
     """Return code of a `torch.nn.Module` with the functions, and of their check by `gradcheck`."""
-    # The module's method `forward` has the input q only, if the code has a function of q only.
+    # `forward` computes the function with the fewest inputs, so that q is its only input if possible.
     first = min(code.functions, key=lambda function: len(function.inputs))
     return _MODULE.format(
         first=first.name,
@@ -227,12 +230,14 @@ def _torch_module(code: Code) -> str:
 
 
 def _rate(plan: CompiledTree) -> float:
-    """Return a bound on the rotation of all vectors for each rad of a coordinate, at least 1.
+    """Return a bound, at least 1, on the rotation (rad) of any vector when a coordinate changes by 1 rad.
 
-    It is the sum of the multipliers of the revolute joints that follow a coordinate. A number of a unit
-    quaternion that changes by t turns the body about a fixed axis. With the angle x between the quaternion
-    and the change, the angle of the turn has the derivatives 2 sin x, -2 sin 2x and 4 sin 3x. The third
-    derivative of a product of F vectors is then at most (2 F)^3 + 3 (2 F)(2 F) + 4 F <= (3 F)^3.
+    The bound is the sum of the multipliers of all revolute joints whose values depend on the coordinate.
+
+    The bound for floating joints is at least 3. If one number of a unit quaternion changes by t, the body
+    rotates about a fixed axis. Let x be the angle between the quaternion and the direction of the change. The
+    derivatives of the rotation angle with respect to t are 2 sin x, -2 sin 2x and 4 sin 3x. For a product of
+    F vectors, the third derivative is then at most (2 F)^3 + 3 (2 F)(2 F) + 4 F <= (3 F)^3.
     """
     floats = bool((plan.steps[:, Step.KIND] == Motion.FLOATING).any())
     return max(3.0 if floats else 1.0, float(column_weights(plan)[0].max(initial=0.0)))

@@ -4,8 +4,8 @@ The compiled tree of a frame is a sequence of steps. Each step is a translation 
 rotation and the motion of a joint about or along z. Placements and Jacobians are computed in the axes of the
 world frame, as in the textbook. Velocities and accelerations are computed in the axes of each link's frame,
 where joint axes are (0, 0, 1) and link vectors are constant. If a result is needed in the axes of the world
-frame, it is then rotated joint by joint. This takes a third fewer operations than a computation of the
-rotation matrix R.
+frame, it is then rotated joint by joint. These rotations take a third fewer operations than a computation of
+the rotation matrix R.
 
 `urdfkin.model.recursion` contains the recursion; this module applies it to a compiled tree.
 """
@@ -33,10 +33,10 @@ class Kind:
         chapter: The textbook's equations for this kind of number.
         sine_cosine: Function that returns sine and cosine of an angle.
         root: Function that returns the square root.
-        entering: Function that is called before each step, before the frame after the last step, and before
-            the frame's results. Its argument is the index of the step.
-        reached: Function that is called for each new state. Its arguments are the number of steps so far and
-            the state.
+        entering: Function that is called before each step, then before the final frame, and then before the
+            results. Its argument counts these calls from 0.
+        reached: Function that is called after each step and after the final frame. Its arguments are the
+            index of the call and the new state.
     """
 
     chapter: Any
@@ -81,7 +81,7 @@ class TreeRecursion(Recursion):
         kind.entering(len(self.states) + 1)
 
     def turned(self, s: State, S: Matrix) -> State:
-        """Return a state for a rotated frame, and store the rotation in `turns`."""
+        """Rotate the frame of a state by S, and append S to `turns`."""
         self.turns.append(S)
         return super().turned(s, S)
 
@@ -182,7 +182,7 @@ def jacobian_rate(plan: CompiledTree, kind: Kind, inputs: Any, reference: Refere
 def hessian(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
     """Return the derivative of each Jacobian entry with respect to each coordinate.
 
-    The terms are those whose sum is equation 7.126.
+    The terms are those of equation 7.126, the time derivative of the Jacobian.
     """
     path, nv = TreeRecursion(plan, kind, inputs, own=False), plan.nv
     out: list[Number] = [0] * (6 * nv**2)
@@ -213,7 +213,7 @@ def _by_row(columns: Sequence[Sequence[Number]]) -> list[Number]:
     return [x for row in zip(*columns, strict=True) for x in row]
 
 
-#: Functions by the names of the table of quantities.
+#: For each quantity by its name: the function that computes it.
 QUANTITIES: dict[str, Callable[[CompiledTree, Kind, Any, Reference], list[Number]]] = {
     "placement": placement,
     "velocity": velocity,

@@ -1,9 +1,11 @@
 """Bound the rounding errors of an exported function in single precision, for each number of its result.
 
-The code in a file is a list of operations. To first order in eps, the error of a result is the sum of the
-errors that the operations and the constants cause, each multiplied by the derivative of the result with
-respect to that operation or constant. The bound is the sum of the absolute values: the error if all roundings
-add up. One backward pass over the operations computes the derivatives of all results.
+The code in a file is a list of operations. Each operation and each constant has a rounding error. To first
+order in eps, the error of a result is a sum over the operations and constants. Each term is the rounding
+error, multiplied by the derivative of the result with respect to that operation or constant. The bound is the
+sum of the absolute values of the terms. One backward pass over the operations computes the derivatives of all
+results.
+
 `urdfkin.kinematics.roundings` derives the error of one operation.
 """
 
@@ -43,8 +45,8 @@ _SLOPES: dict[str, Callable[..., tuple[FloatArray | float, ...]]] = {
 def single_bounds(function: Function, inputs: Sequence[FloatArray]) -> FloatArray:
     """Return the bounds (n, results) on the errors in single precision, in eps = 2^-23.
 
-    They do not contain the errors of the code's double constants. A bound is inf if a number of the code is
-    beyond the range of single precision.
+    The bounds do not include the rounding errors of the code's constants in double precision. A bound is inf
+    if a number of the code is beyond the range of single precision.
 
     Args:
         function: The function.
@@ -63,7 +65,10 @@ def _part(function: Function, value: dict[Node, FloatArray], results: Sequence[N
     bound, slopes = np.zeros((n, len(results))), dict[Node, FloatArray]()
 
     def reach(x: Number, slope: FloatArray, columns: slice | int) -> None:
-        """Add the derivatives of some results with respect to a node, or the errors of a constant."""
+        """Add `slope` to the derivatives of the results `columns` with respect to x.
+
+        If x is a constant, add the effect of its error to the bounds of these results.
+        """
         if not isinstance(x, Node):
             bound[:, columns] += np.abs(slope) * _constant(x)
         elif x in slopes:
@@ -86,7 +91,10 @@ def _part(function: Function, value: dict[Node, FloatArray], results: Sequence[N
 
 
 def _own(node: Node, x: FloatArray) -> FloatArray:
-    """Return the error of an operation itself, in eps, for its values (n,)."""
+    """Return the rounding error (n,) of one operation with exact operands, in eps.
+
+    The results of the operation are x (n,).
+    """
     size = np.abs(x)
     if node.op in INPUTS:
         error = np.zeros_like(size)
@@ -104,6 +112,6 @@ def _constant(x: float) -> float:
 
 
 def _in_range(error: FloatArray, size: FloatArray) -> FloatArray:
-    """Return the errors with those of numbers near zero; inf for numbers beyond the largest."""
+    """Add the errors of numbers that underflow; set the errors of numbers that overflow to inf."""
     small = np.where((size > 0.0) & (size < 2.0 * SINGLE_SMALLEST), SINGLE_SMALLEST / SINGLE_EPS, 0.0)
     return np.where(size <= SINGLE_LARGEST, error + small, np.inf)

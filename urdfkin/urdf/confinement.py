@@ -1,10 +1,12 @@
 """Confine the current process, so that it can only compute and read allowed files.
 
-The kernel limits the memory and time of the process, forbids it to write files, and forbids it to start
-processes. Python raises an audit event for each opened file, new process, socket and import. An audit hook
-refuses every event that is not allowed. The process can remove neither the limits nor the hook. This
-confinement is a second defence. The first defence is `expressions`, which does not let Python run the
-expressions of a file. A program with full control of the interpreter may evade the hook, but not the limits.
+The operating system limits the memory and time of the process. It also prevents the process from writing
+files and from starting other processes. Python raises an audit event for each opened file, new process,
+socket and import. An audit hook refuses every event that is not allowed. The process can remove neither the
+limits nor the hook. A program with full control of the interpreter may evade the hook, but not the limits.
+
+This confinement is the second defence. The first defence is the module `expressions`, which evaluates the
+expressions of a file without Python's `eval`.
 """
 
 from __future__ import annotations
@@ -21,8 +23,9 @@ from urdfkin.urdf.expressions import RefusedError
 #: Memory limit in bytes. The interpreter and its libraries need a tenth of this limit.
 MEMORY = 2 * 1024**3
 
-#: Audit events that are allowed without a check. `_READING` events are allowed for allowed files only.
+#: Audit events that are allowed without a check.
 _HARMLESS = {"builtins.id", "compile", "glob.glob", "glob.glob/2", "object.__getattr__", "sys._getframe"}
+#: Audit events that are allowed only for files that the process may read.
 _READING = {"open", "os.listdir", "os.scandir"}
 _WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
@@ -32,8 +35,8 @@ class Ground:
     """The files that an expansion may read.
 
     Attributes:
-        roots: Folders and files that may be read; hidden folders and files below them may not be read. The
-            target of a symbolic link must also lie in one of them.
+        roots: Folders and files that may be read, without the hidden folders and files below them. The target
+            of a symbolic link must also be one of these files, or lie in one of these folders.
         installed: Folders whose symbolic links may lead to packages in other folders. An example is the
             install folder of `colcon build --symlink-install`.
     """

@@ -1,7 +1,8 @@
 """Expand a xacro file with xacrodoc, inside the confined process. No other module imports xacrodoc.
 
-By itself, xacro lets a file run Python code and read the environment. Here `expressions` evaluates the
-expressions, the environment is empty, and `confinement` limits the files that the process can read.
+Without this module, xacro lets a file run Python code and read environment variables. In the confined process
+the module `expressions` evaluates the expressions. The process has no environment variables, and the module
+`confinement` limits the files that it can read.
 """
 
 from __future__ import annotations
@@ -19,11 +20,11 @@ from urdfkin.urdf.confinement import MEMORY, Ground, confine, limit
 from urdfkin.urdf.expressions import RefusedError, evaluate
 from urdfkin.urdf.xacro import arguments_of
 
-#: Functions of xacro that give an expression access to more than values.
+#: Functions of xacro that are removed, because they give an expression access to types and attributes.
 _NEVER = ("type", "vars")
 
-#: An expression that xacro's own evaluation accepts and ours refuses. If xacro still evaluates it after the
-#: replacement of its function, the replacement had no effect.
+#: An expression that xacro's function evaluates and that urdfkin's function refuses.
+#: It shows whether the replacement of xacro's function took effect.
 _PROBE = "${(lambda: 1)()}"
 
 _TOO_MUCH = f"it takes more than {MEMORY / 1024**3:g} GiB of memory"
@@ -34,7 +35,7 @@ def serve() -> None:
     request = json.load(sys.stdin)
     limit(request["seconds"])
     os.environ.clear()
-    os.chdir(Path(request["path"]).parent)  # includes without a package are relative to it
+    os.chdir(Path(request["path"]).parent)  # an include without a package is relative to this folder
     ground = Ground(**request["ground"])
     try:
         answer = _expand(Path(request["path"]), request["arguments"], request["search"], ground)
@@ -44,7 +45,7 @@ def serve() -> None:
         answer = {"error": f"{type(error).__name__}: {error}"[:2000]}
     sys.stdout.write("\n" + json.dumps(answer) + "\n")
     sys.stdout.flush()
-    os._exit(0)  # the confinement may forbid the interpreter's normal exit
+    os._exit(0)  # the confinement may prevent a normal exit of Python
 
 
 def _expand(
@@ -52,12 +53,12 @@ def _expand(
 ) -> dict[str, Any]:
     """Return the URDF, and the names of the arguments that the file declares.
 
-    The names are None if they are not known, or if the user passed no argument.
+    Without arguments from the user, or if an include cannot be read, None is returned instead of the names.
     """
     import xacrodoc  # noqa: PLC0415  only here
 
     _replace_evaluation(path, search, ground)
-    importlib.import_module("xml.dom.expatbuilder")  # minidom imports it when it first reads a file
+    importlib.import_module("xml.dom.expatbuilder")  # imported now, because minidom would import it later
     confine(ground.holds)
     document = xacrodoc.XacroDoc.from_file(path, subargs=arguments, walk_up=False, resolve_packages=False)
     urdf = document.to_urdf_string()
@@ -83,7 +84,7 @@ def _replace_evaluation(path: Path, search: Mapping[str, str], ground: Ground) -
     def value_of(expression: str, names: Mapping[str, Any], local: object = None) -> object:
         try:
             return evaluate(expression, names, functions)
-        except MemoryError:  # a MemoryError has no message of its own
+        except MemoryError:  # the message of a MemoryError is empty
             raise RefusedError(_TOO_MUCH) from None
 
     def value_of_arguments(expression: str, context: Mapping[str, Any]) -> str:

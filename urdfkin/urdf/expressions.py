@@ -62,11 +62,11 @@ def evaluate(expression: str, names: Mapping[str, Any], functions: Collection[ob
 
     Args:
         expression: The text of the expression.
-        names: The values of the names in it.
+        names: The values of the names that occur in the expression.
         functions: The functions that the expression may call. It may also call the allowed methods.
 
     Raises:
-        RefusedError: the expression contains more than values, operators and allowed calls.
+        RefusedError: the expression contains something other than values, operators and allowed calls.
         SyntaxError: the text is not an expression.
 
     >>> evaluate("2 * a[1] + max(a)", {"a": [1, 2], "max": max}, [max])
@@ -191,7 +191,7 @@ class _Evaluation:
 class _Scope(Mapping[str, Any]):
     """A lookup of names: first the names of a loop, then the names of the scope around the loop.
 
-    The outer names are not copied, because reading a name of xacro may evaluate an expression.
+    The names of the outer scope are not copied, because xacro evaluates names when they are read.
     """
 
     def __init__(self, outer: Mapping[str, Any], own: Mapping[str, Any]) -> None:

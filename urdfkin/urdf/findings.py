@@ -78,7 +78,7 @@ class Excerpts:
         """
         if finding.width <= 0 or not 0 < finding.line <= len(self.lines):
             return None
-        if self.number != finding.line:  # decode a line once: it may have megabytes
+        if self.number != finding.line:  # decode each line once, because a line may have megabytes
             self.number = finding.line
             self.text = self.lines[finding.line - 1].decode("utf-8", "replace")
         start = finding.column - 1
@@ -184,7 +184,7 @@ class Finding:
         element: The tag of the element (`joint`, `link`, `origin`, ...); None for the whole file.
         name: The name of the link, joint or material, or None.
         oracle: Pinocchio's behaviour, if Pinocchio refuses the file for this reason or reads it differently;
-            otherwise None. If it is set, no result of this robot can be verified with Pinocchio.
+            otherwise None. If it is not None, no result of this robot can be verified with Pinocchio.
         also: The lines of further findings of the same kind, which are combined into this finding.
         width: Number of marked characters from `column` on; 0: no position in the text.
         fix: The automatic fix, or None.
@@ -237,7 +237,7 @@ class Finding:
 
     @property
     def _others(self) -> str:
-        """A text with the number of findings in `also` and their lines."""
+        """A text that lists the lines of the findings in `also`."""
         others = tuple(sorted(set(self.also) - {self.line}))
         if len(others) == len(self.also):
             return f"also on {_lines(others)}"
@@ -298,7 +298,7 @@ def _lines(lines: tuple[int, ...], shown: int = 4) -> str:
 
 
 class UrdfError(UrdfkinError, ValueError):
-    """A URDF has errors. The message of this exception lists the errors like a linter.
+    """A URDF has errors. The message lists the errors, each with file, line and column.
 
     Attributes:
         findings: All findings of the file by line, warnings and notes included.
@@ -311,7 +311,7 @@ class UrdfError(UrdfkinError, ValueError):
     URDF402
     """
 
-    #: Number of errors that the message lists. For further errors it only states their number.
+    #: Number of errors that the message lists. The message only counts further errors.
     SHOWN = 5
 
     def __init__(self, findings: Iterable[Finding]) -> None:
@@ -464,19 +464,19 @@ class Silences:
         return silence.reason
 
 
-#: Limits of the search for suggestions: the number of misspelt names per file, the number of known names that
-#: are compared with each misspelt name, and the argument `work` of `nearest`.
+#: Limits of the search for suggestions for a misspelt name.
+#: The limits are: misspelt names per file, known names per search, and the argument `work` of `nearest`.
 SEARCHES, CANDIDATES, WORK = 20, 5_000, 250_000
 
 #: If a file has at least this number of warnings or notes with one code, they are combined into one finding.
 #: The second number is for the codes URDF7xx, which concern content that kinematics does not use.
 FOLDED, FOLDED_EXTRAS = 4, 2
 
-#: Number of errors with one code that are reported separately. Of further errors, only the lines are listed.
+#: Number of errors with one code that are reported separately. Only the lines of further errors are listed.
 ERRORS_SHOWN = 100
 
 #: Largest number of findings with one code that are stored completely.
-#: Of each further finding, only its line is stored.
+#: Only the line of each further finding is stored.
 WRITTEN_OUT = 10_000
 
 
@@ -487,7 +487,7 @@ class _Kind:
     Attributes:
         severity: The severity.
         found: The findings, each with its weight (see `Reporter.add`).
-        lines: The lines of the findings beyond the limit `WRITTEN_OUT`.
+        lines: The line of each finding after the first `WRITTEN_OUT` findings, which are in `found`.
     """
 
     severity: Severity
@@ -541,7 +541,7 @@ class Reporter:
             rule: The rule.
             message: The problem in one clause.
             at: The element; without it, `position` is used.
-            attribute: The attribute of `at` to mark.
+            attribute: The attribute of `at` whose text the excerpt underlines.
             found: The text that causes the finding, quoted for printing.
             remedy: The remedy.
             owner: The tag for the message, if `at` is a link or joint in the wrong place. The default is the
@@ -601,14 +601,17 @@ class Reporter:
                 kind.found = [pair for pair, reason in reasons if reason is None]
 
     def nearest(self, word: str, known: Iterable[str]) -> list[str]:
-        """Return up to three known names similar to `word`; none after `SEARCHES` slow calls."""
+        """Return up to three known names similar to `word`.
+
+        After `SEARCHES` calls the list is always empty, because the search is slow.
+        """
         self._searches += 1
         if self._searches > SEARCHES:
             return []
         return nearest(word, islice(known, CANDIDATES), work=WORK)
 
     def is_full(self, rule: Rule) -> bool:
-        """Return whether a rule has `WRITTEN_OUT` findings. Further ones are not stored completely."""
+        """Return whether a rule already has `WRITTEN_OUT` findings, the largest number stored completely."""
         kind = self._kinds.get((rule.id, rule.severity))
         return kind is not None and len(kind.found) >= WRITTEN_OUT
 
@@ -623,8 +626,8 @@ class Reporter:
         """Return the findings by line.
 
         Args:
-            fold: Whether to combine many warnings of one kind into one finding. The errors of one kind are
-                combined from the hundredth on.
+            fold: Whether to combine many warnings of one kind into one finding. From the hundredth error of
+                one kind on, the errors are always combined.
             wanted: A filter, called once for each finding, in file order; None: all findings.
         """
         kinds = [kind for kind in self._kinds.values() if kind.found]
@@ -643,13 +646,19 @@ class Reporter:
 
     @property
     def has_raw_blanks(self) -> bool:
-        """Whether a value contains a tab, a line end or a reference, which an XML parser replaces."""
+        """Whether an attribute value contains a tab, a line end, or a reference such as `&amp;`.
+
+        An XML parser replaces these characters.
+        """
         if self._raw_blanks is None:
             self._raw_blanks = _RAW_BLANK.search(self.data) is not None
         return self._raw_blanks
 
     def raw(self, at: Element, attribute: str) -> str | None:
-        """Return the value of an attribute as written, before XML replaces white space and references."""
+        """Return the value of an attribute as written in the file.
+
+        An XML parser replaces tabs, line ends and references such as `&amp;`; here they are unchanged.
+        """
         span = self._spans(at).get(attribute)
         return None if span is None else self.data[slice(*span.value)].decode("utf-8", "replace")
 
@@ -681,7 +690,10 @@ class Reporter:
         )
 
     def without_element(self, at: Element) -> Fix | None:
-        """Return the fix that removes an empty element. If its line has nothing else, the line is removed."""
+        """Return the fix that removes an empty element.
+
+        If the line contains only this element, the whole line is removed.
+        """
         tag = START_TAG.match(self.data, at.offset)
         if tag is None:
             return None
@@ -704,8 +716,8 @@ class _AttributeSpan:
     Attributes:
         line: Line, from 1.
         column: Column in characters, from 1.
-        start: Index of its first byte.
-        value: Indices of the first byte between its quotes and of the closing quote.
+        start: Index of the first byte of the attribute's name.
+        value: Two byte indices: the first byte of the value, and the closing quote.
     """
 
     line: int
@@ -714,8 +726,8 @@ class _AttributeSpan:
     value: tuple[int, int]
 
 
-#: An attribute value with a tab, a line end or a reference. An XML parser replaces each of them. Possessive
-#: quantifiers keep the matching time linear.
+#: Pattern of an attribute value with a tab, a line end or a reference such as `&amp;`.
+#: An XML parser replaces these characters. Possessive quantifiers keep the matching time linear.
 _RAW_BLANK = re.compile(rb"""=\s*+(?:"[^"<\t\r\n&]*+[\t\r\n&]|'[^'<\t\r\n&]*+[\t\r\n&])""")
 
 _NEWLINE = re.compile(rb"\r\n|\r|\n")

@@ -152,9 +152,9 @@ def _text(root: Any) -> str:
 
 
 _ROOT = "universe"
-#: Pattern for the class names of joints whose axis is the x, y or z axis of their own frame. R stands for a
-#: revolute joint, RUB for a revolute joint without limits, and P for a prismatic joint. `_KINDS` contains the
-#: class names of all other joints.
+#: Pattern for the class names of joints whose axis is the x, y or z axis of the joint frame.
+#: R is a revolute joint, RUB a revolute joint without limits, and P a prismatic joint.
+#: `_KINDS` contains the class names of all other joints.
 _ALIGNED = re.compile(r"JointModel(R|RUB|P)([XYZ])")
 _KINDS = {
     "R": JointKind.REVOLUTE,
@@ -186,16 +186,19 @@ class Modelled:
 
 
 def is_model(source: object) -> TypeGuard[Any]:
-    """Return whether an object is Pinocchio's Model or RobotWrapper, by its class name, without imports."""
+    """Return whether an object is Pinocchio's `Model` or `RobotWrapper`.
+
+    The function compares class names, so that it does not import Pinocchio.
+    """
     kinds = [(kind.__module__.partition(".")[0], kind.__name__) for kind in type(source).__mro__]
     return ("pinocchio", "Model") in kinds or ("pinocchio", "RobotWrapper") in kinds
 
 
 def tree_of_model(source: Any) -> Modelled:
-    """Return the tree of a model or of a `RobotWrapper`.
+    """Convert Pinocchio's `Model` or `RobotWrapper` to a kinematic tree.
 
     Raises:
-        InputError: URDF has no equivalent of a joint.
+        InputError: the model has a joint of a type that URDF does not have.
     """
     model = getattr(source, "model", source)
     return _ModelReader(model).read()
@@ -254,7 +257,7 @@ class _ModelReader:
     def _attachment(self, frame: Any, joint: int, T: FloatArray) -> tuple[str, FloatArray]:
         """Return the parent link of a frame, and the frame's pose in this link.
 
-        T is the frame's pose in the frame of the joint that carries it.
+        T is the frame's pose in the frame of its parent joint.
         """
         i = -1 if frame is None else int(frame.parentFrame)
         if i < 0 or i not in self.links or int(self.frames[i].parentJoint) != joint:
@@ -299,7 +302,8 @@ class _ModelReader:
             )
         axis = np.eye(3)["XYZ".index(aligned[2])] if aligned else np.array([1.0, 0.0, 0.0])
         if class_name.endswith("Unaligned"):
-            # Some joint classes have no `axis` in Python (4.1). The motion subspace S contains it.
+            # Some joint classes of Pinocchio 4.1 have no attribute `axis` in Python.
+            # The motion subspace S contains the axis.
             linear, angular = np.split(np.ravel(joint.createData().S), 2)
             axis = linear + angular
         if not kind.has_axis:

@@ -11,7 +11,7 @@ MuJoCo compiles the file, which resolves defaults and classes. The tree is built
 Parts of the file that a tree cannot represent are listed in the result.
 
 MuJoCo can align the frame of a free body with its inertial frame (`align`, `alignfree`). The inertial frame
-depends on the shapes, so MuJoCo needs the meshes to compile such a file.
+depends on the shapes. To compile a file with this option, MuJoCo therefore needs the meshes.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ from urdfkin.model.tree import (
 from urdfkin.system.files import at_home, read_start
 from urdfkin.urdf.mujoco import compiled, library
 
-#: Position limit, +- m, that the URDF gets for a slide joint without limits. URDF requires limits of such a
-#: joint.
+#: Position limit, +- m, that the URDF gets for a slide joint without limits.
+#: URDF requires limits for a prismatic joint.
 UNBOUNDED = 1000.0
 #: Pattern of the beginning of an MJCF text. Possessive quantifiers keep the matching time linear.
 _ROOT = re.compile(r"(?>\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*+>)*+<mujoco[\s/>]", re.DOTALL)
@@ -78,10 +78,10 @@ class Mjcf:
         fused: The compiled model with fused static bodies if the file sets `fusestatic`; otherwise None.
         frames: For each link: "body" or "site", and the index of this body or site in MuJoCo's model.
         coordinates: For each moving joint, including mimic joints: its index in MuJoCo's qpos.
-        rules: The equalities that are mimic rules. Each has its index in the model and the name of the mimic
-            joint.
-        apart: Indices in the model of all active equalities between joints that are not mimic rules of the
-            tree.
+        rules: The equalities that are mimic rules. Each entry is the index of the equality in the model and
+            the name of the mimic joint.
+        apart: Indices in the model of the other active equalities between joints. The tree does not represent
+            these equalities.
         listed: The parts of the file that the tree does not represent.
         whole: Whether `model` contains the shapes and inertias of the file.
         aligns: Whether MuJoCo aligns the frame of a free body with its inertial frame.
@@ -118,8 +118,8 @@ class Mjcf:
     def placements(self, q: FloatArray) -> FloatArray:
         """Return the placements (n, frames, 4, 4) of `frames` for q (n, nq), by `mj_kinematics`.
 
-        If there is a fused model, the placements come from this model. A frame that the fused model does not
-        contain has its placement in `model`.
+        If there is a fused model, the placements come from the fused model. The placements of frames that it
+        does not contain come from `model`.
         """
         qpos = self.qpos(q)
         out = _placements(self.model, qpos, dict(enumerate(self.frames.values())))
@@ -169,7 +169,7 @@ class Mjcf:
         return self._of_frames(at_body, np.zeros(m.nsite))
 
     def _joints_of(self, body: int) -> Iterator[tuple[int, str, int]]:
-        """Yield the joints of a body. Each has an index in the model, a kind, and an index in qpos."""
+        """Yield the index in the model, the kind, and the index in qpos of each joint of a body."""
         m, kinds = self.model, library().mjtJoint
         words = {int(kinds.mjJNT_FREE): "free", int(kinds.mjJNT_SLIDE): "slide"}
         first = int(m.body_jntadr[body])
@@ -177,9 +177,9 @@ class Mjcf:
             yield j, words.get(int(m.jnt_type[j]), "hinge"), int(m.jnt_qposadr[j])
 
     def _of_frames(self, at_body: FloatArray, own: FloatArray) -> FloatArray:
-        """Return a value for each frame (n, frames): the value of its body, and for a site also `own`.
+        """Return the value of each frame (n, frames), from the values `at_body` of the bodies (n, bodies).
 
-        `at_body` has the values of the bodies (n, bodies).
+        A body's frame has the body's value. A site has its body's value plus the site's value in `own`.
         """
         columns = [
             at_body[:, i] if kind == "body" else at_body[:, self.model.site_bodyid[i]] + own[i]
@@ -190,7 +190,7 @@ class Mjcf:
     def residuals(self, q: FloatArray) -> FloatArray:
         """Return MuJoCo's residuals `efc_pos` (n, equalities) of the equalities between joints.
 
-        An equality that is inactive or of another kind has NaN.
+        The entry of an inactive equality, or of an equality of another kind, is NaN.
         """
         mujoco, m = library(), self.model
         off = mujoco.mjtDisableBit
@@ -207,7 +207,7 @@ class Mjcf:
         return out
 
     def rule_sizes(self, q: FloatArray) -> FloatArray:
-        """Return the size (n, equalities) of the terms in each mimic rule, for error bounds.
+        """Return the sum (n, equalities) of the sizes of the terms in each mimic rule, for error bounds.
 
         The size of y = y0 + c0 + c1 (x - x0) is |y0| + |c0| + |c1| (size of x + |x0|). This size is
         multiplied by the number of rules in the chain plus one.
@@ -326,7 +326,9 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
 def _spec(mujoco: Any, source: str | os.PathLike[str]) -> Any:
     spec = mujoco.MjSpec.from_string(source) if is_text(source) else mujoco.MjSpec.from_file(str(source))
     spec.compiler.usethread = False  # a confined process cannot start threads
-    spec.memory = spec.njmax = spec.nconmax = spec.nstack = -1  # the file may demand gigabytes for dynamics
+    spec.memory = spec.njmax = spec.nconmax = (
+        spec.nstack
+    ) = -1  # ignore large memory sizes in the file, which only dynamics needs
     return spec
 
 
@@ -410,10 +412,10 @@ def _left_out(mujoco: Any, spec: Any) -> Iterator[Listed]:
 
 
 def _angle_unit(mujoco: Any, model: Any) -> Iterator[Listed]:
-    """Yield a mistake if the limits of the hinges of a file in degrees are probably radians.
+    """Yield a finding if a file is in degrees, but the limits of its hinges are probably in radians.
 
-    The unit is that of the whole file, so the limits of every hinge must be implausibly small. The opposite
-    mistake is not recognized: some robots have limits of many turns in all hinges.
+    The unit applies to the whole file, so the limits of every hinge must be implausibly small. The opposite
+    mistake, degrees in a file in radians, is not reported: all hinges of some robots turn several times.
     """
     hinges = (model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited != 0)
     largest = float(np.degrees(np.abs(model.jnt_range[hinges]).max(initial=0.0)))
@@ -434,7 +436,7 @@ def _strip(mujoco: Any, spec: Any) -> None:
     for site in spec.sites:
         site.material = ""
     for joint in spec.joints:
-        # the alignment would use inertias that are not in the file
+        # the alignment would use the placeholder inertias that are set below
         joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
     for body in spec.bodies[1:]:
         body.explicitinertial, body.mass, body.ipos = True, 1.0, (0.0, 0.0, 0.0)
@@ -514,7 +516,7 @@ class _Reader:
             self._fix(T, here, link)
 
     def _joint(self, j: int, name: str, T: FloatArray) -> tuple[Joint, FloatArray]:
-        """Return a joint with origin T, and the transform from its frame back to the body frame."""
+        """Return a joint with the origin T, and the pose of the body's frame in the joint's frame."""
         m, kinds = self.model, self.mujoco.mjtJoint
         kind, axis, back = m.jnt_type[j], m.jnt_axis[j], pose(p=-m.jnt_pos[j])
         if kind == kinds.mjJNT_BALL:
@@ -583,7 +585,10 @@ class _Reader:
             yield name, _resolve(rules, name)
 
     def _rule(self, i: int) -> tuple[str, Mimic] | None:
-        """Return the mimic rule of y - y0 = c0 + c1 (x - x0) with reference values y0 and x0, or None."""
+        """Return the name of the mimic joint y and its rule from an equality y - y0 = c0 + c1 (x - x0).
+
+        x0 and y0 are the reference values of the joints. Return None for an equality of another form.
+        """
         m = self.model
         y, x = int(m.eq_obj1id[i]), int(m.eq_obj2id[i])
         c = m.eq_data[i, :5]

@@ -2,12 +2,12 @@
 
 `read_document` checks that the bytes are UTF-8 and parses the XML to elements with positions. The
 XML parser is expat. It does not change names (`xacro:macro`), reports the position of every start tag, needs
-no stack for deep nesting, and opens no file. A document type definition with content stops it before it
-expands an entity.
+no stack for deep nesting, and opens no file. A document type definition with content stops the parser before
+it expands an entity.
 
-`read_robot` reads links and joints into records, once and strictly. Numbers are ASCII, finite, and of the
-right count: the grammar is `xs:double` without its special values, as in urdfdom. Nothing is guessed or
-repaired; every problem is a finding. `urdfkin.urdf.lint` checks the records further.
+`read_robot` reads links and joints into records. Each attribute must have the right count of numbers, which
+are ASCII and finite: the grammar is `xs:double` without its special values, as in urdfdom. Nothing is guessed
+or repaired; every problem is a finding. `urdfkin.urdf.lint` checks the records further.
 """
 
 from __future__ import annotations
@@ -57,8 +57,8 @@ DECLARED_ASCII = Rule("URDF104", "declared-encoding-unused", WARNING)
 XML_VERSION = Rule("URDF111", "xml-version", WARNING)
 BYTE_ORDER_MARK = Rule("URDF113", "byte-order-mark", NOTE)
 
-#: Byte order marks of encodings other than UTF-8. Longer marks come first, because a shorter one may be their
-#: beginning.
+#: Byte order marks of encodings other than UTF-8.
+#: The UTF-32 marks come first, because one of them begins with a UTF-16 mark.
 _MARKS = (
     (codecs.BOM_UTF32_LE, "UTF-32"),
     (codecs.BOM_UTF32_BE, "UTF-32"),
@@ -194,8 +194,8 @@ NAME_TOO_LONG = Rule("URDF117", "name-too-long", ERROR)
 INSTRUCTION = Rule("URDF118", "processing-instruction", WARNING, REFUSES)
 MARKUP_TOO_LONG = Rule("URDF119", "markup-too-long", ERROR)
 
-#: Largest number of nested elements that older versions of libxml2 accept. Programs that use such a version
-#: accept no more.
+#: Largest number of nested elements that older versions of libxml2 accept.
+#: Programs that use such a version accept no more.
 COMMON_DEPTH = 256
 _COMMON = ("older readers built on libxml2 refuse", COMMON_DEPTH)
 
@@ -209,7 +209,7 @@ _STORED = 2 * QUOTED
 _NAMES = frozenset({"name", "link", "joint"})
 
 
-class _Stop(Exception):  # noqa: N818 - control flow, not an error
+class _Stop(Exception):  # noqa: N818  only for control flow
     """Stop the parser after a finding that makes the rest of the file meaningless."""
 
 
@@ -620,7 +620,7 @@ _NOT_ZERO = "123456789"
 #: Elements whose tag messages omit.
 _PLAIN = ("origin", "axis", "limit")
 
-#: Leading zeros of a character reference. Python cannot convert a reference with thousands of them.
+#: Leading zeros of a character reference. Python cannot convert a number with thousands of zeros.
 _LEADING_ZEROS = re.compile(r"(&#[xX]?)0+")
 
 #: For each pattern of an invalid number: the remedy. The remedy of the first matching pattern is used.
@@ -675,7 +675,7 @@ SHORTEST, LONGEST = 1e-150, 1e150
 def read_robot(report: Reporter, root: Element) -> RobotRecord | None:
     """Return the links and joints of a document, or None if the document is not a URDF.
 
-    Everything that cannot be read is reported.
+    Each value that cannot be read is reported.
     """
     if root.tag != "robot":
         _other_format(report, root)
@@ -805,8 +805,8 @@ class JointReader:
             element: The element.
             attribute: The name of the attribute.
             example: An example for the remedy.
-            number: Whether the attribute is a number. Then an empty value is not reported here, because
-                `NumberReader` reports it.
+            number: Whether the attribute is a number. This method does not report an empty value of such an
+                attribute, because `NumberReader` reports it.
         """
         value = element.attributes.get(attribute)
         if value is None or not (value or number):
@@ -883,7 +883,7 @@ class JointReader:
         if axis is None:
             return
         if joint.kind in ("fixed", "floating"):
-            # No reader uses the axis of such a joint. An invalid number in it is reported only as URDF510.
+            # No reader uses the axis of such a joint. An invalid number in the axis is reported as URDF510.
             numbers = NumberReader(self.report, IGNORED, IGNORED)
             numbers.vector(axis, "xyz")
             return
@@ -891,7 +891,7 @@ class JointReader:
             joint.axis = self.numbers.vector(axis, "xyz")
             return
         if not axis.attributes and (axis.text or any(x.tag == "xyz" and x.text for x in axis.children)):
-            return  # URDF212 already reports a value between the tags
+            return  # URDF212 reports the value between the tags
         self.report.add(
             EMPTY_AXIS,
             "<axis> without xyz is 1 0 0 to some readers and 0 0 0 to urdfdom",
@@ -935,7 +935,7 @@ class JointReader:
     def _others(self, joint: JointRecord) -> None:
         """Check elements of a joint that kinematics does not use.
 
-        If they are invalid, urdfdom refuses the file.
+        If such an element is invalid, urdfdom refuses the file.
         """
         dynamics = joint.element.first("dynamics")
         if dynamics is not None:
@@ -967,8 +967,8 @@ def nearest_tag(word: str, known: frozenset[str]) -> str | None:
     return _nearest_tag(word, known) if len(word) <= _LONGEST_WORD else None
 
 
-#: Largest length of a word that is compared with the words of URDF. A longer word is not similar to any of
-#: them.
+#: Largest length of a word that is compared with the words of URDF.
+#: Words that are longer than this are not similar to any word of URDF.
 _LONGEST_WORD = 32
 
 

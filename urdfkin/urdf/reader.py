@@ -58,7 +58,7 @@ def root_link(name: str, links: Iterable[str], joints: Sequence[JointRecord]) ->
     """Return the link without a parent.
 
     Raises:
-        InputError: there is none, or more than one.
+        InputError: there is no link without a parent, or more than one.
     """
     roots = set(links) - {joint.child for joint in joints}
     if len(roots) != 1:
@@ -78,7 +78,7 @@ def _joint(joint: JointRecord, rule: Mimic | None) -> Joint:
     kind = JointKind(joint.kind)
     quaternion = joint.quaternion
     roll, pitch, yaw = np.array(joint.rpy) if quaternion is None else rpy_of_quaternion(quaternion)
-    # The parser has already checked the numbers. `rotation_from_rpy` would check them again for each joint.
+    # `rotation_from_rpy` is not used, because it would check the numbers again after the parser.
     T = np.eye(4)
     T[:3, :3] = coordinate_rotation(2, yaw) @ coordinate_rotation(1, pitch) @ coordinate_rotation(0, roll)
     T[:3, 3] = joint.xyz
@@ -110,8 +110,8 @@ def _unit(axis: FloatArray, joint: str) -> FloatArray:
 def _limit(limit: LimitRecord | None, kind: JointKind) -> Limit | None:
     if limit is None or kind.nv == 0:
         return None
-    # A missing position limit is zero, as in urdfdom. By the specification, the position limits of a
-    # continuous joint have no effect.
+    # A missing position limit is zero, as in urdfdom.
+    # By the specification, the position limits of a continuous joint have no effect.
     return Limit(
         lower=(limit.lower or 0.0) if kind.bounded else -math.inf,
         upper=(limit.upper or 0.0) if kind.bounded else math.inf,
@@ -123,9 +123,9 @@ def _limit(limit: LimitRecord | None, kind: JointKind) -> Limit | None:
 def _rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
     """Return the mimic rule of each mimic joint, in terms of a joint that is not a mimic joint.
 
-    A chain of rules is composed into one: y = m2 (m1 x + b1) + b2. The composition begins at the joint that
-    is not a mimic joint. Each joint is visited once. The operations have the same order as in the oracle, so
-    that urdfkin and the oracle have equal rounding errors.
+    A chain of rules is composed into one rule: y = m2 (m1 x + b1) + b2. Composition starts at the joint x,
+    which is not a mimic joint. Each joint is visited once. The operations have the same order as in the
+    oracle, so that urdfkin and the oracle have equal rounding errors.
     """
     named = {joint.name: joint for joint in joints}
     resolved: dict[str, Mimic] = {}

@@ -10,8 +10,8 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-#: Largest number of nested elements that Pinocchio accepts. Its XML parser, tinyxml2, stops at level 500.
-#: That count includes the document itself and the level that the parser refuses.
+#: Largest number of nested elements that Pinocchio accepts.
+#: Its XML parser, tinyxml2, counts the document as level 1 and refuses level 500.
 ORACLE_DEPTH = 498
 
 
@@ -74,7 +74,7 @@ class Element:
     text: str = ""
 
     def append(self, child: Element) -> None:
-        """Add a child. An element gets its list of children with the first child, which saves memory."""
+        """Add a child. The list of children is created with the first child, which saves memory."""
         if isinstance(self.children, list):
             self.children.append(child)
         else:
@@ -103,7 +103,7 @@ class Element:
 
     @property
     def owner(self) -> str:
-        """The tag of the holder. For example, it is `joint` for every element inside a joint."""
+        """The tag of the holder; for example, the tag `joint` for every element inside a joint."""
         return self.holder.tag
 
     @property

@@ -32,7 +32,7 @@ class Origin:
         root_joint: The argument `root_joint`.
         xacro_args: Names and values of the xacro arguments.
         oracle: The argument `oracle`, the name of an oracle; None for the default.
-        table: Whether the robot comes from a Denavit-Hartenberg table. If so, the table's convention
+        table: Whether the robot comes from a Denavit-Hartenberg table. The convention of the table
             determines the frames between base and tip.
         sha256: The digest of the MJCF or USD file behind the URDF; empty if the source is a URDF.
         lock: Name and value (rad or m) of each locked joint, without its mimic joints.
@@ -137,7 +137,8 @@ class Text:
     Attributes:
         data: The bytes.
         label: The name in messages: the path, `<text>`, `<stdin>`.
-        source: The source for a second reading; `<text>`, `<bytes>` or `<file>` if it has no name.
+        source: The path or name from which the source can be read again; for a source without a name,
+            `<text>`, `<bytes>` or `<file>`.
         entry: The catalogue entry, or None.
         xacro_args: Names and values of the xacro arguments.
         sha256: The digest of the MJCF or USD file behind the URDF; empty for a URDF.
@@ -164,7 +165,7 @@ def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, objec
     Args:
         source: One of the sources in the module docstring.
         most: Size limit in bytes; for an open text file, in characters. At most one byte or character more is
-            read. So the checks detect a source that is too long, and reading a device without an end stops.
+            read, which shows that a source is too long. Reading from a device without an end therefore stops.
         xacro_args: Arguments for a .xacro file, which is expanded.
 
     Raises:
@@ -294,7 +295,10 @@ def _read_file(path: Path, most: int) -> Text:
 
 
 def as_word(path: Path) -> str:
-    """Return a path as a word for `load`, with `./` before it where it could be taken for something else."""
+    """Return a path as an argument of `load`.
+
+    `./` is added before a path that would be read as an option, a URDF text or a catalogue name.
+    """
     word = str(path)
     return f"./{word}" if word.startswith(("-", "<")) or entry_of(word) is not None else word
 

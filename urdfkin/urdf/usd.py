@@ -2,15 +2,17 @@
 
 - A prim with `PhysicsRigidBodyAPI` becomes a link with the prim's frame, without its scale. A plain `Xform`
   of a body becomes a link on a fixed joint.
-- A joint prim gives its frame in each of its two bodies: A in the first and B in the second. With the motion
-  J(q), the second body is at A J(q) B^-1 in the first. If the tree reaches the joint from its second body,
-  the first is at B J(q)^-1 A^-1 in the second: the same form with the opposite axis.
+- A joint prim contains the pose A of the joint frame in the first body, and its pose B in the second body.
+  With the joint's motion J(q), the pose of the second body in the first body is A J(q) B^-1. If the second
+  body is the parent in the tree, the pose of the first body in the second body is B J(q)^-1 A^-1: the same
+  form with the opposite axis.
 - Lengths are multiplied by `metersPerUnit`, angles are converted from degrees. A stage whose up axis is Y is
   rotated, so that z is up.
 - Joints that close a loop, point to nothing or are excluded from the articulation are findings.
 
-A stage may consist of many files. `files_of` reads each layer alone and refuses a layer that refers to a file
-outside the robot's folder, package and repository, or to an address, before the layers are composed.
+A stage may consist of many files, its layers. Before OpenUSD composes the layers, `files_of` reads each layer
+alone. It refuses a layer with a reference to a network address, or to a file outside the robot's folder,
+package and repository.
 """
 
 from __future__ import annotations
@@ -49,30 +51,32 @@ from urdfkin.urdf.sources import USD
 
 #: Largest number of layers of a stage.
 _LAYERS = 1_000
-#: Largest number in single precision. Files write it, or infinity, for a missing limit.
+#: Largest number in single precision. In a file, this number or infinity means that there is no limit.
 _LARGEST = float(np.finfo(np.float32).max)
-#: Largest cosine between two axes of a frame without shear, for each prim on the path, in roundings to
-#: single precision. A rotation matrix of rounded numbers has entries that are off by one rounding. The
-#: product of two such matrices in single precision adds three roundings to each entry. An entry of the
-#: columns' products is then off by at most 2 sqrt(3) times as much, 14. A rounded quaternion changes its
-#: length by one rounding, and the cosine by four.
+#: Largest cosine between two axes of a frame without shear, for each prim on the path.
+#: The unit is one rounding to single precision.
+#: In a rotation matrix of rounded numbers, each entry has an error of one rounding.
+#: The product of two such matrices in single precision adds three roundings to each entry.
+#: The scalar product of two columns then has an error of at most 4 * 2 sqrt(3) roundings, which is below 14.
+#: Rounding a quaternion changes its length by one rounding and the cosine by four roundings.
 _SHEAR = 14.0
 _NONE = (-math.inf, math.inf)
 _MIMICS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
 #: Words in the names of types and of applied schemas that couple joints or bodies.
 _COUPLINGS = ("Mimic", "Equality", "Tendon")
-#: Ends of the types of joints that a tree cannot represent. If OpenUSD does not know a type, it is no joint.
+#: Endings of the type names of joints that a tree cannot represent.
+#: OpenUSD recognizes such a type as a joint only if the plugin that defines it is installed.
 _NO_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
-#: Terms of a rule of MuJoCo that a mimic rule does not have.
+#: Coefficients of a MuJoCo joint equality whose terms a mimic rule does not have.
 _HIGHER = ("mjc:coef2", "mjc:coef3", "mjc:coef4")
 _AXES = {"X": 0, "Y": 1, "Z": 2}
 _FREEDOMS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
 #: Names of Xforms that hold the shapes of a body.
 _SHAPES = ("visual", "visuals", "collision", "collisions")
-#: Rotates the up axis y to z.
+#: Rotation matrix that turns the up axis y to z.
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
-#: The kind of a remark; `urdfkin.urdf.lint.rules.left_out` has the rule of each.
+#: The kinds of remarks; `urdfkin.urdf.lint.rules.left_out` defines a rule for each kind.
 Kind = Literal[
     "left-out-of-usd", "unit-scale", "up-axis", "lost-mimic", "limit-unit", "loose-body", "outside-joint",
     "rest-pose", "mirrored-body", "missing-layer", "unused-in-usd", "time-samples",
@@ -105,11 +109,11 @@ class JointReading:
         body0: Path of the first body; empty for the world.
         body1: Path of the second body; empty for the world.
         p0: (3,) origin of the joint's frame in the first body, m.
-        quat0: (4,) its unit quaternion, scalar last.
+        quat0: (4,) unit quaternion of the joint's frame in the first body, scalar last.
         p1: (3,) origin of the joint's frame in the second body, m.
-        quat1: (4,) its unit quaternion, scalar last.
+        quat1: (4,) unit quaternion of the joint's frame in the second body, scalar last.
         limits: Lower and upper limit, rad or m.
-        size: Sum of the lengths (m) of the terms of both origins.
+        size: Sum of the lengths (m) of the vectors that were added to compute `p0` and `p1`.
     """
 
     free: str
@@ -133,12 +137,13 @@ class Usd:
 
     Attributes:
         tree: The links and joints.
-        prims: The path of the prim of each link that has one.
+        prims: For each link with a prim: the prim's path.
         rest: (n, 4, 4) placement in the world of each prim of `prims` by UsdGeom, in m with z up.
-        rest_q: (nq,) coordinates of the tree in which the stage shows the robot.
-        single: For each joint of the tree by name: how far rounding to single precision can move and turn its
-            frames (m, rad), the length (m) that turns with them, and the share of its value that the rounding
-            of its mimic rule can change.
+        rest_q: (nq,) configuration of the robot in the stage.
+        single: For each joint of the tree by name: four numbers for the effect of rounding to single
+            precision. The first two are bounds on the translation (m) and the rotation (rad) of the joint's
+            frames. The third is the length (m) of the vectors that rotate with the frames. The fourth is a
+            bound on the relative change of the joint's value by its mimic rule.
         joints: The numbers of each joint prim of the tree, by its path.
         stage: The stage.
         unit: metersPerUnit.
@@ -187,8 +192,9 @@ def files_of(pxr: Any, path: str) -> tuple[str, ...]:
     """Return the files of a stage. Each layer is read alone, before its references are followed.
 
     Raises:
-        InputError: a layer refers to an address, to a file outside the robot's folder, package and
-            repository, to an expression, or to a file that is not USD; or there are too many layers.
+        InputError: there are too many layers, or a layer has a reference that is not allowed. These are
+            network addresses, expressions, files that are not USD, and files outside the robot's folder,
+            package and repository.
         SourceError: a file is too large, or not a regular file.
     """
     ground = Ground.around(Path(path), [], [])
@@ -253,7 +259,7 @@ def _address(pxr: Any, layer: Any, asset: str, ground: Ground, where: str) -> st
         )
     if Path(inner or outer).suffix.lower() not in USD:
         raise _refused("a reference names a file that is not USD", where, written)
-    return address if os.path.exists(outer) else None  # noqa: PTH110  a name may be no path
+    return address if os.path.exists(outer) else None  # noqa: PTH110  not every name is a path
 
 
 def _refused(what: str, where: str, found: str) -> InputError:
@@ -267,7 +273,7 @@ def _refused(what: str, where: str, found: str) -> InputError:
 
 def _size(path: str, where: str) -> int:
     try:
-        found = os.stat(path)  # noqa: PTH116  a name may be no path
+        found = os.stat(path)  # noqa: PTH116  not every name is a path
     except OSError as error:
         raise SourceError("the file cannot be read", where=path, found=error.strerror) from None
     if not stat.S_ISREG(found.st_mode):
@@ -285,7 +291,8 @@ def read_usd(
     Args:
         path: The file.
         name: The name of the file in messages.
-        variants: (variant set, variant) to select, wherever the stage has that set, in this order.
+        variants: Pairs (variant set, variant). In this order, each variant is selected in all prims that have
+            the variant set.
         articulation: Path or name of the articulation to read; None if there is only one.
 
     Raises:
@@ -314,8 +321,8 @@ def read_usd(
 def _select(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str) -> frozenset[str]:
     """Select variants in the session layer, so that no file changes.
 
-    A variant cannot be selected inside an instance. An instance with such a variant set is expanded, in the
-    session layer too. Return the paths of the expanded instances.
+    OpenUSD cannot select a variant inside an instance. Instances that contain the variant set are therefore
+    expanded, also in the session layer. Return the paths of the expanded instances.
 
     Raises:
         UnknownNameError: no prim has such a variant set, or such a variant.
@@ -364,7 +371,11 @@ class _Body:
 
 @dataclass(slots=True)
 class _Edge:
-    """A joint prim: `ends` are its bodies (None: the world), `frames` the joint's frame in each."""
+    """A joint prim.
+
+    `ends` contains the paths of its two bodies (None: the world). `frames` contains the poses of the joint
+    frame in the two bodies.
+    """
 
     prim: Any
     name: str
@@ -387,7 +398,10 @@ class _Articulation:
 
 @dataclass(slots=True)
 class _Reader:
-    """Read one stage; `source` is its name in messages, `opened` the paths of its expanded instances."""
+    """Reader of one stage.
+
+    `source` is the stage's name in messages. `opened` contains the paths of the expanded instances.
+    """
 
     pxr: Any
     stage: Any
@@ -473,7 +487,7 @@ class _Reader:
     def _value(self, prim: Any, name: str) -> Any:
         """Return the value of an attribute, or its default; None if there is neither.
 
-        A blocked value counts as one that is not written.
+        A blocked value counts as a missing value.
         """
         attribute = prim.GetAttribute(name)
         if not attribute:
@@ -513,7 +527,7 @@ class _Reader:
             prim = prim.GetParent()
 
     def _uneven(self, prim: Any) -> str | None:
-        """Return the nearest prim above a prim whose own scale is not the same in all directions."""
+        """Return a text about the nearest ancestor of a prim that has a non-uniform scale, or None."""
         while (prim := prim.GetParent()) and not prim.IsPseudoRoot():
             local = np.array(self._cache.GetLocalTransformation(prim)[0])[:3, :3]
             scale = np.linalg.norm(local, axis=1)
@@ -570,7 +584,7 @@ class _Reader:
             self._couplings(prim)
 
     def _couplings(self, prim: Any) -> None:
-        """Report what couples joints or bodies, but is neither a joint nor a mimic rule that is read."""
+        """Report prims and schemas that couple joints or bodies and that urdfkin does not read."""
         path, schemas = str(prim.GetPath()), _schemas(prim)
         joint = prim.IsA(self.pxr.UsdPhysics.Joint)
         kind = str(prim.GetTypeName())
@@ -583,7 +597,7 @@ class _Reader:
             if not any(word in schema for word in _COUPLINGS) or (joint and _is_mimic(schema)):
                 continue
             if schema == "MjcEqualityJointAPI" and "NewtonMimicAPI" in schemas:
-                # the rule is that of NewtonMimicAPI, with more terms
+                # this schema describes the rule of NewtonMimicAPI again, with terms of higher degree
                 if more := [name for name in _HIGHER if self._value(prim, name)]:
                     what = f"the terms {', '.join(more)} of this joint's mimic rule are not read"
                     self._say("left-out-of-usd", path, what)
@@ -594,7 +608,7 @@ class _Reader:
             self._say("left-out-of-usd", path, f"urdfkin does not read {', '.join(unread)}")
 
     def _owner(self, prim: Any) -> str | None:
-        """Return the path of the nearest prim at or above a prim that is the root of an articulation."""
+        """Return the path of the articulation root that contains a prim: the prim or its nearest ancestor."""
         while prim and str(prim.GetPath()) != "/":
             if prim.HasAPI(self.pxr.UsdPhysics.ArticulationRootAPI):
                 return str(prim.GetPath())
@@ -604,7 +618,10 @@ class _Reader:
     # -- joints --------------------------------------------------------------------------------------
 
     def _edge(self, prim: Any) -> _Edge | None:
-        """Return a joint that connects two bodies, or a body and the world; otherwise a remark."""
+        """Return a joint that connects two bodies, or a body and the world.
+
+        If the prim is not such a joint, report it and return None.
+        """
         path = str(prim.GetPath())
         if self._value(prim, "physics:jointEnabled") is False:
             self._say("left-out-of-usd", path, "this joint is disabled")
@@ -649,16 +666,17 @@ class _Reader:
         return edge
 
     def _in_stage(self, body: str | None, T: FloatArray) -> FloatArray:
-        """Return a pose in a body, or in the world with the stage's axes instead of z up."""
+        """Return a pose in the axes of the stage. Only a pose in the world (`body` is None) changes."""
         return T if body is not None else pose(self._up.T) @ T
 
     def _side(
         self, prim: Any, i: int, target: str | None
     ) -> tuple[str | None, FloatArray, float, tuple[float, float]] | None:
-        """Return a joint's body and its frame in it (m); None if the target does not exist.
+        """Return one body of a joint, and data of the joint frame; None if the target does not exist.
 
-        Then follow the length of the origin's terms (m), and how far rounding to single precision can move
-        and turn the frame (m, rad).
+        The data are the pose of the joint frame in the body (m), and the sum of the lengths (m) of the
+        vectors in its origin. The other data are two bounds on the effect of rounding to single precision:
+        the translation (m) and the rotation (rad) of the frame.
         """
         p = np.array(self._value(prim, f"physics:localPos{i}"), float)
         quaternion = self._value(prim, f"physics:localRot{i}")
@@ -724,12 +742,15 @@ class _Reader:
         return self._six(prim, path)
 
     def _unlimited(self, path: str, limits: Mapping[str, tuple[float, float]]) -> None:
-        """Report limits of a planar or floating joint, for which a tree has no place."""
+        """Report the limits of a planar or floating joint, which a tree cannot represent."""
         if any(math.isfinite(end) for ends in limits.values() for end in ends):
             self._say("unused-in-usd", path, "the limits of this planar or floating joint are not read")
 
     def _six(self, prim: Any, path: str) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
-        """Return a joint of any degrees of freedom as one of ours, as `_motion` does."""
+        """Return the result of `_motion` for a generic joint, which has a limit for each direction.
+
+        A direction whose lower limit is above its upper limit is locked.
+        """
         free, limits = [], {}
         for freedom in _FREEDOMS:
             low, high = -math.inf, math.inf
@@ -756,11 +777,11 @@ class _Reader:
         )
 
     def _end(self, prim: Any, name: str) -> float:
-        """Return a limit of a joint with limits by direction.
+        """Return the lower or upper limit of one direction of a generic joint.
 
         Raises:
-            InputError: the limit is blocked. OpenUSD's parser of UsdPhysics then reads another number
-                than the default.
+            InputError: the stage blocks the limit. For a blocked limit, OpenUSD's parser of UsdPhysics does
+                not read the default.
         """
         attribute = prim.GetAttribute(name)
         if attribute.HasFallbackValue() and attribute.Get() is None:
@@ -793,7 +814,7 @@ class _Reader:
     def _articulations(self) -> list[_Articulation]:
         """Return the groups of bodies that joints connect.
 
-        A joint between two articulations connects no groups; it is a remark.
+        A joint between two articulations is reported and does not merge their groups.
         """
         above: dict[str, str] = {path: path for path in self._bodies}
 
@@ -832,7 +853,7 @@ class _Reader:
         for path in self._bodies:
             if (key := top(path)) in groups:
                 groups[key].bodies.append(path)
-        # a body without own joints to other bodies, fixed to the world, is scenery
+        # a single body that is fixed to the world is not a robot
         found = [
             group
             for group in groups.values()
@@ -840,14 +861,14 @@ class _Reader:
         ]
         for group in found:
             self._name(group)
-        # an articulation whose base is no rigid body consists of several groups at the world
+        # if the base of an articulation is not a rigid body, several groups are attached to the world
         merged: dict[str, list[_Articulation]] = {}
         for group in found:
             merged.setdefault(self._root(group) or group.path, []).append(group)
         return [own[0] if len(own) == 1 else self._together(own, path) for path, own in merged.items()]
 
     def _name(self, group: _Articulation) -> None:
-        """Name a group by the root of its articulation; without one, by its root body."""
+        """Name a group by its articulation root, or by its root body if it has no articulation root."""
         api = self.pxr.UsdPhysics.ArticulationRootAPI
         for edge in group.edges:
             if edge.prim.HasAPI(api):
@@ -855,7 +876,10 @@ class _Reader:
         group.path = group.path or self._root(group) or group.bodies[0]
 
     def _choose(self, found: list[_Articulation], wanted: str | None) -> _Articulation:
-        """Return the articulation with a path or name; all articulations below the path of another prim."""
+        """Return the articulation with the path or name `wanted`.
+
+        If `wanted` is the path of another prim, merge all articulations below it.
+        """
         if not found:
             raise InputError(
                 "this stage has no joint between bodies",
@@ -884,7 +908,7 @@ class _Reader:
         return self._together(below, wanted.rstrip("/") or "/")
 
     def _together(self, groups: list[_Articulation], path: str) -> _Articulation:
-        """Return one articulation for several that are attached to the world."""
+        """Merge several articulations that are attached to the world into one articulation."""
         for group in groups:
             if len(groups) > 1 and self._root(group) is not None:
                 raise InputError(
@@ -964,7 +988,7 @@ class _Reader:
         self._say("left-out-of-usd", edge.path, what)
 
     def _is_outside(self, edge: _Edge, group: _Articulation) -> bool:
-        """Return whether a joint leads from a body below the articulation's root to another body."""
+        """Return whether a joint connects a body below the articulation's root with a body outside it."""
         inside = group.path + "/"
         if group.path in self._bodies or not any(path.startswith(inside) for path in group.bodies):
             return False
@@ -972,7 +996,7 @@ class _Reader:
         return len(set(below)) > 1
 
     def _short(self, path: str) -> str:
-        """Return the name of a prim; with the names above it if another body has the same name."""
+        """Return a prim's name, preceded by names of its ancestors if other bodies have the same name."""
         parts, same = path.split("/")[1:], [other.split("/")[1:] for other in self._bodies]
         for n in range(1, len(parts) + 1):
             if sum(other[-n:] == parts[-n:] for other in same) <= 1:
@@ -989,7 +1013,7 @@ class _Reader:
     def _joints(
         self, edge: _Edge, names: Mapping[str, str], links: Mapping[str | None, str], *, backwards: bool
     ) -> Iterator[tuple[Joint, str, str]]:
-        """Yield the joint, and if the child's frame is not on its axis, a link and a fixed joint."""
+        """Yield the joint; also a link and a fixed joint if the child's frame is not on the joint axis."""
         (A, B), (parent, child) = edge.frames, edge.ends
         axis = edge.axis
         shares = SINGLE if any(map(_is_mimic, _schemas(edge.prim))) else 0.0
@@ -1078,7 +1102,7 @@ class _Reader:
     def _frames(self, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:
         """Yield each plain Xform of a body that marks a frame, with the path of the body.
 
-        An Xform that only groups shapes, or that is an instance, is none.
+        An Xform that only groups shapes does not mark a frame. An instance does not mark a frame either.
         """
         physics, geom = self.pxr.UsdPhysics, self.pxr.UsdGeom
 
@@ -1142,7 +1166,7 @@ class _Reader:
             yield names[path], Mimic(names[leader_path], multiplier, offset)
 
     def _rules(self, edge: _Edge) -> Iterator[tuple[str, float, float]]:
-        """Yield the leader's path, the multiplier and the offset (rad or m) of each rule of a joint."""
+        """Yield the mimic rules of a joint: path of the mimicked joint, multiplier, offset (rad or m)."""
         prim, schemas = edge.prim, _schemas(edge.prim)
         own = self._factor(edge.kind)
         if "NewtonMimicAPI" in schemas:
@@ -1169,7 +1193,7 @@ class _Reader:
         return self._unit if kind is JointKind.PRISMATIC else math.pi / 180.0
 
     def _ratio(self, edge: _Edge, leader: str) -> float:
-        """Return the factor 1 of a multiplier; report a rule between an angle and a length."""
+        """Return the unit factor of a multiplier, which is 1; report a rule between an angle and a length."""
         kinds = {edge.path: edge.kind for edge in self._edges}
         slides = {kind is JointKind.PRISMATIC for kind in (edge.kind, kinds.get(leader, edge.kind))}
         if len(slides) > 1:
@@ -1199,7 +1223,7 @@ class _Reader:
     def _rest(
         self, tree: KinematicTree, group: _Articulation, links: Mapping[str, str], rest: FloatArray
     ) -> FloatArray:
-        """Return the coordinates (nq,) in which the stage shows the robot."""
+        """Return the configuration (nq,) of the robot in the stage."""
         q = np.zeros(tree.nq)
         placed = dict(zip(links.values(), rest, strict=True))
         values = {}
@@ -1278,13 +1302,16 @@ class _Reader:
             )
 
     def _is_scaled(self, prim: Any, factor: float) -> bool:
-        """Return whether the scale of a prim in the world is a factor, as far as single precision shows."""
+        """Return whether the world scale of a prim is equal to a factor, up to single-precision rounding."""
         M = np.array(self._cache.GetLocalToWorldTransform(prim))[:3, :3]
         scale = np.linalg.norm(M, axis=1) / factor
         return bool((np.abs(scale - 1.0) <= _SHEAR * SINGLE * prim.GetPath().pathElementCount).all())
 
     def _is_resolved(self, prim: Any) -> bool:
-        """Return whether a prim at or above this one is turned to the stage's up axis, by the usual name."""
+        """Return whether a prim or an ancestor has the operation `unitsResolve`.
+
+        By convention, this operation corrects the unit and the up axis of a referenced layer.
+        """
         while prim and not prim.IsPseudoRoot():
             if any(str(name).endswith(":unitsResolve") for name in prim.GetPropertyNames()):
                 return True
@@ -1301,18 +1328,19 @@ class _Reader:
 
 
 def _rounding(x: FloatArray) -> FloatArray:
-    """Return how far each number may be from the one that was rounded to it; a zero is exact.
+    """Return the largest error of each number by rounding to single precision; a zero is exact.
 
-    It is half of the distance to the next number in single precision.
+    The error is half of the distance to the next number in single precision.
     """
     half = 0.5 * np.spacing(np.abs(x).astype(np.float32)).astype(np.float64)
     return np.asarray(np.where(x == 0.0, 0.0, half))
 
 
 def _turned(xyzw: FloatArray) -> float:
-    """Return the angle (rad) that rounding its numbers can turn a quaternion: twice that of the 4-vector.
+    """Return a bound (rad) on the change of a rotation when its quaternion's numbers are rounded.
 
-    A quaternion with one number has the same direction for every value of this number.
+    The rotation changes by twice the angle between the quaternions. A quaternion with only one nonzero number
+    describes the same rotation for every value of this number.
     """
     if np.count_nonzero(xyzw) == 1:
         return 0.0

@@ -6,8 +6,8 @@ without ROS.
 
 xacro ignores an argument that the file does not declare; urdfkin raises an error. To find the declared
 arguments, the separate process reads the file and its includes. An include cannot be read if its name is
-computed, if the file is not found, or if the file is not allowed. In this case urdfkin accepts every
-argument.
+computed, if the file is not found, or if the file is not allowed. If an include cannot be read, urdfkin
+accepts every argument.
 """
 
 from __future__ import annotations

@@ -4,8 +4,9 @@ A fix is accepted under three conditions:
 
 - The new file has fewer findings with the code of the fix.
 - The new file has no new findings.
-- The new file describes the same robot. Every name, number and limit that has a meaning is equal. The
-  direction of an axis may differ by rounding, and the angles of an origin by at most `Fix.turns`.
+- The new file describes the same robot. All names, limits and other numbers that URDF readers use are equal,
+  with two exceptions. The direction of an axis may differ by rounding. The angles of an origin may differ by
+  at most `Fix.turns`.
 
 
 Write the changes of `--fix` as a patch for `git apply` that is safe to print.
@@ -34,12 +35,12 @@ from urdfkin.urdf.lint.runner import Examined
 from urdfkin.urdf.records import AXIAL, FURTHER_LIMITS, JointRecord, RobotRecord
 from urdfkin.urdf.sources import Text
 
-#: Largest number of passes over a file. Each code with a fix needs one pass. If fixes overlap, further passes
-#: are needed.
+#: Largest number of passes over a file.
+#: Each code with a fix needs one pass. If fixes overlap, further passes are needed.
 PASSES = 100
 
-#: Bound (rad) on the rotation of a unit vector when each of its three numbers is rounded to a double. The
-#: bound is twice 2**-53.
+#: Bound (rad) on the rotation of a unit vector when each of its three numbers is rounded to a double.
+#: The bound is twice 2**-53.
 TILT = Fraction(1, 2**52)
 
 
@@ -97,8 +98,8 @@ def mend(
 def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> Iterator[str]:
     """Yield the reasons why a fix must not be applied."""
     code = fixable[0].code
-    # Only a limited number of findings of a kind is stored. A kind with more findings is skipped, because
-    # other findings of this kind are stored after a fix and would look new.
+    # Only a limited number of findings of one code is stored, so codes with more findings are skipped.
+    # For such a code, findings that are first stored after a fix would look new.
     many = {finding.code for finding in before.findings if finding.also}
     old, new = (
         Counter((f.code, f.element, f.name) for f in seen.findings if f.code not in many)
@@ -150,8 +151,7 @@ def _difference(a: JointRecord, b: JointRecord, turns: float) -> str | None:
     return next((what for what, same in equal.items() if not same), None)
 
 
-#: Factor on the bound `Fix.turns`. The factor allows for the rounding errors of that bound, which is a sum of
-#: doubles.
+#: Factor on the bound `Fix.turns`. It allows for the rounding errors of the bound, a sum of doubles.
 _SLACK = 1 + Fraction(1, 2**50)
 
 
@@ -209,7 +209,7 @@ def _relative(file: str) -> str:
 
 
 def _unified_diff(name: str, before: bytes, after: bytes) -> str:
-    # A tab after the name allows spaces in it.
+    # git needs a tab after a file name that contains spaces.
     end = "\t" if " " in name else ""
     old, new = (f"{_quote(f'{side}/{name}')}{end}" for side in "ab")
     found = difflib.unified_diff(_lines(before.decode()), _lines(after.decode()), old, new)

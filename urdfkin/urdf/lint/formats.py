@@ -24,7 +24,7 @@ SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sar
 def as_sarif(findings: Sequence[Finding], version: str, silenced: Sequence[tuple[Finding, str]] = ()) -> str:
     """Return one SARIF run with every code as a rule and every finding as a result.
 
-    The codes about MJCF and USD are rules only if a finding has them.
+    The codes for MJCF and USD files are listed as rules only if a finding has such a code.
 
     Args:
         findings: The reported findings.

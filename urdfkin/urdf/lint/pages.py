@@ -37,8 +37,8 @@ RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lambda r
 #: For each code of the findings about MJCF and USD files: the rule.
 OF_OTHERS = {x.id: x for x in vars(left_out).values() if isinstance(x, Rule)}
 
-#: For each name of a rule in lower case: the code of the rule. Each rule has three names: its code, the
-#: digits of the code, and its short name.
+#: For each name of a rule in lower case: the code of the rule.
+#: Each rule has three names: its code, the digits of its code, and its short name.
 CODES = {word: rule.id for rule in RULES.values() for word in (rule.id.lower(), rule.id[4:], rule.slug)}
 
 _TOPIC = {rule.id: topic for topic, own in TOPICS.items() for rule in own} | dict.fromkeys(
@@ -53,8 +53,8 @@ class Page:
     Attributes:
         title: The problem in one line, for tables of rules.
         why: The consequences of the problem for a user.
-        example: A minimal example with the problem: a whole document, or the content of `<robot>`. If it
-            begins with a joint or a comment, the links `base` and `tip` are added.
+        example: A minimal example with the problem: a whole document, or the content of `<robot>`. The links
+            `base` and `tip` are added to an example that begins with a joint or a comment.
         cure: The corrected example.
         others: The behaviour of Pinocchio (urdfdom) and yourdfpy for the example.
         question: The related entry of the questions page, or None.

@@ -59,8 +59,8 @@ def check(
 
     Returns:
         The findings that no comment silences, as a list that displays as a table in notebooks. The list is
-        empty if the file has no problem. At most 10,000 findings of a kind are complete; the attribute `also`
-        of the last complete finding contains the lines of the further findings.
+        empty if the file has no problem. At most 10,000 findings of one kind are listed. The lines of all
+        further findings are in the attribute `also` of the last listed finding.
 
     Raises:
         SourceError: the file cannot be read.
@@ -162,8 +162,8 @@ def read_urdf(report: Reporter, *, mimic: bool = True, root_joint: str | None = 
         report: The reporter with the name, the bytes and the limits of the file. The reporter receives the
             findings.
         mimic: Whether mimic joints follow their mimicked joints. False: problems with mimic joints are notes.
-        root_joint: `"floating"` or `"planar"` if the robot gets such a joint. Then the file must not use the
-            names of this joint and of its parent link.
+        root_joint: `"floating"` or `"planar"` if the robot gets such a joint. The file must not contain the
+            names of this additional joint and of its parent link.
 
     Returns:
         The records, or None if the file is not a URDF.

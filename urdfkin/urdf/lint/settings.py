@@ -152,8 +152,8 @@ _WORDS = {
     str: "a string",
 }
 
-#: Patterns of robot files in a folder. Files with the suffix .xacro are not included, because most of them
-#: contain only a part of a robot.
+#: Patterns of robot files in a folder.
+#: Files with the suffix .xacro are not included, because most contain only a part of a robot.
 INCLUDE = ("*.urdf",)
 
 
@@ -314,15 +314,15 @@ class Choice:
 
         def is_reported(finding: Finding) -> bool:
             selected = finding.code in codes and (self.notes or finding.severity is not Severity.NOTE)
-            # sum instead of any, because each of the two baselines must count the finding
+            # `any` would stop at the first baseline, but `knows` must count the finding in both baselines
             return selected and not sum(baseline.knows(finding) for baseline in known)
 
         return is_reported
 
     def again(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
-        """Return a function like that of the method `of`, with its own copies of the baselines.
+        """Return the filter of the method `of` for a second check of the same file.
 
-        Checking a file a second time then changes no count of matches.
+        The filter uses copies of the baselines, so that the second check does not change their counts.
         """
         copies = [
             None if known is None else replace(known, counts=Counter(known.counts))
@@ -334,11 +334,9 @@ class Choice:
 def known_before(text: Text, version: Version, look: Callable[[Text], Examined]) -> Baseline | None:
     """Return the findings of an older version of a file.
 
-    The result is None if the file and the files that it uses have not changed, so that its findings are the
-        same.
+    If neither the file nor a file that it uses has changed, the findings are the same, and None is returned.
 
-    If a file with the name of a mesh was deleted since then, the finding that the mesh is missing counts as
-    new.
+    If a mesh file was deleted after the older version, the finding about the missing mesh counts as new.
 
     Args:
         text: The present file.
@@ -349,8 +347,8 @@ def known_before(text: Text, version: Version, look: Callable[[Text], Examined])
     if path is None:
         return Baseline(Counter())
     if is_xacro(text.source):
-        # The expansion of the older xacro file is not available. If a file that it may include has changed,
-        # every finding counts as new.
+        # The older xacro file cannot be expanded.
+        # If a file that it may include has changed, every finding counts as new.
         return Baseline(Counter()) if version.changed(_PARTS) else None
     same = version.holds(text.data)
     old = text.data if same else version.read(path)

@@ -15,14 +15,15 @@ INERTIAL_INCOMPLETE = Rule("URDF701", "inertial-incomplete", WARNING)
 INERTIAL_IMPOSSIBLE = Rule("URDF702", "inertial-impossible", WARNING)
 INERTIAL_SCALE = Rule("URDF703", "inertial-scale", WARNING)
 
-#: Largest plausible mass (kg) and distance of the centre of mass from the link's origin (m). Larger values
-#: are reported.
+#: Largest plausible mass (kg) and distance of the centre of mass from the link's origin (m).
+#: Larger values are reported.
 HEAVIEST, FARTHEST = 1e9, 1e6
 
 #: A body with a smaller mass (kg) is a placeholder, so its moments of inertia are not checked.
 NEGLIGIBLE = 1e-3
 
-#: Moments of inertia per kg (m^2) below this count as rounding errors. A body of 0.03 mm has such moments.
+#: Moments of inertia per kg (m^2) below this number count as rounding errors.
+#: Only bodies smaller than about 0.03 mm have such small moments.
 ROUNDING = 1e-9
 
 #: Allowed relative rounding error of moments of inertia, which is large because exporters write few digits.
@@ -152,8 +153,7 @@ def principal_moments(moments: Sequence[float]) -> tuple[float, float, float]:
 UNREADABLE = Rule("URDF704", "unreadable-extra", WARNING)
 GEOMETRY = Rule("URDF705", "geometry-incomplete", WARNING)
 
-#: For each shape: its attributes with numbers. An attribute is (name, count of numbers, whether it is
-#: required).
+#: For each shape: its numeric attributes, as (name, count of numbers, whether the attribute is required).
 _SHAPES: dict[str, tuple[tuple[str, int, bool], ...]] = {
     "box": (("size", 3, True),),
     "sphere": (("radius", 1, True),),

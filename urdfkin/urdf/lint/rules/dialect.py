@@ -142,7 +142,7 @@ def _check_expressions(report: Reporter, root: Element) -> None:
 
 
 def _moves(element: Element) -> bool:
-    """Return whether kinematics uses an element, as it uses `<link>` and everything in a `<joint>`."""
+    """Return whether kinematics uses an element: a link, a joint, or an element inside a joint."""
     holder = element.holder
     return holder.tag == "joint" or (holder is element and element.tag == "link")
 
@@ -193,8 +193,8 @@ _ADDED = (
 )
 EXTENSIONS = frozenset(_ADDED.split())
 
-#: Each line is `element: attributes > child elements`. If the colon is missing, the attributes of the element
-#: are not checked. An element that has no line here is not checked.
+#: Each line is `element: attributes > child elements`.
+#: The attributes of an element without a colon are not checked. No other element is checked.
 _TABLE = """
 robot: name version > link joint material
 link: name type > inertial visual collision
@@ -322,8 +322,7 @@ def _is_part(element: Element) -> bool:
 
 _PARTS = frozenset({"link", "joint"})
 
-#: Tags of this length or longer count as similar neither to `link` nor to `joint`, because difflib's ratio is
-#: too small.
+#: Tags of this length or longer are not similar to `link` or `joint`: difflib's ratio is too small.
 _LONGEST_PART = 8
 
 

@@ -76,8 +76,8 @@ def _ends_exist(report: Reporter, robot: RobotRecord, joint: JointRecord) -> boo
 def _no_loops_or_diamonds(report: Reporter, robot: RobotRecord, edges: list[JointRecord]) -> bool:
     """Search depth first for links with several parent joints.
 
-    A joint whose child is on the current path closes a loop. A joint whose child was visited on another path
-    gives this child a second parent.
+    If the child of a joint is on the current path, the joint closes a loop. If the child was already visited
+    on another path, the child has a second parent.
     """
     below: dict[str, list[JointRecord]] = {}
     children = set()
@@ -160,8 +160,8 @@ AXIS_LENGTH = Rule("URDF503", "axis-not-unit", WARNING)
 PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
 NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
-#: If the length of an axis differs from 1 by less than this number, the cause is rounding of the last digits,
-#: and the finding is a note.
+#: If the length of an axis differs from 1 by less than this number, the finding is only a note.
+#: Such a small difference comes from rounding of the last digits.
 LENGTH_ROUNDING = 2e-4
 
 #: Tolerance of a unit vector's length, the same as in `kinematics.inputs`.
@@ -170,13 +170,11 @@ _ONE = 1e-12
 #: Relative tolerance within which the axis of a planar joint counts as the z axis.
 _LEAN = 1e-9
 
-#: If an axis differs from a coordinate axis by less than this relative tolerance, Pinocchio uses the
-#: coordinate axis. The number is the default tolerance of Eigen's isApprox, which compares squares of
-#: lengths.
+#: Relative tolerance within which Pinocchio replaces a joint's axis by a coordinate axis.
+#: It is the default tolerance of Eigen's isApprox, which compares squares of lengths.
 _SNAPPED = 1e-12
 
-#: A tilt (rad) below this number is not reported, because `verify.bounds` allows such a rounding error of an
-#: axis.
+#: A tilt (rad) below this number is not reported, because `verify.bounds` includes such a rounding error.
 _TILT = 2.0**-52
 
 
@@ -262,7 +260,7 @@ def tilts(robot: RobotRecord) -> dict[str, float]:
 def _snap(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
     """Return the coordinate axis that Pinocchio uses for an axis, and the angle between them (rad).
 
-    The result is None if Pinocchio uses the axis itself.
+    Return None if Pinocchio uses the axis unchanged.
     """
     if axis is None:
         return None
@@ -308,7 +306,7 @@ def check_ranges(report: Reporter, robot: RobotRecord) -> None:
 
 
 def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, version: tuple[int, int]) -> None:
-    strict = version >= (1, 2)  # from 1.2 on urdfdom has the same rules for all joint types
+    strict = version >= (1, 2)  # for URDF 1.2 or newer, urdfdom has the same rules for all joint types
     for attribute in ("effort", "velocity", *FURTHER_LIMITS):
         value = getattr(limit, attribute)
         if value is not None and value < 0.0:
@@ -542,7 +540,10 @@ class _MimicChecker:
 
 
 def _range_of(joint: JointRecord) -> tuple[float, float] | None:
-    """Return the range of a joint, which is its limits or one revolution; None if it has no valid limits."""
+    """Return the limits of a joint; for a continuous joint, one revolution.
+
+    Return None if the joint has no valid limits.
+    """
     if joint.kind == "continuous":
         return -math.pi, math.pi
     if joint.limit is None or joint.kind not in ("revolute", "prismatic"):
@@ -582,8 +583,8 @@ FAR = 100.0
 #: If the sum of all lengths of a robot is smaller than this (m), the robot was probably scaled twice.
 TINY = 1e-4
 
-#: An angle that is a whole number and at least `MANY` is probably in degrees, not in radians. Some exporters
-#: write an angle of at least `ENDLESS` to state that there is no limit.
+#: An angle that is a whole number and at least `MANY` is probably in degrees, not in radians.
+#: Some exporters write an angle of at least `ENDLESS` for a joint without limits.
 MANY, ENDLESS = 30.0, 1000.0
 
 #: If the rounding of a multiple of pi moves a tip by more than this (m), the finding is a warning.
@@ -592,8 +593,8 @@ NOTICEABLE = 1e-3
 #: If an angle differs from a multiple of pi by less than this (rad), it is not reported.
 ANGLE_ROUNDING = 1e-10
 
-#: Multiples of pi, each with the smallest number of decimals with which a written number is recognized as
-#: this multiple.
+#: Multiples of pi that are recognized in rounded numbers.
+#: With each: the smallest number of decimals that a rounded number must have.
 _MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
@@ -686,9 +687,9 @@ def _replace_words(raw: str | None, words: list[str]) -> str:
 
 
 def rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
-    """Return the multiple of pi whose rounding a decimal probably is, and the multiple's value.
+    """Return the multiple of pi that was probably rounded to a decimal, and the multiple's value.
 
-    Otherwise None.
+    Return None if there is no such multiple.
 
     >>> rounded_pi("1.5708", 1.5708)
     (Fraction(1, 2), 1.5707963267948966)
@@ -783,7 +784,7 @@ def _check_places(report: Reporter, robot: RobotRecord) -> None:
 
 
 def _reach(robot: RobotRecord) -> dict[str, float]:
-    """Return, for each link, a bound (m) on the distance to all links below it, which is a sum of lengths."""
+    """Return, for each link, a bound (m) on the distance to its descendants: the sum of the lengths."""
     below: dict[str, list[JointRecord]] = {}
     for joint in robot.joints:
         below.setdefault(joint.parent or "", []).append(joint)

@@ -39,7 +39,7 @@ def left_out(one: Listed, file: str) -> Finding:
 
 
 def of_usd(one: Remark, file: str) -> Finding:
-    """Return a finding for a remark about a USD stage; its place is the path of the prim."""
+    """Convert a remark about a USD stage to a finding. The finding contains the path of the prim."""
     rule = next(rule for rule in globals().values() if isinstance(rule, Rule) and rule.slug == one.kind)
     element, name = ("prim", one.where) if one.where else (None, None)
     return Finding(rule.id, rule.severity, one.what, remedy=one.remedy, file=file, element=element, name=name)
