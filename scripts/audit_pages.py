@@ -66,8 +66,8 @@ UNFOLD = "document.querySelectorAll('details').forEach((part) => { part.open = t
 _PRESSES, _PAGES = 60, 12
 #: Errors of the HTML checker that the site's theme causes.
 FOREIGN = ("Attribute “autocomplete” is only allowed when the input type is",)
-#: Options with which Chromium reports a mouse. Without a mouse, the site's theme omits elements that keyboard
-#: users need, and the audit tests these elements.
+#: Options with which Chromium reports a mouse.
+#: Without a mouse, the site's theme omits elements for keyboard users, which the audit must test.
 _MOUSE = (
     "--blink-settings=primaryHoverType=2,availableHoverTypes=2,primaryPointerType=4,availablePointerTypes=4"
 )
@@ -268,7 +268,7 @@ def viewer(plays: bool = False) -> Iterator[Page]:
 
 def load(browser: Browser, page: Page) -> None:
     """Open a page and wait until it is drawn."""
-    browser.chrome.get("about:blank")  # another fragment of the same page loads nothing
+    browser.chrome.get("about:blank")  # otherwise a new fragment would not reload the page
     browser.chrome.get(page.url)
     if page.ready:
         browser.wait(page.ready)

@@ -167,7 +167,7 @@ def check_library(library: str, environment: Path, package: str | None, keep: Pa
 
 
 def _files(library: str, folder: Path) -> Iterator[Path]:
-    """Write the files of all tips in a library's language, and as `array`."""
+    """Write two files for each tip: one in a library's export format, and one in the format `array`."""
     for number, (_, robot, frame) in enumerate(subjects(tips=True)):
         wanted = ("placement", "jacobian", "velocity", "acceleration") if robot.nv else ("placement",)
         if 0 < robot.nv <= _HESSIANS and all(joint.nv <= 1 for joint in robot.tree.joints):

@@ -17,7 +17,7 @@ from pathlib import Path
 
 try:
     from packaging.requirements import Requirement
-except ModuleNotFoundError:  # an environment without extras has only pip's copy
+except ModuleNotFoundError:  # without extras, pip contains the only copy of this library
     from pip._vendor.packaging.requirements import Requirement  # type: ignore[assignment,unused-ignore]
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
@@ -35,7 +35,7 @@ def closure(name: str, extras: Iterable[str] = (), without: str = "") -> dict[st
     Args:
         name: A package.
         extras: Extras of the package that are included.
-        without: A package that is left out, together with all packages that only this package needs.
+        without: A package to leave out, together with all packages that only this package needs.
 
     Raises:
         PackageNotFoundError: a package is not installed.

@@ -69,8 +69,8 @@ _HOMES = {
     "verify_function": "urdfkin.validation.functions",
 }
 
-# Methods of earlier packages call these functions of later packages.
-# An earlier package cannot import from a later package.
+# Methods call these functions, which are in packages that come later in the order of docs/architecture.md.
+# A package cannot import from a package that comes later.
 register_hook("a table in a form", lazy_import("urdfkin.dh.export:export"))
 register_hook("code of a robot", lazy_import("urdfkin.export.forms:code_of_robot"))
 register_hook("code of a chain", lazy_import("urdfkin.export.forms:code_of_chain"))

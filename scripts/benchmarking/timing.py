@@ -31,10 +31,10 @@ class Work:
 
     Attributes:
         who: Name of the contender in the tables.
-        n: Number of configurations that `compute` computes; they are the first configurations of the subject.
+        n: Number of configurations: `compute` uses the first `n` configurations of the subject.
         compute: The timed function.
-        result: Returns the results in urdfkin's conventions, for the first configurations; not timed. None if
-            there are no results to compare, as for the task that only writes the output.
+        result: Returns the results in urdfkin's conventions, for the first configurations. It is not timed.
+            None: there are no results to compare; for example, a task only writes the output.
         tolerance: Allowed difference from Pinocchio.
         remark: A remark on the measurement.
     """
@@ -56,7 +56,7 @@ class Table:
         robot: A name of the catalogue, or the number of joints of a chain.
         quantity: jacobian, acceleration or placement.
         numbers: Number of float64 values of one configuration's result.
-        size: The varied number of joints, frames or configurations.
+        size: Number of joints, frames or configurations, whichever the table varies.
     """
 
     section: str

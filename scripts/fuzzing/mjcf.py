@@ -18,8 +18,8 @@ from urdfkin.robot import Robot
 
 FAMILIES = ("mjcf-free", "mjcf-equalities", "mjcf-classes")
 _CLASSES = ("outer", "inner", "other")
-#: Allowed relative difference between urdfkin's and MuJoCo's placements, or between the two sides of an
-#: equality.
+#: Allowed relative difference between placements by urdfkin and by MuJoCo.
+#: The two sides of an equality may differ by the same amount.
 _APART = 1e-12
 
 mujoco.set_mju_user_warning(

@@ -196,10 +196,10 @@ def _recheck(robots: tuple[Robot, Robot], path: Path) -> Answer:
 def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown: Path | None) -> Answer:
     """List the changes from OLD to NEW, attribute by attribute, and how far they move the robot's frames.
 
-    For each changed joint, the command prints how far its changes alone move the most affected frame. This is
-    the maximum over all configurations within limits, at equal coordinates. The last line is for all changes
-    together. Between URDF, MJCF and USD, the changes are the differences that `same` finds. With C, all pairs
-    are compared.
+    For each changed joint, the command prints how far its changes alone move the most affected frame. This
+    distance is the maximum over all configurations within limits, for equal joint coordinates of OLD and NEW.
+    The last line is for all changes together. Between URDF, MJCF and USD, the changes are the differences
+    that `same` finds. With C, all pairs are compared.
 
     Exit 0: no changes. 1: changes. 2: bad input.
     """

@@ -43,7 +43,7 @@ report_options = together(
 
 
 def write_reports(document: Document, files: Mapping[str, Path | None]) -> int:
-    """Write the requested formats. A failure of one does not affect the others.
+    """Write a report in the requested formats; if one file cannot be written, write the others.
 
     Returns:
         0, or the exit code of the first format that could not be written. Its error has been printed.
@@ -100,7 +100,7 @@ EXAMPLE = "urdfkin report results.json --html report.html --junit report.xml"
 
 
 class _Results(click.Group):
-    """The subcommands; `report FILE` without one is `report show FILE`."""
+    """The subcommands of `report`. Without a subcommand, `report FILE` means `report show FILE`."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Insert `show` unless a subcommand or help is asked for."""
@@ -213,10 +213,10 @@ def report_history(paths: tuple[Path, ...], all_: bool, schema: bool) -> Answer:
     """Show the verdicts, results, findings and changes of each robot from run to run.
 
     Give reports, stores, or folders with them. Runs are ordered by their start; robots are matched by their
-    source, and renamed files by the robot's name. Changes and regressions are those of `report compare`. With
-    `--output history.html` it writes an offline page with charts.
+    source, and renamed files by the robot's name. Changes and regressions are defined as in `report compare`.
+    With `--output history.html`, the command writes an offline page with charts.
 
-    A file that cannot be used is named with the reason; the others are shown.
+    If a file cannot be used, the command prints its name and the reason, and shows the other files.
     Exit 0: every file was used. 2: a file cannot be used.
     """
     from urdfkin.report.history import HISTORY, as_html, document, history  # noqa: PLC0415

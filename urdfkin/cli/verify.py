@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from urdfkin.validation.functions import FunctionCheck
 
-#: Quantities of a function: commands of the table that have one result for each configuration.
+#: Commands that compute one result for each configuration: the quantities that a function may have.
 _QUANTITIES = ("placement", "velocity", "jacobian", "jacobian-rate", "hessian", "acceleration", "imu")
 
 

@@ -43,8 +43,7 @@ from urdfkin.model.tree import FloatArray
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _PLACES = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
-#: From this output size (bytes) on, results are written directly to memory and not to the caches, which are
-#: too small for them.
+#: Results of at least this size (bytes) are written directly to memory, because the caches are too small.
 _STREAMED = 2 << 20
 #: Number of values in a block of results. A block fits into half of the processor's first-level cache.
 _MOST_STAGED = 3072
@@ -180,9 +179,10 @@ def _interpreted(
     out: FloatArray,
     threads: int | None,
 ) -> int | None:
-    """Compute with Python numbers; return whether an input is not ordinary, or None if a kernel is faster.
+    """Compute a batch with Python numbers; return None, without a result, if a kernel is faster.
 
-    The processor time of the first configurations decides whether a kernel is faster.
+    Otherwise return 1 if an input is nan, infinite or too large, else 0. The processor time of the first
+    configurations decides whether a kernel is faster.
     """
     if preload.kernel(name) is not None:
         return None
@@ -263,7 +263,8 @@ def task_of(
     Args:
         program: The program of the recursion.
         reference: The reference frame of the results.
-        inputs: The base's state, q and, if needed, v and a; each input has one row or as many rows as `out`.
+        inputs: The base's state, q and, if needed, v and a. Each of them has one row, or as many rows as
+            `out`.
         out: (n, ...) array for the result.
         staged: Whether blocks are collected before output (`is_staged`).
     """

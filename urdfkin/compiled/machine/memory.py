@@ -125,7 +125,7 @@ def _at_address(kind: Any) -> Any:
 numbers_at, whole_numbers_at = map(_at_address, (NUMBERS, WHOLE_NUMBERS))
 
 
-#: Largest number of doubles that are prefetched: they fill half of a processor's first-level cache.
+#: Largest number of doubles that are prefetched. They fill half of a processor's first-level cache.
 _MOST_FETCHED = 3072
 _NUMBERS = types.CPointer(types.float64)
 

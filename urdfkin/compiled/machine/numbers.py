@@ -47,7 +47,7 @@ class Lanes(types.Type):
 
 
 class Product(types.Type):
-    """The type of a product that is still stored as its two factors."""
+    """The type of a product that is not multiplied yet: it is stored as its two factors."""
 
     def __init__(self, width: int) -> None:
         self.width = width
