@@ -140,7 +140,7 @@ def html_checker() -> Path | None:
 
 
 def disagreement() -> Document:
-    """Return the report of a disagreement, for which the oracle's velocities are changed by a millionth."""
+    """Return a report with disagreements, caused by a relative error of 1e-6 in the oracle's velocities."""
     right = PinocchioOracle.velocities
 
     def bent(*args: Any) -> Any:

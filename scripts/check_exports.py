@@ -105,10 +105,10 @@ def subjects(tips: bool) -> Iterator[tuple[str, Robot, str]]:
 
 
 def found_of(robot: Robot, frame: str, ways: Collection[str]) -> dict[str, Any]:
-    """Return the result of a leaf frame.
+    """Check the exported code of a frame.
 
-    The result contains the largest errors as fractions of their bounds, and states whether all errors are
-    within the bounds.
+    The result has the largest errors as fractions of their bounds. It states whether all errors are within
+    the bounds.
     """
     wanted = QUANTITIES if robot.nv else ("placement",)
     with tempfile.TemporaryDirectory() as folder:

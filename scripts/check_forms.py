@@ -5,8 +5,8 @@
     python scripts/check_forms.py --toolbox PYTHON     # another interpreter, with roboticstoolbox
     python scripts/check_forms.py --forms sympy latex  # some formats only
 
-LaTeX tables are compiled and must fit on the page of an article. Exit 1: the difference of a format is
-larger than rounding, or a table does not fit.
+LaTeX tables are compiled and must fit on the page of an article. Exit 1: results of a format differ by more
+than rounding, or a LaTeX table is too wide.
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from urdfkin.verify.tables import TableError
     from urdfkin.verify.verifier import NotVerifiedWarning
 
-# Imported at first use, so that `import urdfkin` loads neither NumPy nor Pinocchio nor a compiler.
+# These names are imported at their first use: `import urdfkin` loads no NumPy, no Pinocchio and no compiler.
 _HOMES = {
     "BaseMotion": "urdfkin.model.base_motion",
     "Certificate": "urdfkin.verify.certificate",

@@ -20,8 +20,8 @@ import numpy as np
 
 from urdfkin.model.tree import FloatArray
 
-#: Allowed difference of results in m, rad, m/s^2, rad/s^2. The limit detects different computations, not
-#: errors of accuracy.
+#: Allowed difference of results in m, rad, m/s^2, rad/s^2.
+#: The limit detects different computations, not errors of accuracy.
 TOLERANCE = 1e-9
 
 

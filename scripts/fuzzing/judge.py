@@ -17,8 +17,8 @@ from urdfkin.urdf.lint import Finding, Severity, UrdfError
 from urdfkin.urdf.mjcf import is_mjcf
 from urdfkin.verify.verifier import NotVerifiedWarning
 
-#: Findings about sizes beyond the floating-point range; robots with such findings may have non-finite
-#: results.
+#: Findings about sizes beyond the floating-point range.
+#: Results of robots with such findings may be infinite or nan.
 _SIZES = {"URDF526", "URDF603", "URDF606"}
 
 

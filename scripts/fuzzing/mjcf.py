@@ -99,11 +99,11 @@ class _File:
         return f"<body {' '.join(words)}>{''.join(parts)}</body>"
 
     def site_words(self) -> str:
-        """Return the pose of a site, or nothing."""
+        """Return the attributes of a site's pose, or an empty text."""
         return f'pos="{self.vector()}" {self.orientation()}' if self.rng.random() < 0.7 else ""
 
     def of_class(self) -> str:
-        """Return the attribute of a random class."""
+        """Return the attribute `class` with a random class, or an empty text."""
         named = self.family == "mjcf-classes" and self.rng.random() < 0.4
         return f' class="{self.rng.choice(_CLASSES)}"' if named else ""
 

@@ -156,8 +156,8 @@ form_options = together(
 #: Options that have no effect with --like, which chooses their values.
 _SIGNS = ("last", "parallel_offset", "flip", "first", "sign")
 _CHOICES = ("convention", "near_parallel", "snap", "slide", "like", *_SIGNS)
-#: If ROBOT is a table, each of these options makes the command derive a new table. Without these options, the
-#: table is written unchanged.
+#: If ROBOT is a table, the command writes it unchanged unless one of these options is given.
+#: With one of these options, the command derives a new table from the robot of the table.
 _DERIVED = ("base", "tip", "all_", *_CHOICES[1:])
 _UNITS = ("degrees", "millimetres", "digits", "columns")
 

@@ -221,7 +221,7 @@ usd_options = together(
         help="Path of the articulation to load, if a USD stage has several.",
     ),
 )
-#: The options that concern the source of a robot, not its joints.
+#: The options about the file of a robot, for example arguments of xacro.
 source_options = together(xacro_option, usd_options)
 
 

@@ -211,10 +211,10 @@ def hand_out(data: bytes | str, output: Path | None) -> None:
 
 
 def check_writable(*paths: Path | None) -> None:
-    """Raise SourceError before the work if a file cannot be written.
+    """Raise SourceError if a file cannot be written; call this before the computation begins.
 
     Raises:
-        SourceError: Missing permission, or no such folder.
+        SourceError: The permission is missing, or the folder does not exist.
     """
     for path in paths:
         if path is None:

@@ -235,7 +235,7 @@ def say_file(text: str) -> None:
 
 
 def harmless(text: str) -> str:
-    """Return a text of whole lines in the escaped form that `say_file` writes."""
+    """Return a text of whole lines with the same escapes as in the output of `say_file`."""
     return SafeStream(sys.stdout).tamed_file(text)
 
 

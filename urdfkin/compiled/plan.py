@@ -257,7 +257,7 @@ def turned(joint: Joint) -> FloatArray:
 
 
 def _flat(T: FloatArray) -> FloatArray:
-    """Return the twelve numbers of a pose: R row by row, then the offset in the previous frame's axes."""
+    """Return the twelve numbers of a pose: the rotation matrix row by row, then the offset."""
     return np.concatenate((T[:3, :3].ravel(), T[:3, 3]))
 
 
@@ -616,8 +616,8 @@ def _blocks(places: Sequence[int]) -> list[int]:
 #: Size of a cache line of the processor, bytes.
 #: Access to a vector that lies across two cache lines takes twice as long.
 _LINE = 64
-#: The reference frames that the kernels support, each with its number in a kernel. Any other reference frame
-#: raises a KeyError.
+#: The reference frames that the kernels support, each with its number in a kernel.
+#: Any other reference frame raises a KeyError.
 REFERENCES = {
     known: int(known) for known in (Reference.LOCAL, Reference.WORLD, Reference.LOCAL_WORLD_ALIGNED)
 }

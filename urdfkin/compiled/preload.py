@@ -142,9 +142,10 @@ _beside: dict[str, subprocess.Popen[bytes]] = {}
 
 
 def _compile_beside(name: str, home: str) -> bool:
-    """Return whether a second process compiles a kernel; start this process, unless it has failed before.
+    """Start a second process that compiles a kernel, and return whether such a process runs.
 
-    Only one second process compiles at a time. The result is also True while it compiles another kernel.
+    Only one second process runs at a time, and there is only one attempt for each kernel. The result is also
+    True while the second process compiles another kernel.
     """
     if cache_folder() is None:
         return False
