@@ -45,7 +45,7 @@ from urdfkin.verify.quantities import Quantity, recursive_quantities
 from urdfkin.verify.verifier import bound_of
 
 #: Numbers of configurations of the tested batches. A block has eight configurations.
-#: A batch is less than a block, one block, a little more than a block, or many blocks and a remainder.
+#: The sizes are: part of a block, one block, a little more than a block, and many blocks and a remainder.
 LENGTHS = (1, 2, 7, 8, 9, 100)
 #: Numbers of threads of a batch; None: urdfkin's default.
 THREADS = (None, 1, 2, 3)

@@ -62,7 +62,8 @@ def pair(name: str, what: str) -> dict[str, Any] | None:
 def _farthest(found: Sameness) -> Interval | None:
     """Return the interval of the frame with the largest distance between the two robots.
 
-    Frames that differ only as tools are left out. The result is None if the interval has no upper end.
+    Frames that `same` reports as moved on their bodies are left out. The result is None if the interval has
+    no upper end.
     """
     frames = [frame for frame in found.frames if frame.frame_b not in _tools(found) and frame.q_a]
     worst = max(frames, key=lambda frame: (frame.upper, frame.lower), default=None)

@@ -45,7 +45,7 @@ CONFIGURATIONS = 3
 #: A misread element causes a difference of more than 1e-3.
 RIGHT = 1e-9
 #: Time limit (seconds) for a library to read all features.
-#: After a crash, the limit begins again for the remaining features.
+#: After a crash or a timeout, the limit begins again for the remaining features.
 _SECONDS = 60
 _QUOTED = 160
 

@@ -18,7 +18,8 @@ from urdfkin.compiled.plan import KEPT_ROWS, WIDTH, CompiledTree, Head, Op, prog
 from urdfkin.kinematics.arithmetic import bound
 
 #: Number of operations that compute the sine and the cosine of an angle (`compiled.python_numbers`).
-#: The reduction of the angle needs 10 operations. The terms z and 1 - z/2, and their rounding errors, need 8.
+#: The reduction of the angle needs 10 operations.
+#: The terms z and 1 - z/2, and their rounding errors, need 8 operations.
 #: The two polynomials need 20 operations, and the last steps need 13.
 _SINE_COSINE = 51
 

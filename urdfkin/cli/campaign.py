@@ -29,8 +29,8 @@ _LINES, _JSON = 10.0, 0.5
 class Pace:
     """Speed in chunks per second and remaining time, measured with a monotonic clock.
 
-    The measurement starts when the first chunk is about to be computed: at the last call of `of` before that.
-    The time for compiling kernels is thus not counted.
+    The measurement starts at the last call of `of` for which no chunk was computed yet. The time for
+    compiling kernels is thus not counted.
     """
 
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:

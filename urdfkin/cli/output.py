@@ -1,4 +1,4 @@
-"""Print the result of a command as a table, or write it in any format.
+"""Print the result of a command as a table, or write it in another format.
 
 A file is written completely or not at all.
 """

@@ -180,7 +180,8 @@ def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) 
     A regression is one of these: the run passed before and fails now; a robot is missing, or its verdict is
     worse; more results lie outside their bound; something is no longer compared, or on fewer samples; a bound
     is wider; a worst disagreement grew by more than the factor and is above 2 eps*scale. A changed model is
-    listed joint by joint. It is not a regression by itself; `same` and `diff` compute how far a frame moves.
+    listed joint by joint. A changed model alone is not a regression; `same` and `diff` compute how far its
+    frames move.
     A report that contradicts itself is an error.
     Exit 0: no regression. 1: a regression. 2: a file that cannot be used.
     """

@@ -70,7 +70,7 @@ def info_command(robot: str) -> Answer:
     """Show a robot's links, joints, axes, limits, indices in q and v, and mimic rules.
 
     Joints are in the order of q, of v and of a Jacobian's columns, which is Pinocchio's order. If the file
-    has another order, a line says so. Limits are in rad and rad/s; those of prismatic joints are in m and
+    has another order, a line reports it. Limits are in rad and rad/s; those of prismatic joints are in m and
     m/s. A link that is not indented is a child of the link above it. If a link has several children, lines
     lead to them.
     """

@@ -98,7 +98,7 @@ def command(
         Viewer(server, loaded, None if begin is None else begin[0], played, conversion)
     try:
         say(f"{loaded.name}: {server.address}")
-        sys.stdout.flush()  # in a pipe, the address would else be printed at the end
+        sys.stdout.flush()  # a pipe would otherwise receive the address at the end
         wanted = sys.stdout.isatty() and has_screen() if browser is None else browser
         with opened_page(server.address) if wanted else nullcontext():
             server.sleep_forever()

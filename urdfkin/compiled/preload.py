@@ -25,13 +25,13 @@ from urdfkin.system.locks import importing
 if TYPE_CHECKING:
     import subprocess
 
-#: Times (s) of computations without a kernel.
-#: After the first time, Numba is imported and the kernel is read from disk.
-#: After the second time, this process compiles a kernel that is not on disk.
+#: Limits (s) of the time for computations without a kernel.
+#: Above the first limit, Numba is imported and the kernel is read from disk.
+#: Above the second limit, this process compiles a kernel that is not on disk.
 LOADING, COMPILING = 0.3, 3.0
 #: When computing without a kernel has taken this many seconds, a second process compiles the kernel.
 BESIDE = 1.0
-#: If Numba is imported already, this time (s) is used instead of `LOADING`.
+#: If another kernel is loaded already, this limit (s) replaces `LOADING`.
 _LOADING_MORE = 0.03
 #: Seconds that a call for one configuration saves if it uses the fast function.
 _SAVED = 5e-5

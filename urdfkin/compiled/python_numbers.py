@@ -274,7 +274,7 @@ def write_rows(
 ) -> None:
     """Write `count` rows of scratch memory to the list `to`, from `to[at]` on.
 
-    The indices of the rows are `rows[first]` and the following elements of `rows`.
+    The list `rows` has the indices of the rows, from `rows[first]` on.
     """
     to[at : at + count] = [s[row].x for row in rows[first : first + count]]
 
