@@ -232,8 +232,8 @@ def read_rows(m, x, at, stride, count, s, row):
     """Read `count` numbers of each of eight configurations into rows of scratch memory.
 
     The numbers of the first configuration begin at `x[at]`. The numbers of each next configuration begin
-    `stride` numbers later. If `m` is 1, only the first configuration is read, and its numbers are used for all
-    eight.
+    `stride` numbers later. If `m` is 1, only the first configuration is read, and its numbers are used for
+    all eight.
     """
     i = 0
     if m == 1:
