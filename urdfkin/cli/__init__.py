@@ -92,7 +92,7 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         ),
         "verify": (
             "urdfkin.cli.verify",
-            "Check a function or a program of yours against the same numbers and bounds.",
+            "Compare your function or program with the same numbers, within the same bounds.",
         ),
         "readers": (
             "urdfkin.cli.readers",

@@ -112,7 +112,8 @@ def command(
 ) -> None:
     """Fit the parameters of ROBOT to measured poses, and write them back into its own file.
 
-    In the written URDF only the changed numbers differ. Pinocchio checks it at the measured configurations.
+    In the written URDF, only the fitted numbers are changed. Pinocchio checks this URDF at the measured
+    configurations.
     ROBOT may also be the file of a Denavit-Hartenberg table; then its cells are fitted. Without --poses
     and --ur, the command lists which parameters are identifiable in principle.
 

@@ -160,7 +160,7 @@ def say_fixed(file: str, fixed: Sequence[Finding]) -> None:
 
 
 def difference(file: str, before: bytes, after: bytes) -> str:
-    """Return the changes by the fixes as a patch."""
+    """Return the changes that the fixes have made, as a patch."""
     return patch(file, before, after, harmless)
 
 
@@ -542,8 +542,8 @@ def _is_other(file: str) -> bool:
         return False
     with contextlib.suppress(OSError):
         if b"<mujoco" not in read_start(Path(file), 1 << 16):
-            return False  # without NumPy, which `check` of a URDF does not need
-    from urdfkin.urdf.mjcf import is_mjcf  # noqa: PLC0415  a URDF needs none of that module's imports
+            return False  # return before the next import, which loads NumPy
+    from urdfkin.urdf.mjcf import is_mjcf  # noqa: PLC0415  keeps the check of a URDF fast
 
     return is_mjcf(file)
 

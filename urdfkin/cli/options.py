@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 class Whole(click.IntRange):
-    """The type of a whole number in a range."""
+    """The type of an option whose value is a whole number in a range."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the text as an int."""
@@ -43,7 +43,7 @@ class Whole(click.IntRange):
 
 
 class Number(click.types.FloatParamType):
-    """The type of a finite number."""
+    """The type of an option whose value is a finite number."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the text as a float."""
@@ -51,7 +51,7 @@ class Number(click.types.FloatParamType):
 
 
 class NumberFrom(click.FloatRange):
-    """The type of a finite number in a range."""
+    """The type of an option whose value is a finite number in a range."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the text as a float."""

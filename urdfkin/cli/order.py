@@ -69,8 +69,8 @@ def _table(robot: Robot) -> Answer:
 def _cells(robot: Robot, conversion: Conversion) -> tuple[str, ...]:
     """Return the cell of each moving joint.
 
-    The cell is the index in q; if the index in v differs, it is both indices as q/v. It is "-" if the joint
-    has no coordinate.
+    The cell is the index in q. If the index in v differs, the cell has both indices, as q/v. The cell is "-"
+    if the joint has no coordinate.
     """
     indices = conversion.q_and_v_indices
 

@@ -129,10 +129,10 @@ def show(
 ) -> None:
     """Show a report or convert it to HTML, JUnit or Markdown.
 
-    A store has a report at any time. An incomplete store is reported as an interrupted run.
+    A report of a store is possible at any time. An incomplete store is reported as an interrupted run.
 
-    The exit status is that of the run. 0: everything verified. 1: a disagreement. 2: a robot could not be
-    read, or the file cannot be used. 3: a robot was not verified. 130: interrupted.
+    The exit status is the exit status of the run. 0: everything verified. 1: a disagreement. 2: a robot could
+    not be read, or the file cannot be used. 3: a robot was not verified. 130: interrupted.
     """
     from urdfkin.report.reading import read_document, stored_document  # noqa: PLC0415
     from urdfkin.validation.document import VALIDATION, outcome_of  # noqa: PLC0415  keeps --help fast

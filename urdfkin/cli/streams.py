@@ -5,9 +5,9 @@ before it has read everything. The encoding of a stream may lack a character of 
 of these cases causes a traceback.
 
 `guard` wraps standard output and standard error in a `SafeStream`, which escapes control characters and
-commands of CI services. All output passes through this stream, also the output of click and Python. Line
-feeds pass, because the stream cannot detect a line feed inside a name. `say` and the console escape these as
-well.
+commands of CI services. All output passes through this stream, also the output of click and Python. The
+stream does not escape line feeds, because it cannot detect whether a line feed is part of a name. `say` and
+the console escape line feeds in names.
 """
 
 from __future__ import annotations

@@ -229,8 +229,8 @@ def command(
 ) -> None:
     """Compare every frame and joint with Pinocchio in all three reference frames, on many samples.
 
-    Compared: {compared}. Not compared: {not_compared}; each call of the library and each command checks those
-    itself.
+    Compared: {compared}. Not compared: {not_compared}. The library and the commands check these quantities
+    in each call.
 
     Configurations are random within the limits. The neutral configuration and both ends of the limits are
     added. Every eighth sample has joint velocities and joint accelerations a hundred times larger.

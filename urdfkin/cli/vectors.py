@@ -53,8 +53,8 @@ def write_command(
 ) -> Answer:
     """Write test vectors into the folder DIR: results at 50 digits, with a tolerance for every number.
 
-    Without ROBOT, the robots are some 70 small ones with one feature of URDF each, and those of the
-    catalogue. With ROBOT, only these are written. For each robot, there is a JSON file, and a text
+    Without ROBOT, the command uses the robots of the catalogue, and some 70 small robots with one feature of
+    URDF each. With ROBOT, it uses only the given robots. For each robot, there is a JSON file, and a text
     file with the same numbers, separated by tabs. SHA256SUMS has the digests of all files.
 
     The results are placement, velocity, Jacobian, its time derivative, Hessian, classical and spatial

@@ -92,7 +92,7 @@ def verify_command(
     junit: Path | None,
     oracle: Any,
 ) -> Answer:
-    """Check a function or a program of yours against urdfkin, Pinocchio and the derived bound.
+    """Compare your function or program with urdfkin and Pinocchio, within the derived bound.
 
     TARGET is FILE.py:FUNCTION, or FILE.py for all its functions with the name of a quantity. A function takes
     q (nq,), and v and a (nv,) if the quantity needs them, in rad, m and seconds. It returns the result as an

@@ -60,7 +60,7 @@ def command(
     it.
 
     With --trajectory, a CSV or .npz file as in `urdfkin plot`, the viewer plays the samples of the file. With
-    --convention, the field of q reads and shows a tool's numbers too.
+    --convention, the input field of q also accepts and shows values in that convention.
 
     The printed address ends with a secret key. Open the address with its key, and show it only to people who
     may see and move the robot. Other web pages and other users of this machine have no access.

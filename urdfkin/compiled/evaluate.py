@@ -292,7 +292,7 @@ def _is_large(base: FloatArray) -> bool:
 
 
 def _check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """Raise an error for a non-finite input or result; called only if an input is not ordinary."""
+    """Raise an error for a non-finite input or result; called only if one is possible."""
     if not all(np.isfinite(x).all() for x in inputs):
         raise NotFiniteError("q, v and a must be finite")
     finite = np.isfinite(out).all(axis=tuple(range(1, out.ndim)))

@@ -2,8 +2,8 @@
 
 The arrays have a step for each moving joint and a row for each frame. As in the textbook, every joint frame
 is rotated so that the joint's axis is z (`turned` returns this rotation). Each revolute joint is then Rz, and
-each prismatic joint is Tz. Fixed joints are merged into the constant offsets between moving joints. A plan
-contains only the joints that move one of its frames.
+each prismatic joint is Tz. Fixed joints are merged into the constant offsets between moving joints. A
+compiled tree contains only the joints that move one of its frames.
 
 The program consists of the instructions for each block of configurations. The instructions are chosen once
 for each robot. There are special instructions for a translation along a coordinate axis and for a rotation

@@ -46,7 +46,7 @@ def number(context: Any, s: Any, row: Any) -> Any:
 
 @intrinsic
 def number_if(context: Any, wanted: Any, s: Any, row: Any) -> Any:
-    """Return the number in a row if it is wanted.
+    """Return the number in a row of scratch memory if it is needed.
 
     If `wanted` is the unused number `nothing()` of the module `numbers`, return `nothing()`.
     """
