@@ -285,7 +285,7 @@ def forget(browser: Browser) -> None:
 
 
 def scroll_through(browser: Browser) -> None:
-    """Bring each view into sight, so that it is drawn, and return to the top."""
+    """Scroll to each view, so that the browser draws it, and return to the top."""
     for k in range(browser.js("return document.querySelectorAll('canvas').length")):
         browser.js("document.querySelectorAll('canvas')[arguments[0]].scrollIntoView()", k)
         browser.settle()

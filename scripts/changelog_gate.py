@@ -27,7 +27,7 @@ class CannotTellError(Exception):
 
 
 def complaint(changed: Collection[str], messages: str) -> str | None:
-    """Return the problem of a branch with these changed files and commit messages, or None."""
+    """Return a message if a branch lacks a line in CHANGELOG.md; None if these changes need none."""
     package = sorted(path for path in changed if path.startswith("urdfkin/"))
     if not package or PAGE in changed or _ARGUED.search(messages):
         return None

@@ -11,10 +11,11 @@
 `--library` creates a virtual environment and installs the library there by pip, unless it is there already;
 `--package torch==2.13.0+cpu` chooses the version. `scripts/run_exported.py` describes the checks.
 
-When a function is written, it is compared with Pinocchio. When it runs, it is compared with results at fifty
-digits. The function runs with GCC and Clang if they are installed, for one configuration and in batches. It
-also runs with NumPy, and with NumPy as an array API namespace, in both precisions. GCC compiles
-CUDA's host functions. Exit 1: a number is outside the derived bound, or a compiler prints a warning.
+Each exported function is compared with Pinocchio before it is written. The results of the exported code are
+compared with results at fifty digits. The code runs with GCC and Clang if they are installed, for one
+configuration and in batches. It also runs with NumPy, and with NumPy as an array API namespace, in both
+precisions. GCC compiles CUDA's host functions. Exit 1: a number is outside the derived bound, or a compiler
+prints a warning.
 """
 
 from __future__ import annotations

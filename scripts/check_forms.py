@@ -58,7 +58,8 @@ class Subject:
     def off(self, found: FloatArray) -> tuple[float, float]:
         """Return the distance from Pinocchio (m), and the deviation from the table divided by the bound."""
         apart = np.abs(found - self.table.placement(self.job.q))[:, :3].max(axis=(-1, -2))
-        # urdfkin and Pinocchio round differently. A table without lengths still has rounding of its angles.
+        # urdfkin and Pinocchio round differently.
+        # A table without lengths still has rounding errors of its angles.
         allowed = 2.0 * np.maximum(self.table.rounding(self.job.q), EPS * of_rows(len(self.table.rows)))
         return float(np.abs(found - self.theirs)[:, :3, 3].max()), float((apart / allowed).max())
 

@@ -94,7 +94,7 @@ def configurations(robot: urdfkin.Robot) -> list[dict[str, Any]]:
 
 
 def expected(robot: urdfkin.Robot) -> list[dict[str, Any]]:
-    """Return the poses of all links in the base for each configuration; Pinocchio checks each pose."""
+    """Return the poses of all links in the base frame for each configuration; Pinocchio checks each pose."""
     q = robot.sample(CONFIGURATIONS, seed=0)
     links = list(robot.link_names)
     T = robot.placement(q, links)

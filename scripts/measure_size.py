@@ -3,8 +3,8 @@
     python scripts/measure_size.py           print the sizes, and write the page
     python scripts/measure_size.py --print   only print them
 
-The environment that scripts/try.sh makes is enough to print. To write the page, all extras must be
-installed, as scripts/test.sh does. Python, pip and bytecode are not counted.
+The environment that scripts/try.sh makes is enough to print. To write the page, install all extras, for
+example by scripts/test.sh. Python, pip and bytecode are not counted.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Generate code for one robot, frame and quantity; its speed is a limit for the speed of a general kernel.
+"""Generate code for one robot, frame and quantity; its speed is an upper limit for a general kernel.
 
 The textbook's equations run once on CasADi's symbols. The resulting expressions contain the robot's
 constants, without products with 0 and 1. CasADi writes these expressions as straight-line C code, which the

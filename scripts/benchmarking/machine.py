@@ -1,7 +1,7 @@
 """Describe the machine, and measure the memory of a batch and the time of a first use in new processes.
 
-This module runs itself in a new process, in which no kernel is compiled and no library is loaded yet. Linux
-reports the largest memory size of the process since its last reset.
+This module runs itself in a new process, in which no kernel is compiled and no library is loaded yet. For
+each process, Linux reports the largest memory size since the last reset of this number.
 """
 
 from __future__ import annotations

@@ -92,7 +92,7 @@ class DifferenceError(Exception):
 
 
 def agree(works: Sequence[Work], reference: Work, what: str) -> None:
-    """Compute all results once, as a warm-up too, and compare them with the result of `reference`.
+    """Compute all results once, also as a warm-up, and compare them with the result of `reference`.
 
     Raises:
         DifferenceError: a result differs; the message has the contender and the largest difference.

@@ -16,7 +16,7 @@ from urdfkin.errors import InputError, RepresentationSingularityError, UnknownNa
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 
-#: Number of frames of a robot whose placements are computed in one pass and also one by one.
+#: Largest numbers of frames for which quantities are computed in one pass, and one by one.
 TOGETHER, ALONE = 12, 2
 #: Number of frame names that are looked up for each robot.
 NAMES = 6
