@@ -66,8 +66,8 @@ UNFOLD = "document.querySelectorAll('details').forEach((part) => { part.open = t
 _PRESSES, _PAGES = 60, 12
 #: Errors of the HTML checker that the site's theme causes.
 FOREIGN = ("Attribute “autocomplete” is only allowed when the input type is",)
-#: Options with which Chromium reports a mouse. Without a mouse, the site's theme omits elements that keyboard
-#: users need, and the audit tests these elements.
+#: Options with which Chromium reports a mouse.
+#: Without a mouse, the site's theme omits elements for keyboard users, which the audit must test.
 _MOUSE = (
     "--blink-settings=primaryHoverType=2,availableHoverTypes=2,primaryPointerType=4,availablePointerTypes=4"
 )
@@ -140,7 +140,7 @@ def html_checker() -> Path | None:
 
 
 def disagreement() -> Document:
-    """Return the report of a disagreement, for which the oracle's velocities are changed by a millionth."""
+    """Return a report with disagreements, caused by a relative error of 1e-6 in the oracle's velocities."""
     right = PinocchioOracle.velocities
 
     def bent(*args: Any) -> Any:
@@ -268,7 +268,7 @@ def viewer(plays: bool = False) -> Iterator[Page]:
 
 def load(browser: Browser, page: Page) -> None:
     """Open a page and wait until it is drawn."""
-    browser.chrome.get("about:blank")  # another fragment of the same page loads nothing
+    browser.chrome.get("about:blank")  # otherwise a new fragment would not reload the page
     browser.chrome.get(page.url)
     if page.ready:
         browser.wait(page.ready)
@@ -285,7 +285,7 @@ def forget(browser: Browser) -> None:
 
 
 def scroll_through(browser: Browser) -> None:
-    """Bring each view into sight, so that it is drawn, and return to the top."""
+    """Scroll to each view, so that the browser draws it, and return to the top."""
     for k in range(browser.js("return document.querySelectorAll('canvas').length")):
         browser.js("document.querySelectorAll('canvas')[arguments[0]].scrollIntoView()", k)
         browser.settle()

@@ -58,7 +58,7 @@ class Plan:
         joints: Numbers of joints of the chains.
         numbers: Number of values in a chain's batch of Jacobians.
         frames: Numbers of frames whose placements are computed in one pass.
-        frame_configurations: Number of configurations of the batches for `frames`.
+        frame_configurations: Number of configurations of a batch for the measurement of `frames`.
         sizes: Sizes of batches.
         memory: Number of configurations for the measurement of memory.
     """

@@ -3,9 +3,9 @@
     python scripts/changelog_gate.py [--base REVISION]
 
 The base is the commit at which the branch left `main` (or `origin/main`). Files that were only moved do not
-count as changed. If no user notices the change, add `No-changelog: REASON` to a commit of the branch. If
-there is nothing to compare with (main itself, a shallow clone, an unpacked archive, no git), the script
-reports it and passes.
+count as changed. If no user notices the change, add the line `No-changelog: <reason>` to a commit message of
+the branch. If there is nothing to compare with (main itself, a shallow clone, an unpacked archive, no git),
+the script reports it and passes.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class CannotTellError(Exception):
 
 
 def complaint(changed: Collection[str], messages: str) -> str | None:
-    """Return the problem of a branch with these changed files and commit messages, or None."""
+    """Return a message if a branch lacks a line in CHANGELOG.md; None if these changes need none."""
     package = sorted(path for path in changed if path.startswith("urdfkin/"))
     if not package or PAGE in changed or _ARGUED.search(messages):
         return None
@@ -50,7 +50,7 @@ def left_main(root: Path) -> str:
     """Return the commit at which HEAD left main.
 
     Raises:
-        CannotTellError: HEAD is on main, main does not exist, or the clone is too shallow.
+        CannotTellError: the commit HEAD is on main, main does not exist, or the clone is too shallow.
     """
     head = git(root, "rev-parse", "HEAD").strip()
     for main in ("origin/main", "main"):

@@ -8,9 +8,11 @@
 The script checks every robot of the catalogue, every quantity and all three reference frames. Fused
 multiply-adds are explicit, and urdfkin has its own sine and cosine, so digests are equal on every machine.
 If results differ from the stored results, the script prints the largest difference as a fraction of the
-stored bound. An enclosure must lie in the stored enclosure. Exit 1: a bit differs unexpectedly, an interval
-is not within the stored interval, or, with `--within SHARE`, a result differs by more than this fraction of
-its bound.
+stored bound. An enclosure must lie in the stored enclosure.
+
+Exit 1: results of this run have different bits, a result differs from the stored result, or an interval is
+not within the stored interval. With `--within SHARE`, the difference from a stored result may be this
+fraction of its bound.
 """
 
 from __future__ import annotations
@@ -42,16 +44,14 @@ from urdfkin.verify.call import Call
 from urdfkin.verify.quantities import Quantity, recursive_quantities
 from urdfkin.verify.verifier import bound_of
 
-#: Numbers of configurations of the tested batches.
-#: The numbers are: fewer than a block of eight, one block, a little more than a block, and many blocks with a
-#: remainder.
+#: Numbers of configurations of the tested batches. A block has eight configurations.
+#: The sizes are: part of a block, one block, a little more than a block, and many blocks and a remainder.
 LENGTHS = (1, 2, 7, 8, 9, 100)
 #: Numbers of threads of a batch; None: urdfkin's default.
 THREADS = (None, 1, 2, 3)
 #: Number of configurations, and number of frames, whose results the script stores.
 KEPT, FRAMES = 9, 6
-#: Index of the configuration that is computed with Python numbers.
-#: Names of the two ways to compute it.
+#: Index of the configuration that is computed with Python numbers and with a compiled kernel.
 INTERPRETED = 3
 WAYS: tuple[Way, ...] = ("interpreted", "compiled")
 
@@ -198,7 +198,7 @@ def digest(now: Arrays) -> str:
 def share(what: str, now: Arrays, stored: Arrays) -> float:
     """Return the difference from the stored result as a fraction of the stored bound.
 
-    The fraction is 0 if all bits are equal.
+    The result is 0 if all bits are equal.
     """
     if same(now[what], stored[what]):
         return 0.0
@@ -230,7 +230,7 @@ def compared(name: str, now: Arrays, stored: Arrays) -> tuple[str, float]:
 # -- enclosures ------------------------------------------------------------------------------------------
 
 
-#: Numbers of decimal digits of enclosures. The first is 15, as in a double; None is the default number.
+#: Numbers of decimal digits of the compared enclosures: 15 digits, and the default number (None).
 _DIGITS = (15, None)
 
 
@@ -261,7 +261,7 @@ def enclosures(subject: Subject) -> dict[str, Any]:
 def nested(name: str, now: Arrays, stored: Arrays) -> tuple[str, float]:
     """Compare intervals with stored intervals.
 
-    Return a line of text, and the number of intervals that are not inside the stored interval.
+    Return a line of text, and the number of intervals that are not inside their stored intervals.
     """
     words, wrong = [], 0
     for digits in _DIGITS:

@@ -11,10 +11,11 @@
 `--library` creates a virtual environment and installs the library there by pip, unless it is there already;
 `--package torch==2.13.0+cpu` chooses the version. `scripts/run_exported.py` describes the checks.
 
-When a function is written, it is compared with Pinocchio. When it runs, it is compared with results at fifty
-digits. The function runs with GCC and Clang if they are installed, for one configuration and in batches. It
-also runs with NumPy, and with NumPy as an array API namespace, in both precisions. GCC compiles
-CUDA's host functions. Exit 1: a number is outside the derived bound, or a compiler prints a warning.
+Each exported function is compared with Pinocchio before it is written. The results of the exported code are
+compared with results at fifty digits. The code runs with GCC and Clang if they are installed, for one
+configuration and in batches. It also runs with NumPy, and with NumPy as an array API namespace, in both
+precisions. GCC compiles CUDA's host functions. Exit 1: a number is outside the derived bound, or a compiler
+prints a warning.
 """
 
 from __future__ import annotations
@@ -105,10 +106,10 @@ def subjects(tips: bool) -> Iterator[tuple[str, Robot, str]]:
 
 
 def found_of(robot: Robot, frame: str, ways: Collection[str]) -> dict[str, Any]:
-    """Return the result of a leaf frame.
+    """Check the exported code of a frame.
 
-    The result contains the largest errors as fractions of their bounds, and states whether all errors are
-    within the bounds.
+    The result has the largest errors as fractions of their bounds. It states whether all errors are within
+    the bounds.
     """
     wanted = QUANTITIES if robot.nv else ("placement",)
     with tempfile.TemporaryDirectory() as folder:
@@ -167,7 +168,7 @@ def check_library(library: str, environment: Path, package: str | None, keep: Pa
 
 
 def _files(library: str, folder: Path) -> Iterator[Path]:
-    """Write the files of all tips in a library's language, and as `array`."""
+    """Write two files for each tip: one in a library's export format, and one in the format `array`."""
     for number, (_, robot, frame) in enumerate(subjects(tips=True)):
         wanted = ("placement", "jacobian", "velocity", "acceleration") if robot.nv else ("placement",)
         if 0 < robot.nv <= _HESSIANS and all(joint.nv <= 1 for joint in robot.tree.joints):

@@ -5,8 +5,8 @@
     python scripts/check_forms.py --toolbox PYTHON     # another interpreter, with roboticstoolbox
     python scripts/check_forms.py --forms sympy latex  # some formats only
 
-LaTeX tables are compiled and must fit on the page of an article. Exit 1: the difference of a format is
-larger than rounding, or a table does not fit.
+LaTeX tables are compiled and must fit on the page of an article. Exit 1: results of a format differ by more
+than rounding, or a LaTeX table is too wide.
 """
 
 from __future__ import annotations
@@ -58,7 +58,8 @@ class Subject:
     def off(self, found: FloatArray) -> tuple[float, float]:
         """Return the distance from Pinocchio (m), and the deviation from the table divided by the bound."""
         apart = np.abs(found - self.table.placement(self.job.q))[:, :3].max(axis=(-1, -2))
-        # urdfkin and Pinocchio round differently. A table without lengths still has rounding of its angles.
+        # urdfkin and Pinocchio round differently.
+        # A table without lengths still has rounding errors of its angles.
         allowed = 2.0 * np.maximum(self.table.rounding(self.job.q), EPS * of_rows(len(self.table.rows)))
         return float(np.abs(found - self.theirs)[:, :3, 3].max()), float((apart / allowed).max())
 

@@ -3,8 +3,8 @@
     python scripts/check_growth.py                      # 1, 4, 16 and 64 MB of every kind of content
     python scripts/check_growth.py --sizes 1,4 number   # kinds with "number" in the name
 
-If the cost grows linearly, all numbers in a row are equal. Each document is checked in its own process. A
-check that takes longer than `--patience` ends its row.
+If the cost grows linearly, all numbers in a row are equal. Each document is checked in its own process. If a
+check takes longer than `--patience`, the larger documents of the same row are not checked.
 
 Each kind of content is a function that takes a size in bytes, and returns a URDF of about this size with this
 content many times. A faulty exporter or an attacker could write such files. Most are rejected. The time and
@@ -79,7 +79,7 @@ KINDS: dict[str, Kind] = {
         _filled(n, lambda i: f'<joint name="j{i}" type="fixed"><origin xyz="a b c"/></joint>')
     ),
     "signs and points": lambda n: _attribute(f'xyz="{"+." * (n // 2)} 0 0"'),
-    # inputs with many comments that address urdfkin
+    # inputs with many comments that suppress findings
     "comments that silence nothing": lambda n: _robot(
         '<link name="l"/>' + _filled(n, lambda i: f"<!-- urdfkin: ignore[x{i}] y -->\n")
     ),

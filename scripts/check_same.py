@@ -36,8 +36,8 @@ from urdfkin.comparison.result import Interval, Sameness, Verdict
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import catalogue
 
-#: Largest rounding error of a placement in a robot of some metres. The unit is metres for positions; entries
-#: of rotation matrices have no unit.
+#: Largest rounding error of a placement in a robot of some metres.
+#: The unit is metres for positions; entries of rotation matrices have no unit.
 ROUNDING = 1e-10
 
 
@@ -52,7 +52,7 @@ def pair(name: str, what: str) -> dict[str, Any] | None:
     said = {"robot": name, "change": what, "verdict": found.verdict.value, "seconds": seconds}
     if what in ALIKE:
         return said | {"right": bool(found) and _places_agree(found, a, b)}
-    # Rounding to four digits may leave a file unchanged; the interval must be right in either case.
+    # Rounding to four digits may leave a file unchanged, so the verdict of this change is not checked.
     right = found.verdict is Verdict.DIFFERS or what == "rounded"
     if (worst := _farthest(found)) is None:
         return said | {"right": right}
@@ -60,9 +60,10 @@ def pair(name: str, what: str) -> dict[str, Any] | None:
 
 
 def _farthest(found: Sameness) -> Interval | None:
-    """Return the interval of the farthest frame.
+    """Return the interval of the frame with the largest distance between the two robots.
 
-    Frames that are only different tools do not count. The result is None if the interval has no upper end.
+    Frames that `same` reports as moved on their bodies are left out. The result is None if the interval has
+    no upper end.
     """
     frames = [frame for frame in found.frames if frame.frame_b not in _tools(found) and frame.q_a]
     worst = max(frames, key=lambda frame: (frame.upper, frame.lower), default=None)

@@ -1,6 +1,6 @@
 """Count the files of urdfkin whose functions run during `load` and during `same`.
 
-A reader who follows a call through the code opens about as many files. Code that runs while a module is
+The count states how many files a reader must open to follow such a call. Code that runs while a module is
 imported does not count.
 
     python scripts/count_files.py               load and same of two robots of this repository
@@ -48,13 +48,13 @@ def files_run(call: Callable[[], object]) -> list[str]:
 
 
 def files_of_load(source: Path) -> list[str]:
-    """Return the files through which `load` runs."""
+    """Return the files whose functions run during `load`."""
     load = urdfkin.load
     return files_run(lambda: load(source))
 
 
 def files_of_same(first: Path, second: Path) -> list[str]:
-    """Return the files through which `same` runs.
+    """Return the files whose functions run during `same`.
 
     The forward recursion runs as a compiled kernel, and its files do not count.
     """

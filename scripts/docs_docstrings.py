@@ -1,6 +1,6 @@
 """Extend mkdocs so that doctests in docstrings are shown as blocks of code; mkdocs.yml refers to this module.
 
-The docstrings of `Robot` are the same as in `help`, with the arguments that the methods of `Robot` share. The
+The docstrings of `Robot` are as in `help`: each one lists also the arguments that several methods share. The
 heading `Example:` is removed, because the site would draw a box around such a section.
 """
 

@@ -23,8 +23,9 @@ LESSONS = "lessons/"
 #: Pattern of the equation numbers in the first line of a docstring.
 _EQUATIONS = re.compile(r" \(eq\. [^)]*\)")
 _ROBOT = "urdfkin.robot.Robot"
-#: Pages of the library. For each path: title, introduction, and names. A name of the package and the name of
-#: a method of `Robot` are given without a path; any other class has its full path.
+#: Pages of the library. For each path: title, introduction, and names.
+#: Names of the package and names of methods of `Robot` have no path.
+#: The name of any other class has its full path.
 LIBRARY: dict[str, tuple[str, str, str]] = {
     "api/robot.md": (
         "Load a robot",

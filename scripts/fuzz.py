@@ -41,7 +41,7 @@ from scripts.fuzzing import GOOD, Case, calibrations, mjcf, robots, tables
 from scripts.fuzzing.mutations import LARGEST, mutant
 from urdfkin.urdf.catalogue import catalogue
 
-#: The message of a worker that is ready; a worker becomes ready after it has compiled its kernels.
+#: The message that a worker sends after it has compiled its kernels.
 READY, FIRST_WAIT = "ready", 300.0
 
 MUTANTS = "mutants"

@@ -49,14 +49,14 @@ def usage() -> dict[str, float]:
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return {
         "MiB": pages * os.sysconf("SC_PAGE_SIZE") / 2**20,
-        "descriptors": len(os.listdir("/proc/self/fd")),  # noqa: PTH208  one less than a Path would open
+        "descriptors": len(os.listdir("/proc/self/fd")),  # noqa: PTH208  a Path opens one more descriptor
         "objects": len(gc.get_objects()),
     }
 
 
 def measure(n: int) -> list[dict[str, float]]:
     """Return the memory, the open descriptors and the number of objects after each part of the n robots."""
-    # All kernels are loaded at first use. Otherwise a kernel that pays only later would count as a leak.
+    # All kernels are loaded at first use. Otherwise a kernel that is loaded later would look like a leak.
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), only("compiled"):
         warnings.simplefilter("ignore")
         found = []

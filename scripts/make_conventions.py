@@ -66,8 +66,8 @@ ARM = _robot(
     _joint("b", "revolute", "l1", "l2", _axis("0 1 0")),
     _joint("a", "revolute", "l2", "l3", _axis("0.6 0 0.8")),
 )
-#: A robot that shows the order of coordinates. Two limbs are on the base, and a third limb is on the first
-#: limb.
+#: A robot that shows the order of coordinates.
+#: Two limbs are attached to the base, and a third limb is attached to the first limb.
 LIMBS = _robot(
     _joint("z", "revolute", "base", "l1"),
     _joint("a", "revolute", "base", "l2"),
@@ -169,7 +169,7 @@ class MeasuredMotion:
         mujoco.mj_rnePostConstraint(self.mj_model, self.mj_data)
         self.body = self.mj_model.body("l3").id
 
-    # The candidate definitions use only placements at times close to t = 0.
+    # The reference values are numerical derivatives of placements with respect to time.
 
     def path(self, t: float) -> FloatArray:
         """Return T_world_frame at time t, for q(t) = q + v t + a t^2 / 2."""
@@ -194,10 +194,10 @@ class MeasuredMotion:
         return R, ps[0], first(ps), axial(R_rate @ R.T), second(ps), axial(second(Rs) @ R.T)
 
     def velocity_readings(self) -> dict[str, FloatArray]:
-        """Return candidate velocities.
+        """Return the frame's velocity according to each of six candidate definitions.
 
-        The candidates combine two orders of the linear and angular parts with three choices of axes and
-        point.
+        A definition states the order of the linear and the angular part (two choices), and the axes and the
+        reference point (three choices).
         """
         R, p, v, w, _, _ = self.motion()
         points = {
@@ -398,7 +398,7 @@ def _reads(text: str) -> Callable[[str], str]:
 
 
 def _free() -> list[Row]:
-    """Return the rows about a free body: order of q, and axes of v."""
+    """Return the two rows of the table about a free body: the order of q, and the axes of v."""
     import mujoco  # noqa: PLC0415
     import pinocchio as pin  # noqa: PLC0415
 

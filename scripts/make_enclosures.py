@@ -142,9 +142,9 @@ def _parts(proof: Enclosures) -> tuple[Enclosure, ...]:
 
 
 def _larger_end(part: Enclosure) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    """Return an array with the shape of the enclosure.
+    """Return the largest absolute value of the ends of all intervals.
 
-    Each element is the largest absolute value of the ends of all intervals.
+    The result is an array with the shape of the enclosure; all its elements have this value.
     """
     return np.full_like(part.lower, np.maximum(np.abs(part.lower), np.abs(part.upper)).max(initial=1e-300))
 
@@ -152,7 +152,7 @@ def _larger_end(part: Enclosure) -> np.ndarray[tuple[int, ...], np.dtype[np.floa
 def _inside(parts: list[Enclosure], side: str) -> str:
     """Return the fraction of a library's numbers that lie in their proven intervals.
 
-    Intervals of width 0 do not count.
+    Numbers with an interval of width 0 are left out.
     """
     found = [part.contains(getattr(part, side))[part.width > 0.0] for part in parts]
     return f"{np.concatenate(found).mean():.0%}"

@@ -31,7 +31,7 @@ FAMILIES = {
     "7": "Inertials, geometry and materials",
 }
 
-#: For each code of a finding: the consequences of this warning for catalogue robots that have it.
+#: For each code: what the warning means for the robots of the catalogue that have it.
 REMARKS = {
     "URDF207": "URDF has no origin in a link; every reader ignores this pose.",
     "URDF405": "A slash in a name is legal; urdfkin does not use names as paths.",

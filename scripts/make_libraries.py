@@ -40,11 +40,12 @@ DATA: dict[str, Any] = tomllib.loads(LISTED.read_text("utf-8"))
 FEATURES = {name: features()[name] for name in DATA["features"]}
 #: Number of random configurations for which each feature is tested.
 CONFIGURATIONS = 3
-#: Largest difference (m, and entries of a rotation matrix) of a pose that counts as right. Libraries that
-#: compute in double precision differ by less than 1e-14 for these robots. A misread element causes a
-#: difference of more than 1e-3.
+#: Largest difference (m, and entries of a rotation matrix) of a pose that counts as right.
+#: For these robots, libraries that compute in double precision differ by less than 1e-14.
+#: A misread element causes a difference of more than 1e-3.
 RIGHT = 1e-9
-#: Longest time (seconds) that a library may take for all features that it has not read yet.
+#: Time limit (seconds) for a library to read all features.
+#: After a crash or a timeout, the limit begins again for the remaining features.
 _SECONDS = 60
 _QUOTED = 160
 
@@ -93,7 +94,7 @@ def configurations(robot: urdfkin.Robot) -> list[dict[str, Any]]:
 
 
 def expected(robot: urdfkin.Robot) -> list[dict[str, Any]]:
-    """Return the poses of all links in the base for each configuration; Pinocchio checks each pose."""
+    """Return the poses of all links in the base frame for each configuration; Pinocchio checks each pose."""
     q = robot.sample(CONFIGURATIONS, seed=0)
     links = list(robot.link_names)
     T = robot.placement(q, links)
@@ -241,7 +242,7 @@ def _documented(figures: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _reasons(cells: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the lines of a table with a line for each message or note of each library."""
+    """Yield the Markdown table of messages and notes: each row has a library and one of its messages."""
     yield "| Library | Features | Message, or the joints |\n|---|---|---|\n"
     for library, column in cells.items():
         reasons: dict[str, list[str]] = {}

@@ -112,7 +112,7 @@ def photograph_viewer(folder: Path) -> None:
             with opened(folder / f"{name}{theme}", width=width, height=height, dark=dark) as browser:
                 browser.chrome.get(server.address)
                 browser.wait("return document.querySelector('canvas') !== null")
-                time.sleep(30)  # shapes fade in, and a software renderer is slow
+                time.sleep(30)  # shapes appear slowly without a GPU
                 browser.js(
                     "document.querySelectorAll('[class*=Notification] button').forEach(b => b.click())"
                 )
@@ -122,7 +122,7 @@ def photograph_viewer(folder: Path) -> None:
                 time.sleep(5)
                 browser.js(
                     "window.requestAnimationFrame = () => 0"
-                )  # a frame takes seconds; keep only the last frame
+                )  # drawing takes seconds: stop after the current picture
                 time.sleep(2)
                 keep(browser, f"{name}{theme}")
     finally:

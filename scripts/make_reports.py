@@ -36,7 +36,7 @@ def _table(title: str, part: dict[str, Any]) -> Iterator[str]:
 
 
 def _type(entry: dict[str, Any]) -> str:
-    """Return a type as text: `number or null`, `list of Check`, or the allowed values."""
+    """Return a type as text, such as `number or null`, `list of Check`, or the allowed values of an enum."""
     if "$ref" in entry:
         return f"`{entry['$ref'].rpartition('/')[2]}`"
     if "anyOf" in entry:

@@ -156,7 +156,10 @@ def integral_of_w(figure: Any) -> None:
 
 
 def euler_singularity(figure: Any) -> None:
-    """Plot the condition number of Omega against the middle angle, for ZYZ and roll-pitch-yaw."""
+    """Plot the condition number of Omega against the middle angle, for ZYZ and roll-pitch-yaw.
+
+    The matrix Omega converts the rates of the angles to an angular velocity.
+    """
     axes = figure.subplots()
     middle = np.linspace(0.0, np.pi, 1801)[1:-1]
     for name, color, dashes, label in (

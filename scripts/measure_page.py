@@ -1,7 +1,7 @@
 """Measure the times to write, open, search and expand a report of thousands of robots in Chromium.
 
-The robots in the report are copies of the robots of a real validation, with other names. The script prints
-medians over new browser profiles. The script needs Debian's chromium and chromium-driver.
+The script validates a few robots, and copies their results many times under other names. It prints medians
+over several runs, each with a new browser profile. The script needs Debian's chromium and chromium-driver.
 
     python scripts/measure_page.py --robots 2000
 """

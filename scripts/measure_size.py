@@ -3,8 +3,8 @@
     python scripts/measure_size.py           print the sizes, and write the page
     python scripts/measure_size.py --print   only print them
 
-The environment that scripts/try.sh makes is enough to print. To write the page, all extras must be
-installed, as scripts/test.sh does. Python, pip and bytecode are not counted.
+The environment that scripts/try.sh makes is enough to print. To write the page, install all extras, for
+example by scripts/test.sh. Python, pip and bytecode are not counted.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pathlib import Path
 
 try:
     from packaging.requirements import Requirement
-except ModuleNotFoundError:  # an environment without extras has only pip's copy
+except ModuleNotFoundError:  # without extras, pip contains the only copy of this library
     from pip._vendor.packaging.requirements import Requirement  # type: ignore[assignment,unused-ignore]
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
@@ -35,7 +35,7 @@ def closure(name: str, extras: Iterable[str] = (), without: str = "") -> dict[st
     Args:
         name: A package.
         extras: Extras of the package that are included.
-        without: A package that is left out, together with all packages that only this package needs.
+        without: A package to leave out, together with all packages that only this package needs.
 
     Raises:
         PackageNotFoundError: a package is not installed.

@@ -1,6 +1,6 @@
 """Measure the processor time until a first result, and write this time into docs/performance.md.
 
-    python scripts/measure_start.py            # measure, write the table; exit 1 if a bar is missed
+    python scripts/measure_start.py            # measure, write the table; exit 1 if a time is too long
     python scripts/measure_start.py --rounds 3
 
 Each row is a new process, whose time is compared with the time of `import numpy, pinocchio` in the same
@@ -40,8 +40,8 @@ class Row:
     Attributes:
         what: Name of the process on the page.
         words: Arguments of the interpreter; ROBOT stands for a URDF that is not in the catalogue.
-        most: Largest allowed time (the bar), in multiples of the time of `import numpy, pinocchio`. None: the
-            time has no limit.
+        most: Limit of the time, in multiples of the time of `import numpy, pinocchio`. None: the time has no
+            limit.
         fresh: Whether the process starts with an empty kernel cache.
     """
 
@@ -121,13 +121,13 @@ def table(found: Sequence[Row]) -> str:
 
 
 def missed(found: Sequence[Row]) -> list[str]:
-    """Return the names of the rows that exceed their bar."""
+    """Return the names of the rows whose time exceeds its limit."""
     base = found[0].median
     return [row.what for row in found if row.most is not None and row.median > row.most * base]
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Measure and write the page; return 1 if a bar is missed."""
+    """Measure and write the page; return 1 if a time exceeds its limit."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     parser.add_argument("--rounds", type=int, default=11, help="number of processes for each row")
     given = parser.parse_args(words)

@@ -42,7 +42,7 @@ _QUICK, _SLOW = "not slow and not browser", "slow and not browser"
 
 @dataclass(frozen=True)
 class Mutant:
-    """A mistake that is made in a file.
+    """A change of a file that introduces a mistake, which a test should detect.
 
     Attributes:
         name: Name for --only.
@@ -113,8 +113,8 @@ def judge_named(slip: Named, *, timeout: float) -> Outcome:
     return Outcome(mutant, word, by, round(time.perf_counter() - begin, 1))
 
 
-#: A server that forks a process for each run of tests. The server has already imported the foreign libraries,
-#: because importing them takes longer than most tests.
+#: A server that forks a process for each run of tests.
+#: The server has already imported the foreign libraries, which takes longer than most tests.
 _READY = multiprocessing.get_context("forkserver")
 _READY.set_forkserver_preload(["numba", "pinocchio", "pytest"])
 
@@ -136,7 +136,7 @@ def _run(slip: dict[str, str], tests: list[str], timeout: float) -> tuple[str, s
 
 
 def _ask(slip: dict[str, str], tests: list[str], output: str) -> None:
-    """Make the mistake in this new process and its children, run the tests, and exit with pytest's code."""
+    """Inject a mutant into this new process and its children, run the tests, and exit with pytest's code."""
     import pytest  # noqa: PLC0415  only in child processes
 
     hook = ROOT / "scripts" / "mutating" / "hook"

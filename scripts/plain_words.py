@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
-#: For each pattern: the plain form. In a blind test, a reader did not understand sentences that contain such
-#: a pattern.
+#: For each pattern: the plain form.
+#: In a blind test, a reader did not understand sentences with these patterns.
 PLAIN = {
     r"\bwitness(es)?\b": "oracle",
     r"\b(stands?|stood) still\b": "fixed",
@@ -51,7 +51,7 @@ _FILES_SKIPPED = {"CHANGELOG.md", "plain_words.py"}
 
 
 class Passage(NamedTuple):
-    """A piece of text that a person reads.
+    """A piece of text for people, such as a line of a page, a docstring or a comment.
 
     Attributes:
         file: The file, relative to the repository.

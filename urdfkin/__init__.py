@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from urdfkin.verify.tables import TableError
     from urdfkin.verify.verifier import NotVerifiedWarning
 
-# Imported at first use, so that `import urdfkin` loads neither NumPy nor Pinocchio nor a compiler.
+# These names are imported at their first use: `import urdfkin` loads no NumPy, no Pinocchio and no compiler.
 _HOMES = {
     "BaseMotion": "urdfkin.model.base_motion",
     "Certificate": "urdfkin.verify.certificate",
@@ -69,8 +69,8 @@ _HOMES = {
     "verify_function": "urdfkin.validation.functions",
 }
 
-# Methods of earlier packages call these functions of later packages.
-# An earlier package cannot import from a later package.
+# Methods call these functions, which are in packages that come later in the order of docs/architecture.md.
+# A package cannot import from a package that comes later.
 register_hook("a table in a form", lazy_import("urdfkin.dh.export:export"))
 register_hook("code of a robot", lazy_import("urdfkin.export.forms:code_of_robot"))
 register_hook("code of a chain", lazy_import("urdfkin.export.forms:code_of_chain"))

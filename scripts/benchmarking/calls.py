@@ -27,13 +27,13 @@ class Calls:
         who: Name of the contender.
         names: Variables that the lines use, besides `q`, `v` and `a`.
         lines: The calls; the last line is an expression whose value is the result.
-        store: The lines for a batch, which write their result to `out[k]`. None: `lines` are used, and the
-            value of the last line is stored in `out[k]`.
+        store: The lines for a batch, which write their result to `out[k]`. None: the batch runs `lines`, and
+            stores the value of the last line in `out[k]`.
         order: For each coordinate of the library, its index among urdfkin's coordinates. None: the library
             and urdfkin have the same order.
         shape: Shape of one configuration's result in a batch; None: urdfkin's shape.
         read: Converts a batch's raw results to urdfkin's conventions.
-        read_one: Converts the last line's value to an array like a row of the raw results.
+        read_one: Converts the value of the last line to an array with the layout of one row of a batch.
         remark: See `Work`.
     """
 
@@ -89,14 +89,17 @@ class Calls:
 
 
 def _rows(inputs: Any) -> Any:
-    """Yield (q, v, a) for each configuration. If the inputs lack v and a, yield (q, q, q)."""
+    """Yield (q, v, a) for each configuration. If q is the only input, yield (q, q, q) instead."""
     return zip(*(inputs if len(inputs) == 3 else [inputs[0]] * 3), strict=True)
 
 
 def _function(
     names: Mapping[str, Any], arguments: str, head: str, body: tuple[str, ...]
 ) -> Callable[..., Any]:
-    """Make a function with `names` as local variables; its code is `head` with the block `body` inside."""
+    """Make a function whose code is the line `head` and, below it, the indented lines `body`.
+
+    The code can use `names` as local variables.
+    """
     here = {"rows": _rows, **names}
     parameters = ", ".join((arguments, *(f"{name}={name}" for name in here)))
     source = "\n".join([f"def function({parameters}):", f"    {head}", *(f"        {line}" for line in body)])

@@ -1,4 +1,4 @@
-"""Generate code for one robot, frame and quantity; its speed is a limit for the speed of a general kernel.
+"""Generate code for one robot, frame and quantity; its speed is an upper limit for a general kernel.
 
 The textbook's equations run once on CasADi's symbols. The resulting expressions contain the robot's
 constants, without products with 0 and 1. CasADi writes these expressions as straight-line C code, which the
@@ -178,8 +178,8 @@ def _straight_line(plan: CompiledTree, quantity: str) -> str:
     whole = re.search(r"static int casadi_f0\(.*?\n}", generator.dump(), re.DOTALL)
     if whole is None:
         raise ValueError("CasADi wrote no function")
-    # CasADi's code computes with single doubles, and tests whether an argument is missing. This script
-    # replaces the doubles by vectors, and removes the tests.
+    # CasADi's code computes with single doubles, and tests whether an argument is missing.
+    # The next lines replace the doubles by vectors, and remove the tests.
     text = re.sub(r"(arg\[\d+\])\? (\1\[\d+\]) : 0", r"\2", whole[0])
     text = text.replace("if (res[0]!=0) ", "")
     return re.sub(r"(a\d+)=(-?[\d.][\d.e+-]*);", r"\1=in_all_lanes(\2);", text)

@@ -1,7 +1,7 @@
 """Describe the machine, and measure the memory of a batch and the time of a first use in new processes.
 
-This module runs itself in a new process, in which no kernel is compiled and no library is loaded yet. Linux
-reports the largest memory size of the process since its last reset.
+This module runs itself in a new process, in which no kernel is compiled and no library is loaded yet. For
+each process, Linux reports the largest memory size since the last reset of this number.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from urdfkin.robot import Robot
 
 ROOT = Path(__file__).parents[2]
 #: Keys of the two measured times of a first use.
-#: For the first time, the kernel cache is empty. For the second time, the compiled kernels are on disk.
+#: The first is the time with an empty kernel cache, the second is the time with compiled kernels on disk.
 EMPTY, KEPT = "empty_ms", "kept_ms"
 #: For each quantity whose first use compiles a kernel: its number of inputs.
 #: One input means q; two mean q and v; three mean q, v and a.
@@ -107,7 +107,7 @@ def _use(model: Robot, frame: str, use: str) -> None:
 
 
 def _memory(robot: str, frame: str, quantity: str, count: str, kind: str) -> dict[str, object]:
-    from scripts.benchmarking.subject import Subject  # noqa: PLC0415  not part of a first use
+    from scripts.benchmarking.subject import Subject  # noqa: PLC0415  a first use must not import it
 
     n = int(count)
     with Subject(robot, frame, n) as subject:

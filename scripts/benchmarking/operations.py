@@ -1,8 +1,8 @@
 """Count the additions and multiplications of one configuration by executing them.
 
 The functions of the forward recursion run on numbers that count their operations. A fused multiply-add counts
-as two operations, as in the peak performance that is stated for a machine. Signs are free, and so are
-products with a known 0 or 1.
+as two operations, as in the stated peak performance of a machine. A change of sign and a product with a known
+0 or 1 are not counted.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from urdfkin.compiled.plan import KEPT_ROWS, WIDTH, CompiledTree, Head, Op, prog
 from urdfkin.kinematics.arithmetic import bound
 
 #: Number of operations that compute the sine and the cosine of an angle (`compiled.python_numbers`).
-#: The reduction of the angle needs 10 operations. z and 1 - z/2 with their rounding errors need 8.
+#: The reduction of the angle needs 10 operations.
+#: The terms z and 1 - z/2, and their rounding errors, need 8 operations.
 #: The two polynomials need 20 operations, and the last steps need 13.
 _SINE_COSINE = 51
 
@@ -29,8 +30,8 @@ class Number:
 
     Attributes:
         known: 0 or 1 if the number is this constant; None otherwise.
-        nothing: Whether the number is not needed. Operations with this number cost nothing, and their
-            results are not needed either.
+        nothing: Whether the number is not needed. Operations with such a number are not counted, because
+            their results are not needed either.
         made_of: The operands; empty for an input.
     """
 

@@ -185,7 +185,10 @@ def drake(subject: Subject, quantity: str) -> Iterator[Calls]:
 
 
 def toolbox(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """Yield the calls of the Robotics Toolbox: `jacob0` for a Jacobian, J a + Jdot v for an acceleration."""
+    """Yield the calls of the Robotics Toolbox.
+
+    The calls compute a Jacobian with `jacob0`, and an acceleration as J a + Jdot v.
+    """
     import roboticstoolbox as rtb  # noqa: PLC0415
 
     with warnings.catch_warnings():

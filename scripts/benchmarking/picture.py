@@ -14,7 +14,7 @@ from typing import Any
 from urdfkin.view.figure import BLUE, GREEN, VERMILION, new_figure, save, style
 
 #: For each prefix of a contender's name: the contender's colour, hatch and name in the legend.
-#: The last entry is for all other contenders.
+#: The last entry applies to all other contenders.
 KINDS = {
     "urdfkin": (BLUE, "", "urdfkin"),
     "Pinocchio": (VERMILION, "////", "Pinocchio"),

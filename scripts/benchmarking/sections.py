@@ -28,8 +28,8 @@ from scripts.benchmarking.timing import Row, Table, Work, agree, measure
 from urdfkin.model.tree import FloatArray
 
 #: Names of three measurements of Pinocchio in a Python loop.
-#: Two use Pinocchio's cheapest calls, with and without storing the results.
-#: The third uses the calls that compute all joints.
+#: The first two measure Pinocchio's cheapest calls, with and without storing the results.
+#: The third one measures the calls that compute all joints.
 STORED = "Pinocchio's cheapest calls, results stored"
 NOT_STORED = "Pinocchio's cheapest calls, nothing stored"
 ALL_JOINTS = "Pinocchio's calls for all joints, results stored"

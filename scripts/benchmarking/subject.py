@@ -140,7 +140,8 @@ def bare_urdf(urdf: str, *, flags: dict[str, str] | None = None) -> str:
 def chain_urdf(joints: int, seed: int = 0) -> str:
     """Return a serial robot of revolute joints with different axes and links of 0.1 m.
 
-    Joint names sort in the chain's order; the frame `TIP` is fixed to the last link.
+    The alphabetical order of the joint names is their order in the chain. The frame `TIP` is fixed to the
+    last link.
     """
     generator = np.random.default_rng(seed)
     axes = generator.standard_normal((joints, 3))

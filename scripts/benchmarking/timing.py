@@ -20,8 +20,8 @@ import numpy as np
 
 from urdfkin.model.tree import FloatArray
 
-#: Allowed difference of results in m, rad, m/s^2, rad/s^2. The limit detects different computations, not
-#: errors of accuracy.
+#: Allowed difference of results in m, rad, m/s^2, rad/s^2.
+#: The limit detects different computations, not errors of accuracy.
 TOLERANCE = 1e-9
 
 
@@ -31,10 +31,10 @@ class Work:
 
     Attributes:
         who: Name of the contender in the tables.
-        n: Number of configurations that `compute` computes; they are the first configurations of the subject.
+        n: Number of configurations: `compute` uses the first `n` configurations of the subject.
         compute: The timed function.
-        result: Returns the results in urdfkin's conventions, for the first configurations; not timed. None if
-            there are no results to compare, as for the task that only writes the output.
+        result: Returns the results in urdfkin's conventions, for the first configurations. It is not timed.
+            None: there are no results to compare; for example, a task only writes the output.
         tolerance: Allowed difference from Pinocchio.
         remark: A remark on the measurement.
     """
@@ -56,7 +56,7 @@ class Table:
         robot: A name of the catalogue, or the number of joints of a chain.
         quantity: jacobian, acceleration or placement.
         numbers: Number of float64 values of one configuration's result.
-        size: The varied number of joints, frames or configurations.
+        size: Number of joints, frames or configurations, whichever the table varies.
     """
 
     section: str
@@ -92,7 +92,7 @@ class DifferenceError(Exception):
 
 
 def agree(works: Sequence[Work], reference: Work, what: str) -> None:
-    """Compute all results once, as a warm-up too, and compare them with the result of `reference`.
+    """Compute all results once, also as a warm-up, and compare them with the result of `reference`.
 
     Raises:
         DifferenceError: a result differs; the message has the contender and the largest difference.

@@ -128,7 +128,7 @@ def _calls(subject: Subject, quantity: str) -> Iterator[Calls]:
 
 
 def _function(quantity: str) -> Callable[..., object]:
-    """Return an empty method with the arguments of a prepared frame's method."""
+    """Return a method without code that has the same arguments as a prepared frame's method."""
 
     class Empty:
         def jacobian(self, q: object, out: object = None) -> object:

@@ -47,7 +47,7 @@ _DOCUMENT = r"""\documentclass{article}
 """
 
 
-class Missing(Exception):  # noqa: N818  it is reported, and the run continues
+class Missing(Exception):  # noqa: N818  not an error: the run continues
     """Error if an interpreter or library of a format is not installed."""
 
 
@@ -179,7 +179,7 @@ def as_urdf(jobs: Sequence[Job], folder: Path) -> Poses:
     found = Poses()
     for job in jobs:
         base, *_, tip = link_names(job.table)
-        with warnings.catch_warnings():  # the warnings are about the limits and axes of the robot itself
+        with warnings.catch_warnings():  # the robot's own limits and axes cause warnings
             warnings.simplefilter("ignore", UrdfWarning)
             path = load(to_urdf(job.table), verify=False).chain(tip, base)
         order = [job.table.joint_names.index(name) for name in path.joint_names]

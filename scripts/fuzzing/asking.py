@@ -16,11 +16,11 @@ from urdfkin.errors import InputError, RepresentationSingularityError, UnknownNa
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 
-#: Number of frames of a robot whose placements are computed in one pass and also one by one.
+#: Largest numbers of frames for which quantities are computed in one pass, and one by one.
 TOGETHER, ALONE = 12, 2
 #: Number of frame names that are looked up for each robot.
 NAMES = 6
-#: Distance of the second base in metres.
+#: Distance of the far base from the world's origin, in metres.
 FAR = 1e6
 
 
@@ -149,7 +149,7 @@ def _names(robot: Robot, q: FloatArray, generator: np.random.Generator) -> Itera
     for i in generator.permutation(len(asked))[:NAMES]:
         try:
             yield f"placement of {asked[i]!r}", robot.placement(q, asked[i])
-        except UnknownNameError:  # the name is `joint:NAME`, but only a link has the NAME
+        except UnknownNameError:  # for example `joint:x`, if x is only a link
             if asked[i] in own:
                 raise
         except InputError:  # two frames have this name

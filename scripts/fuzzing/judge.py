@@ -17,8 +17,8 @@ from urdfkin.urdf.lint import Finding, Severity, UrdfError
 from urdfkin.urdf.mjcf import is_mjcf
 from urdfkin.verify.verifier import NotVerifiedWarning
 
-#: Findings about sizes beyond the floating-point range; robots with such findings may have non-finite
-#: results.
+#: Findings about sizes beyond the floating-point range.
+#: Results of robots with such findings may be infinite or nan.
 _SIZES = {"URDF526", "URDF603", "URDF606"}
 
 
@@ -82,7 +82,7 @@ def _computed(robot: Robot, findings: list[Finding], warned: list[warnings.Warni
         for what, result in ask(robot, seed=0):
             if not np.isfinite(result).all():
                 return Outcome(too_large, what)
-        # Tables have no certificate: a warning reports an unverified table.
+        # The certificate does not include tables; for a table that is not verified there is a warning.
         doubted = any(issubclass(w.category, NotVerifiedWarning) for w in warned)
         verified = robot.certificate().verified and not doubted
         ask_prepared(robot, seed=0)
@@ -100,7 +100,7 @@ def _computed(robot: Robot, findings: list[Finding], warned: list[warnings.Warni
 def _unverified(robot: Robot, findings: list[Finding], warned: list[warnings.WarningMessage]) -> Outcome:
     """Return the outcome if some results are not verified.
 
-    The outcome is good if urdfkin reported the reason, and otherwise a failure.
+    The outcome is good if urdfkin reported the reason. Otherwise, it is a failure.
     """
     marked = [finding for finding in findings if finding.oracle is not None]
     if marked:

@@ -18,8 +18,8 @@ from urdfkin.robot import Robot
 
 FAMILIES = ("mjcf-free", "mjcf-equalities", "mjcf-classes")
 _CLASSES = ("outer", "inner", "other")
-#: Allowed relative difference between urdfkin's and MuJoCo's placements, or between the two sides of an
-#: equality.
+#: Allowed relative difference between placements by urdfkin and by MuJoCo.
+#: The two sides of an equality may differ by the same amount.
 _APART = 1e-12
 
 mujoco.set_mju_user_warning(
@@ -99,11 +99,11 @@ class _File:
         return f"<body {' '.join(words)}>{''.join(parts)}</body>"
 
     def site_words(self) -> str:
-        """Return the pose of a site, or nothing."""
+        """Return the attributes of a site's pose, or an empty text."""
         return f'pos="{self.vector()}" {self.orientation()}' if self.rng.random() < 0.7 else ""
 
     def of_class(self) -> str:
-        """Return the attribute of a random class."""
+        """Return the attribute `class` with a random class, or an empty text."""
         named = self.family == "mjcf-classes" and self.rng.random() < 0.4
         return f' class="{self.rng.choice(_CLASSES)}"' if named else ""
 

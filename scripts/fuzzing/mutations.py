@@ -14,7 +14,7 @@ from xml.etree import ElementTree as ET
 
 from scripts.fuzzing import Case
 
-#: Largest size of a mutated file; larger files only take longer.
+#: Largest size of a file to mutate, in bytes. Larger files take longer and test nothing more.
 LARGEST = 150_000
 
 ODD_NUMBERS = (

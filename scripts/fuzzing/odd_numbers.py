@@ -50,7 +50,7 @@ def odd_angle(rng: random.Random) -> float:
 
 
 def direction(rng: random.Random) -> list[float]:
-    """Return a unit vector; half of them are coordinate axes."""
+    """Return a random unit vector, in half of the cases a coordinate axis."""
     if rng.random() < 0.5:
         axis = [0.0, 0.0, 0.0]
         axis[rng.randrange(3)] = rng.choice((1.0, -1.0))

@@ -1,7 +1,7 @@
 """Make random robots, which are trees with all kinds of joints and some unusual content.
 
-Most of these robots are legal, because no quantity is computed for a rejected robot. A robot depends only on
-the seed, its family and its number.
+Most of these robots are legal: a rejected robot would not test the computations. A robot depends only on the
+seed, its family and its number.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from scripts.fuzzing import Case
 from scripts.fuzzing import odd_numbers as odd
 from urdfkin.urdf.records import FURTHER_LIMITS
 
-#: Kinds of unusual content, one for each family. The family "everything" has a random selection.
+#: Kinds of unusual content, one for each family.
+#: In addition, robots of the family "everything" have several random kinds.
 ODDITIES = ("names", "prefixes", "versions", "followers", "lengths", "angles", "axes", "limits", "roots")
 FAMILIES = (*ODDITIES, "everything")
 
@@ -187,7 +188,7 @@ class _Robot:
         return f"<mimic {' '.join(words)}/>"
 
     def foreign(self) -> str:
-        """Return an element of another program, or nothing."""
+        """Return an element that belongs to another program, or an empty text."""
         if "prefixes" not in self.strange or self.rng.random() < 0.6:
             return ""
         return self.rng.choice(_FOREIGN).format(p=self.prefix)

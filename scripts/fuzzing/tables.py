@@ -34,8 +34,8 @@ PIECES = (
     "1e155",
     "(i-1)",
 )
-#: On average, one of every `_ANYWHERE` changes is at any place in the table.
-#: All other changes are in the headings.
+#: On average, one of every `_ANYWHERE` changes is at a random place in the whole table.
+#: All other changes are near the headings.
 _ANYWHERE = 3
 
 

@@ -1,7 +1,7 @@
 """Select the files to mutate, and the nearest tests of each; read the named and the harmless mutants.
 
-A named mutant was once not detected. It replaces a text of a file and has a test that must fail. A harmless
-mutant is listed in docs/mutation.md: no test detects it, and no test is needed.
+In the past, no test detected the named mutants. A named mutant replaces a text of a file, and one given test
+must now fail. Harmless mutants are listed in docs/mutation.md: no test detects them, and no test is needed.
 """
 
 from __future__ import annotations

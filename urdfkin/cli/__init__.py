@@ -23,9 +23,9 @@ from urdfkin.verify.quantities import by_command
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-#: For each heading of the help page, and for each command name below it: the module, and a summary in one
-#: line. A module of several commands defines `NAME_command` for each, others define `command`. The commands
-#: of the table of quantities come first under `_COMPUTE`.
+#: For each heading of the help page, and for each command below it: the module, and a summary of one line.
+#: A module of several commands defines `NAME_command` for each, others define `command`.
+#: Below `_COMPUTE`, the commands of the table of quantities come first.
 _COMPUTE = "Compute"
 _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {
@@ -92,7 +92,7 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         ),
         "verify": (
             "urdfkin.cli.verify",
-            "Check a function or a program of yours against the same numbers and bounds.",
+            "Compare your function or program with the same numbers, within the same bounds.",
         ),
         "readers": (
             "urdfkin.cli.readers",
@@ -131,8 +131,8 @@ def commands() -> dict[str, tuple[str, str]]:
     return {name: entry for entries in groups().values() for name, entry in entries.items()}
 
 
-#: For each word that users may type instead of a command: the right command. A value that is not a command's
-#: name is a text to suggest.
+#: For each word that users may type instead of a command: the right command.
+#: A value with options, such as "placement --relative-to FRAME", is only printed as a suggestion.
 _SYNONYMS = {
     **dict.fromkeys(("fk", "forward", "forward-kinematics", "pose", "transform", "tf"), "placement"),
     **dict.fromkeys(("relative-placement", "relative-pose"), "placement --relative-to FRAME"),

@@ -112,13 +112,14 @@ def command(
 ) -> None:
     """Fit the parameters of ROBOT to measured poses, and write them back into its own file.
 
-    In the written URDF only the changed numbers differ. Pinocchio checks it at the measured configurations.
+    In the written URDF, only the fitted numbers are changed. Pinocchio checks this URDF at the measured
+    configurations.
     ROBOT may also be the file of a Denavit-Hartenberg table; then its cells are fitted. Without --poses
     and --ur, the command lists which parameters are identifiable in principle.
 
     A calibration that is not plausible is refused with the likeliest reason: joint angles in degrees, rows of
-    q shifted against the poses, or the sign of a joint. Then nothing is written without --force; values that
-    look like degrees also need --radians.
+    q shifted against the poses, or the sign of a joint. A refused calibration is written only with --force.
+    If values look like degrees, --radians is also needed.
 
     Exit 0: verified. 1: Pinocchio disagrees. 2: bad input. 3: not checked, or refused.
     """

@@ -29,8 +29,8 @@ _LINES, _JSON = 10.0, 0.5
 class Pace:
     """Speed in chunks per second and remaining time, measured with a monotonic clock.
 
-    The measurement starts at the last call of `of` before the first chunk is computed, so that the time for
-    compiling kernels is not counted.
+    The measurement starts at the last call of `of` for which no chunk was computed yet. The time for
+    compiling kernels is thus not counted.
     """
 
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
@@ -153,7 +153,7 @@ def _bar(pace: Pace) -> Iterator[Progress]:
 
 
 EXAMPLE = "urdfkin report status nightly"
-#: Maximum number of failed robots in the list, and maximum number of chunks whose computing times are read.
+#: Largest number of failed robots that are listed, and of chunks from which the mean time is computed.
 _NAMED, _READ = 20, 200
 
 _FOLDER = click.Path(path_type=Path, file_okay=False)

@@ -160,7 +160,7 @@ def say_fixed(file: str, fixed: Sequence[Finding]) -> None:
 
 
 def difference(file: str, before: bytes, after: bytes) -> str:
-    """Return the changes by the fixes as a patch."""
+    """Return the changes that the fixes have made, as a patch."""
     return patch(file, before, after, harmless)
 
 
@@ -391,7 +391,7 @@ class Run:
         look: A function that checks one file.
         choice: Selects the findings to report.
         strict: Whether warnings become errors.
-        fold: Whether many findings with one code become one.
+        fold: Whether to report many findings with the same code as one finding.
         fix: Whether to apply fixes.
         diff: Whether to collect fixes as patches.
         unsafe: Whether to include the fixes of --unsafe-fixes.
@@ -452,7 +452,7 @@ class Run:
         self.outcome.add(file, replace(found, findings=tuple(findings)))
 
     def _check_other(self, file: str) -> None:
-        """Check a USD or MJCF file. An invalid robot also has findings about the URDF made of it.
+        """Check a USD or MJCF file; for an invalid robot, add findings about the URDF made from the file.
 
         With --changed-since, an unchanged file is skipped; all findings of another file count as new.
         """
@@ -480,10 +480,11 @@ class Run:
         self.outcome.add(file, Examined(text, b"", None, findings, ()))
 
     def _is_unchanged(self, file: str, parts: tuple[str, ...], version: Version) -> bool:
-        """Return whether a file is as in an older version, with all files that it may refer to.
+        """Return whether a file, and every file that it may refer to, is the same as in an older version.
 
-        Its references are not known here. Therefore all files of the repository with the suffixes `parts`
-        must be unchanged, and no file whose name occurs in this file may have been deleted.
+        The references of the file are not known here. The result is therefore True only on two conditions.
+        All files of the repository with the suffixes `parts` are unchanged. The file contains no name of a
+        deleted file.
         """
         if parts not in self._changed:
             self._changed[parts] = version.changed(parts)
@@ -541,8 +542,8 @@ def _is_other(file: str) -> bool:
         return False
     with contextlib.suppress(OSError):
         if b"<mujoco" not in read_start(Path(file), 1 << 16):
-            return False  # without NumPy, which `check` of a URDF does not need
-    from urdfkin.urdf.mjcf import is_mjcf  # noqa: PLC0415  a URDF needs none of that module's imports
+            return False  # return before the next import, which loads NumPy
+    from urdfkin.urdf.mjcf import is_mjcf  # noqa: PLC0415  keeps the check of a URDF fast
 
     return is_mjcf(file)
 

@@ -22,8 +22,9 @@ from urdfkin.urdf.catalogue import catalogue
 if TYPE_CHECKING:
     Items = list[CompletionItem[str]]
 
-#: Pattern of the names that completion offers. The words have no quotes, blanks or characters that a shell
-#: expands, and no colon, because bash separates words at colons.
+#: Pattern of the names that completion offers.
+#: The names have no quotes, no blanks and no characters that a shell expands.
+#: The names have no colon, because bash separates words at colons.
 _HARMLESS = re.compile(r"(?=\w)[\w./+-]+")
 #: Largest file that is read for its names, in bytes.
 _MOST = 10_000_000
@@ -43,7 +44,7 @@ def complete_file(_context: click.Context, _parameter: click.Parameter, incomple
 
 def complete_frame(context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
     """Return the links and joints of the robot on the command line."""
-    # While an option has no value yet, click has not assigned the arguments.
+    # While the user types the value of an option, click does not yet know the command's arguments.
     robot = context.params.get("robot") or next(iter(context.args), "")
     return _offered(_frames(robot), incomplete)
 

@@ -156,8 +156,8 @@ form_options = together(
 #: Options that have no effect with --like, which chooses their values.
 _SIGNS = ("last", "parallel_offset", "flip", "first", "sign")
 _CHOICES = ("convention", "near_parallel", "snap", "slide", "like", *_SIGNS)
-#: If ROBOT is a table, each of these options makes the command derive a new table. Without these options, the
-#: table is written unchanged.
+#: If ROBOT is a table, the command writes it unchanged unless one of these options is given.
+#: With one of these options, the command derives a new table from the robot of the table.
 _DERIVED = ("base", "tip", "all_", *_CHOICES[1:])
 _UNITS = ("degrees", "millimetres", "digits", "columns")
 
@@ -195,11 +195,12 @@ def _reject_unused(context: click.Context, is_table: bool, options: dict[str, An
 def command(robot: str, verify: bool, **options: Any) -> Answer:
     """Write the Denavit-Hartenberg table of the path between two frames, exact to rounding and checked.
 
-    The path may lead down the tree, up, or through the common ancestor. Angles and lengths are the file's.
-    --snap rounds angles; the table then states a bound of the tip's motion.
+    The path may lead down the tree, up, or through the common ancestor. The table has the file's angles and
+    lengths, without rounding. --snap rounds angles; the table then states a bound of the tip's motion.
     ROBOT is a path, a name that `urdfkin robots` lists, - for standard input, or a table (.toml, .json, .csv,
-    .tsv, .md, .tex, .txt). A table is written with its own numbers, in the chosen convention. Options that
-    choose rows derive a new table from the robot that it describes. See `urdfkin explain urdf-to-dh`.
+    .tsv, .md, .tex, .txt). A table is written with its own numbers, in the chosen convention. With options
+    that choose rows, a new table is derived from the robot of the given table. See `urdfkin explain
+    urdf-to-dh`.
 
     Exit 0: verified, or the compared table agrees. 1: the compared table differs, or agrees only because
     base, tool and zeros absorb a mistake, which is printed. 2: bad input. 3: not checked, or a strict table

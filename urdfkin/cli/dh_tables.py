@@ -42,7 +42,7 @@ from urdfkin.verify.verifier import TABLE_SAMPLES
 _FORMATS_OF_SEVERAL = ("terminal", "markdown", "latex", "json")
 #: In these formats, the check's result is printed below the table. With other formats, it goes to stderr.
 _PRINTED = ("terminal", "markdown")
-#: Formats for reading, in contrast to formats for data and code.
+#: Formats for people. All other formats are for data and code.
 _TEXTS = (*_PRINTED, "html", "latex")
 #: Formats that round numbers, each with the number of digits of base and tool.
 #: None stands for the option --digits.
@@ -54,7 +54,8 @@ class Work:
     """The command's options.
 
     Attributes:
-        written: File of the table, if ROBOT is a table that is written without a new derivation; else None.
+        written: File of the given table, if ROBOT is a table and its rows are written as they are. None: the
+            table is derived from the robot.
         choices: Other arguments of `Robot.dh`.
     """
 
@@ -142,7 +143,7 @@ def _make_table(work: Work, tip: str | None, snap: float) -> DHTable:
     robot, base = work.robot, work.base
     if work.written is not None:
         table = read_table_or_screws(at_home(work.written))
-        # screws need no conversion here: `Robot.dh` derives a table from them, as from a URDF
+        # `Robot.dh` derives a table from screws in the same way as from a URDF
         if isinstance(table, DHTable):
             return to_convention(table, work.convention or table.convention)
     like = None

@@ -25,7 +25,7 @@ _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 def answers() -> dict[str, str]:
     """Return the section of each question by the anchor of its heading.
 
-    The links in a section have lost their targets.
+    Links in a section are replaced by their texts.
     """
     return {anchor(text.partition("\n")[0]): _LINK.sub(r"\1", text).rstrip() for text in _sections()[1:]}
 

@@ -85,14 +85,14 @@ def same_command(
 
     A and B are robots as in other commands, or Denavit-Hartenberg tables. They are the same if the screws of
     all joints and the zero-configuration poses of all links agree. A different base pose, joint zeros and
-    senses, fixed links, names and order are allowed. If they differ, the command prints an interval for the
-    largest distance of each frame over all configurations within limits. Its lower bound is attained at a
-    printed configuration; its upper bound is proven. The numbers of a USD file have single precision. Models
-    are the same up to single precision if each joint differs by the rounding of its own numbers only.
+    senses, fixed links, names and order are allowed. If A and B differ, the command prints an interval for
+    the largest distance of each frame over all configurations within limits. The lower end is attained at a
+    printed configuration; the upper end is proven. The numbers of a USD file have single precision. Two
+    models are the same up to single precision if every joint differs only by the rounding of its own numbers.
 
-    Exit 0: same, also up to single precision, or equivalent up to the printed changes. 1: different; with
-    --strict also if only equivalent. With --within: 0 if all frames stay within the distance as written, else
-    1. 2: bad input.
+    Exit 0: same, same up to single precision, or equivalent up to the printed changes. 1: different; with
+    --strict, also if only equivalent. 2: bad input. With --within, A and B are compared as written. Exit 0:
+    all frames stay within the given distance. 1: a frame does not.
     """
     if schema:
         from urdfkin.comparison.certificate import SAME  # noqa: PLC0415  keeps --help fast
@@ -196,10 +196,10 @@ def _recheck(robots: tuple[Robot, Robot], path: Path) -> Answer:
 def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown: Path | None) -> Answer:
     """List the changes from OLD to NEW, attribute by attribute, and how far they move the robot's frames.
 
-    For each changed joint, the command prints how far its changes alone move the most affected frame. This is
-    the maximum over all configurations within limits, at equal coordinates. The last line is for all changes
-    together. Between URDF, MJCF and USD, the changes are the differences that `same` finds. With C, all pairs
-    are compared.
+    For each changed joint, the command prints how far its changes alone move the most affected frame. This
+    distance is the maximum over all configurations within limits, for equal joint coordinates of OLD and NEW.
+    The last line is for all changes together. Between URDF, MJCF and USD, the changes are the differences
+    that `same` finds. With C, all pairs are compared.
 
     Exit 0: no changes. 1: changes. 2: bad input.
     """

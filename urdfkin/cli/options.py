@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 class Whole(click.IntRange):
-    """The type of a whole number in a range."""
+    """The type of an option whose value is a whole number in a range."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the text as an int."""
@@ -43,7 +43,7 @@ class Whole(click.IntRange):
 
 
 class Number(click.types.FloatParamType):
-    """The type of a finite number."""
+    """The type of an option whose value is a finite number."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the text as a float."""
@@ -51,7 +51,7 @@ class Number(click.types.FloatParamType):
 
 
 class NumberFrom(click.FloatRange):
-    """The type of a finite number in a range."""
+    """The type of an option whose value is a finite number in a range."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the text as a float."""
@@ -114,10 +114,11 @@ def reject_unused_options(context: click.Context, idle: Collection[str], because
     Args:
         context: Context of the command.
         idle: Names of the parameters without effect.
-        because: The condition under which they have no effect; it follows "does nothing" in the message.
+        because: The condition under which these options have no effect, such as "with --opw". In the message,
+            it follows the words "does nothing".
 
     Raises:
-        InputError: one of them was given on the command line.
+        InputError: one of these options was given on the command line.
     """
     for parameter in context.command.params:
         if parameter.name in idle and typed(context, parameter.name):
@@ -148,7 +149,7 @@ _HOW = "urdfkin.how_to_load"
 
 
 def _remember(context: click.Context, parameter: click.Parameter, value: object) -> None:
-    """Store an option, which `how_to_load` returns later. So no command has to pass the option on."""
+    """Store the value of an option; `how_to_load` returns it later, so that no command has to pass it on."""
     context.meta.setdefault(_HOW, {})[parameter.name] = value
 
 
@@ -220,7 +221,7 @@ usd_options = together(
         help="Path of the articulation to load, if a USD stage has several.",
     ),
 )
-#: The options that concern the source of a robot, not its joints.
+#: The options about the file of a robot, for example arguments of xacro.
 source_options = together(xacro_option, usd_options)
 
 
@@ -279,7 +280,10 @@ path_options = together(
 
 
 class _ReferenceName(click.Choice):  # type: ignore[type-arg]  # generic from click 8.2 on
-    """The name of a reference frame; the error for another word says where the frames are explained."""
+    """The type of an option whose value is a reference frame.
+
+    The error for an unknown name refers to the explanation of the reference frames.
+    """
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the name in its standard spelling."""
@@ -400,9 +404,9 @@ class Inputs:
         a: (n, n_v) joint accelerations.
         t: (n,) times of a trajectory in s, or None.
         base: Motion of the root link, or None.
-        said: Other settings on which the result depends; titles and JSON list them.
+        said: Other settings on which the result depends. Titles and JSON output list these settings.
         conversion: The convention of q, v and a, if it is not urdfkin's.
-        along: Whether the samples are those of a --trajectory; then each is one row of CSV.
+        along: Whether the samples come from --trajectory. If so, each sample is one row of CSV.
     """
 
     robot: Robot
@@ -464,7 +468,7 @@ def load_several(*sources: str) -> tuple[Robot, ...]:
         raise click.UsageError("only one of the robots can come from standard input")
 
     def others(source: str) -> dict[str, Any]:
-        """Return the options for the formats of the other robots, without their values."""
+        """Return None or {} for each option that is for a file format of another robot."""
         none: dict[str, Any] = {}
         if not is_xacro(source) and any(map(is_xacro, sources)):
             none["xacro_args"] = None

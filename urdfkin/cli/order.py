@@ -30,10 +30,10 @@ _NO_ORDER = (
 def command(robot: str, start: str | None, end: str | None) -> Answer:
     """Show the order of the joints in Pinocchio, MuJoCo, Drake, Isaac Lab and other tools.
 
-    A cell is the joint's index in q; if the index in v differs, both, as q/v. Tools with the same indices
-    share a column. With --from or --to, the command prints the permutation as lines of NumPy. NAME is a tool
-    from the table; FILE is a TOML file with your own order, signs, units and motor zeros
-    (docs/conventions.md).
+    A cell is the joint's index in q. If its index in v differs, the cell has both indices, as q/v. Tools with
+    the same indices share a column. With --from or --to, the command prints the permutation as lines of
+    NumPy. NAME is a tool from the table; FILE is a TOML file with your own order, signs, units and motor
+    zeros (docs/conventions.md).
     """
     loaded = load_robot(robot, verify=False)
     if start is None and end is None:
@@ -69,8 +69,8 @@ def _table(robot: Robot) -> Answer:
 def _cells(robot: Robot, conversion: Conversion) -> tuple[str, ...]:
     """Return the cell of each moving joint.
 
-    The cell is the index in q; if the index in v differs, it is both indices as q/v. It is "-" if the joint
-    has no coordinate.
+    The cell is the index in q. If the index in v differs, the cell has both indices, as q/v. The cell is "-"
+    if the joint has no coordinate.
     """
     indices = conversion.q_and_v_indices
 

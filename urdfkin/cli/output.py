@@ -1,4 +1,4 @@
-"""Print the result of a command as a table, or write it in any format.
+"""Print the result of a command as a table, or write it in another format.
 
 A file is written completely or not at all.
 """
@@ -58,14 +58,14 @@ class Answer:
     """The result of a command, from which every format is made.
 
     Attributes:
-        document: Returns the document that a person reads, for the formats of `TEXTS`.
+        document: Returns the document for the formats of `TEXTS`, which are for people.
         data: For each other format, a function that returns its data: a mapping for JSON, rows for CSV, an
-            array for npy, text for all others. If it has a function for a format of
-            `TEXTS`, this function is called instead of `document`.
+            array for npy, text for all others. A function for a format of `TEXTS` is called instead of
+            `document`.
         check: The last line of the output, which states the result of the check. It is empty if the command
             has nothing to check.
         code: The exit code.
-        fitted: Returns the document for a terminal, if it depends on the width; None: `document`.
+        fitted: Returns the document for a terminal, if it depends on the terminal's width. None: `document`.
     """
 
     document: Callable[[], TextDocument]
@@ -96,9 +96,9 @@ class Answer:
         return document.written(form), True
 
     def put(self, form: str, forms: Sequence[str], output: Path | None = None) -> None:
-        """Print the result if the chosen format is the first of `forms`.
+        """Print the result as a styled document if `form` is the first format of `forms`.
 
-        In any other format, write it to standard output or to a file.
+        If `form` is another format or if a file is given, write the result as plain data.
         """
         if form == forms[0] and output is None and form not in self.data:
             self.show(console())
@@ -125,12 +125,12 @@ _WRITERS: dict[str, Callable[[Any], bytes | str]] = {
 def answering(*names: str, suffixes: Mapping[str, tuple[str, ...]] | None = None) -> Callable[[Any], Any]:
     """Return a decorator for a function that returns an `Answer`.
 
-    The decorated function has the options --format and --output. It writes the answer and exits with its
-    code.
+    The decorated function has the options --format and --output. It writes the answer, and exits with the
+    answer's exit code.
 
     Args:
-        names: The formats. By default those of `TEXTS`, and JSON and CSV.
-        suffixes: For each suffix of a file, its formats. By default each format has its own.
+        names: The formats. The default is the formats of `TEXTS`, JSON and CSV.
+        suffixes: For each suffix of a file, its formats. By default, each format has one suffix.
     """
     forms = names or (*TEXTS, "json", "csv")
     endings = suffixes or {_SUFFIXES[form]: (form,) for form in forms}
@@ -194,7 +194,7 @@ def console(*, err: bool = False) -> Console:
 
 
 def _columns() -> int:
-    """Return the width of a pipe from COLUMNS; if it is empty or 0, the largest width."""
+    """Return the width of lines in a pipe, which is COLUMNS; if COLUMNS is empty or 0, the largest width."""
     wanted = parse_int(os.environ.get("COLUMNS", "")) or 0
     return min(wanted, _WIDEST) if wanted > 0 else _WIDEST
 
@@ -211,10 +211,10 @@ def hand_out(data: bytes | str, output: Path | None) -> None:
 
 
 def check_writable(*paths: Path | None) -> None:
-    """Raise SourceError before the work if a file cannot be written.
+    """Raise SourceError if a file cannot be written; call this before the computation begins.
 
     Raises:
-        SourceError: Missing permission, or no such folder.
+        SourceError: The permission is missing, or the folder does not exist.
     """
     for path in paths:
         if path is None:

@@ -40,7 +40,7 @@ def _path_command(
 ) -> Callable[[Callable[..., Answer]], click.Command]:
     """Return a decorator that makes a command whose options name two links and the path between them.
 
-    `answers` is a decorator that `answering` returns.
+    The argument `answers` is a decorator that `answering` has returned.
     """
 
     def decorate(function: Callable[..., Answer]) -> click.Command:
@@ -65,8 +65,8 @@ def chain_command(
 
     Each joint has its axis z, its origin O and the interorigin vector d to the next origin, in metres. The
     last vector d leads to the tip. The path may run up the tree: such a joint is marked "backwards", and its
-    axis is reversed so that its coordinate keeps the URDF's sign. Fixed joints are folded in. --q is the
-    configuration of the whole robot.
+    axis is reversed so that its coordinate keeps the URDF's sign. A fixed joint has no row: its offset is
+    part of d. --q is the configuration of the whole robot.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
@@ -134,7 +134,7 @@ def _kind_of_joint(joint: Any) -> str:
 def _vector(numbers: FloatArray) -> str:
     """Return the numbers as text with six digits.
 
-    Numbers as small as the rounding errors of a length of a metre are shown as 0.
+    A number below the rounding error of a length of one metre is shown as 0.
     """
     return " ".join(six_digits(x) for x in numbers.tolist())
 
@@ -159,7 +159,8 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
 
     The result is the pose M in the zero configuration, and each joint's screw in space and body axes. A
     screw is (w, v), angular part first; generated code has the screws as columns of Slist and Blist. Every
-    command accepts the toml or json output as a robot. A handwritten file needs M, and space or body.
+    command accepts the toml or json output as a robot. In a handwritten file, M is required, and also `space`
+    or `body`, the screws.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
@@ -191,8 +192,9 @@ def structure_command(
 ) -> Answer:
     """Classify an arm by its consecutive parallel and intersecting axes: wrist, SCARA, gantry, solvers.
 
-    An arm counts as a kind within 0.02 rad or 5 mm. The deviation is printed, since a calibrated arm is never
-    exactly of a kind. The screws are compared with Pinocchio. JSON is in metres and radians.
+    A property, such as parallel axes, is reported if the deviation is at most 0.02 rad or 5 mm. The deviation
+    is printed, because the axes of a calibrated arm are never exactly parallel. The screws are compared with
+    Pinocchio. JSON is in metres and radians.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """

@@ -131,7 +131,7 @@ def _along(
 
 
 def _checked(x: Inputs, title: str, parts: Callable[[], Iterable[str | Table]], **data: Any) -> Answer:
-    """Return an answer whose check is the robot's certificate."""
+    """Return an answer with the line and the exit code of the robot's certificate."""
     certificate = x.robot.certificate()
     check = check_line(certificate)
     if x.conversion is not None:
@@ -244,8 +244,8 @@ def _data(x: Inputs, quantity: Quantity, reference: str | None, result: FloatArr
 def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[object]]:
     if quantity.columns and not x.along:
         rates = [csv_cell(name) for name in x.rate_names]
-        # In the table of a Hessian, a line is for one column of the Jacobian, and a column of the table is
-        # for one joint velocity.
+        # The table of a Hessian has a line for each column of the Jacobian.
+        # It has a column for each joint velocity.
         keys = [[row] for row in quantity.labels]
         for _ in range(2, quantity.axes):
             keys = [[*key, rate] for key in keys for rate in rates]
@@ -262,8 +262,7 @@ def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[ob
         yield from ([t, *map(repr, row)] for t, row in samples)
 
 
-#: Headings of the first CSV column: the first is for results without times, the second for results with
-#: times.
+#: Headings of the first CSV column, for results without times and for results with times.
 _TIME = ("sample", "t")
 
 
@@ -439,7 +438,7 @@ def _numbers(x: Inputs, T: FloatArray, written: str, *, verify: bool) -> FloatAr
 
 
 def _again(x: Inputs, k: int, written: str) -> str:
-    """Return the command that computes the pose of sample `k` again."""
+    """Return a command line with which the user can compute the pose of sample `k` alone."""
     line = replay_line(x.robot.origin, "placement", x.frame, None, {"q": x.q[k].tolist()})
     given = click.get_current_context().params
     for name in ("relative_to", "base_placement"):
@@ -558,11 +557,12 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
 
     Each value has a guaranteed lower and upper bound. The bounds include the error of the Jacobian and the
     rounding of the decomposition. Manipulability is Yoshikawa's sqrt(det J J^T), the product of the singular
-    values. Its derivative for each joint velocity comes from the Hessian.
+    values. The command also prints the derivative of the manipulability for each joint velocity, which it
+    computes from the Hessian.
 
-    At a singularity the command prints the rank, the lost directions and the joints that cause them. There
-    the manipulability may have no derivative; it is nan in CSV and null in JSON. See `urdfkin explain
-    singularity`.
+    At a singularity, the command prints the rank, the lost directions and the joints that cause them. At such
+    a configuration, the manipulability may have no derivative. A missing derivative is nan in CSV and null in
+    JSON. See `urdfkin explain singularity`.
 
     With --convention, the derivatives are for the tool's joint velocities. The singular values are always for
     joint velocities in rad/s and m/s.

@@ -43,7 +43,7 @@ report_options = together(
 
 
 def write_reports(document: Document, files: Mapping[str, Path | None]) -> int:
-    """Write the requested formats. A failure of one does not affect the others.
+    """Write a report in the requested formats; if one file cannot be written, write the others.
 
     Returns:
         0, or the exit code of the first format that could not be written. Its error has been printed.
@@ -100,7 +100,7 @@ EXAMPLE = "urdfkin report results.json --html report.html --junit report.xml"
 
 
 class _Results(click.Group):
-    """The subcommands; `report FILE` without one is `report show FILE`."""
+    """The subcommands of `report`. Without a subcommand, `report FILE` means `report show FILE`."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Insert `show` unless a subcommand or help is asked for."""
@@ -129,10 +129,10 @@ def show(
 ) -> None:
     """Show a report or convert it to HTML, JUnit or Markdown.
 
-    A store has a report at any time. An incomplete store is reported as an interrupted run.
+    A report of a store is possible at any time. An incomplete store is reported as an interrupted run.
 
-    The exit status is that of the run. 0: everything verified. 1: a disagreement. 2: a robot could not be
-    read, or the file cannot be used. 3: a robot was not verified. 130: interrupted.
+    The exit status is the exit status of the run. 0: everything verified. 1: a disagreement. 2: a robot could
+    not be read, or the file cannot be used. 3: a robot was not verified. 130: interrupted.
     """
     from urdfkin.report.reading import read_document, stored_document  # noqa: PLC0415
     from urdfkin.validation.document import VALIDATION, outcome_of  # noqa: PLC0415  keeps --help fast
@@ -180,7 +180,8 @@ def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) 
     A regression is one of these: the run passed before and fails now; a robot is missing, or its verdict is
     worse; more results lie outside their bound; something is no longer compared, or on fewer samples; a bound
     is wider; a worst disagreement grew by more than the factor and is above 2 eps*scale. A changed model is
-    listed joint by joint. It is not a regression by itself; `same` and `diff` compute how far a frame moves.
+    listed joint by joint. A changed model alone is not a regression; `same` and `diff` compute how far its
+    frames move.
     A report that contradicts itself is an error.
     Exit 0: no regression. 1: a regression. 2: a file that cannot be used.
     """
@@ -213,10 +214,10 @@ def report_history(paths: tuple[Path, ...], all_: bool, schema: bool) -> Answer:
     """Show the verdicts, results, findings and changes of each robot from run to run.
 
     Give reports, stores, or folders with them. Runs are ordered by their start; robots are matched by their
-    source, and renamed files by the robot's name. Changes and regressions are those of `report compare`. With
-    `--output history.html` it writes an offline page with charts.
+    source, and renamed files by the robot's name. Changes and regressions are defined as in `report compare`.
+    With `--output history.html`, the command writes an offline page with charts.
 
-    A file that cannot be used is named with the reason; the others are shown.
+    If a file cannot be used, the command prints its name and the reason, and shows the other files.
     Exit 0: every file was used. 2: a file cannot be used.
     """
     from urdfkin.report.history import HISTORY, as_html, document, history  # noqa: PLC0415

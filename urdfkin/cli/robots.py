@@ -69,10 +69,10 @@ def _as_dict(entry: Entry) -> dict[str, object]:
 def info_command(robot: str) -> Answer:
     """Show a robot's links, joints, axes, limits, indices in q and v, and mimic rules.
 
-    Joints are in the order of q, of v and of a Jacobian's columns, which is Pinocchio's order. A line reports
-    it if the file has another order. Limits are in rad and rad/s; those of prismatic joints are in m and m/s.
-    A link that is not indented is a child of the link above it. If a link has several children, lines lead
-    to them.
+    Joints are in the order of q, of v and of a Jacobian's columns, which is Pinocchio's order. If the file
+    has another order, a line reports it. Limits are in rad and rad/s; those of prismatic joints are in m and
+    m/s. A link that is not indented is a child of the link above it. If a link has several children, lines
+    lead to them.
     """
     from urdfkin.validation.robot_summary import describe  # noqa: PLC0415  keeps --help fast
 
@@ -95,7 +95,7 @@ def _fitted(out: Console, document: TextDocument) -> TextDocument:
 
 
 def _rows(document: TextDocument, links: Sequence[str]) -> Iterator[list[str]]:
-    """Yield the rows of the table. The lines that connect a link with its children are not in these rows."""
+    """Yield the rows of the table with plain link names, without the lines of the drawn tree."""
     for part in document.parts:
         if isinstance(part, Table):
             yield list(part.heads)

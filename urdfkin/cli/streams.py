@@ -1,12 +1,13 @@
 """Safe standard streams: robust against stream failures, and against control characters in names.
 
-A shell can close a stream, connect it to a full disk or to a reader that exits, or give it an encoding that
-lacks a name's letters. With this module, none of these failures causes a traceback.
+A shell can close a standard stream. It can also connect the stream to a full disk, or to a program that exits
+before it has read everything. The encoding of a stream may lack a character of a name. With this module, none
+of these cases causes a traceback.
 
 `guard` wraps standard output and standard error in a `SafeStream`, which escapes control characters and
-commands of CI services. All output passes through this stream, also the output of click and Python. Line
-feeds pass, because the stream cannot detect a line feed inside a name. `say` and the console escape these as
-well.
+commands of CI services. All output passes through this stream, also the output of click and Python. The
+stream does not escape line feeds, because it cannot detect whether a line feed is part of a name. `say` and
+the console escape line feeds in names.
 """
 
 from __future__ import annotations
@@ -96,7 +97,8 @@ def _with_errors(stream: Any, descriptor: int) -> Any:
 def _occupy_closed() -> None:
     """Open the null device for each closed stream; otherwise the next opened file would get its descriptor.
 
-    Such an output cannot be written and such an input cannot be read. Text for standard error is lost.
+    Reading the replaced standard input fails, and so does writing to the replaced standard output. Text for
+    standard error is lost.
     """
     for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
@@ -133,8 +135,8 @@ class SafeStream:
 
     Args:
         stream: The stream to write to.
-        styled: Whether escape sequences for styles are kept. Use it only for a stream that only rich writes
-            to.
+        styled: Whether escape sequences for styles are kept. Set this only if nothing but rich writes to the
+            stream.
         encoding: The encoding that this stream reports.
     """
 
@@ -189,7 +191,7 @@ class SafeStream:
         before = len(self._line)
         whole = self._line + piece
         at = [m.start(1) for command in COMMANDS for m in command.finditer(whole) if m.start(1) >= before]
-        # Keep only the end of a long line, and whether the line was blank so far.
+        # Of a long line, keep only its end; an "x" before the end means that the line is not blank.
         self._line = whole if len(whole) <= _STORED else ("x" if whole.strip() else "") + whole[-16:]
         return "".join(escape(c) if before + k in at else c for k, c in enumerate(piece)) if at else piece
 
@@ -233,7 +235,7 @@ def say_file(text: str) -> None:
 
 
 def harmless(text: str) -> str:
-    """Return a text of whole lines in the escaped form that `say_file` writes."""
+    """Return a text of whole lines with the same escapes as in the output of `say_file`."""
     return SafeStream(sys.stdout).tamed_file(text)
 
 

@@ -60,8 +60,8 @@ def judge_all(
         given: Robots, or their sources.
         settings: Settings of the study.
         store: Folder of the campaign, which also stores the results of the study; None: no store.
-        shard: Part of the campaign. Only robots with their first chunk in this part are studied. The report
-            covers the same part.
+        shard: Part of the campaign. Only robots with their first chunk in this part are studied. The argument
+            `report` must be the report of the same part.
         retry: Whether to repeat studies that failed before.
         how: `mimic`, `root_joint`, `xacro_args`, `lock` and `joints`, as in `load`.
 
@@ -118,7 +118,7 @@ def _open_results(
 def _study(
     source: Robot | str, settings: StudySettings, stamp: str | None, how: Mapping[str, Any]
 ) -> tuple[Judgement | NotJudged, bool]:
-    """Return the accuracy result of a robot, and whether another study would give the same result."""
+    """Return the accuracy result of a robot, and whether a repeated study would give the same result."""
     import numpy as np  # noqa: PLC0415  keeps --help fast
 
     from urdfkin.model.configuration import draw_base  # noqa: PLC0415
@@ -229,8 +229,8 @@ def command(
 ) -> None:
     """Compare every frame and joint with Pinocchio in all three reference frames, on many samples.
 
-    Compared: {compared}. Not compared: {not_compared}; each call of the library and each command checks those
-    itself.
+    Compared: {compared}. Not compared: {not_compared}. The library and the commands check these quantities
+    in each call.
 
     Configurations are random within the limits. The neutral configuration and both ends of the limits are
     added. Every eighth sample has joint velocities and joint accelerations a hundred times larger.
@@ -313,7 +313,7 @@ def _load_usd(source: Robot | str, how: dict[str, Any], usd: dict[str, Any]) -> 
 
 
 def _say_shard(report: ValidationReport, shard: str, store: Path | None) -> None:
-    """Print the result of a shard. The report covers the whole campaign."""
+    """Print the result of a shard; a full report is possible only after the shards are merged."""
     from urdfkin.report.words import counted  # noqa: PLC0415  keeps --help fast
 
     for robot in report.robots:

@@ -53,9 +53,9 @@ def write_command(
 ) -> Answer:
     """Write test vectors into the folder DIR: results at 50 digits, with a tolerance for every number.
 
-    Without ROBOT, the robots are some 70 small ones with one feature of URDF each, and those of the
-    catalogue. With ROBOT, only these are written. Each robot has a JSON file, and a file with the same
-    numbers as lines between tabs. SHA256SUMS has the digests of all files.
+    Without ROBOT, the command uses the robots of the catalogue, and some 70 small robots with one feature of
+    URDF each. With ROBOT, it uses only the given robots. For each robot, there is a JSON file, and a text
+    file with the same numbers, separated by tabs. SHA256SUMS has the digests of all files.
 
     The results are placement, velocity, Jacobian, its time derivative, Hessian, classical and spatial
     acceleration in LOCAL, WORLD and LOCAL_WORLD_ALIGNED. The files depend on the robots and --samples alone.

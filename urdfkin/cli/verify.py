@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from urdfkin.validation.functions import FunctionCheck
 
-#: Quantities of a function: commands of the table that have one result for each configuration.
+#: Quantities that a user's function may compute: commands with one result for each configuration.
 _QUANTITIES = ("placement", "velocity", "jacobian", "jacobian-rate", "hessian", "acceleration", "imu")
 
 
@@ -92,16 +92,17 @@ def verify_command(
     junit: Path | None,
     oracle: Any,
 ) -> Answer:
-    """Check a function or a program of yours against urdfkin, Pinocchio and the derived bound.
+    """Compare your function or program with urdfkin and Pinocchio, within the derived bound.
 
     TARGET is FILE.py:FUNCTION, or FILE.py for all its functions with the name of a quantity. A function takes
     q (nq,), and v and a (nv,) if the quantity needs them, in rad, m and seconds. It returns the result as an
     array. --program checks a program in any language: it reads lines of JSON and answers each with a line
     {"result": [...]}. The file and the program run with your rights.
 
-    The configurations are the zero configuration, the joint limits and random ones. A wrong function is
-    explained by a usual mistake where one fits: another reference frame, joint order, sign, unit, frame or
-    missing term. Exit code 0: all results agree; 1: they do not; 3: no oracle can check the robot.
+    The configurations are the zero configuration, the joint limits and random ones. If a usual mistake
+    explains wrong results, the command names it. Examples are another reference frame, joint order, sign,
+    unit or frame, and a missing term. Exit code 0: all results agree; 1: they do not; 3: no oracle can check
+    the robot.
     """
     from urdfkin.validation.functions import verify_function  # noqa: PLC0415  keeps --help fast
     from urdfkin.validation.programs import Program  # noqa: PLC0415
@@ -212,7 +213,7 @@ def _module(path: str) -> ModuleType:
     file = Path(path).resolve()
     if not file.is_file():
         raise SourceError("no such file", where=path)
-    name = f"_urdfkin_checks_{file.stem}"  # a file may have the name of a library
+    name = f"_urdfkin_checks_{file.stem}"  # its own name could be the name of a library
     spec = importlib.util.spec_from_file_location(name, file)
     assert spec is not None
     assert spec.loader is not None

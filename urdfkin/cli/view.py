@@ -60,10 +60,10 @@ def command(
     it.
 
     With --trajectory, a CSV or .npz file as in `urdfkin plot`, the viewer plays the samples of the file. With
-    --convention, the field of q reads and shows a tool's numbers too.
+    --convention, the input field of q also accepts and shows values in that convention.
 
-    The printed address contains a key. Open the whole address, and show it only to people who may see and
-    move the robot. Other web pages and other users of this machine are refused.
+    The printed address ends with a secret key. Open the address with its key, and show it only to people who
+    may see and move the robot. Other web pages and other users of this machine have no access.
     """
     from urdfkin.view.server import (  # noqa: PLC0415
         has_screen,
@@ -98,7 +98,7 @@ def command(
         Viewer(server, loaded, None if begin is None else begin[0], played, conversion)
     try:
         say(f"{loaded.name}: {server.address}")
-        sys.stdout.flush()  # the reader of a pipe needs the address now
+        sys.stdout.flush()  # a pipe would otherwise receive the address at the end
         wanted = sys.stdout.isatty() and has_screen() if browser is None else browser
         with opened_page(server.address) if wanted else nullcontext():
             server.sleep_forever()

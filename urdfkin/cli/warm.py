@@ -16,9 +16,9 @@ EXAMPLE = "urdfkin warm"
 def command() -> None:
     """Compile every kernel for this machine and store it, for container images and CI.
 
-    Otherwise a command or program compiles a kernel when it saves time, which takes some seconds. Kernels are
-    stored below XDG_CACHE_HOME. Kernels from another processor are compiled again. Exit 2: the kernels cannot
-    be stored.
+    Without this command, urdfkin compiles a kernel when the kernel saves time. Each compilation takes some
+    seconds. Kernels are stored below XDG_CACHE_HOME. Kernels from another processor are compiled again. Exit
+    2: the kernels cannot be stored.
     """
     from urdfkin.compiled.kept import cache_folder, listen_to_compile_events  # noqa: PLC0415
     from urdfkin.compiled.machine import kernels  # noqa: PLC0415

@@ -25,7 +25,7 @@ def link_axes(own, world):
 
 
 def world_axes(own, world):
-    """Return the second argument: the same vector expressed in world axes."""
+    """Return the second argument: the vector expressed in world axes."""
     return world
 
 
@@ -40,6 +40,6 @@ def seen(axes, R, x):
 def seen_after(axes, S, x):
     """Return a velocity or acceleration x after the link's frame is rotated by S.
 
-    In world axes x does not change. In the link's own axes, it is rotated to the new axes.
+    In world axes, x does not change. In the link's own axes, x is converted to components in the new axes.
     """
     return axes(eq.rotate(eq.transposed(S), x), x)

@@ -1,9 +1,10 @@
 """The acceleration of a frame as a sum of contributions, one for each joint and each kind of acceleration.
 
-This module follows sections 7.6 and 7.7. Consider joint k, with all later joints fixed. Relative to link k-1,
-the frame's origin then moves about or along the axis of joint k, with velocity u_k = v_k z x d (or v_k z).
-Link k-1 itself rotates with w_{k-1}. The origin is thus a moving point in a moving frame, and 7.125 gives the
-terms of its acceleration. The sum of these terms over all joints, from the last joint to the first, is 7.130:
+This module follows sections 7.6 and 7.7. Consider joint k, and assume that all later joints are fixed. Then
+the frame's origin moves relative to link k-1. Its velocity u_k is v_k z x d for a revolute joint k, and v_k z
+for a prismatic joint k. Link k-1 itself rotates with the angular velocity w_{k-1}. The origin is thus a
+moving point in a moving frame, and 7.125 gives the terms of its acceleration. The sum of these terms over all
+joints, from the last joint to the first, is 7.130:
 
 | kind | term | cause |
 |---|---|---|
@@ -16,10 +17,10 @@ The vector d leads from the joint's origin to the frame's origin. This vector d 
 interorigin vectors after the joint, as in 7.110. A difference of two positions in the world would lose digits
 if the robot is far from the world's origin or has a long link.
 
-The angular acceleration follows from 7.129. In 7.129, the term a_k z has the kind transverse, and the term
-v_k w_{k-1} x z has the kind coriolis. A planar or floating joint translates and rotates at the same time, and
-its axes of translation rotate with it. Let s be the joint's linear velocity and o its angular velocity. Such
-a joint then adds the term o x s, of the kind coriolis.
+The angular acceleration follows from 7.129. Its term a_k z belongs to the kind transverse. Its term
+v_k w_{k-1} x z belongs to the kind coriolis. A planar or floating joint translates and rotates at the same
+time, and its axes of translation rotate with it. Its linear velocity is s, and its angular velocity is o. The
+acceleration of such a joint has one more term, o x s, which belongs to the kind coriolis.
 """
 
 from __future__ import annotations
@@ -109,9 +110,9 @@ class AccelerationBreakdown(Displayable):
 
 
 class _Moves(NamedTuple):
-    """Linear and angular part, each (n, 3), of a joint's velocity or acceleration, in world axes.
+    """The velocity or acceleration of a joint relative to its parent link, in world axes.
 
-    The two parts are relative to the joint's parent link.
+    The linear part and the angular part each have the shape (n, 3).
     """
 
     slide: FloatArray
@@ -228,9 +229,9 @@ def _levers(tree: KinematicTree, path: Sequence[int], q: FloatArray, Rs: FloatAr
 
 
 def _slide(joint: Joint, q: FloatArray) -> FloatArray:
-    """Return a joint's displacement (n, 3) in the joint's axes, from the joint's coordinates q.
+    """Return a joint's translation (n, 3) in the joint's axes, from the joint's coordinates q.
 
-    The first numbers of q are the displacement.
+    For planar and floating joints, the first coordinates are the translation.
     """
     slide = np.zeros((len(q), 3))
     match joint.kind:

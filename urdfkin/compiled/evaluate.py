@@ -43,8 +43,7 @@ from urdfkin.model.tree import FloatArray
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _PLACES = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
-#: From this output size (bytes) on, results are written directly to memory and not to the caches, which are
-#: too small for them.
+#: Results of at least this size (bytes) are written directly to memory, because the caches are too small.
 _STREAMED = 2 << 20
 #: Number of values in a block of results. A block fits into half of the processor's first-level cache.
 _MOST_STAGED = 3072
@@ -180,9 +179,10 @@ def _interpreted(
     out: FloatArray,
     threads: int | None,
 ) -> int | None:
-    """Compute with Python numbers; return whether an input is not ordinary, or None if a kernel is faster.
+    """Compute a batch with Python numbers; return None, without a result, if a kernel is faster.
 
-    The processor time of the first configurations decides whether a kernel is faster.
+    Otherwise return 1 if an input is nan, infinite or too large, else 0. The processor time of the first
+    configurations decides whether a kernel is faster.
     """
     if preload.kernel(name) is not None:
         return None
@@ -263,7 +263,8 @@ def task_of(
     Args:
         program: The program of the recursion.
         reference: The reference frame of the results.
-        inputs: The base's state, q and, if needed, v and a; each input has one row or as many rows as `out`.
+        inputs: The base's state, q and, if needed, v and a. Each of them has one row, or as many rows as
+            `out`.
         out: (n, ...) array for the result.
         staged: Whether blocks are collected before output (`is_staged`).
     """
@@ -291,7 +292,7 @@ def _is_large(base: FloatArray) -> bool:
 
 
 def _check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """Raise an error for a non-finite input or result; called only if an input is not ordinary."""
+    """Raise an error for a non-finite input or result; called only if one is possible."""
     if not all(np.isfinite(x).all() for x in inputs):
         raise NotFiniteError("q, v and a must be finite")
     finite = np.isfinite(out).all(axis=tuple(range(1, out.ndim)))
@@ -307,12 +308,12 @@ def _check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
 #: Starting a thread takes about ten microseconds.
 _WORTH_THREADS = 4096
 
-#: Number of configurations that NumPy computes at a time, so that the intermediate results fit into the
-#: processor's cache.
+#: Number of configurations that NumPy computes at a time.
+#: The intermediate results then fit into the processor's cache.
 PART = 2048
 
-#: A function (inputs, out) that computes the rows of `out` from the rows of the inputs. The function returns
-#: 1 if an input is nan, infinite or too large (see `ordinary` in `urdfkin.compiled.machine.memory`), else 0.
+#: A function (inputs, out) that computes the rows of `out` from the rows of the inputs.
+#: The function returns 1 if an input is nan, infinite or too large, else 0 (see `machine.memory.ordinary`).
 Compute = Callable[[Sequence[FloatArray], FloatArray], int]
 
 

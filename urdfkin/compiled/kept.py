@@ -19,14 +19,16 @@ from urdfkin.kinematics import equations
 from urdfkin.system.lazy_import import installed_version
 from urdfkin.system.locks import importing, lock_over_forks
 
-#: Lock for the import of Numba and for compilations. A fork of the process waits for this lock, because the
-#: child process could not finish an import or a compilation. A fork acquires the newest lock first. This lock
-#: is created after the lock of `logging`, which the import of Numba uses, and before that import begins.
+#: Lock for the import of Numba and for compilations.
+#: A fork of the process waits for this lock, because the child could not finish an import or a compilation.
+#: A fork acquires several locks in the reverse order of their creation.
+#: The import of Numba uses the lock of `logging`, so this lock must be newer than the lock of `logging`.
+#: This lock is created before the import of Numba begins.
 compiling = lock_over_forks()
 
-#: A function that receives the events of compilations. When a compilation begins, it is called with the
-#: kernel's name and None. When the kernel is ready, it is called with the kernel's name and the duration in
-#: seconds.
+#: A function that receives the events of compilations.
+#: When a compilation begins, the function is called with the kernel's name and None.
+#: When the kernel is ready, the function is called with the kernel's name and the duration in seconds.
 Listener = Callable[[str, float | None], None]
 
 
@@ -59,9 +61,9 @@ def listen_to_compile_events(listener: Listener) -> Iterator[None]:
 
 @contextmanager
 def compile_event(name: str) -> Iterator[Callable[[], None]]:
-    """Send the events of a possible compilation of the kernel `name`.
+    """Inform the listener when the compilation of the kernel `name` begins and ends.
 
-    The context yields a function, which must be called if the compilation begins.
+    The context yields a function. The caller must call this function if it begins to compile the kernel.
     """
     begun: list[float] = []
 

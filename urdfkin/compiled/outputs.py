@@ -18,8 +18,7 @@ from urdfkin.kinematics import equations as eq
 _LOCAL, _WORLD, _ALIGNED = REFERENCES.values()
 _FRAMES, _NV = int(Head.FRAMES), int(Head.NV)
 
-#: Indices of rows of scratch memory: 16 rows for the numbers of a 4 by 4 pose, and six rows for the numbers
-#: of [linear; angular].
+#: Indices of rows of scratch memory: 16 for a 4 by 4 pose, and six for [linear; angular].
 _POSE = np.array([*range(OUT_ROW, OUT_ROW + 12), ZERO_ROW, ZERO_ROW, ZERO_ROW, ONE_ROW])
 _SIX = np.arange(OUT_ROW, OUT_ROW + 6)
 
@@ -32,17 +31,17 @@ def _unused_vector():
 
 
 def follow_place(state):
-    """Keep R and p of a link's state; a placement needs only these."""
+    """Return a link's state with R and p only, which a placement needs."""
     return state[0], state[1], _unused_vector(), _unused_vector(), _unused_vector(), _unused_vector()
 
 
 def follow_velocity(state):
-    """Keep R, p, w and vel of a link's state; a velocity needs only these."""
+    """Return a link's state with R, p, w and vel only, which a velocity needs."""
     return state[0], state[1], state[2], state[3], _unused_vector(), _unused_vector()
 
 
 def follow_acceleration(state):
-    """Keep R, p, w, alpha and acc of a link's state; the velocity vel does not occur in equation 7.130."""
+    """Return a link's state without vel, which does not occur in equation 7.130."""
     return state[0], state[1], state[2], _unused_vector(), state[4], state[5]
 
 
@@ -220,7 +219,7 @@ def emit_pairs(m, s, program, place, pairs, b, reference, state, to):
             put_vector(s, program[j + 3], _no_vector())
             put_vector(s, program[j + 3] + 3, _no_vector())
         for i in range(first, end, PAIR_WIDTH):
-            if program[i + 2] == rate:  # the column of the coordinate's own joint, or of a mimic joint
+            if program[i + 2] == rate:  # the joint with this velocity, or a joint that mimics it
                 _add_changes(s, program, i, first, end, reference)
         for row in range(6):
             at = begin + row * size + rate * nv
@@ -230,10 +229,10 @@ def emit_pairs(m, s, program, place, pairs, b, reference, state, to):
 def _add_changes(s, program, i, first, end, reference):
     """Add the derivatives of column i with respect to the motion of each joint.
 
-    Consider the joint of column i. A joint before it on the path rotates the whole column. A joint after it
-    moves only the reference point of the column, which is the frame's origin. For WORLD, the reference point
-    does not move, so a later joint does not change the column. For LOCAL, an earlier joint rotates the column
-    and the axes of the frame together, so it does not change the components of the column.
+    Column i belongs to a joint on the path. An earlier joint on the path rotates the whole column. A later
+    joint moves only the reference point of the column, which is the frame's origin. For WORLD, the reference
+    point does not move, so a later joint does not change the column. For LOCAL, an earlier joint rotates the
+    column and the axes of the frame together, so it does not change the components of the column.
     """
     v_i, w_i = vector(s, program[i]), vector(s, program[i] + 3)
     for j in range(first, end, PAIR_WIDTH):

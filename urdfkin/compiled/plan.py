@@ -2,8 +2,8 @@
 
 The arrays have a step for each moving joint and a row for each frame. As in the textbook, every joint frame
 is rotated so that the joint's axis is z (`turned` returns this rotation). Each revolute joint is then Rz, and
-each prismatic joint is Tz. Fixed joints are merged into the constant offsets between moving joints. A plan
-contains only the joints that move one of its frames.
+each prismatic joint is Tz. Fixed joints are merged into the constant offsets between moving joints. A
+compiled tree contains only the joints that move one of its frames.
 
 The program consists of the instructions for each block of configurations. The instructions are chosen once
 for each robot. There are special instructions for a translation along a coordinate axis and for a rotation
@@ -52,7 +52,10 @@ class Motion(IntEnum):
 
 
 class Geometry(IntEnum):
-    """Columns of `CompiledTree.geometry`: R, the offset in the previous step's axes, and the mimic rule."""
+    """Columns of `CompiledTree.geometry`: a rotation R, an offset, and the joint's mimic rule.
+
+    The offset is in the axes of the previous step.
+    """
 
     R = 0
     OFFSET = 9
@@ -77,8 +80,8 @@ _MOTION = {
     JointKind.FLOATING: Motion.FLOATING,
 }
 
-#: For each joint velocity of a joint: the index of its axis in the joint's frame, and whether it is a
-#: rotation.
+#: For each joint velocity of a joint: the index of its axis in the joint's frame.
+#: The second value is True for a rotation about this axis, and False for a translation along it.
 _RATES: dict[Motion, tuple[tuple[int, bool], ...]] = {
     Motion.TURN: ((2, True),),
     Motion.SLIDE: ((2, False),),
@@ -254,7 +257,7 @@ def turned(joint: Joint) -> FloatArray:
 
 
 def _flat(T: FloatArray) -> FloatArray:
-    """Return the twelve numbers of a pose: R row by row, then the offset in the previous frame's axes."""
+    """Return the twelve numbers of a pose: the rotation matrix row by row, then the offset."""
     return np.concatenate((T[:3, :3].ravel(), T[:3, 3]))
 
 
@@ -286,7 +289,10 @@ def _columns(steps: IntArray, geometry: FloatArray) -> tuple[IntArray, FloatArra
 
 
 def _leaders(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> IntArray:
-    """Return `CompiledTree.leaders`; `ends` is the last step of each frame."""
+    """Return the array `CompiledTree.leaders`.
+
+    The argument `ends` has, for each frame, the last step before the frame.
+    """
     leaders = np.full((len(ends), len(columns)), -1, dtype=np.int64)
     rows = columns.tolist()
     for frame, end in enumerate(ends):
@@ -337,31 +343,31 @@ class Head(IntEnum):
     NQ = 1
     NV = 2
     FRAMES = 3
-    BLOCKS_Q = 4  # index of the list of needed blocks of eight coordinates
+    BLOCKS_Q = 4  # index at which the list of needed blocks of eight coordinates begins
     BLOCKS_V = 5
     BLOCKS_END = 6
-    ANGLES = 7  # index of the list of joint angles
+    ANGLES = 7  # index at which the list of joint angles begins
     ANGLES_END = 8
-    Q = 9  # first scratch row of the coordinates; the next entries are the first rows of other numbers
+    Q = 9  # first scratch row of the coordinates, then of the velocities, the accelerations, and so on
     V = 10
     A = 11
     BASE = 12
 
 
-#: Number of configurations in a row of scratch memory. A row fills one AVX-512 register or two AVX2
-#: registers.
+#: Number of configurations in a row of scratch memory.
+#: A row fills one AVX-512 register or two AVX2 registers.
 LANES = 8
 #: Number of integers in an instruction: the operation, three operands, and the index of its constants.
 WIDTH = 5
-#: Number of integers in an entry of the list of angles. They are the row of the angle, the row of the sine,
-#: the index of the mimic rule, and whether there is a mimic rule.
+#: Each entry of the list of angles has this number of integers.
+#: They are two scratch rows (angle and sine), the index of the mimic rule, and 1 if there is such a rule.
 ANGLE_WIDTH = 4
-#: Reserved scratch rows: a row for the number 0, a row for the number 1, rows for a result before it is
-#: written, and a row for an angle. The last value is the first free row.
+#: Scratch rows with a fixed purpose: the number 0, the number 1, a result before it is written, an angle.
+#: The last value is the first free row.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, KEPT_ROWS, COLUMN_ROWS = 24, 12, 6
-#: Number of integers in an entry of a list of pairs. An entry describes a Jacobian column: the column's row,
-#: its step, its index in v, and the first scratch row of the sums for that index.
+#: Each entry of a list of pairs has this number of integers.
+#: They describe a Jacobian column: its scratch row, step, index in v, and the scratch row of its sums.
 PAIR_WIDTH = 4
 
 _JOINTS = {
@@ -403,11 +409,11 @@ def program_of(plan: CompiledTree, *, turned: bool, columns: bool = False, pairs
 
     Args:
         plan: The compiled tree.
-        turned: Whether the state is rotated to the axes of each frame. Placements need this rotation, and so
-            do results in the frame's own axes.
+        turned: Whether the state is rotated to the axes of each frame. Placements and results in the frame's
+            own axes need this rotation.
         columns: Whether Jacobian columns are needed.
-        pairs: Whether the column of each joint, also of a mimic joint, is stored separately, to compute
-            derivatives from pairs of columns.
+        pairs: Whether each joint, also a mimic joint, has a stored column of its own. Derivatives are
+            computed from pairs of these columns.
     """
     key = turned, columns, pairs
     made: Program | None = plan.made.get(key)
@@ -481,9 +487,9 @@ class _Writer:
                 f += 1
 
     def _save(self, step: int, last: Mapping[int, int], following: int) -> None:
-        """Write an instruction that saves the state after a step, if it is needed again later.
+        """Write an instruction that saves the state after a step, if a later event starts from this step.
 
-        The state is needed again if an event with an index above `following` starts from this state.
+        An event is later if its index is above `following`.
         """
         if last.get(step, -1) > following:
             self._put(Op.SAVE, self._slot(step))
@@ -500,9 +506,9 @@ class _Writer:
         return len(self.constants) - len(numbers)
 
     def _rigid(self, R: FloatArray, p: FloatArray, *, turned: bool = True) -> bool:
-        """Write the instructions for a translation by p and a rotation by R.
+        """Write the instructions for a translation by p and a rotation by R; return whether there are any.
 
-        The result is True if an instruction was needed.
+        A translation by zero and a rotation by the identity need no instruction.
         """
         before = len(self.code)
         along = np.flatnonzero(p).tolist()
@@ -549,7 +555,7 @@ class _Writer:
     def _frame(self, f: int) -> bool:
         """Write the instructions that write a frame's results.
 
-        The result is True if these instructions change the current state.
+        Return True if these instructions replace the current state by the state of the frame.
         """
         plan, offsets = self.plan, self.plan.offsets[f]
         moved = self._rigid(offsets[:9].reshape(3, 3), offsets[9:], turned=self.turned)
@@ -584,10 +590,10 @@ class _Writer:
         return found
 
     def _pairs(self, f: int) -> list[int]:
-        """Return the list of pairs of a frame.
+        """Return the list from which a frame's Hessian is computed by pairs of Jacobian columns.
 
-        The list consists of the number of columns, an entry (`PAIR_WIDTH` numbers) for each column, and the
-        scratch rows of the sums.
+        The list has the number of columns, then `PAIR_WIDTH` integers for each column, then the scratch rows
+        of the sums.
         """
         columns, leaders = self.plan.columns, self.plan.leaders[f]
         own = np.flatnonzero(leaders >= 0)
@@ -607,11 +613,11 @@ def _blocks(places: Sequence[int]) -> list[int]:
     return sorted({int(place) // 8 * 8 for place in places})
 
 
-#: Size of a cache line of the processor, bytes. Access to a vector that lies across two cache lines takes
-#: twice as long.
+#: Size of a cache line of the processor, bytes.
+#: Access to a vector that lies across two cache lines takes twice as long.
 _LINE = 64
-#: The reference frames that the kernels support, each with its number in a kernel. Any other reference frame
-#: raises a KeyError.
+#: The reference frames that the kernels support, each with its number in a kernel.
+#: Any other reference frame raises a KeyError.
 REFERENCES = {
     known: int(known) for known in (Reference.LOCAL, Reference.WORLD, Reference.LOCAL_WORLD_ALIGNED)
 }
@@ -620,7 +626,7 @@ REFERENCES = {
 class KernelArgs(IntEnum):
     """Index of each argument in the row of integers.
 
-    Arguments from CORE on are for calls with one configuration.
+    Only calls with one configuration use the arguments from CORE to the last.
     """
 
     @staticmethod
@@ -637,8 +643,8 @@ class KernelArgs(IntEnum):
     A = auto()
     #: Address of the base's state (rows of 24 numbers); 0 for a fixed base at the world's origin.
     BASE = auto()
-    #: Distance in memory between the first numbers of two consecutive configurations; 0 if all configurations
-    #: use the same numbers.
+    #: Distance in memory between the first numbers of two consecutive configurations.
+    #: The distance is 0 if all configurations use the same numbers.
     STRIDE_Q = auto()
     STRIDE_V = auto()
     STRIDE_A = auto()
@@ -646,8 +652,8 @@ class KernelArgs(IntEnum):
     OUT = auto()
     #: Number of output numbers for one configuration.
     WIDTH = auto()
-    #: Address of a buffer that collects the results of a block before they are written to the output; 0 if
-    #: they are written directly.
+    #: Address of a buffer that collects the results of a block before they are written to the output.
+    #: The address is 0 if the results are written directly.
     STAGE = auto()
 
     CORE = auto()
@@ -663,7 +669,7 @@ class KernelArgs(IntEnum):
 
 def address(x: NDArray[Any]) -> int:
     """Return the address of an array's first number."""
-    # `x.ctypes.data` runs Python code, which takes longer after a batch has displaced it from the caches.
+    # `x.ctypes.data` runs Python code, which is slow when a batch has displaced this code from the caches.
     found: int = x.__array_interface__["data"][0]
     return found
 

@@ -4,8 +4,8 @@ A single configuration needs no kernel, because Python computes it in a millisec
 Importing Numba and reading a kernel from disk takes longer, and compiling takes seconds. Therefore, this
 module sums up the time that the interpreted computation has taken in place of each kernel. When this time
 exceeds `LOADING`, the kernel is read from disk. If the kernel is not on disk and the time exceeds `BESIDE`, a
-second process compiles the kernel. Python computes until the second process has finished. If more time than
-`COMPILING` would pass without a kernel, this process compiles the kernel itself.
+second process compiles the kernel. Python computes until the second process has finished. If the time would
+exceed `COMPILING`, this process compiles the kernel itself.
 """
 
 from __future__ import annotations
@@ -25,14 +25,15 @@ from urdfkin.system.locks import importing
 if TYPE_CHECKING:
     import subprocess
 
-#: The first number is the computing time (s) that a kernel must save before Numba is imported for the kernel.
-#: The second number is the computing time (s) that a kernel must save before this process compiles it.
+#: Limits (s) of the time for computations without a kernel.
+#: Above the first limit, Numba is imported and the kernel is read from disk.
+#: Above the second limit, this process compiles a kernel that is not on disk.
 LOADING, COMPILING = 0.3, 3.0
 #: When computing without a kernel has taken this many seconds, a second process compiles the kernel.
 BESIDE = 1.0
-#: This number of seconds replaces `LOADING` if Numba is imported already.
+#: If another kernel is loaded already, this limit (s) replaces `LOADING`.
 _LOADING_MORE = 0.03
-#: Seconds that each call saves through the fast function for single configurations.
+#: Seconds that a call for one configuration saves if it uses the fast function.
 _SAVED = 5e-5
 #: Seconds after which the cache folder is searched again for a kernel that it did not contain.
 _AGAIN = 0.05
@@ -57,7 +58,7 @@ _only: list[Way] = []
 def only(way: Way) -> Iterator[None]:
     """Compute everything in the given way while the context is open.
 
-    The caller can thus compare the two ways.
+    A test can thus compare results of Python numbers with results of kernels.
     """
     _only.append(way)
     try:
@@ -141,9 +142,10 @@ _beside: dict[str, subprocess.Popen[bytes]] = {}
 
 
 def _compile_beside(name: str, home: str) -> bool:
-    """Return whether a second process compiles a kernel; start this process, unless it has failed before.
+    """Start a second process that compiles a kernel, and return whether such a process runs.
 
-    Only one second process compiles at a time. A kernel that waits for this process counts as being compiled.
+    Only one second process runs at a time, and there is only one attempt for each kernel. The result is also
+    True while the second process compiles another kernel.
     """
     if cache_folder() is None:
         return False

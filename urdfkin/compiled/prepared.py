@@ -22,9 +22,9 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.locks import importing
 
-#: A function of q, or q and v, or q, v and a, and of the output array or None. The function returns the
-#: result, or None for arguments that it does not support. In that case `Robot` computes the result or raises
-#: the error.
+#: A function of q, or q and v, or q, v and a, and of the output array or None.
+#: The function returns the result, or None for arguments that it does not support.
+#: If it returns None, `Robot` computes the result or raises the error.
 Fast = Callable[..., FloatArray | None]
 
 
@@ -81,10 +81,10 @@ class PreparedFrame:
     ) -> None:
         self.frame, self.reference, self.verify = frame, reference, verify
         self._robot, self._plan = robot, plan
-        #: Whether the user created this object with `Robot.prepare`; the first call then compiles machine
-        #: code.
+        #: Whether the user created this object with `Robot.prepare`.
+        #: If so, the first call compiles machine code.
         self.wanted = False
-        # Compiled, or read from disk, at the first call.
+        # At the first call, `_first` replaces each of these by a compiled function.
         self._placement: Fast = partial(self._first, "placement")
         self._velocity: Fast = partial(self._first, "velocity")
         self._jacobian: Fast = partial(self._first, "jacobian")
@@ -164,9 +164,9 @@ class PreparedFrame:
     def _first(self, quantity: str, q: Given, *others: object) -> FloatArray | None:
         """Create the fast function of a quantity and call it.
 
-        Return None as long as creating it saves no time.
+        Return None if the function would save less time than its creation takes.
         """
-        # The robot handles quaternions, which are normalised first, and trees whose results may overflow.
+        # `Robot` must normalise quaternions, and must check the results of large robots for overflow.
         robots = self._robot.tree.floating_joints or self._plan.is_large
         if robots or not (isinstance(q, np.ndarray) and q.ndim == 1):
             return None

@@ -16,15 +16,15 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-#: If all coordinates, velocities, lengths and multipliers are below this number, no result overflows. With N
-#: joints, the velocity of a joint is below LARGE^2 and the length of a path is below N LARGE^2. The largest
-#: product, w^2 d, is therefore below N^3 LARGE^6.
+#: If all coordinates, velocities, lengths and multipliers are below this number, no result overflows.
+#: With N joints, the velocity of a joint is below LARGE^2 and the length of a path is below N LARGE^2.
+#: The largest product, w^2 d, is therefore below N^3 LARGE^6.
 LARGE = 1e45
 
 LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
 _2_PI, PI_2, PI_2_REST = 2.0 / math.pi, math.pi / 2.0, 6.123233995736766e-17
-#: The sum of this constant and a number below 2^51 is rounded to an integer. The last bits of the sum are the
-#: integer that is nearest to the number.
+#: The sum of this constant and a number below 2^51 is rounded to an integer.
+#: The last bits of the sum are the integer that is nearest to the number.
 NO_FRACTION = 1.5 * 2.0**52
 SINE = (
     -1.66666666666666324348e-01,
@@ -274,7 +274,7 @@ def write_rows(
 ) -> None:
     """Write `count` rows of scratch memory to the list `to`, from `to[at]` on.
 
-    The indices of the rows are `rows[first]` and the following elements of `rows`.
+    The list `rows` has the indices of the rows, from `rows[first]` on.
     """
     to[at : at + count] = [s[row].x for row in rows[first : first + count]]
 
@@ -290,7 +290,7 @@ def ordinary(total: Number) -> bool:
 
 
 def all_written(*_: object) -> None:
-    """Do nothing, because interpreted code does not write past the caches."""
+    """Do nothing: interpreted code writes through the caches, so it need not wait for memory."""
 
 
 stream = all_written

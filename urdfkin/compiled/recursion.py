@@ -125,7 +125,7 @@ def revolute(axes, state, s, row, v, a):
 def prismatic(axes, state, slide, v, a):
     """Compute the state after a prismatic joint.
 
-    Equation 7.64 gives the displacement; then 7.130 and 7.128 are applied.
+    The position follows from 7.64, the acceleration from 7.130, and the velocity from 7.128.
     """
     R, p, w, vel, alpha, acc = carried(axes, state, (zero(), zero(), slide))
     z = seen(axes, R, (zero(), zero(), one()))
@@ -259,8 +259,7 @@ def _read(m, x, n, b, width, stride, blocks, begin, end, s, row):
 
     If x has one row, all configurations use this row. A block of eight numbers is read faster than a shorter
     block. If a configuration ends within a block, numbers of the next configuration are therefore read too,
-    unless they are beyond the end of x. These numbers are written to the scratch rows of inputs that are read
-    later.
+    unless they are beyond the end of x. Later reads overwrite the scratch rows of these numbers.
     """
     for i in range(begin, end):
         at = blocks[i]

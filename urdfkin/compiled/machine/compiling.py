@@ -8,8 +8,9 @@ folder is writable, nothing is cached.
 
 Parts. A *part* is a function that only kernels call, never Python. The compiler inlines a part into each
 kernel that calls it. A part therefore needs no machine code of its own, and no optimization before it is
-inlined. A part also needs no compiler passes for closures, `with`, literal loops, inlining by Numba, or array
-expressions. Skipping these steps halves the compile time.
+inlined. Parts have no closures, no `with`, no literal loops and no array expressions, and need no inlining by
+Numba. The compiler passes for these features are therefore skipped. Skipping all these steps halves the
+compile time.
 """
 
 from __future__ import annotations
@@ -153,10 +154,12 @@ class PartCompiler(_Compiler):  # type: ignore[misc]
 
 _config: Any = numba.config  # Numba defines these settings at run time
 
-#: Options of every compiled function. The compiler must not reorder operations. The compiler fuses a product
-#: and a sum only where the module `numbers` requests it. Results therefore do not depend on the compiler.
-#: Division by zero gives inf as in C, so that loops contain no branch that raises an error. The functions
-#: allocate no memory, so their arrays need no reference counts.
+#: Options of every compiled function.
+#: The compiler must not reorder operations.
+#: The compiler fuses a product and a sum only where the module `numbers` requests it.
+#: Results therefore do not depend on the compiler.
+#: Division by zero gives inf as in C, so that loops contain no branch that raises an error.
+#: The functions allocate no memory, so their arrays need no reference counts.
 COMPILED: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 #: Options of a part. Because a part is only inlined into kernels, it has no entry point for Python or C.
 _PART: dict[str, Any] = {
@@ -208,8 +211,8 @@ def jitted(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 #: Decorator for a function that is a part of kernels.
 compiled = jitted(**_PART)
 
-# An input array may be read-only. Numba passes a writable array to this signature without a copy, so the
-# kernels need no second signature.
+# An input array may be read-only.
+# Numba also accepts a writable array for this signature, without a copy.
 NUMBERS = types.Array(types.float64, 1, "C", readonly=True)
 ROWS = types.Array(types.float64, 2, "C", readonly=True)
 PLACES = types.Array(types.int64, 1, "C", readonly=True)
@@ -234,8 +237,9 @@ class Kernel:
         self.__doc__, self.__name__ = function.__doc__, function.__name__
 
     def __getattr__(self, name: str) -> Any:
-        # Python calls this for attributes that do not exist yet. A cached property is not used here: before
-        # Python 3.12 it has its own lock, which could stay locked forever in a forked child process.
+        # Python calls this for attributes that do not exist yet.
+        # Before Python 3.12, a cached property has its own lock.
+        # That lock could stay locked forever in a forked child process, so this is no cached property.
         if name != "compiled":
             raise AttributeError(name)
         with compiling:
@@ -290,7 +294,7 @@ class Core(Kernel):
 
 
 def core(function: Callable[..., int]) -> Core:
-    """Decorate a function that takes an address.
+    """Return the compiled form of a function whose arguments are addresses and other integers.
 
     The function is compiled at the first call and cached on disk.
     """

@@ -46,7 +46,7 @@ def number(context: Any, s: Any, row: Any) -> Any:
 
 @intrinsic
 def number_if(context: Any, wanted: Any, s: Any, row: Any) -> Any:
-    """Return the number in a row if it is wanted.
+    """Return the number in a row of scratch memory if it is needed.
 
     If `wanted` is the unused number `nothing()` of the module `numbers`, return `nothing()`.
     """
@@ -125,7 +125,7 @@ def _at_address(kind: Any) -> Any:
 numbers_at, whole_numbers_at = map(_at_address, (NUMBERS, WHOLE_NUMBERS))
 
 
-#: Largest number of doubles that are prefetched: they fill half of a processor's first-level cache.
+#: Largest number of doubles that are prefetched. They fill half of a processor's first-level cache.
 _MOST_FETCHED = 3072
 _NUMBERS = types.CPointer(types.float64)
 
@@ -231,10 +231,9 @@ _write_8, _write_4, _write_2, _write_1 = map(_make_writer, (8, 4, 2, 1))
 def read_rows(m, x, at, stride, count, s, row):
     """Read `count` numbers of each of eight configurations into rows of scratch memory.
 
-    The first number of the first configuration is `x[at]`.
-
-    The numbers of the next configuration begin `stride` numbers later. If `m` is 1, the numbers of one
-    configuration are read for all eight configurations.
+    The numbers of the first configuration begin at `x[at]`. The numbers of each next configuration begin
+    `stride` numbers later. If `m` is 1, only the first configuration is read, and its numbers are used for
+    all eight.
     """
     i = 0
     if m == 1:
@@ -258,7 +257,7 @@ def read_rows(m, x, at, stride, count, s, row):
 def write_rows(m, s, rows, first, count, to, at, stride):
     """Write `count` rows of scratch memory to the array `to`, from `to[at]` on.
 
-    The indices of the rows are `rows[first]` and the following elements of `rows`. If `m` is 1, only one
+    The list `rows` has the indices of the rows, from `rows[first]` on. If `m` is 1, only one
     configuration is written, else eight.
     """
     i = 0
@@ -306,7 +305,7 @@ def fetch(x, at, count):
             _fetch(x, number)
 
 
-#: Number of doubles from a number that is read to the number that is loaded into the cache in advance.
+#: When the number with index i is read, the number with index i + _AHEAD is loaded into the cache.
 _AHEAD = 512
 
 

@@ -42,19 +42,19 @@ class Lanes(types.Type):
         return Conversion.safe if isinstance(other, Product) and other.width == self.width else None
 
     def unify(self, context: Any, other: Any) -> Any:
-        """Return the common type of a number and a product, which is the number's type."""
+        """Return the type to which a number and a product can both be converted: the type of the number."""
         return self if isinstance(other, Product) and other.width == self.width else None
 
 
 class Product(types.Type):
-    """The type of a product that is still stored as its two factors."""
+    """The type of a product that is not multiplied yet: it is stored as its two factors."""
 
     def __init__(self, width: int) -> None:
         self.width = width
         super().__init__(name=f"Product({width})")
 
     def unify(self, context: Any, other: Any) -> Any:
-        """Return the common type of a number and a product, which is the number's type."""
+        """Return the type to which a number and a product can both be converted: the type of the number."""
         return other if isinstance(other, Lanes) and other.width == self.width else None
 
 

@@ -78,8 +78,8 @@ def _of_small(context: Any, x: Any) -> Any:
         # `most` is 1 - z/2, and `most_lost` is its rounding error.
         most = fused(builder, z, all_lanes(-0.5), all_lanes(1.0))
         most_lost = fused(builder, z, all_lanes(-0.5), builder.fsub(all_lanes(1.0), most))
-        # sin(r + lost) = sin r + lost cos r, cos(r + lost) = cos r - lost sin r. The largest term is added
-        # last; the other terms are small, and so are their rounding errors.
+        # sin(r + lost) = sin r + lost cos r, cos(r + lost) = cos r - lost sin r.
+        # The largest term is added last, because the other terms and their rounding errors are small.
         sine = fused(builder, builder.fmul(r, z), polynomial(z, SINE), builder.fmul(lost, most))
         sine = builder.fadd(r, sine)
         rest = fused(builder, builder.fmul(z, z), polynomial(z, COSINE), most_lost)
@@ -91,8 +91,9 @@ def _of_small(context: Any, x: Any) -> Any:
             sign = builder.shl(builder.and_(turns, bits(2)), bits(62))
             return builder.bitcast(builder.xor(builder.bitcast(value, whole), sign), x.type)
 
-        # An odd number of quarter turns exchanges sine and cosine. Two or three quarter turns change the sign
-        # of the sine; one or two quarter turns change the sign of the cosine.
+        # An odd number of quarter turns exchanges sine and cosine.
+        # Two or three quarter turns change the sign of the sine.
+        # One or two quarter turns change the sign of the cosine.
         odd = builder.icmp_signed("!=", builder.and_(quarters, bits(1)), bits(0))
         pair = (
             signed(builder.select(odd, cosine, sine), quarters),

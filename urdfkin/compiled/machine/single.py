@@ -40,14 +40,14 @@ _Q, _OUT, _NQ, _NV, _ORDERS = (
 )
 _AXES, _ROWS, _COLUMNS = int(KernelArgs.AXES), int(KernelArgs.ROWS), int(KernelArgs.COLUMNS)
 
-#: Positions in a Python object, in words of eight bytes: the length of the object's header, the index of its
-#: type, and the index of a tuple's first item.
+#: Number of words (of eight bytes) in the header of a Python object.
 _OWN = object.__basicsize__ // 8
+#: Indices of two words: an object's type, and a tuple's first item.
 _TYPE, _ITEMS = _OWN - 1, tuple.__basicsize__ // 8
-#: Indices of words in a NumPy array (PyArrayObject_fields) and in its element type (PyArray_Descr). In the
-#: array, the number of axes and the flags occupy half a word each. In the element type, one word contains the
-#: byte order and NumPy's type number.
+#: Indices of words in a NumPy array (the C structure PyArrayObject_fields).
+#: The number of axes and the flags occupy half a word each.
 _DATA, _NDIM, _SHAPE, _KIND, _FLAGS = _OWN, _OWN + 1, _OWN + 2, _OWN + 5, _OWN + 6
+#: In the C structure PyArray_Descr (an element type), one word has the byte order and the type number.
 _KIND_AND_ORDER, _NATIVE, _DOUBLE = _OWN + 1, ord("="), 12
 _HALF, _BYTE = 0xFFFFFFFF, 0xFF
 #: Required flags of an input array (C-contiguous and aligned), and of an output array (also writable).
@@ -119,8 +119,8 @@ def one_configuration(bound, arguments, count):
     The function returns the result, or None if it does not support the arguments or if its memory is busy.
 
     Args:
-        bound: Address of the bound tuple: kernel arguments, array type, None, the function that creates an
-            array, its shape, and the objects that must stay alive.
+        bound: Address of a tuple. Its items are the kernel arguments, the array type, None, the function
+            that creates the result array, the array's shape, and objects that must stay alive.
         arguments: Address of the Python call's arguments.
         count: Number of these arguments.
     """
@@ -195,7 +195,7 @@ def _built_in(name: str, address: int, *bound: object) -> Callable[..., FloatArr
 def arrays_are_known() -> bool:
     """Return whether this NumPy stores arrays in memory as this module expects.
 
-    If it does not, `single` is not used.
+    If the result is False, the fast function `single` must not be used.
     """
     x = np.zeros((2, 3))
     if np.ndarray.__basicsize__ < 8 * (_FLAGS + 1) or np.dtype.__basicsize__ < 8 * (_KIND_AND_ORDER + 1):
@@ -210,9 +210,9 @@ def arrays_are_known() -> bool:
     )
 
 
-#: Four values for each quantity: its kernel, its kernel for the reference frame LOCAL, its number of inputs,
-#: and the number of the result's axes that have length nv. The inputs are q (1), q and v (2), or q, v and a
-#: (3).
+#: For each quantity: its kernel, and its kernel for the reference frame LOCAL.
+#: The third value is the number of inputs: 1 for q, 2 for q and v, 3 for q, v and a.
+#: The fourth value is the number of the result's axes that have length nv.
 _HOW: dict[str, tuple[Core, Core, int, int]] = {
     "placement": (kernels.placements, kernels.placements, 1, 0),
     "velocity": (kernels.velocities, kernels.local_velocities, 2, 0),
@@ -250,7 +250,7 @@ def single(
 def called(
     core: Any, orders: int, shape: tuple[int, ...], plan: CompiledTree
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    """Return a fast function, as `single` does, for a C function that takes kernel arguments.
+    """Return a fast function for one configuration, which calls a C function like a kernel.
 
     Args:
         core: The C function, as a `ctypes` object.
