@@ -63,7 +63,7 @@ radius of each sum, product, quotient, square root, sine and cosine. Other parts
 | the rotation nearest to a base's matrix of nine digits | Newton's iteration with a bound on its residual |
 | the ends as doubles | the nearest double, then the next one if it lies inside the ball |
 
-The [accuracy study](judge.md) and the test vectors of [exported code](export.md) use the same balls.
+The [accuracy study](judge.md) and the test vectors of [exported code](export.md) use the same intervals.
 Arb has one precision for the whole process. So `enclose` in several threads computes one sample at a time,
 and restores the precision afterwards.
 

@@ -89,7 +89,7 @@ def one_link(figure: Any) -> None:
         arrow(axes, tip, 0.4 * link_endpoint_velocity(theta, rate, a1), VERMILION)
     axes.plot(0, 0, "o", color=INK, markersize=8)
     axes.set(xlim=(-1.1, 1.15), ylim=(-0.95, 1.3))
-    plane(axes, "7.2: the endpoint's velocity is along y1:\na1 times the joint velocity")
+    plane(axes, "7.2: the endpoint's velocity along y1\nis a1 times the joint velocity")
 
 
 def velocity_field(figure: Any) -> None:

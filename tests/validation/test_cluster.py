@@ -272,8 +272,8 @@ def test_a_robot_that_kills_its_process_is_blamed_and_none_of_its_neighbours(
         two._client.run(_deadly, str(deaths), "urdfkin.validation.worker_processes")
     assert [i for i, robot in enumerate(report.robots) if robot.verdict != Verdict.VERIFIED] == [25]
     reason = (
-        "ur5: the process that validated the robot crashed twice, the second time without other"
-        " work: found signal SIGSEGV"
+        "ur5: the process that validated the robot crashed twice; the second time it computed"
+        " nothing else: found signal SIGSEGV"
     )
     assert report.robots[25].reason == reason
     assert deaths.read_text() == "97"

@@ -55,7 +55,11 @@ def test_processes_change_no_number(how: dict[str, Any]) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("how", "words"),
-    [(HOW[0], "crashed twice, the second time without other work"), (HOW[1], "crashed"), (HOW[2], "crashed")],
+    [
+        (HOW[0], "crashed twice; the second time it computed nothing else"),
+        (HOW[1], "crashed"),
+        (HOW[2], "crashed"),
+    ],
 )
 def test_a_death_is_that_robots_result_and_the_others_go_on(
     how: dict[str, Any], words: str, deaths: Path

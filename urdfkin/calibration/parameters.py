@@ -1,4 +1,4 @@
-"""Model a path with a URDF's origins or a table's cells as parameters.
+"""Model a path; its parameters are the URDF's origins or the table's cells.
 
 Compute the Jacobian with respect to the parameters.
 

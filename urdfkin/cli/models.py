@@ -188,7 +188,7 @@ def _recheck(robots: tuple[Robot, Robot], path: Path) -> Answer:
 @click.option(
     "--effects/--no-effects",
     default=True,
-    help="Compute bounds of the motion of frames by the changes (default).",
+    help="Compute how far each change can move the frames (default).",
 )
 @click.option("--markdown", type=_PATH, help="Write the result as Markdown for a pull request comment.")
 @source_options

@@ -184,7 +184,7 @@ class Certificate(Header):
         list[Annotated[list[str], of_length(2)]], says("Matched pairs of a link of A and a link of B.")
     ]
     tools: Annotated[
-        list[ToolEntry], says("Matched links with different poses that count as different tools.")
+        list[ToolEntry], says("Matched links whose poses differ; they count as different tools.")
     ]
     orders: Annotated[
         list[list[str]],
@@ -518,7 +518,7 @@ def _not_attained(
     place = f"frame {claim['frame']}"
     q_a, q_b = np.array([claim["q_a"]]), np.array([claim["q_b"]])
     if not search.belong_together(q_a, q_b):
-        yield f"{place}: its configurations do not correspond to each other, or leave the limits"
+        yield f"{place}: the configurations of A and B do not correspond, or exceed the limits"
         return
     for computed, by in ((own_results, "urdfkin"), (pinocchios, "Pinocchio")):
         turned, off = apart(*(Ts[0, 0] for Ts in search.poses_at(q_a, q_b, [frame], computed)))

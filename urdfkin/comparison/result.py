@@ -207,7 +207,7 @@ def _range(ends: Value) -> str:
 
 @dataclass(frozen=True, slots=True)
 class JointDifference:
-    """A difference of two models as they are written, at one joint or link, that rounding does not explain.
+    """A difference between the numbers of two models at one joint or link; rounding does not explain it.
 
     Attributes:
         place: The joint or link of A, for example "joint elbow".
@@ -877,7 +877,7 @@ def limit_differences(
         b: The joint of B.
         tolerance: Tolerance of a limit (rad or m), as a share of its size or of 1.
         single: The relative error of rounding a limit to single precision; 0 if it is not rounded so.
-        zero: Sense and offset of B's coordinate; its limits are converted to A's.
+        zero: Sense and offset of B's coordinate. They convert the limits of B to the coordinate of A.
     """
     place, (sense, offset) = f"joint {a.name}", zero
     if a.kind is not b.kind:

@@ -227,7 +227,7 @@ def _depths(tree: KinematicTree, links: Iterable[int]) -> dict[int, int]:
 
 
 class _Anchor(NamedTuple):
-    """The step that moves a link (-1: the base), the link's pose in the step's frame, and the path length."""
+    """A link's last moving joint (-1: none), its pose in that joint's frame, and the path length."""
 
     step: int
     T: FloatArray

@@ -338,8 +338,8 @@ def steps_like(
         pairs: All pairs of consecutive axes.
         phi_in: Angle about the first axis from frame 0 to the first joint's frame (rad).
         carry: Offset along the first axis from frame 0 to the first joint's frame (metres).
-        tip: Offset (metres) before the last row with which its d equals the d in the other table. None if the
-            tool or the last row gets the remaining offset.
+        tip: Offset (metres) before the last row. With it, the last d is the same as in the other table.
+            None if the tool or the last row gets the remaining offset.
 
     Returns:
         The steps between consecutive axes, and theta of each row.

@@ -42,7 +42,8 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Tolerance of handwritten screws, for the length 1 of each axis and for the pitch 0 m/rad.
+#: Tolerance of handwritten screws.
+#: The length of an axis may differ from 1 by this much, and the pitch (m/rad) from 0.
 _WRITTEN = 1e-4
 
 

@@ -477,7 +477,7 @@ class DHTable(Displayable):
         return lengths + math.hypot(*self.tool[:3, 3])
 
     def rounding(self, q: Given) -> FloatArray:
-        """Return the (...,) bound of the position error of `placement(q)` by rounding, in metres.
+        """Return a bound (...,) in metres for the position error that rounding causes in `placement(q)`.
 
         The result divided by `span` is a bound of the orientation error in radians.
 

@@ -228,7 +228,7 @@ def point_acceleration(
 ) -> AccelerationParts:
     """Return p-dot-dot_0 = alpha x p + w x (w x p) + 2 w x R v_1 + R a_1 + d-dot-dot (7.125).
 
-    For a point that is fixed in frame 1 this is 7.123.
+    For a point that is fixed in frame 1, the result is equation 7.123.
 
     Args:
         frame: Frame 1 in frame 0.

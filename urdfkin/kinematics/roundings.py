@@ -196,7 +196,7 @@ ROW = 8.0
 SINGLE_EPS = 2.0**-23
 #: The smallest normal number, and the largest number.
 SINGLE_SMALLEST, SINGLE_LARGEST = 2.0**-126, (2.0 - SINGLE_EPS) * 2.0**127
-#: Error of each operation, in eps of its value.
+#: Relative error of the result of each operation, in eps.
 SINGLE_OPERATION = {
     "+": 0.5,
     "-": 0.5,

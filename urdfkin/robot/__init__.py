@@ -1639,8 +1639,8 @@ class Robot(Displayable):
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
         """Return the fast evaluator of a frame, which is made at the first call."""
         # A plain name is a key by itself, because the hash of an enumeration member takes long to compute.
-        # Other keys contain types, because a member of an enumeration can be equal to a number.
-        # In the same way, `LinkFrame("link:a")` differs from a link with the literal name "link:a".
+        # All other keys contain the types too. Without them, a member of an enumeration equals its number.
+        # Also, `LinkFrame("link:a")` differs from a link with the literal name "link:a".
         plain = reference is _ALIGNED and type(frame) is str
         key = frame if plain else (type(frame), frame, type(reference), reference)
         known = self._checked if verify else self._prepared

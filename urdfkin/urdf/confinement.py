@@ -75,9 +75,9 @@ class Ground:
 
 
 def _package_of(path: str) -> list[str]:
-    """Return a list with the folder of the package that contains a file.
+    """Return the folder of a file's package, as a list with one entry.
 
-    The list is empty if no package contains it.
+    The list is empty if the file belongs to no package.
     """
     return [str(folder) for folder in Path(path).parents if _exists(folder / "package.xml")][:1]
 
@@ -118,7 +118,7 @@ def limit(seconds: int) -> None:
 
 
 def confine(holds: Callable[[str], bool]) -> None:
-    """From now on, allow this process only to read certain files.
+    """From now on, allow this process to read certain files and nothing else.
 
     Every other audit event is refused.
 

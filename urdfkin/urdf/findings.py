@@ -541,7 +541,7 @@ class Reporter:
             rule: The rule.
             message: The problem in one clause.
             at: The element; without it, `position` is used.
-            attribute: The attribute of `at` whose text the excerpt underlines.
+            attribute: Name of an attribute of `at`; the excerpt underlines its text.
             found: The text that causes the finding, quoted for printing.
             remedy: The remedy.
             owner: The tag for the message, if `at` is a link or joint in the wrong place. The default is the

@@ -62,7 +62,7 @@ class Origin:
 
     @property
     def again(self) -> str:
-        """The source to pass to `load` to get the same robot again; `-` (standard input) for text."""
+        """The argument with which `load` reads the robot again; for a text it is `-` (standard input)."""
         return "-" if self.source.startswith("<") else self.source
 
     @property
@@ -295,7 +295,7 @@ def _read_file(path: Path, most: int) -> Text:
 
 
 def as_word(path: Path) -> str:
-    """Return a path as an argument of `load`.
+    """Return the text with which `load` reads a path.
 
     `./` is added before a path that would be read as an option, a URDF text or a catalogue name.
     """

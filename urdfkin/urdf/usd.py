@@ -603,7 +603,7 @@ class _Reader:
                     self._say("left-out-of-usd", path, what)
                 continue
             unread.append(schema)
-        # a joint that is not in the tree is listed already
+        # if the joint is not in the tree, a remark lists the joint already
         if unread and not any(one.where == path and one.kind == "left-out-of-usd" for one in self.remarks):
             self._say("left-out-of-usd", path, f"urdfkin does not read {', '.join(unread)}")
 

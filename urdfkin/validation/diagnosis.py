@@ -2,8 +2,8 @@
 
 For each mistake, the module computes the results of a function with this mistake from urdfkin's results.
 Examples are exchanged rows, another reference frame, another frame, other units, and joints in another order.
-A mistake is named if it explains all but a thousandth of the difference at every configuration. Mistakes with
-the same prediction are all named.
+A mistake is named if it explains all but a thousandth of the difference at every configuration. If
+several mistakes lead to the same results, all of them are named.
 """
 
 from __future__ import annotations

@@ -148,8 +148,8 @@ class Finding(TypedDict):
     oracle: Annotated[
         Literal["refuses", "differs"] | None,
         says(
-            "Pinocchio's behaviour if it differs from the specification: it refuses the file, or "
-            "reads another robot from it; null: neither."
+            "Pinocchio's behaviour: it refuses the file, or the robot that it reads differs from the "
+            "specification; null: neither."
         ),
     ]
     also: Annotated[

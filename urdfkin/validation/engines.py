@@ -201,7 +201,7 @@ def lost(what: str, error: Exception) -> Failure:
 
 #: Reasons that are reported for a robot that crashed its process.
 DIED = "the process that validated the robot crashed"
-DIED_TWICE = "the process that validated the robot crashed twice, the second time without other work"
+DIED_TWICE = "the process that validated the robot crashed twice; the second time it computed nothing else"
 
 
 def died(subject: RobotInput, how: str, cause: str) -> Failure:

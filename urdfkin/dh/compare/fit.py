@@ -59,7 +59,7 @@ _LAST_WINS = 1.2
 #: With a small weight, beta changes only if a change of alpha is not enough.
 _BETA, _BETA_AGAIN = 0.3, 0.5
 #: Free parameters can compensate for changes of some cells.
-#: They can replace a cell if at most this fraction of the cell's effect then remains.
+#: If they compensate for all but this fraction of a cell's effect, the cell cannot be determined.
 _HIDDEN = 1e-6
 
 

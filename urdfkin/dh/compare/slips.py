@@ -38,7 +38,7 @@ from urdfkin.model.tree import FloatArray
 
 #: Number of interpretations that are fitted.
 #: Axes with a smaller tilt (rad) count as parallel.
-#: Relative cost of each difference between an interpretation and the file's own interpretation.
+#: Relative cost of each respect in which an interpretation differs from the one that the file states.
 _TRIED, _PARALLEL, _WORTH = 3, 2e-2, 0.1
 #: An interpretation explains a disagreement if it leaves at most this fraction of the tip error.
 _EXPLAINS = 0.05
