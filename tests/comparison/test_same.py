@@ -265,7 +265,7 @@ FORGED: dict[str, Any] = {
     "its upper bound is wrong": lambda d: d["frames"][-1].update(upper=0.99 * d["frames"][-1]["lower"]),
     "finds": lambda d: d["frames"][-1].update(lower=1.01 * d["frames"][-1]["lower"]),
     "of A and B do not correspond": lambda d: d["frames"][-1]["q_b"].__setitem__(0, 0.123),
-    "leave the limits": lambda d: [d["frames"][-1][q].__setitem__(1, 50.0) for q in ("q_a", "q_b")],
+    "or exceed the limits": lambda d: [d["frames"][-1][q].__setitem__(1, 50.0) for q in ("q_a", "q_b")],
     "`verdict`: the models give differs": lambda d: d.update(verdict="same"),
     "`differences`: this difference is missing": lambda d: d.update(differences=[]),
     "`differences`: this is not a difference": lambda d: d["differences"].append(
