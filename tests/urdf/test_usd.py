@@ -6,7 +6,7 @@ import math
 import os
 import re
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ from tests.cli.running import urdfkin as command
 from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Question
 from urdfkin.errors import InputError, OracleError, SourceError
-from urdfkin.kinematics.rotation import quaternion_of, rotation_about, rotation_of
+from urdfkin.kinematics.rotation import quaternion_of, rotation_about, rotation_from_rpy, rotation_of
 from urdfkin.model.conventions.convention import transcoded
 from urdfkin.model.tree import LARGEST_ANGLE, Joint, KinematicTree, pose
 from urdfkin.report.diff import as_data, headline
@@ -81,7 +81,7 @@ def write(tmp_path: Path) -> Write:
     return of
 
 
-def loaded(path: Path, **options: Any) -> urdfkin.Robot:
+def loaded(path: Path | str, **options: Any) -> urdfkin.Robot:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", urdfkin.UrdfWarning)
         return urdfkin.load(path, **options)
@@ -1239,3 +1239,109 @@ def test_newtons_importer_and_kinematics_place_the_links_alike(write: Write, up:
             assert seven[:3] == pytest.approx(T[:3, 3], abs=1e-5)
             x, y, z, w = seven[3:].astype(float) / np.linalg.norm(seven[3:])
             assert pose(rotation_of([x, y, z, w]))[:3, :3] == pytest.approx(T[:3, :3], abs=1e-5)
+
+
+def _frames(first: Sequence[float], rotation: Sequence[float] = (1, 0, 0, 0)) -> str:
+    """Return the frames of a joint prim: the origin in the first body and a rotation; body 1 has identity."""
+    ends = (first, (0, 0, 0)), (rotation, (1, 0, 0, 0))
+    origin, turn = [[", ".join(repr(float(x)) for x in one) for one in two] for two in ends]
+    return (
+        f'uniform token physics:axis = "Z"\n'
+        f"point3f physics:localPos0 = ({origin[0]})\n point3f physics:localPos1 = ({origin[1]})\n"
+        f"quatf physics:localRot0 = ({turn[0]})\n quatf physics:localRot1 = ({turn[1]})\n"
+    )
+
+
+def _urdf(*joints: tuple[str, str, str, str, str]) -> str:
+    """Return a URDF with revolute joints about z and fixed joints: name, kind, parent, child, origin."""
+    links = dict.fromkeys(link for joint in joints for link in joint[2:4])
+    text = "".join(f'<link name="{link}"/>' for link in links)
+    for name, kind, parent, child, origin in joints:
+        text += (
+            f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+            f'<origin {origin}/><axis xyz="0 0 1"/></joint>'
+        )
+    return f'<robot name="arm">{text}</robot>'
+
+
+def _explained(urdf: str, file: Path) -> bool:
+    """Return whether single precision explains all differences; the order of the two models has no effect."""
+    a, b = loaded(urdf), loaded(file)
+    forward, backward = (urdfkin.same(*two, bounds=False) for two in ((a, b), (b, a)))
+    assert forward.up_to_single == backward.up_to_single
+    return forward.up_to_single
+
+
+@pytest.mark.parametrize(("error", "explained"), [(0.0, True), (1e-6, False), (1e-4, False)])
+def test_the_rounding_of_a_far_link_explains_no_error_of_a_joint_beside_it(
+    write: Write, error: float, explained: bool
+) -> None:
+    """The URDF's elbow follows a link 1 km away; the stage's elbow does not."""
+    urdf = _urdf(
+        ("turn", "continuous", "base", "b", 'xyz="0 0 0.1"'),
+        ("mount", "fixed", "b", "far", 'xyz="1000 0 0"'),
+        ("elbow", "continuous", "far", "tip", 'xyz="-999.7 0.1 0.2"'),
+    )
+    file = write(
+        stage(
+            body("base", schemas=ROOT) + body("b") + body("far") + body("tip")
+            + joint("turn", "Revolute", "base", "b", _frames((0, 0, 0.1)))
+            + joint("mount", "Fixed", "b", "far", _frames((1000, 0, 0)))
+            + joint("elbow", "Revolute", "b", "tip", _frames((0.3 + error, 0.1, 0.2)))
+        )
+    )  # fmt: skip
+    assert _explained(urdf, file) == explained
+
+
+@pytest.mark.parametrize(("error", "explained"), [(0.0, True), (3e-5, False)])
+def test_the_rounding_of_a_far_joint_explains_no_error_of_the_next(
+    write: Write, error: float, explained: bool
+) -> None:
+    """Only the URDF has the link that carries the second joint."""
+    urdf = _urdf(
+        ("first", "continuous", "base", "only", 'xyz="1000 0 0" rpy="0.3 0.4 0.5"'),
+        ("glue", "fixed", "only", "b", ""),
+        ("second", "continuous", "only", "tip", 'xyz="0.3 0.1 0.2"'),
+    )
+    turned = np.roll(quaternion_of(rotation_from_rpy([0.3, 0.4, 0.5])), 1)
+    file = write(
+        stage(
+            body("base", schemas=ROOT) + body("b") + body("tip")
+            + joint("first", "Revolute", "base", "b", _frames((1000, 0, 0), turned.tolist()))
+            + joint("second", "Revolute", "b", "tip", _frames((0.3 + error, 0.1, 0.2)))
+        )
+    )  # fmt: skip
+    assert _explained(urdf, file) == explained
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-17])
+def test_a_quaternion_of_the_identity_explains_no_angle(write: Write, noise: float) -> None:
+    urdf = _urdf(("turn", "continuous", "base", "tip", 'xyz="0 0 0.1" rpy="0 1e-7 0"'))
+    file = write(
+        stage(
+            body("base", schemas=ROOT) + body("tip")
+            + joint("turn", "Revolute", "base", "tip", _frames((0, 0, 0.1), (1, 0, 0, noise)))
+        )
+    )  # fmt: skip
+    assert not _explained(urdf, file)
+
+
+@pytest.mark.parametrize(("written", "explained"), [("double3", False), ("float3", True)])
+def test_a_translation_in_double_precision_is_not_rounded(
+    write: Write, written: str, explained: bool
+) -> None:
+    urdf = _urdf(
+        ("turn", "continuous", "base", "b", 'xyz="0 0 0.1"'),
+        ("mount", "fixed", "b", "tool", 'xyz="1000 0 0"'),
+    )
+    inside = (
+        f'def Xform "tool" {{ {written} xformOp:translate = (1000, 2e-5, 0)\n'
+        'uniform token[] xformOpOrder = ["xformOp:translate"]\n}'
+    )
+    file = write(
+        stage(
+            body("base", schemas=ROOT) + body("b", inside=inside)
+            + joint("turn", "Revolute", "base", "b", _frames((0, 0, 0.1)))
+        )
+    )  # fmt: skip
+    assert _explained(urdf, file) == explained

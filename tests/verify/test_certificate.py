@@ -185,3 +185,9 @@ def test_a_share_that_is_no_number_is_kept_in_a_sum_of_comparisons(other: float)
         assert not both.agrees
         assert both.results == 3
     assert (wrong + Comparison.of_nothing()).index == (Comparison.of_nothing() + wrong).index == (3,)
+
+
+def test_a_sum_of_equal_comparisons_has_the_index_of_the_first() -> None:
+    first, second = Comparison(1, 0.5, 0.5, (3,)), Comparison(1, 0.5, 0.5, (4,))
+    assert (first + second).index == (3,)
+    assert (second + first).index == (4,)

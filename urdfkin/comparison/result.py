@@ -828,7 +828,12 @@ def _of_frame(found: Alignment, frame: FramePair) -> Difference:
 
 
 def remarks(
-    found: Alignment, variables: Variables, tolerance: Tolerance, single: float = 0.0
+    found: Alignment,
+    variables: Variables,
+    tolerance: Tolerance,
+    single: float = 0.0,
+    *,
+    as_written: bool = False,
 ) -> tuple[Difference, ...]:
     """Return the differences without effect on motion: joint limits, joint types, links of one model only.
 
@@ -837,12 +842,14 @@ def remarks(
         variables: Their common variables.
         tolerance: The tolerance within which numbers are equal.
         single: The relative error of rounding a number to single precision; 0 if no model is rounded so.
+        as_written: Compare limits without the change of a joint's sense and zero.
     """
     some = list[Difference]()
     for step in found.steps:
         if not step.unlike:
             a, b = found.a.tree.joints[step.a], found.b.tree.joints[step.b]
-            some += limit_differences(a, b, tolerance.angle, single, (step.sense, step.offset))
+            zero = (1, 0.0) if as_written else (step.sense, step.offset)
+            some += limit_differences(a, b, tolerance.angle, single, zero)
     for tree, which in ((found.a.tree, "A"), (found.b.tree, "B")):
         for lock in filter(None, map(idle, tree.joints)):
             value = lock.joint.kind.value, lock.value

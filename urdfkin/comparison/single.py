@@ -36,6 +36,11 @@ those of P, both from the last common link of the two branches. Seen from P, a l
 by at most W + V + F d, and turned by at most E + F. The rounding of double precision, which `same` ignores,
 comes on top. If both models are rounded, their bounds add.
 
+**Both orders.** A link that only B has can carry a joint, or P can be far from the joint in B. Then the bound
+contains the rounding of other joints. `same` therefore compares A with B and B with A. In the order that
+starts with a rounded model, the path from P has at most one moving joint, and its fixed joints all lie
+between P and the link. Otherwise, the answer is that the difference is not explained.
+
 **What the proof means.** If a difference exceeds its bound, single precision is not its cause, and the first
 such joint is named. If no difference exceeds its bound, an error that is smaller than the rounding of the
 joint's own numbers may remain. Nothing can distinguish such an error from rounding. Planar and floating
@@ -142,6 +147,9 @@ class JointComparison:
         if moving[0][0] or moving[1][0] or partners != moving[1][1]:
             yield JointDifference(name, "", None, "is carried by other joints in the other model")
             return
+        if self.joints[0].any() and (len(steps) > 1 or self._sums(paths[1][0])):
+            yield JointDifference(name, "", None, "is carried by joints without a common link between them")
+            return
         if any(step is not None and step.kind in ("planar", "floating") for step in steps):
             yield from self._of_free_joint(name, [way for _, way in paths])
             return
@@ -160,6 +168,10 @@ class JointComparison:
                     self._beyond(joint, "axis", *self._between(step, *seen), sum(bound) + sum(bounds))
                 )
             yield from beyond
+
+    def _sums(self, back: Sequence[int]) -> bool:
+        """Return whether the joints to the link in whose frame B is seen are rounded."""
+        return bool(back) and bool(self.joints[1][list(back)].any())
 
     def _between(self, step: Step, axis: Screw, other: Screw) -> tuple[float, float]:
         """Return the angle and the distance of two axes.

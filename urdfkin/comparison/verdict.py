@@ -232,7 +232,13 @@ class Comparator:
             after=tuple(dict.fromkeys(words for _, words in after)),
             up_to=tuple(what for what in FREE if what in free),
             differences=wrong,
-            remarks=remarks(found, variables, self.tolerance, SINGLE if single else 0.0),
+            remarks=remarks(
+                found,
+                variables,
+                self.tolerance,
+                SINGLE if single else 0.0,
+                as_written=verdict is Verdict.UP_TO_SINGLE,
+            ),
             joints=tuple(
                 JointMap(names[0][s.a], names[1][s.b], s.sense, s.offset, s.conversion) for s in found.steps
             ),
@@ -275,13 +281,26 @@ class Comparator:
         return metres, radians
 
     def unexplained(self, found: Alignment) -> tuple[JointDifference, ...]:
-        """Return the differences of the models as they are written, joint by joint, beyond rounding."""
+        """Return the differences of the models as they are written, joint by joint, beyond rounding.
+
+        The models are compared in both orders, because a bound depends on the link from which a joint is seen
+        (`urdfkin.comparison.single`).
+        """
         off = [
             np.zeros((len(tree.joints), 3)) if robot.single is None else robot.single.joints
             for tree, robot in zip(self.trees, self.robots, strict=True)
         ]
-        base = base_as_written(*self.mechanisms)
-        return tuple(JointComparison(found, (off[0], off[1]), base, self.tolerance).differences())
+        a, b = self.mechanisms
+        unlike = tuple(
+            JointComparison(found, (off[0], off[1]), base_as_written(a, b), self.tolerance).differences()
+        )
+        if unlike or not (off[0].any() or off[1].any()):
+            return unlike
+        back = align(b, a, {theirs: ours for ours, theirs in found.names.items()})
+        other = JointComparison(back, (off[1], off[0]), base_as_written(b, a), self.tolerance)
+        return tuple(
+            one if one.a is None else replace(one, a=one.b, b=one.a) for one in other.differences()
+        )
 
     def as_written(self, found: Alignment) -> Alignment:
         """Return the alignment of the models as they are written, for the joint and link pairs of `found`.

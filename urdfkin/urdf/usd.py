@@ -23,6 +23,7 @@ import stat
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
+from itertools import product
 from pathlib import Path
 from typing import Any, Literal
 
@@ -140,10 +141,11 @@ class Usd:
         prims: For each link with a prim: the prim's path.
         rest: (n, 4, 4) placement in the world of each prim of `prims` by UsdGeom, in m with z up.
         rest_q: (nq,) configuration of the robot in the stage.
-        single: For each joint of the tree by name: four numbers for the effect of rounding to single
+        single: For each joint of the tree by name: five numbers for the effect of rounding to single
             precision. The first two are bounds on the translation (m) and the rotation (rad) of the joint's
             frames. The third is the length (m) of the vectors that rotate with the frames. The fourth is a
-            bound on the relative change of the joint's value by its mimic rule.
+            bound on the relative change of the joint's value by its mimic rule. The last is the length (m) of
+            the origin of the joint's frame in its child.
         joints: The numbers of each joint prim of the tree, by its path.
         stage: The stage.
         unit: metersPerUnit.
@@ -155,7 +157,7 @@ class Usd:
     prims: dict[str, str]
     rest: FloatArray
     rest_q: FloatArray
-    single: dict[str, tuple[float, float, float, float]]
+    single: dict[str, tuple[float, float, float, float, float]]
     joints: dict[str, JointReading]
     stage: Any
     unit: float
@@ -411,7 +413,7 @@ class _Reader:
     _bodies: dict[str, _Body] = field(default_factory=dict)
     _edges: list[_Edge] = field(default_factory=list)
     _read: dict[str, JointReading] = field(default_factory=dict)
-    _single: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)
+    _single: dict[str, tuple[float, float, float, float, float]] = field(default_factory=dict)
     # `root_joint` and `universe` are Pinocchio's names of the joint and the link of a moving base
     _names: dict[str, set[str]] = field(
         default_factory=lambda: {"link": {"universe"}, "joint": {"root_joint"}}
@@ -704,8 +706,35 @@ class _Reader:
         if body != target:
             T = T if body is None else inverse(self._bodies[body].T) @ T
             A, length = T @ A, length + float(np.linalg.norm(T[:3, 3]))
-            off = off[0] + SINGLE * length, off[1] + 2.0 * SINGLE
+            moved, turned = self._stored(target, body, length)
+            off = off[0] + moved, off[1] + turned
         return body, A, length, off
+
+    def _stored(self, path: str | None, body: str | None, length: float) -> tuple[float, float]:
+        """Return how far rounding to single precision can move (m) and turn (rad) a prim below a body.
+
+        A transform in double precision is not rounded. A rotation in single precision does not move its own
+        prim, but it moves the prims below. A transform in half precision explains nothing.
+
+        Args:
+            path: Path of the prim.
+            body: Path of the body; None: the world.
+            length: Sum of the lengths of the translations between the two (m).
+        """
+        moved = turned = False
+        geometry, prim = self.pxr.UsdGeom, self.stage.GetPrimAtPath(path)
+        own = True
+        while prim and not prim.IsPseudoRoot() and str(prim.GetPath()) != body:
+            for one in geometry.Xformable(prim).GetOrderedXformOps():
+                if one.GetPrecision() == geometry.XformOp.PrecisionFloat:
+                    rotates = one.GetOpType() not in (
+                        geometry.XformOp.TypeTranslate,
+                        geometry.XformOp.TypeScale,
+                    )
+                    turned |= rotates
+                    moved |= not rotates or not own
+            prim, own = prim.GetParent(), False
+        return SINGLE * length if moved else 0.0, 2.0 * SINGLE if turned else 0.0
 
     def _instanced(self, path: object) -> bool:
         return any(str(path).startswith(one) for one in self._instancers)
@@ -975,7 +1004,7 @@ class _Reader:
                 self._say("unused-in-usd", path, f"this Xform is no link: {error.what}", error.remedy)
                 continue
             joint = Joint(self._new("joint", f"{link}_fixed"), JointKind.FIXED, 0, T, _unit(0))
-            self._single[joint.name] = SINGLE * joint.length, 2.0 * SINGLE, joint.length, 0.0
+            self._single[joint.name] = *self._stored(path, parent, joint.length), joint.length, 0.0, 0.0
             joints.append((joint, links[parent], link))
             prims[link] = path
         self._read = {edge.path: self._read[edge.path] for edge, _ in ordered}
@@ -1017,9 +1046,10 @@ class _Reader:
         (A, B), (parent, child) = edge.frames, edge.ends
         axis = edge.axis
         shares = SINGLE if any(map(_is_mimic, _schemas(edge.prim))) else 0.0
-        self._single[names[edge.path]] = *edge.rounded, edge.size, shares
         if backwards:
             A, B, parent, child, axis = B, A, child, parent, -axis
+        lever = float(np.linalg.norm(B[:3, 3]))
+        self._single[names[edge.path]] = *edge.rounded, edge.size, shares, lever
         name, here, there = names[edge.path], links[parent], links[child]
         if edge.kind is JointKind.FIXED:
             yield Joint(name, JointKind.FIXED, 0, A @ inverse(B), _unit(0)), here, there
@@ -1339,12 +1369,13 @@ def _rounding(x: FloatArray) -> FloatArray:
 def _turned(xyzw: FloatArray) -> float:
     """Return a bound (rad) on the change of a rotation when its quaternion's numbers are rounded.
 
-    The rotation changes by twice the angle between the quaternions. A quaternion with only one nonzero number
-    describes the same rotation for every value of this number.
+    The rotation changes by twice the angle between the quaternions. A change along the quaternion itself does
+    not change the rotation. The largest change across it is at a corner of the box of all changes.
     """
-    if np.count_nonzero(xyzw) == 1:
-        return 0.0
-    return 2.0 * float(np.linalg.norm(_rounding(xyzw)) / np.linalg.norm(xyzw))
+    unit = xyzw / np.linalg.norm(xyzw)
+    corners = _rounding(xyzw) * np.array(list(product((-1.0, 1.0), repeat=4)))
+    across = np.linalg.norm(corners - np.outer(corners @ unit, unit), axis=1).max()
+    return 2.0 * float(across / np.linalg.norm(xyzw))
 
 
 def _is_mimic(schema: str) -> bool:

@@ -197,8 +197,8 @@ def _angle(R: FloatArray) -> float:
     return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
 
 
-#: For each joint name: four bounds on rounding errors, in the order of `urdfkin.urdf.usd.Usd.single`.
-Single = Mapping[str, tuple[float, float, float, float]]
+#: For each joint name: bounds on rounding errors and two lengths, in the order of `urdfkin.urdf.usd.Usd.single`.
+Single = Mapping[str, tuple[float, float, float, float, float]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -231,7 +231,7 @@ def single_precision(tree: KinematicTree, single: Single) -> SinglePrecision:
     both rotations. The rotation is off by at most e. The place is off by at most w + e |p|, with the origin p
     of B. A revolute joint of the tree has no such term: the reader writes B as a fixed joint of its own if
     its origin is not zero. That fixed joint has no entry, because the entry of the revolute joint counts both
-    frames. For other joints, the length in the entry is at least |p|. In a locked joint the two frames are
+    frames. For other joints, the last number of the entry is |p|. In a locked joint the two frames are
     apart by the value q too, and |q| is at most the length of the constant plus that of the two origins.
 
     Args:
@@ -240,8 +240,9 @@ def single_precision(tree: KinematicTree, single: Single) -> SinglePrecision:
     """
     out, own = np.zeros((len(tree.links), 2)), np.zeros((len(tree.joints), 3))
     for i, joint in enumerate(tree.joints):
-        way, angle, size, share = single.get(joint.name, (0.0, 0.0, 0.0, 0.0))
-        lever = size + (joint.length if joint.lock else 0.0)
+        way, angle, size, share, lever = single.get(joint.name, (0.0, 0.0, 0.0, 0.0, 0.0))
+        if joint.lock:
+            lever = size + joint.length
         own[i] = way + angle * (0.0 if joint.kind.turns else lever), angle, share
         length = max(joint.length, size)
         slides = joint.kind is JointKind.PRISMATIC
