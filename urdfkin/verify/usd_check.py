@@ -197,7 +197,7 @@ def _angle(R: FloatArray) -> float:
     return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
 
 
-#: For each joint name: bounds on rounding errors and two lengths, in the order of `urdfkin.urdf.usd.Usd.single`.
+#: For each joint name: bounds on rounding errors and two lengths (see `urdfkin.urdf.usd.Usd.single`).
 Single = Mapping[str, tuple[float, float, float, float, float]]
 
 
