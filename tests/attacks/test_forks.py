@@ -121,6 +121,46 @@ CASES = {
         fork(lambda: robot.placement(q[:3], "tool0"))
         thread.join()
         """,
+    "several threads that fork at the same time": """
+        import urdfkin.compiled.kept
+        sys.setswitchinterval(1e-6)
+        end, codes = time.monotonic() + 3.0, set()
+        def many():
+            while time.monotonic() < end:
+                pid = os.fork()
+                if pid == 0:
+                    os._exit(0)
+                codes.add(os.waitpid(pid, 0)[1])
+        threads = [threading.Thread(target=many) for _ in range(3)]
+        [thread.start() for thread in threads]
+        [thread.join() for thread in threads]
+        assert codes == {0}
+        sys.setswitchinterval(5e-3)
+        fork(lambda: robot.placement(q[:3], "tool0"))
+        """,
+    "a robot, after one thread imported a module lazily that another imported as usual": """
+        from urdfkin.system.lazy_import import lazy_import
+        module = "urdfkin.verify.exact.numbers"  # its body makes a lock
+        assert module not in sys.modules
+        begun, also = threading.Event(), threading.Event()
+        class Slow:
+            def find_spec(self, name, path=None, target=None):
+                if name == "flint" and threading.current_thread().name == "plain":
+                    begun.set()
+                    also.wait(2.0)
+                    time.sleep(0.5)
+        sys.meta_path.insert(0, Slow())
+        def plain():
+            __import__(module)
+        def lazy():
+            begun.wait()
+            also.set()
+            lazy_import(module + ":exact")(1)
+        threads = [threading.Thread(target=plain, name="plain"), threading.Thread(target=lazy)]
+        [thread.start() for thread in threads]
+        [thread.join() for thread in threads]
+        fork(lambda: robot.placement(q[:3], "tool0"))
+        """,
     "a pool of processes": """
         import multiprocessing
         robot.jacobian(q, "tool0", threads=2)

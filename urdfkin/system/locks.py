@@ -10,7 +10,8 @@ import os
 import threading
 
 _locks: list[threading.RLock] = []
-_acquired: list[threading.RLock] = []
+#: The locks that a thread holds during its fork, by the thread's identifier.
+_acquired: dict[int, list[threading.RLock]] = {}
 
 
 def lock_over_forks() -> threading.RLock:
@@ -30,14 +31,16 @@ def lock_over_forks() -> threading.RLock:
 
 
 def _before_fork() -> None:
+    acquired = _acquired[threading.get_ident()] = list[threading.RLock]()
     for lock in reversed(_locks[:]):
         lock.acquire()
-        _acquired.append(lock)
+        acquired.append(lock)
 
 
 def _after_fork() -> None:
-    while _acquired:
-        _acquired.pop().release()
+    # There are none if another thread registered this function during the fork.
+    for lock in reversed(_acquired.pop(threading.get_ident(), [])):
+        lock.release()
 
 
 class _ImportLock:
@@ -57,6 +60,8 @@ class _ImportLock:
 
     def register(self) -> None:
         """Let each later fork acquire the locks of this module."""
+        if self._registered:  # the body of a module may call this while another thread holds the lock
+            return
         with self._lock:
             if not self._registered:
                 import logging  # noqa: F401, PLC0415  not at the start: a folder could replace it
@@ -67,8 +72,7 @@ class _ImportLock:
                 self._registered = True
 
     def __enter__(self) -> None:
-        if not self._registered:
-            self.register()
+        self.register()
         self._lock.acquire()
 
     def __exit__(self, *error: object) -> None:
