@@ -298,9 +298,7 @@ class Comparator:
             return unlike
         back = align(b, a, {theirs: ours for ours, theirs in found.names.items()})
         other = JointComparison(back, (off[1], off[0]), base_as_written(b, a), self.tolerance)
-        return tuple(
-            one if one.a is None else replace(one, a=one.b, b=one.a) for one in other.differences()
-        )
+        return tuple(one if one.a is None else replace(one, a=one.b, b=one.a) for one in other.differences())
 
     def as_written(self, found: Alignment) -> Alignment:
         """Return the alignment of the models as they are written, for the joint and link pairs of `found`.

@@ -120,6 +120,14 @@ def _demands(writer: Writer, first: str = "") -> list[str]:
     ]
 
 
+def _lengths(writer: Writer) -> list[str]:
+    """Return the lines of code that check the lengths of one configuration's inputs."""
+    lines = list[str]()
+    for x, width in writer.code.widths(writer.function).items():
+        lines += [f"if len({x}) != {width}:", f'    raise ValueError("{x} needs {width} numbers")']
+    return lines
+
+
 def _in_any_namespace(writer: Writer) -> list[str]:
     used = [name for name in _FUNCTIONS if any(node.op == name for node in writer.function.nodes)]
     names = [f"{', '.join(used)} = {', '.join(f'xp.{name}' for name in used)}"] if used else []
@@ -288,6 +296,7 @@ DIALECTS = {
         about="One configuration, float64 arrays q ({nq},), v and a ({nv},); compiled when first called.",
         imports="from math import {}\n\nimport numpy as np\nfrom numba import njit",
         decorator='@njit(error_model="numpy")',
+        entering=_lengths,
         result=_in_array("np.empty({0})", ""),
         values=_ONE_BY_ONE.format("function(*map(np.array, one)).ravel().tolist()"),
     ),

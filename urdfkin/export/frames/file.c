@@ -15,7 +15,7 @@ extern "C" {
 #include <float.h>
 #include <tgmath.h>
 
-#ifdef __FAST_MATH__
+#if defined(__FAST_MATH__) || defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__)
 #error "-ffast-math takes apart the reduction of angles; -O3 -ffp-contract=fast -fno-math-errno is as fast"
 #endif
 #ifdef __GNUC__

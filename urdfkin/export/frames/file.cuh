@@ -16,8 +16,8 @@ struct CUstream_st;
 
 #ifndef @UP@_DECLARATIONS
 #include <cmath>
-#if defined(__FAST_MATH__) || defined(__USE_FAST_MATH__)
-#error "-ffast-math or -use_fast_math reorders sums and rounds sines more; the error bounds of this file do not allow for it"
+#if defined(__FAST_MATH__) || defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__)
+#error "-ffast-math reorders sums and rounds sines more; the error bounds of this file do not allow for it"
 #endif
 #ifdef __CUDACC__
 #include <cuda_runtime.h>

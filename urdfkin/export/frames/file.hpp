@@ -2,7 +2,7 @@
 #ifndef @UP@_HPP
 #define @UP@_HPP
 #include <cmath>
-#ifdef __FAST_MATH__
+#if defined(__FAST_MATH__) || defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__)
 #error "-ffast-math reorders sums and rounds sines more; the error bounds of this file do not allow for it"
 #endif
 
