@@ -5,8 +5,8 @@ axe, and looks for serious violations, errors in the console, sideways scrolling
 The script also moves through the page with the Tab key, checks the HTML, and prints the page to a PDF.
 `--output` saves pictures of all screens and of the printed pages.
 
-The script needs Debian's chromium and chromium-driver. axe is in the extra `test`. A newer axe and the Nu
-HTML checker, which needs Java, are optional. Debian's poppler-utils draws the printed pages.
+The script needs Debian's chromium and chromium-driver. The extra `test` contains axe-core. A newer axe and
+the Nu HTML checker, which needs Java, are optional. Debian's poppler-utils draws the printed pages.
 
     npm install --prefix ~/.cache/urdfkin-audit axe-core vnu-jar
     python -m scripts.audit_pages --output /tmp/audit
@@ -56,7 +56,7 @@ ROOT = Path(__file__).parents[1]
 TOOLS = Path.home() / ".cache" / "urdfkin-audit" / "node_modules"
 #: Widths in pixels, and whether the theme is dark.
 SCREENS = tuple(product((390, 768, 1000, 1280), (False, True)))
-#: Longest time for axe on a page in seconds. A page of 100,000 elements takes half a minute.
+#: Longest time (s) for axe-core to audit a page. A page of 100,000 elements takes half a minute.
 _AXE_SECONDS = 600
 #: Severities of violations that fail the audit; violations of other severities are only printed.
 IMPACTS = ("serious", "critical")
@@ -66,8 +66,8 @@ UNFOLD = "document.querySelectorAll('details').forEach((part) => { part.open = t
 _PRESSES, _PAGES = 60, 12
 #: Errors of the HTML checker that the site's theme causes.
 FOREIGN = ("Attribute “autocomplete” is only allowed when the input type is",)
-#: Options with which Chromium reports a mouse.
-#: Without a mouse, the site's theme omits elements for keyboard users, which the audit must test.
+#: Options with which Chromium reports a mouse. The site's theme shows some elements only if the device has a
+#: mouse. The audit must test these elements too.
 _MOUSE = (
     "--blink-settings=primaryHoverType=2,availableHoverTypes=2,primaryPointerType=4,availablePointerTypes=4"
 )
@@ -296,7 +296,7 @@ def scroll_through(browser: Browser) -> None:
 def look(
     browser: Browser, page: Page, width: int, dark: bool, axe: str | None, output: Path | None = None
 ) -> list[str]:
-    """Return the faults of a page on one screen."""
+    """Return the faults of a page for one screen size."""
     where, faults = f"{width} {'dark' if dark else 'light'}", Faults(page.name)
     browser.become(width, 844 if width < 600 else 1000, dark=dark)
     browser.requests()
@@ -329,7 +329,7 @@ def _note(where: str, what: str) -> None:
 
 
 def _photograph(browser: Browser, path: Path, width: int, dark: bool, most: int = 6000) -> None:
-    """Save a picture of the page on a screen as high as the page, at most `most` pixels."""
+    """Save a picture of the whole page, up to a height of `most` pixels."""
     browser.become(width, min(most, browser.js("return document.documentElement.scrollHeight")), dark=dark)
     browser.settle()
     browser.chrome.save_screenshot(str(path))
@@ -360,7 +360,7 @@ def walk(browser: Browser, page: Page) -> list[str]:
 
 
 def _border_changes(browser: Browser) -> bool:
-    """Return whether the focus changes the border of its element, which may take a moment."""
+    """Return whether an element's border changes when the element has the focus. Wait for a transition."""
     return bool(
         browser.chrome.execute_async_script(
             "const done = arguments[0], e = document.activeElement;"

@@ -4,7 +4,7 @@
 
 Each round times every library once. Ratios are therefore reliable even on a machine with other load, but
 absolute times are not. The script prints medians, minima and ratios of medians. The script compares the
-results first. A difference between results fails the run, but a slow time never fails it. Libraries that are
+results first. The script fails if results differ. It does not fail if something is slow. Libraries that are
 not installed are listed and left out.
 
 `--only where` splits the time of a batch and of a single call into parts. `--only first` measures the first

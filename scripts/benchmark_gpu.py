@@ -112,7 +112,7 @@ def compiled(code: Code, folder: Path, compiler: str) -> dict[str, Path]:
 
 
 def rows(code: Code, lines: Iterable[str]) -> Iterator[dict[str, Any]]:
-    """Yield the measurements with configurations a second and the share of the bandwidth.
+    """Yield the measurements, with configurations per second and the fraction of the memory bandwidth.
 
     Raises:
         ValueError: the first line is not the bandwidth.

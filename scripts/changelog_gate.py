@@ -4,8 +4,8 @@
 
 The base is the commit at which the branch left `main` (or `origin/main`). Files that were only moved do not
 count as changed. If no user notices the change, add the line `No-changelog: <reason>` to a commit message of
-the branch. If there is nothing to compare with (main itself, a shallow clone, an unpacked archive, no git),
-the script reports it and passes.
+the branch. If there is no earlier commit to compare with, for example on main or in a shallow clone, the
+script reports this and passes.
 """
 
 from __future__ import annotations

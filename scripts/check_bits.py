@@ -6,13 +6,13 @@
     python scripts/check_bits.py --enclosures --write before.npz    # store enclosures, or compare them
 
 The script checks every robot of the catalogue, every quantity and all three reference frames. Fused
-multiply-adds are explicit, and urdfkin has its own sine and cosine, so digests are equal on every machine.
-If results differ from the stored results, the script prints the largest difference as a fraction of the
-stored bound. An enclosure must lie in the stored enclosure.
+multiply-adds are explicit, and urdfkin has its own sine and cosine, so digests are equal on every machine. If
+results differ from the stored results, the script prints the largest difference as a fraction of the stored
+bound. An interval with the true value must lie in the stored interval.
 
 Exit 1: results of this run have different bits, a result differs from the stored result, or an interval is
-not within the stored interval. With `--within SHARE`, the difference from a stored result may be this
-fraction of its bound.
+not within the stored interval. With `--within SHARE`, a result may differ from the stored result by SHARE
+times its error bound.
 """
 
 from __future__ import annotations
@@ -146,7 +146,7 @@ def differing(subject: Subject) -> Iterator[str]:
 
 
 def differing_in_one_pass(subject: Subject, now: Arrays) -> Iterator[str]:
-    """Yield the results that differ between several frames in one pass and separate calls."""
+    """Compute several frames in one pass and in separate calls. Yield the results that differ."""
     for what, quantity, reference, inputs in subject.results():
         few = [x[:KEPT] for x in inputs]
         if not same(computed(subject, quantity, reference, subject.frames, few), now[what]):
@@ -230,7 +230,7 @@ def compared(name: str, now: Arrays, stored: Arrays) -> tuple[str, float]:
 # -- enclosures ------------------------------------------------------------------------------------------
 
 
-#: Numbers of decimal digits of the compared enclosures: 15 digits, and the default number (None).
+#: Digits of the compared intervals: 15, and the default (None).
 _DIGITS = (15, None)
 
 

@@ -94,7 +94,8 @@ def _largest(found: Sequence[float], count: int) -> float:
 def subjects(tips: bool) -> Iterator[tuple[str, Robot, str]]:
     """Yield robots and frames.
 
-    The tips come first, so that a run which is stopped later has checked each robot at least once.
+    The main tip of each robot comes first. A run that is stopped early has then checked one frame of each
+    robot.
     """
     robots = {name: urdfkin.load(name) for name in examples()}
     for name, robot in robots.items():

@@ -56,7 +56,7 @@ class Subject:
         return self.job.table
 
     def off(self, found: FloatArray) -> tuple[float, float]:
-        """Return the distance from Pinocchio (m), and the deviation from the table divided by the bound."""
+        """Return the tip's distance from Pinocchio's (m), and the table's error as a share of its bound."""
         apart = np.abs(found - self.table.placement(self.job.q))[:, :3].max(axis=(-1, -2))
         # urdfkin and Pinocchio round differently.
         # A table without lengths still has rounding errors of its angles.

@@ -4,11 +4,11 @@
     python scripts/check_growth.py --sizes 1,4 number   # kinds with "number" in the name
 
 If the cost grows linearly, all numbers in a row are equal. Each document is checked in its own process. If a
-check takes longer than `--patience`, the larger documents of the same row are not checked.
+check takes longer than `--patience`, the script does not check larger documents of the same kind.
 
-Each kind of content is a function that takes a size in bytes, and returns a URDF of about this size with this
-content many times. A faulty exporter or an attacker could write such files. Most are rejected. The time and
-memory of the rejection must be proportional to the size of the file.
+For each kind of content there is a function. It takes a size in bytes and returns a URDF of about this size,
+in which the content repeats. A faulty exporter or an attacker could write such files. Most are rejected. The
+time and memory of the rejection must be proportional to the size of the file.
 """
 
 from __future__ import annotations

@@ -5,11 +5,11 @@
     python scripts/check_same.py --keep pairs.jsonl --tell   # only print the figures of docs/same.md
 
 There are twenty-one changes. After eleven of these changes, a robot is still the same
-(`tests/comparison/pairs.py`). For a robot that is the same, all links must have the placements that `same`
-predicts at random configurations. For a different robot, an independent global search looks for the largest
-distance of the farthest frame. This distance is computed with fifty digits from the decimals in the texts of
-the two robots, and must lie in the interval of `same`. Exit 1: a distance is outside its interval, or a
-verdict is wrong.
+(`tests/comparison/pairs.py`). If `same` reports two robots as the same, all links must have the placements
+that `same` predicts, at random configurations. If the robots differ, an independent global search looks for
+the largest distance between a frame of A and the same frame of B. This distance is computed with fifty digits
+from the decimals in the texts of the two robots, and must lie in the interval of `same`. Exit 1: a distance
+is outside its interval, or a verdict is wrong.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def pair(name: str, what: str) -> dict[str, Any] | None:
 
 
 def _farthest(found: Sameness) -> Interval | None:
-    """Return the interval of the frame with the largest distance between the two robots.
+    """Return the interval of the frame whose distance between the two robots is largest.
 
     Frames that `same` reports as moved on their bodies are left out. The result is None if the interval has
     no upper end.

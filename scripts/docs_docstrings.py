@@ -1,6 +1,6 @@
 """Extend mkdocs so that doctests in docstrings are shown as blocks of code; mkdocs.yml refers to this module.
 
-The docstrings of `Robot` are as in `help`: each one lists also the arguments that several methods share. The
+`help(Robot.jacobian)` also lists the arguments that several methods share. The pages show the same text. The
 heading `Example:` is removed, because the site would draw a box around such a section.
 """
 

@@ -55,7 +55,10 @@ def usage() -> dict[str, float]:
 
 
 def measure(n: int) -> list[dict[str, float]]:
-    """Return the memory, the open descriptors and the number of objects after each part of the n robots."""
+    """Process n robots in batches.
+
+    After each batch, return the memory, the open descriptors and the number of objects.
+    """
     # All kernels are loaded at first use. Otherwise a kernel that is loaded later would look like a leak.
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), only("compiled"):
         warnings.simplefilter("ignore")

@@ -105,7 +105,7 @@ _TABLES = (
     ("urdfkin", "pinocchio", "mujoco", "drake", "idyntree", "rtb", "kdl"),
     ("isaaclab", "isaaclab3", "isaacgym", "newton", "newton-usd", "usd", "ros"),
 )
-#: The distribution of each library that tests/model/conventions/libraries.py runs.
+#: The package (on PyPI) of each library that tests/model/conventions/libraries.py uses.
 _DISTRIBUTIONS = {
     "pinocchio": "pin",
     "mujoco": "mujoco",

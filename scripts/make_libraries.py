@@ -4,9 +4,9 @@
     python scripts/make_libraries.py --page  # write the page from the JSON file
 
 Each library gets its own environment outside the repository; docs/libraries.toml states its version. In this
-environment, the library's adapter (urdfkin/verify/adapters.py) reads the features of robots/features.toml
-that docs/libraries.toml lists. The expected poses are urdfkin's, which Pinocchio checks;
-tests/test_libraries.py compares them with a reader that was written from the URDF standard.
+environment, the library loads small robots with one feature of URDF each (robots/features.toml,
+docs/libraries.toml). urdfkin/verify/adapters.py calls the library. The expected poses are urdfkin's, which
+Pinocchio checks; tests/test_libraries.py compares them with a reader that was written from the URDF standard.
 """
 
 from __future__ import annotations
@@ -102,7 +102,10 @@ def expected(robot: urdfkin.Robot) -> list[dict[str, Any]]:
 
 
 def cell(feature: Feature, robot: urdfkin.Robot, library: str, answer: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the cell of a feature and a library: a verdict, and the largest difference or a message."""
+    """Return the table's cell for a feature and a library.
+
+    The cell has a verdict, and the largest difference or a message.
+    """
     if "error" in answer:
         return {"verdict": "refused", "message": answer["error"][:_QUOTED]}
     if any("tip" not in theirs for theirs in answer["poses"]):

@@ -263,7 +263,7 @@ def two_link(figure: Any) -> None:
 
 
 def breakdown(figure: Any) -> None:
-    """Draw the acceleration of the elbow robot's tool by joint and term."""
+    """Draw the terms of the tool's acceleration, for each joint of the elbow robot."""
     robot = urdfkin.load("elbow")
     q, v, a = (
         [0.4, 0.5, 0.7, 0.3, 0.6, 0.2],

@@ -78,7 +78,7 @@ def installed_extras(core: dict[str, int]) -> dict[str, tuple[int, int]]:
 
 
 def sentences(core: dict[str, int], lean: dict[str, int], extras: dict[str, tuple[int, int]]) -> str:
-    """Return the text of the page: the core with and without yourdfpy, `check` alone, the extras."""
+    """Return the text of the page: the sizes of the core, of the core without yourdfpy, and of the extras."""
     total, meshes = sum(core.values()), sum(core.values()) - sum(lean.values())
     robots, pinocchio = core["example-robot-data"], sum(closure("pin").values())
     text = (

@@ -5,8 +5,8 @@
 
 It runs each file's own check; a file for any array library runs in the namespace of the named library.
 Derivatives of the Jacobian by PyTorch and JAX are compared with the Hessian's true values in the file, within
-the Hessian's bound, if the file has a Hessian. The functions of the first file of PyTorch are also compiled
-by `torch.compile`. `scripts/check_exports.py --library` calls this script.
+the Hessian's bound, if the file has a Hessian. For the first file of PyTorch code, the script also compiles
+the functions with `torch.compile`. `scripts/check_exports.py --library` calls this script.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def of_hessian(scope: dict[str, Any], array: Callable[..., Any], slopes: Callabl
 
 
 def of_compiled(scope: dict[str, Any]) -> float:
-    """Return the largest error of the functions by `torch.compile`, as a share of their bounds."""
+    """Compile the functions with `torch.compile`. Return their largest error divided by its bound."""
     import torch  # noqa: PLC0415
 
     found = 0.0

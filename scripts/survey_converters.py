@@ -76,8 +76,8 @@ def row_of(tool: str, name: str) -> tuple[str, str, str, str, str]:
     """Return the row of a robot: name, joints, verdict, and two sizes.
 
     For MJCF the sizes are the largest distance and the largest angle between the models as they are written.
-    For USD they are the largest distance after the changes of `same`, and the largest distance that single
-    precision can cause.
+    For USD, `same` gives two distances: the largest distance between the models, and the largest distance
+    that single precision can cause.
     """
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -106,7 +106,10 @@ def _verdict(found: Sameness) -> str:
 
 
 def _loaded(file: Path) -> urdfkin.Robot:
-    """Return the robot of a file. A root link without a mass becomes several articulations of a stage."""
+    """Return the robot of a file.
+
+    If the root link has no mass, the converter writes several articulations into the stage.
+    """
     try:
         return urdfkin.load(file)
     except urdfkin.UrdfkinError as error:

@@ -23,9 +23,9 @@ from urdfkin.verify.quantities import by_command
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-#: For each heading of the help page, and for each command below it: the module, and a summary of one line.
-#: A module of several commands defines `NAME_command` for each, others define `command`.
-#: Below `_COMPUTE`, the commands of the table of quantities come first.
+#: The commands under each heading of the help page: the module of each command, and a summary of one line. If
+#: a module has one command, the function is called `command`. If it has several, the functions are called
+#: `NAME_command`. Under the heading `_COMPUTE`, the quantities of `verify/quantities.py` come first.
 _COMPUTE = "Compute"
 _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {
@@ -220,7 +220,10 @@ class LazyGroup(click.Group):
         return super().resolve_command(ctx, args)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem[str]]:
-        """Return matching commands with their summaries, and options, without importing the commands."""
+        """Return the commands and options that begin with `incomplete`.
+
+        The modules of the commands are not imported.
+        """
         from click.shell_completion import CompletionItem  # noqa: PLC0415  only for shell completion
 
         found = [(name, summary) for name, (_, summary) in commands().items() if name.startswith(incomplete)]

@@ -1,4 +1,4 @@
-"""`urdfkin report status` and `merge`: progress of a resumable validation, stores of several machines."""
+"""`urdfkin report status` and `merge`: show the progress of a validation, and combine several stores."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ _LINES, _JSON = 10.0, 0.5
 class Pace:
     """Speed in chunks per second and remaining time, measured with a monotonic clock.
 
-    The measurement starts at the last call of `of` for which no chunk was computed yet. The time for
-    compiling kernels is thus not counted.
+    The clock starts shortly before the first chunk is finished. The time for compiling kernels is thus not
+    counted.
     """
 
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
@@ -102,7 +102,7 @@ def _failures(state: CampaignProgress) -> str:
 
 @contextmanager
 def _at_intervals(seconds: float, show: Callable[[CampaignProgress], Any]) -> Iterator[Progress]:
-    """Show the progress once in `seconds`; with JSON, also show the first and the last progress."""
+    """Show the progress every `seconds` seconds. With JSON, also show it at the start and at the end."""
     shown, last = time.monotonic(), None
     first = seconds == _JSON
 
@@ -153,7 +153,8 @@ def _bar(pace: Pace) -> Iterator[Progress]:
 
 
 EXAMPLE = "urdfkin report status nightly"
-#: Largest number of failed robots that are listed, and of chunks from which the mean time is computed.
+#: `_NAMED`: the largest number of failed robots in the output. `_READ`: the number of chunks in the mean
+#: time.
 _NAMED, _READ = 20, 200
 
 _FOLDER = click.Path(path_type=Path, file_okay=False)

@@ -452,7 +452,9 @@ class Run:
         self.outcome.add(file, replace(found, findings=tuple(findings)))
 
     def _check_other(self, file: str) -> None:
-        """Check a USD or MJCF file; for an invalid robot, add findings about the URDF made from the file.
+        """Check a USD or MJCF file.
+
+        If the robot is invalid, convert it to URDF and add the findings about the URDF.
 
         With --changed-since, an unchanged file is skipped; all findings of another file count as new.
         """
@@ -482,9 +484,9 @@ class Run:
     def _is_unchanged(self, file: str, parts: tuple[str, ...], version: Version) -> bool:
         """Return whether a file, and every file that it may refer to, is the same as in an older version.
 
-        The references of the file are not known here. The result is therefore True only on two conditions.
-        All files of the repository with the suffixes `parts` are unchanged. The file contains no name of a
-        deleted file.
+        This method does not know to which files the file refers. It therefore returns True only if two
+        conditions hold. No file of the repository that ends with one of the suffixes `parts` has changed. The
+        file contains no name of a deleted file.
         """
         if parts not in self._changed:
             self._changed[parts] = version.changed(parts)
@@ -543,7 +545,7 @@ def _is_other(file: str) -> bool:
     with contextlib.suppress(OSError):
         if b"<mujoco" not in read_start(Path(file), 1 << 16):
             return False  # return before the next import, which loads NumPy
-    from urdfkin.urdf.mjcf import is_mjcf  # noqa: PLC0415  keeps the check of a URDF fast
+    from urdfkin.urdf.mjcf import is_mjcf  # noqa: PLC0415  a check of a URDF does not need this slow import
 
     return is_mjcf(file)
 

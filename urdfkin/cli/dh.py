@@ -156,8 +156,8 @@ form_options = together(
 #: Options that have no effect with --like, which chooses their values.
 _SIGNS = ("last", "parallel_offset", "flip", "first", "sign")
 _CHOICES = ("convention", "near_parallel", "snap", "slide", "like", *_SIGNS)
-#: If ROBOT is a table, the command writes it unchanged unless one of these options is given.
-#: With one of these options, the command derives a new table from the robot of the table.
+#: If ROBOT is a table, the command writes it unchanged unless one of these options is given. With one of
+#: these options, the command makes a robot from the table and derives a new table from this robot.
 _DERIVED = ("base", "tip", "all_", *_CHOICES[1:])
 _UNITS = ("degrees", "millimetres", "digits", "columns")
 
@@ -193,14 +193,13 @@ def _reject_unused(context: click.Context, is_table: bool, options: dict[str, An
 @verify_option
 @answering(*FORMATS, suffixes=ENDINGS)
 def command(robot: str, verify: bool, **options: Any) -> Answer:
-    """Write the Denavit-Hartenberg table of the path between two frames, exact to rounding and checked.
+    """Write the Denavit-Hartenberg table of the path between two frames. Pinocchio checks the table.
 
     The path may lead down the tree, up, or through the common ancestor. The table has the file's angles and
-    lengths, without rounding. --snap rounds angles; the table then states a bound of the tip's motion.
-    ROBOT is a path, a name that `urdfkin robots` lists, - for standard input, or a table (.toml, .json, .csv,
-    .tsv, .md, .tex, .txt). A table is written with its own numbers, in the chosen convention. With options
-    that choose rows, a new table is derived from the robot of the given table. See `urdfkin explain
-    urdf-to-dh`.
+    lengths, without rounding. --snap rounds angles; the table then states a bound of the tip's motion. ROBOT
+    is a path, a name that `urdfkin robots` lists, - for standard input, or a table (.toml, .json, .csv, .tsv,
+    .md, .tex, .txt). If ROBOT is a table, its numbers stay the same, in the chosen convention. With options
+    that choose rows, a new table is derived from the table's robot. See `urdfkin explain urdf-to-dh`.
 
     Exit 0: verified, or the compared table agrees. 1: the compared table differs, or agrees only because
     base, tool and zeros absorb a mistake, which is printed. 2: bad input. 3: not checked, or a strict table

@@ -23,7 +23,7 @@ _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def answers() -> dict[str, str]:
-    """Return the section of each question by the anchor of its heading.
+    """Return a mapping from the anchor of each question's heading to its section.
 
     Links in a section are replaced by their texts.
     """
@@ -41,7 +41,10 @@ def answer_to(topic: str) -> str | None:
 
 
 def as_text(answer: str) -> str:
-    """Format a section for a terminal: wrapped paragraphs, indented code, and last the setup of the code."""
+    """Format a section for a terminal.
+
+    Paragraphs are wrapped and code is indented. The code's set-up comes last.
+    """
     pieces = _BLOCK.split(answer)
     prose, kinds, codes = pieces[::3], pieces[1::3], pieces[2::3]
     parts = []

@@ -1,4 +1,7 @@
-"""`urdfkin export`: write a frame's kinematics as code, with its proof in the same file."""
+"""`urdfkin export`: write a frame's kinematics as code.
+
+The same file contains test vectors and their bounds.
+"""
 
 from __future__ import annotations
 

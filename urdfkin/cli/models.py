@@ -84,11 +84,12 @@ def same_command(
     """Prove whether A and B are the same robot in every configuration; with C, all pairs of them.
 
     A and B are robots as in other commands, or Denavit-Hartenberg tables. They are the same if the screws of
-    all joints and the zero-configuration poses of all links agree. A different base pose, joint zeros and
-    senses, fixed links, names and order are allowed. If A and B differ, the command prints an interval for
-    the largest distance of each frame over all configurations within limits. The lower end is attained at a
-    printed configuration; the upper end is proven. The numbers of a USD file have single precision. Two
-    models are the same up to single precision if every joint differs only by the rounding of its own numbers.
+    all joints and the zero-configuration poses of all links agree. The models may differ in the base pose,
+    the joint zeros and senses, fixed links, names and the order of joints. If A and B differ, the command
+    prints an interval for the largest distance of each frame over all configurations within limits. The lower
+    end is attained at a printed configuration; the upper end is proven. The numbers of a USD file have single
+    precision. Two models are the same up to single precision if every joint differs only by the rounding of
+    its own numbers.
 
     Exit 0: same, same up to single precision, or equivalent up to the printed changes. 1: different; with
     --strict, also if only equivalent. 2: bad input. With --within, A and B are compared as written. Exit 0:

@@ -443,7 +443,10 @@ class Inputs:
 
 
 def load_robot(source: str, *, verify: bool = True, oracle: OracleName = "pinocchio", **how: Any) -> Robot:
-    """Load a command's robot with the command's options or `how`; write each warning to stderr as a line."""
+    """Load a robot with the options of the command line; `how` overrides them.
+
+    Write each warning to stderr.
+    """
     from urdfkin.robot.loading import load  # noqa: PLC0415  keeps --help fast
     from urdfkin.urdf.findings import UrdfWarning  # noqa: PLC0415
 
@@ -468,7 +471,7 @@ def load_several(*sources: str) -> tuple[Robot, ...]:
         raise click.UsageError("only one of the robots can come from standard input")
 
     def others(source: str) -> dict[str, Any]:
-        """Return None or {} for each option that is for a file format of another robot."""
+        """Return arguments of `load` that disable the options for file formats other than this robot's."""
         none: dict[str, Any] = {}
         if not is_xacro(source) and any(map(is_xacro, sources)):
             none["xacro_args"] = None

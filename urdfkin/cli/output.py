@@ -186,7 +186,10 @@ def compiling() -> Iterator[None]:
 
 
 def console(*, err: bool = False) -> Console:
-    """Return the console: as wide as the terminal; for a pipe, as wide as COLUMNS or without wrapping."""
+    """Return a console with the width of the terminal.
+
+    In a pipe, COLUMNS sets the width; without it, nothing wraps.
+    """
     from urdfkin.cli.terminal import Terminal  # noqa: PLC0415  keeps --help fast
 
     stream = sys.stderr if err else sys.stdout
@@ -194,7 +197,7 @@ def console(*, err: bool = False) -> Console:
 
 
 def _columns() -> int:
-    """Return the width of lines in a pipe, which is COLUMNS; if COLUMNS is empty or 0, the largest width."""
+    """Return the variable COLUMNS as a number, or the largest width if COLUMNS is empty or 0."""
     wanted = parse_int(os.environ.get("COLUMNS", "")) or 0
     return min(wanted, _WIDEST) if wanted > 0 else _WIDEST
 

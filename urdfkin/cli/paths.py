@@ -38,9 +38,9 @@ if TYPE_CHECKING:
 def _path_command(
     name: str, example: str, *options: Any, answers: Any
 ) -> Callable[[Callable[..., Answer]], click.Command]:
-    """Return a decorator that makes a command whose options name two links and the path between them.
+    """Return a decorator that makes a command with the options --base and --tip of a path.
 
-    The argument `answers` is a decorator that `answering` has returned.
+    `answers` is the return value of `answering`.
     """
 
     def decorate(function: Callable[..., Answer]) -> click.Command:
@@ -157,10 +157,10 @@ _SUFFIXES = {
 def screws_command(robot: str, base: str | None, tip: str | None, digits: int, verify: bool) -> Answer:
     """Derive the product of exponentials of a path in the notation of Lynch and Park.
 
-    The result is the pose M in the zero configuration, and each joint's screw in space and body axes. A
-    screw is (w, v), angular part first; generated code has the screws as columns of Slist and Blist. Every
-    command accepts the toml or json output as a robot. In a handwritten file, M is required, and also `space`
-    or `body`, the screws.
+    The result is the pose M in the zero configuration, and each joint's screw in space and body axes. A screw
+    is (w, v), angular part first; generated code has the screws as columns of Slist and Blist. Every command
+    can load the TOML or JSON file that this command writes. In a handwritten file, M is required, and also
+    `space` or `body`, the screws.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
@@ -190,7 +190,7 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
 def structure_command(
     robot: str, base: str | None, tip: str | None, opw: float | None, verify: bool
 ) -> Answer:
-    """Classify an arm by its consecutive parallel and intersecting axes: wrist, SCARA, gantry, solvers.
+    """Find parallel and intersecting axes of an arm, its class (such as SCARA), and solvers for it.
 
     A property, such as parallel axes, is reported if the deviation is at most 0.02 rad or 5 mm. The deviation
     is printed, because the axes of a calibrated arm are never exactly parallel. The screws are compared with

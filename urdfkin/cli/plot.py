@@ -99,11 +99,11 @@ def command(
 ) -> None:
     """Plot a frame's motion along a trajectory.
 
-    The panels show q, v and a with their limits, the frame's position, velocity, acceleration and its parts,
-    the singular values and the check. Each axis has one unit. The trajectory is a CSV or .npz file, or a line
-    in joint space from rest to rest, with --to. A floating base moves along a screw. With --convention, the
-    file and the values of --from and --to are in that convention. The panels show the numbers of the URDF, in
-    rad and m.
+    There are panels for q, v and a with their limits; for the position, the velocity and the acceleration of
+    the frame; for the parts of the acceleration; for the singular values; and for the check. Each axis has
+    one unit. --trajectory reads a CSV or .npz file. --to makes a line in joint space that begins and ends at
+    rest. A floating base moves along a screw. With --convention, the file and the values of --from and --to
+    are in that convention. The panels show the numbers of the URDF, in rad and m.
 
     Exit 0: verified. 1: a disagreement. 3: Pinocchio could not check it.
     """

@@ -131,7 +131,7 @@ def _along(
 
 
 def _checked(x: Inputs, title: str, parts: Callable[[], Iterable[str | Table]], **data: Any) -> Answer:
-    """Return an answer with the line and the exit code of the robot's certificate."""
+    """Return an answer whose last line and exit code are those of the robot's certificate."""
     certificate = x.robot.certificate()
     check = check_line(certificate)
     if x.conversion is not None:
@@ -308,7 +308,7 @@ def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Tab
 
 
 def _parts(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
-    """Return the terms of each joint's acceleration, with the certificate of the total acceleration."""
+    """Return the terms of the acceleration, joint by joint. The check covers their sum, the acceleration."""
     from urdfkin.compiled.breakdown import KINDS  # noqa: PLC0415  keeps --help fast
 
     def parts() -> Iterator[str | Table]:
@@ -398,8 +398,8 @@ def placement_command(relative_to: str | None, written: str, verify: bool, **_: 
     The pose is a matrix T with the frame's axes and origin, or, with --as, six or seven numbers. Pinocchio
     checks that these numbers give the same rotation.
 
-    ROBOT is a path, a name from `urdfkin robots`, or - for standard input. The path can also be a table of a
-    robot: .toml, .json or .csv.
+    ROBOT is a path, a name from `urdfkin robots`, or - for standard input. ROBOT can also be the file of a
+    Denavit-Hartenberg table (.toml, .json or .csv).
     """
     if relative_to is not None:
         reject_unused_options(click.get_current_context(), ("base_placement",), "with --relative-to")
@@ -557,8 +557,8 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
 
     Each value has a guaranteed lower and upper bound. The bounds include the error of the Jacobian and the
     rounding of the decomposition. Manipulability is Yoshikawa's sqrt(det J J^T), the product of the singular
-    values. The command also prints the derivative of the manipulability for each joint velocity, which it
-    computes from the Hessian.
+    values. The command also computes the derivative of the manipulability with respect to each joint, from
+    the Hessian.
 
     At a singularity, the command prints the rank, the lost directions and the joints that cause them. At such
     a configuration, the manipulability may have no derivative. A missing derivative is nan in CSV and null in

@@ -1,4 +1,4 @@
-"""`urdfkin report`: show, convert and compare results of validations; progress and merging of stores."""
+"""`urdfkin report`: show, convert and compare reports of validations."""
 
 from __future__ import annotations
 
@@ -129,7 +129,8 @@ def show(
 ) -> None:
     """Show a report or convert it to HTML, JUnit or Markdown.
 
-    A report of a store is possible at any time. An incomplete store is reported as an interrupted run.
+    RESULTS can be a store at any time, also during a validation. An incomplete store is shown as an
+    interrupted run.
 
     The exit status is the exit status of the run. 0: everything verified. 1: a disagreement. 2: a robot could
     not be read, or the file cannot be used. 3: a robot was not verified. 130: interrupted.
@@ -211,11 +212,12 @@ def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) 
 @click.option("--schema", is_flag=True, help="Print the JSON Schema of the data and exit.")
 @answering(*TEXTS, "json")
 def report_history(paths: tuple[Path, ...], all_: bool, schema: bool) -> Answer:
-    """Show the verdicts, results, findings and changes of each robot from run to run.
+    """Show how the verdicts, results and findings of each robot changed over several runs.
 
-    Give reports, stores, or folders with them. Runs are ordered by their start; robots are matched by their
-    source, and renamed files by the robot's name. Changes and regressions are defined as in `report compare`.
-    With `--output history.html`, the command writes an offline page with charts.
+    Give reports, stores, or folders with them. Runs are ordered by their start. Robots are matched by the
+    path of their file. If a file was renamed, they are matched by the robot's name. Changes and regressions
+    are defined as in `report compare`. With `--output history.html`, the command writes an offline page with
+    charts.
 
     If a file cannot be used, the command prints its name and the reason, and shows the other files.
     Exit 0: every file was used. 2: a file cannot be used.

@@ -95,7 +95,10 @@ def _fitted(out: Console, document: TextDocument) -> TextDocument:
 
 
 def _rows(document: TextDocument, links: Sequence[str]) -> Iterator[list[str]]:
-    """Yield the rows of the table with plain link names, without the lines of the drawn tree."""
+    """Yield the rows of the table.
+
+    The first cell is the link's name, without the branches of the drawn tree.
+    """
     for part in document.parts:
         if isinstance(part, Table):
             yield list(part.heads)

@@ -1,13 +1,13 @@
 """Safe standard streams: robust against stream failures, and against control characters in names.
 
 A shell can close a standard stream. It can also connect the stream to a full disk, or to a program that exits
-before it has read everything. The encoding of a stream may lack a character of a name. With this module, none
-of these cases causes a traceback.
+before it has read everything. The encoding of a stream may not support every character of a name. With this
+module, none of these cases causes a traceback.
 
 `guard` wraps standard output and standard error in a `SafeStream`, which escapes control characters and
 commands of CI services. All output passes through this stream, also the output of click and Python. The
-stream does not escape line feeds, because it cannot detect whether a line feed is part of a name. `say` and
-the console escape line feeds in names.
+stream does not escape line feeds, because it cannot detect whether a line feed is part of a name. The
+function `say` and the class `Terminal` know the names and escape line feeds in them.
 """
 
 from __future__ import annotations
@@ -240,5 +240,5 @@ def harmless(text: str) -> str:
 
 
 def command_lines(text: str) -> None:
-    """Write lines that a CI service interprets as commands: findings for GitHub."""
+    """Write lines that GitHub interprets as commands, for example findings as annotations."""
     SafeStream(sys.stdout).write_commands(text + "\n")

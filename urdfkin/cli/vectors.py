@@ -57,8 +57,9 @@ def write_command(
     URDF each. With ROBOT, it uses only the given robots. For each robot, there is a JSON file, and a text
     file with the same numbers, separated by tabs. SHA256SUMS has the digests of all files.
 
-    The results are placement, velocity, Jacobian, its time derivative, Hessian, classical and spatial
-    acceleration in LOCAL, WORLD and LOCAL_WORLD_ALIGNED. The files depend on the robots and --samples alone.
+    The results are the placement, velocity, Jacobian, Jacobian rate, Hessian, classical acceleration and
+    spatial acceleration. All but the placement are written in LOCAL, WORLD and LOCAL_WORLD_ALIGNED. The files
+    depend only on the robots and --samples.
     """
     from urdfkin.validation import vectors  # noqa: PLC0415  keeps --help fast
 

@@ -94,10 +94,10 @@ def verify_command(
 ) -> Answer:
     """Compare your function or program with urdfkin and Pinocchio, within the derived bound.
 
-    TARGET is FILE.py:FUNCTION, or FILE.py for all its functions with the name of a quantity. A function takes
-    q (nq,), and v and a (nv,) if the quantity needs them, in rad, m and seconds. It returns the result as an
-    array. --program checks a program in any language: it reads lines of JSON and answers each with a line
-    {"result": [...]}. The file and the program run with your rights.
+    TARGET is FILE.py:FUNCTION. With FILE.py alone, the command checks each function that has the name of a
+    quantity. A function takes q (nq,), and v and a (nv,) if the quantity needs them, in rad, m and seconds.
+    It returns the result as an array. --program checks a program in any language: it reads lines of JSON and
+    answers each with a line {"result": [...]}. The file and the program run with your rights.
 
     The configurations are the zero configuration, the joint limits and random ones. If a usual mistake
     explains wrong results, the command names it. Examples are another reference frame, joint order, sign,
@@ -183,7 +183,10 @@ def _stated(function: str) -> str | None:
 
 
 def _functions(target: str) -> dict[str, Callable[..., object]]:
-    """Return the function of FILE.py:FUNCTION, or all functions of FILE.py with the name of a quantity."""
+    """Return the function of FILE.py:FUNCTION.
+
+    For FILE.py, return each function that has the name of a quantity.
+    """
     path, _, name = target.rpartition(":") if not target.endswith(".py") else (target, "", "")
     if not path.endswith(".py"):
         raise InputError(

@@ -55,9 +55,9 @@ def command(
 ) -> None:
     """Show a robot in a browser tab, with sliders, shapes, frames, DH frames and arrows.
 
-    The viewer starts at --q, or in the neutral configuration moved to within the limits. Pinocchio checks the
-    numbers of the chosen frame as the robot moves. The viewer needs the package viser. Ctrl-C stops
-    it.
+    The viewer starts at --q. Without --q, it starts in the configuration within the limits nearest to zero.
+    Pinocchio checks the numbers of the chosen frame as the robot moves. The viewer needs the package viser.
+    Ctrl-C stops it.
 
     With --trajectory, a CSV or .npz file as in `urdfkin plot`, the viewer plays the samples of the file. With
     --convention, the input field of q also accepts and shows values in that convention.
@@ -98,7 +98,7 @@ def command(
         Viewer(server, loaded, None if begin is None else begin[0], played, conversion)
     try:
         say(f"{loaded.name}: {server.address}")
-        sys.stdout.flush()  # a pipe would otherwise receive the address at the end
+        sys.stdout.flush()  # otherwise a pipe gets the address only when the viewer stops
         wanted = sys.stdout.isatty() and has_screen() if browser is None else browser
         with opened_page(server.address) if wanted else nullcontext():
             server.sleep_forever()

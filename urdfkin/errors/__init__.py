@@ -117,7 +117,8 @@ class UrdfkinError(Exception):
 
     Attributes:
         what: The problem in one clause, without a full stop.
-        where: The location: file and line, frame or sample. None without a location.
+        where: The location, for example a file with a line, a frame, or a sample. None if there is no
+            location.
         found: The wrong value, as the user wrote it.
         remedy: Instruction for the user.
         question: A related section of docs/questions.md. The message ends with the command that prints this

@@ -50,7 +50,7 @@ class Table:
         ]
 
     def _split_cells(self) -> list[list[tuple[str, str]]]:
-        """Split each cell and heading into the line characters of a tree and the remaining text."""
+        """Split each cell and heading into its leading box-drawing characters, such as `├─`, and the rest."""
         return [
             [(cell[: len(cell) - len(words)], words) for cell in row for words in (cell.lstrip(LINES),)]
             for row in (self.heads, *self.cells())
@@ -167,7 +167,7 @@ class Strong(str):
 
 
 class Code(str):
-    """A formula or another line of code."""
+    """A line that is printed as code, for example a formula."""
 
     __slots__ = ()
 

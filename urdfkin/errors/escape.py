@@ -16,8 +16,8 @@ from typing import Any
 #: First characters that make a spreadsheet interpret a cell as a formula.
 FORMULA = ("=", "+", "-", "@")
 #: Patterns of commands to a CI service. Commands of Azure and TeamCity may be anywhere in a line, commands of
-#: GitHub at its beginning. The group of a pattern is the character to escape. JSON and TOML parsers turn the
-#: escape back into the character.
+#: GitHub at its beginning. The character to escape is the group (in parentheses) of each pattern. JSON and
+#: TOML parsers turn the escape back into the character.
 COMMAND_ANYWHERE = re.compile(r"##(?:vso|teamcity)?(\[)")
 COMMANDS = (re.compile(r"\A\s*:(:)"), COMMAND_ANYWHERE)
 _NUMBER = re.compile(r"[-+]?[0-9.]+(?:e[-+]?[0-9]+)?")

@@ -18,7 +18,8 @@ _WHOLE = re.compile(r"[+-]?[0-9]+")
 #: Longest accepted number, in characters: Python converts long integers in quadratic time.
 _LONGEST = 2000
 
-#: Pairs of a pattern for rejected text and a remedy. The first pattern that matches gives the remedy.
+#: Remedies for texts that are no numbers. Each entry has a pattern and a remedy; the first matching pattern
+#: counts.
 _REMEDIES = (
     (r"", "the text is empty: write a number"),
     (r"[+-]?(nan|inf|infinity)", "write a finite number"),

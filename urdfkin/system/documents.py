@@ -79,7 +79,7 @@ class Layout(Generic[_T]):
     """A kind of document.
 
     Attributes:
-        name: Name and version, the value of the entry "schema".
+        name: The value of the entry "schema" in the document, which has a name and a version.
         type: The type of the document.
         verdicts: The possible verdicts; empty if the document has no header.
         made_by: The command that writes such a document.

@@ -270,7 +270,8 @@ def _first_of_pipe(descriptor: int, path: Path) -> bytes:
 def write_file(path: Path, data: bytes) -> None:
     """Write a file completely or not at all: write a temporary file in the same folder and rename it.
 
-    A link is followed. A device or a pipe (`/dev/null`) is written to and never replaced.
+    A link is followed. If the path is a device or a pipe, such as `/dev/null`, the data are written to it
+    directly, without a temporary file.
 
     Raises:
         SourceError: for example no permission, no such folder, or a full disk.

@@ -37,7 +37,7 @@ class Version:
         return Path(os.path.relpath(path.resolve(), self.root)).as_posix()
 
     def holds(self, data: bytes) -> bool:
-        """Return whether a file of this version, of any name, has exactly this content."""
+        """Return whether this version has a file, under any name, with exactly this content."""
         blob = b"blob %d\0" % len(data) + data
         return any(
             hashlib.new(kind, blob, usedforsecurity=False).hexdigest() in self.digests

@@ -1,10 +1,9 @@
 """Lazy imports, versions of installed packages, and hooks.
 
 `lazy_import` imports a function's module at the first call, so `--help` does not load NumPy. `is_a` tests for
-a class in the same way. The version
-functions read the metadata of a package without importing it. `EXTRAS` contains the package of each extra.
-A hook lets a lower package call a function of a higher one by name, without importing it;
-`urdfkin/__init__.py` registers the hooks.
+a class in the same way. The version functions read the metadata of a package without importing it. `EXTRAS`
+names the package that each extra installs. A hook lets a lower package call a function of a higher one by
+name, without importing it; `urdfkin/__init__.py` registers the hooks.
 """
 
 from __future__ import annotations
@@ -51,7 +50,7 @@ def installed_version(package: str) -> str | None:
         for name in os.listdir(entry):  # noqa: PTH208  pathlib takes longer
             if name.startswith(start) and name.endswith(end):
                 return name[len(start) : -len(end)]
-    from importlib import metadata  # noqa: PLC0415  it imports modules that a folder may replace
+    from importlib import metadata  # noqa: PLC0415  imports modules that files in the current folder could replace
 
     try:
         return metadata.version(package)
@@ -59,7 +58,7 @@ def installed_version(package: str) -> str | None:
         return None
 
 
-#: The requirement of each extra of pyproject.toml that users install.
+#: The extras for users in pyproject.toml, with the requirement that each extra adds.
 EXTRAS = {
     "xacro": "xacrodoc>=2",
     "plots": "matplotlib>=3.10.7",

@@ -137,7 +137,7 @@ class _Canvas:
 
 
 def _corners(table: DHTable, frames: FloatArray) -> FloatArray:
-    """Return (n, 3): for each row, the point between its offset d and its length a."""
+    """Return (n, 3): for each row, the point where the segment of d meets the segment of a."""
     corners = np.empty((len(table.rows), 3))
     for i, row in enumerate(table.rows):
         # in this convention, the offset d comes first, then the length a

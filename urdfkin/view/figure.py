@@ -37,7 +37,7 @@ TEXT, GRID, FIRST, SECOND, THIRD = PAGE_COLOURS
 FORMATS = ("svg", "png", "pdf")
 
 #: Okabe and Ito's colours, distinguishable with every colour vision deficiency. Some readers see no colours.
-#: Therefore, a sign, a dash or a position always has the same meaning as the colour.
+#: Therefore each difference in colour is also a difference in sign, line style or position.
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK = COLOURS = (
     "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000",
 )  # fmt: skip
@@ -73,7 +73,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def style(**more: Any) -> Any:
-    """Return the matplotlib context: text remains text, and the same drawing gives the same file."""
+    """Return a matplotlib context in which text stays text and equal drawings give equal files."""
     return _matplotlib().rc_context(_STYLE | {key.replace("_", "."): value for key, value in more.items()})
 
 

@@ -18,8 +18,8 @@ requests itself. Before a robot is shown, the module tests the running server wi
 refuse. It stops the server if the server accepts one of these requests. A new version of viser can therefore
 make the viewer fail, but it cannot make it insecure.
 
-The address is not passed to the browser on its command line, which every user of the machine can read. The
-browser opens a file in a private folder instead, which redirects it.
+The address is not passed to the browser on its command line, which every user of the machine can read.
+Instead the browser opens a file in a private folder. This file redirects the browser to the address.
 """
 
 from __future__ import annotations
@@ -118,8 +118,8 @@ class RequestFilter:
     def _is_known(self, host: str) -> bool:
         """Return whether a Host header may name this server.
 
-        An attacker can let a host name of his own resolve to this machine, but not an IP address. The port in
-        the header is not checked, because it differs if the port is forwarded.
+        An attacker can make a host name resolve to this machine. An IP address needs no name server, so it is
+        safe. The port in the header is not checked, because it differs if the port is forwarded.
         """
         found = _HOST.fullmatch(host)
         if found is None:
@@ -154,7 +154,7 @@ def policy(nonce: str, host: str) -> str:
 
     Scripts need the nonce, which is random for each page, so names in a URDF cannot inject a script. The page
     can connect only to this server; viser's client would otherwise connect to any server in `?websocket=`.
-    The page draws its styles and images itself.
+    Styles and images are part of the page.
     """
     return "; ".join(
         [
@@ -223,7 +223,7 @@ def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
 
     _require_address(host)
     requests = RequestFilter(host, secrets.token_urlsafe(16))
-    # Viser prints an address without the key, which is useless.
+    # Viser prints its address without the key, so the printed line would be useless.
     with _responding_with(_answer(requests, _page())), contextlib.redirect_stdout(io.StringIO()):
         server = PrivateServer(host=host, port=port, label="urdfkin", verbose=False)
     try:

@@ -207,7 +207,7 @@ class Stage:
         server.on_client_connect(self._welcome)
 
     def fill(self, Ts: FloatArray) -> None:
-        """Set the view so that the robot fills it in n placements (n, links, 4, 4) of the links."""
+        """Store the points that the view must contain, for n placements (n, links, 4, 4) of the links."""
         points = [Ts[:, :, :3, 3].reshape(-1, 3)]
         for link, box in self._corners:
             R, p = Ts[:, link, :3, :3], Ts[:, link, np.newaxis, :3, 3]
@@ -416,7 +416,8 @@ class Stage:
 def _segments(table: DHTable, q: FloatArray, frames: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return three points for each row of the table, as three arrays (rows, 3).
 
-    The points are the start of the row's two segments, the corner between them, and their end.
+    A row is drawn as two segments, d and a. The points are the start of the first segment, the common point,
+    and the end of the second segment.
     """
     starts, ends = frames[:-1, :3, 3], frames[1:, :3, 3]
     if str(table.convention) == "standard":

@@ -1,7 +1,7 @@
 """The viewer: a panel with sliders and checked numbers beside the robot's picture.
 
-A slider reports a change only if the user moves it, and then only its own number. When the program sets a
-value, the slider shows it and reports nothing.
+When the user moves a slider, it reports only its own number. When the program sets a value, the slider shows
+the value and reports nothing.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Row:
 
 
 class Sliders:
-    """A slider for each row, in a folder of a panel.
+    """The sliders of one folder of the panel; each `Row` has a slider.
 
     Args:
         gui: Viser's GUI.
@@ -295,7 +295,7 @@ class Viewer:
     Args:
         server: The server from `urdfkin.view.server.new_server`.
         robot: The robot to show.
-        q: (nq,) start configuration. None means the neutral configuration, moved to within the limits.
+        q: (nq,) start configuration. None means the configuration within the limits nearest to zero.
         trajectory: A trajectory to play; it starts at its first sample.
         conversion: The convention of q in the text field, where q can be copied or typed. None means
             urdfkin's convention.
@@ -521,7 +521,7 @@ class Viewer:
             self._choose()
 
     def _choose(self) -> None:
-        """Apply a new frame, reference or convention: derive and check the table once, then update."""
+        """Apply a new frame, reference or convention. Derive and check the DH table once, then draw again."""
         with self._lock:
             self._table = None
             self.dh_words.content = ""
