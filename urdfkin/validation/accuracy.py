@@ -50,7 +50,7 @@ from urdfkin.verify.verifier import bound_of, oracle_results, own_results
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _BALLS = np.vectorize(exact, otypes=[object])
-#: Representations of the orientation that share a line of the study, by the name of the line.
+#: The lines of the study for analytical Jacobians. Each line combines the results of several representations.
 _REPRESENTATIONS = {
     "euler angles": tuple(name for name in SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
@@ -242,8 +242,8 @@ class _Work:
 def _moving_columns(scale: FloatArray) -> NDArray[np.intp]:
     """Return indices (n, links, most) of the columns that move each link.
 
-    Here `most` is the largest number of such columns. A link with fewer such columns also gets the indices of
-    columns that are 0.
+    Here `most` is the largest number of such columns. If a link has fewer such columns, the array is filled
+    up with indices of columns that are 0.
     """
     idle = ~(scale > 0.0).any(axis=-2)
     most = int((~idle).sum(axis=-1).max(initial=0))

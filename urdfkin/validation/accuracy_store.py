@@ -63,7 +63,7 @@ class AccuracyResult:
 
     @classmethod
     def merge(cls, store: Store, others: Sequence[Store]) -> None:
-        """Copy results from other stores of the same campaign that are missing in this store.
+        """Copy results that are missing in this store from other stores of the same validation.
 
         Raises:
             InputError: The stores have different settings of the study.

@@ -99,7 +99,7 @@ _MOST = 2**27
 
 
 class DamagedError(Exception):
-    """Error for bytes that are not an answer of the chunk; the message states the reason."""
+    """Error for a damaged file: its bytes are not the results of the chunk. The message states the reason."""
 
 
 def written(key: str, found: Answer) -> bytes:

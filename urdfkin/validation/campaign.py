@@ -84,12 +84,12 @@ def validate(
             report names the third library. This needs the extra `mujoco`.
         isolate: Run each robot in its own process, `jobs` processes at a time. If a process crashes, its
             robot is reported as not verified with the reason, and the other robots continue.
-        executor: Runs the chunks instead of local processes. The argument is an executor with the interface
-            of `concurrent.futures`, or a cluster (`urdfkin.validation.cluster.connected`).
+        executor: An executor that runs the chunks; None: local processes run them. The executor has the
+            interface of `concurrent.futures`, or is a cluster (`urdfkin.validation.cluster.connected`).
         store: A folder in which each finished chunk is saved. After any interruption, the same call resumes
             the run. The function `stored` makes a report from the folder at any time.
-        retry: "failed": compute again the robots in the store that could not be checked. The texts of these
-            robots may have changed.
+        retry: "failed": repeat the check of robots that could not be checked before. Their files may have
+            changed since then.
         shard: "2/4": run only the second of four equal parts of the work. A store is required, and the report
             covers only that part.
         progress: Callback, called before the work and after each chunk.
@@ -100,7 +100,8 @@ def validate(
 
     Raises:
         InputError: The number of samples or the seed is negative, or `jobs` is below one. The oracle is not
-            installed. The store belongs to another campaign, or another process uses it.
+            installed. The store contains a validation with other robots or settings, or another process uses
+            the store.
         InstallationError: Pinocchio is missing, or another project is installed under its name.
         SourceError: The store cannot be made.
 
@@ -233,9 +234,8 @@ def _judgements(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Jud
     return tuple(None if isinstance(one, NotJudged) else one for one in found), None not in found
 
 
-#: Smallest numbers of samples for which kernels save time.
-#: First number: the kernels are on disk.
-#: Second number: the kernels must be compiled.
+#: Smallest numbers of samples for which kernels save time: if the kernels are on disk (first number), and if
+#: they must be compiled (second number).
 _WORTH_LOADING, _WORTH_COMPILING = 30, 300
 
 

@@ -33,8 +33,8 @@ from urdfkin.verify.oracles import PINOCCHIO
 DRAWN = 25
 #: Number of special configurations before the random configurations.
 SPECIAL = 3
-#: Minimum number of chunks of a robot, so that several workers can share the robot.
-#: A robot with fewer draws has fewer chunks.
+#: Minimum number of chunks of a robot, so that several workers can share the robot. If a robot has fewer
+#: samples than this number, each chunk has one sample.
 _CHUNKS = 8
 #: Maximum number of draws in a chunk.
 #: For a typical robot, 40 draws take one second and give a few kilobytes of results.

@@ -37,7 +37,7 @@ _FOR_EACH, _MORE = 2, 4
 #: Maximum number of times a chunk is sent when Dask loses its worker.
 #: A robot can only crash the process of its chunks, not Dask's worker.
 _TRIES = 20
-#: Seconds between two counts of the workers.
+#: Time (s) after which the number of workers is read again.
 _COUNT = 1.0
 #: Packages that must have the same version in this process and on the scheduler, if the scheduler has them.
 _COMPARED = ("urdfkin", "pin")
@@ -106,7 +106,10 @@ def _client(scheduler: str) -> Iterator[Client]:
 
 
 class _Portless:
-    """A part of a Dask cluster without web pages. All users of the machine could open such pages."""
+    """Base class for Dask's scheduler and worker that serves no web page.
+
+    All users of the machine could open it.
+    """
 
     def start_http_server(self, *_: object, **__: object) -> None:
         """Do nothing; this method overrides Dask's method, which starts a web server."""
@@ -216,7 +219,8 @@ class Cluster:
         """Run the tasks.
 
         Raises:
-            ClusterError: The connection to the scheduler is lost, or a new worker has other versions.
+            ClusterError: The connection to the scheduler is lost, or a new worker has another version of
+                urdfkin or Pinocchio.
         """
         waiting, failed = chain.from_iterable(work), set[int]()
         landed = as_completed(loop=self._client.loop)

@@ -59,7 +59,7 @@ def tallies(
     clock: Clock,
     second: SecondWitness | None = None,
 ) -> dict[Key, Tally]:
-    """Compare all frames, joints and columns of a robot.
+    """Compare the results for all frames and joints of a robot with the oracle's results.
 
     Args:
         robot: The robot.
@@ -109,7 +109,10 @@ class _Work:
 
 
 class _Block(_Work):
-    """The comparisons of a block of frames, and of the joints with child links in the block."""
+    """The comparisons for a block of frames.
+
+    The block includes each joint whose child link is in the block.
+    """
 
     def __init__(
         self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, clock: Clock, frames: slice
@@ -146,11 +149,11 @@ class _Block(_Work):
                     yield self._compare(joint, reference, ours[:, self.joint_rows], self.part(bound), second)
 
     def part(self, bound: Bound) -> Bound:
-        """Return the bound for the joints of the block, selected from the bound for its frames."""
+        """Select the bounds of the joints in the block from the bounds of its frames."""
         return Bound(bound.scale[:, self.joint_rows], bound.k[:, self.joint_rows])
 
     def asked(self, row: Quantity, reference: Reference | None) -> QueryBatch:
-        """Return the query of the frames or joints that a quantity compares."""
+        """Return the query to the oracle: the frames or joints, and the inputs that the quantity needs."""
         joints = row.of == "joints"
         frames = [JointFrame.of(name) for name in self.joint_names] if joints else self.frames
         inputs = self.x.q, self.x.v, self.x.a

@@ -1,9 +1,9 @@
 """Find common mistakes that explain a wrong result of a user's function.
 
-For each mistake, the module computes the results of a function with this mistake from urdfkin's results.
-Examples are exchanged rows, another reference frame, another frame, other units, and joints in another order.
-A mistake is named if it explains all but a thousandth of the difference at every configuration. If
-several mistakes lead to the same results, all of them are named.
+Examples of mistakes are exchanged rows, a wrong reference frame, a wrong frame, degrees instead of radians,
+and joints in another order. The module makes each mistake in urdfkin's own results. If they then agree with
+the user's results, the mistake is named. At every configuration, the remaining difference may be at most a
+thousandth of the original difference. If several mistakes lead to the same results, all of them are named.
 """
 
 from __future__ import annotations
@@ -25,14 +25,13 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.verify.quantities import Quantity
 
-#: A mistake explains a result if at most this fraction of the difference remains.
+#: A mistake is named if at most this fraction of the difference remains after urdfkin makes the same mistake.
 EXPLAINED = 1e-3
 #: Largest number of explanations that are named.
 _MOST = 3
 #: Number of configurations at which exchanges of two joints are tried.
 _FEW = 4
-#: Smallest divisor of a difference, as a fraction of the largest scale.
-#: The scale itself may be 0, for a number that must be 0.
+#: Differences are divided by their scale. If a scale is 0, the divisor is this fraction of the largest scale.
 _LEAST = 1e-9
 _HALVES = [3, 4, 5, 0, 1, 2]
 _G = 9.81
@@ -62,9 +61,10 @@ class Diagnosis:
     compute: Callable[..., FloatArray]
 
     def remainder(self, predicted: FloatArray, n: int | None = None) -> float:
-        """Return the fraction of the difference that a prediction for the first n results does not explain.
+        """Return the fraction of the difference that remains for predicted results.
 
-        If the prediction explains the whole difference, the result is 0.
+        `predicted` contains the first n results with a mistake. If they equal the user's results, the
+        fraction is 0.
         """
         scale = np.maximum(self.scale[:n], _LEAST * self.scale[:n].max(initial=_LEAST))
         with np.errstate(all="ignore"):
@@ -73,7 +73,7 @@ class Diagnosis:
             return left / whole if np.isfinite(left) and whole > 0.0 else np.inf
 
     def is_expected(self, predicted: FloatArray) -> bool:
-        """Return whether the prediction of a mistake equals the expected results for these inputs."""
+        """Return whether the predicted results equal the expected ones, so that the mistake has no effect."""
         size = np.maximum(self.scale, _LEAST * self.scale.max(initial=_LEAST))
         return bool((np.abs(predicted - self.expected) <= _LEAST * size).all())
 
@@ -421,7 +421,7 @@ class Mistakes:
             )
 
     def _of_frames(self, case: Diagnosis) -> Iterator[Mistake]:
-        """Yield, for each other link, the mistake that the function uses this link instead of the frame."""
+        """For each other link, yield the mistake "the function computes this link instead of the frame"."""
         names = [f"link:{name}" for name in self.robot.link_names if name != self.frame]
         if self.row.against is not None or not names:
             return

@@ -68,7 +68,7 @@ class WorkQueue:
         self._ended = set[int]()
 
     def first(self) -> tuple[Task, Row] | None:
-        """Return a task for a worker that has no robot yet, and the remaining tasks of the task's robot.
+        """Return the next robot's first task and the robot's other tasks, for a worker without a robot.
 
         Return None if no task is left.
         """
@@ -91,7 +91,7 @@ class WorkQueue:
         return task
 
     def put_back(self, task: Task, row: Row) -> None:
-        """Put a task back into its `Row`, so that a worker without a robot can take over its robot."""
+        """Put a task back into its `Row`, so that another worker can run it."""
         row.put_back(task)
         self._begun.remove(row)
         self._waiting = chain([row], self._waiting)
@@ -155,7 +155,7 @@ class ExecutorEngine:
         self._executor = executor
 
     def run(self, work: Work, enter: Enter) -> None:
-        """Run the tasks. An error of the executor becomes the answer of the chunk's robot."""
+        """Run the tasks. If the executor raises an error, the error becomes the result of the robot."""
         waiting, failed = chain.from_iterable(work), set[int]()
         flying = deque[tuple[Task, Future[Answer]]]()
         next_task = next(waiting, None)

@@ -1,8 +1,8 @@
 """Error statistics of a validation, which can be added over chunks, processes and machines.
 
-A `Tally` contains the statistics of one quantity in one reference frame. Tallies can be added in any order
-and grouping. If the worst cases of two tallies have the same ratio, the sum keeps the case with the earlier
-sample. The sum therefore does not depend on the division of the samples into chunks.
+A `Tally` contains the statistics of one quantity in one reference frame. Tallies of different samples can be
+added. The addition is commutative and associative, so the sum does not depend on the division of the samples
+into chunks. If two worst cases have the same ratio, the sum contains the case with the earlier sample.
 
 With a second oracle, `ThreeSides` compares three results: urdfkin's, Pinocchio's and the second oracle's.
 Each pair of libraries has a bound. Two results agree if their difference lies within the bound of their pair.
@@ -33,7 +33,8 @@ class Pair:
 
     Attributes:
         failed: Number of results outside their bound.
-        worst: The largest disagreement, in eps * scale of the second oracle's bound.
+        worst: The largest disagreement in units of eps * scale, with the scale of the comparison with the
+            second oracle.
         share_of_bound: The largest ratio of a disagreement to its bound.
     """
 
@@ -59,8 +60,8 @@ class ThreeSides:
         by: Name of the second oracle.
         urdfkin: urdfkin compared with the second oracle.
         pinocchio: Pinocchio compared with the second oracle.
-        alone: For each library of `SIDES`, the number of results in which this library differs from the other
-            two libraries and these two agree.
+        alone: For each library of `SIDES`, the number of results in which only this library differs from the
+            other two.
         undecided: Number of results without a majority. Either no two of the three results agree, or a result
             agrees with two results that disagree with each other.
     """
@@ -219,7 +220,10 @@ class Tally:
         return replace(joined, by_frame=self.by_frame + other.by_frame)
 
     def percentile(self, percent: float) -> float:
-        """Return a percentile of the disagreements, with the accuracy of a histogram bin's width (26 %)."""
+        """Return a percentile of the disagreements.
+
+        Its error is at most the width of a histogram bin, 26 %.
+        """
         return percentile(self.histogram, HISTOGRAM_EDGES, self.worst, percent)
 
 

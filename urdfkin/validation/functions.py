@@ -45,7 +45,8 @@ _AT_A_TIME = 256
 _DIAGNOSED = 48
 #: Largest number of exceptions and wrong shapes that are stored with their message.
 _KEPT = 5
-#: Largest relative difference for the diagnosis that the function rounds to single precision.
+#: If the relative difference is at most this number, the diagnosis is "the function rounds to single
+#: precision".
 _SINGLE = 1e-5
 
 
@@ -55,7 +56,7 @@ class FunctionError:
 
     Attributes:
         sample: Index of the configuration.
-        message: The exception with its message, or the shape that was found.
+        message: The text of the exception, or a text that states the wrong shape.
     """
 
     sample: int
@@ -83,7 +84,7 @@ class WorstResult:
     replay: str
 
     def largest(self, rows: Sequence[str], columns: Sequence[str]) -> str:
-        """Return a sentence about the number whose difference is the largest multiple of its bound."""
+        """Return a sentence about the worst number, whose difference divided by its bound is largest."""
         with np.errstate(all="ignore"):
             over = np.abs(self.found - self.expected) / np.maximum(self.bound, np.finfo(float).tiny)
         flat = int(np.nan_to_num(over, nan=np.inf).argmax())
@@ -97,7 +98,7 @@ class WorstResult:
 
 @dataclass(frozen=True)
 class FunctionCheck(Displayable):
-    """The comparison of a function with urdfkin, the oracle and the derived bound.
+    """The differences between a function's results, urdfkin's and the oracle's, relative to the bound.
 
     Attributes:
         function: Name of the function.
@@ -113,14 +114,14 @@ class FunctionCheck(Displayable):
         factor: The bound is multiplied by this factor.
         eps_scale: Largest difference in multiples of eps * scale.
         share: Largest ratio of a difference to the bound times `factor`; at most 1 if all results agree.
-        oracle_share: Largest ratio of a difference between the function and the oracle to the bound times
-            `factor`; None without an oracle.
+        oracle_share: As `share`, for the difference between the function and the oracle. None without an
+            oracle.
         rows: Largest ratio in each row of the result, by name.
-        columns: Largest ratio in each column of the result, by joint velocity; empty if the quantity has no
-            such columns.
+        columns: Largest ratio in each column of a Jacobian; the key is the name of the joint velocity. Empty
+            for other quantities.
         worst: The worst result; None if no result was compared.
         errors: Number of exceptions and wrong shapes.
-        first_errors: The first of these exceptions and wrong shapes.
+        first_errors: The texts of the first of these errors.
         diagnoses: Explanations of a disagreement. Each explanation alone explains all results.
 
     >>> import urdfkin
@@ -233,7 +234,7 @@ class FunctionCheck(Displayable):
 
 
 class _Recorder:
-    """A verifier for a robot that also stores the call that it checks, and the result of this call."""
+    """A wrapper of a robot's verifier. It also stores each checked call with its result."""
 
     def __init__(self, verifier: Verifier) -> None:
         self._verifier = verifier
@@ -270,7 +271,7 @@ def verify_function(
 
     Args:
         function: The function to check: q -> result, (q, v) -> result or (q, v, a) -> result.
-        robot: The robot that the function computes.
+        robot: The robot whose kinematics the function computes.
         quantity: Name of a row of the table of quantities: "placement", "velocity", "jacobian",
             "jacobian rate", "hessian", "acceleration", "relative placement", "analytical jacobian" or "imu".
         frame: Name of a link or joint; None: the robot's only tip.
@@ -351,7 +352,7 @@ class _Compared:
         found: The function's results (n, ...) at the configurations in `good`.
         expected: urdfkin's results at the configurations in `good`.
         scale: The scale of the bound of these results.
-        k: The k of the bound of these results, (n,).
+        k: (n,) the factor k of the bound k * eps * scale, for each result.
     """
 
     first: int
@@ -369,9 +370,9 @@ class _Compared:
         return self.units(other) / k
 
     def units(self, other: FloatArray) -> FloatArray:
-        """Compare with another result; return each difference in eps * scale.
+        """Compare with other results, and return each difference in units of eps * scale.
 
-        A number whose difference is not finite gets inf.
+        A difference that is not finite becomes inf.
         """
         with np.errstate(all="ignore"):
             units = disagreement(self.found, other, Bound(self.scale, self.k))
@@ -511,7 +512,7 @@ class _Run:
         return self.conversion.result(self.how.row.name, ours, result, jacobian)
 
     def _converted_scale(self, ours: Sequence[FloatArray], scale: FloatArray) -> FloatArray:
-        """Return the scale of a result that is expressed in the function's convention.
+        """Return the scale of the bound for a result after its conversion to the function's convention.
 
         Each number of the converted result is a sum of numbers in urdfkin's convention.
         """

@@ -1,4 +1,4 @@
-"""Define the manifest of a campaign: the robots, samples and versions, written before the first computation.
+"""Define the manifest of a stored validation: its robots, samples and versions.
 
 The manifest defines the chunks and their keys. The key of a chunk is the sha256 of all data on which the
 numbers of the chunk depend. If the code, the text of the robot or the options change, the keys change too.
@@ -48,7 +48,7 @@ class Manifest:
 
     @classmethod
     def of(cls, subjects: Sequence[RobotInput], samples: int, seed: int, started: str) -> Manifest:
-        """Return the manifest of a new campaign."""
+        """Return the manifest of a new validation, which is written before the first computation."""
         robots = tuple((subject.origin, subject.stamp) for subject in subjects)
         return cls(robots, samples, seed, provenance(), _versions(subjects), started)
 

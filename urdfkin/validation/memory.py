@@ -68,8 +68,8 @@ def _gigabytes(size: int) -> str:
 def _free() -> Iterator[int]:
     """Yield several numbers of free bytes.
 
-    The numbers are the free bytes of the machine, of each control group of this process, and of the process's
-    own limit.
+    The numbers are the free bytes of the machine, the bytes that each control group still allows, and the
+    bytes that the limit of the process (`ulimit`) still allows.
     """
     for line in _lines(_PROC / "meminfo"):
         if line.startswith("MemAvailable:"):
@@ -101,7 +101,7 @@ def _group(mount: Path, group: str, limit: str, usage: str) -> Iterator[int]:
 
 
 def _cached(place: Path) -> int:
-    """Return the bytes of the inactive file cache of a control group.
+    """Return the number of bytes of cached files that a control group has not read recently.
 
     The kernel counts these bytes as used, but frees them on demand.
     """

@@ -21,7 +21,7 @@ class Verdict(StrEnum):
     VERIFIED = "verified"
 
 
-#: Exit codes: a disagreement, a robot that cannot be read, and a robot that Pinocchio did not check.
+#: Exit codes for three cases: a result disagrees, a robot cannot be read, or Pinocchio did not check a robot.
 DISAGREEMENT, INPUT, UNCHECKED = 1, 2, 3
 #: Exit code of an interrupted run: 128 + SIGINT, as in shells.
 INTERRUPTED = 130
@@ -46,8 +46,9 @@ class Outcome:
     """The outcome of a validation run.
 
     Attributes:
-        exit_code: 0: everything verified. Otherwise the first of these that applies: 1: a disagreement. 130:
-            interrupted. 2: a robot cannot be read. 3: a robot was not verified, or there was none.
+        exit_code: 0 if everything is verified. Otherwise the first code that applies, in this order: 1 (a
+            disagreement), 130 (interrupted), 2 (a robot cannot be read), 3 (a robot was not verified, or
+            there was no robot).
         reason: Reason in one line if the run has not passed; None if it has passed.
     """
 

@@ -4,8 +4,8 @@ A chunk runs in a separate process, not in the process of Dask's worker.
 
 Dask's worker imports no computing code, so a robot can only crash the separate process and not the worker. A
 chunk that crashes its process is tried a second time in a new process. If the second process crashes too, the
-crash is the answer. Chunks and answers are transferred as bytes. The text of a robot is sent only once for
-all chunks of the robot.
+robot's result is "not verified" with the signal as the reason. Chunks and answers are transferred as bytes.
+The text of a robot is sent only once for all chunks of the robot.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from urdfkin.validation.worker_processes import WorkerProcess
 if TYPE_CHECKING:
     from urdfkin.validation.chunk import Chunk
 
-#: Result of a chunk on a worker: the pickled answer, the cause of its crashes, or the worker's versions.
+#: Return value of a worker for a chunk. "answer": the pickled results. "died": the reason for two crashes.
+#: "other code": the versions on the worker, because they differ from ours.
 Found = (
     tuple[Literal["answer"], bytes]
     | tuple[Literal["died"], str]
@@ -34,7 +35,7 @@ _lock = threading.Lock()
 
 
 def hold(robot: bytes) -> bytes:
-    """Store a robot on a worker for its chunks; Dask calls this function again if the worker is lost."""
+    """Store a robot's text on a worker. If the worker is lost, Dask calls this function on another worker."""
     return robot
 
 

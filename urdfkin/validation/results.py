@@ -240,8 +240,8 @@ class ValidationReport(Displayable):
     def command(self) -> str:
         """The command that repeats the run.
 
-        Each set of options has its own line. Each robot that was given as text also has its own line, because
-        only one robot can be read from standard input.
+        Each set of options has its own line. A robot that was passed as text is read from standard input.
+        Each such robot therefore has its own line.
         """
         settings = f"--samples {self.samples} --seed {self.seed}"
         return "\n".join(

@@ -63,7 +63,7 @@ class RobotInput:
 
     @property
     def label(self) -> str:
-        """Name of the robot before it is loaded."""
+        """The source of the robot, which is its name in messages until it is loaded."""
         return self.origin.source
 
     def text(self) -> Text:

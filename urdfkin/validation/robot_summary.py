@@ -3,9 +3,9 @@
 The summary has the links and joints, the findings in the file, and Denavit-Hartenberg tables. The summary is
 plain data, which can be sent between processes and written as JSON.
 
-The chains of a catalogue robot are the limbs in the catalogue. For other robots the chains are the paths from
-the base to the leaves, one path for each set of moving joints. The tables are exact. Each chain has a
-standard and a modified table, which are compared with Pinocchio.
+The chains of a catalogue robot are the limbs in the catalogue. For other robots, the chains are the paths
+from the base to the leaves. If several paths have the same moving joints, the summary contains one of them.
+The tables are exact. Each chain has a standard and a modified table, which are compared with Pinocchio.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ Tell = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Store:
-    """The folder of a campaign for reading; the function `opened` returns a store for writing.
+    """The folder of a stored validation, for reading. The function `opened` returns a store for writing.
 
     Attributes:
         folder: The folder.
@@ -233,7 +233,7 @@ class Store:
 def opened(
     folder: Path, manifest: Manifest, tell: Tell, *, shard: str | None = None, retry_failed: bool = False
 ) -> Iterator[Store]:
-    """Open the store of a campaign so that only this process can write.
+    """Open the store of a validation so that no other process can write into it.
 
     Create the store if it does not exist.
 
@@ -241,14 +241,15 @@ def opened(
         folder: The folder.
         manifest: Definition of the campaign.
         tell: Callback for each damaged file.
-        shard: The part of the campaign to lock; other processes may work on other parts. None: lock the whole
-            store.
+        shard: The part of the store to lock, for example "2/4". Other processes may write other parts. None:
+            lock the whole store.
         retry_failed: Whether to delete the stored failures. The files of the failed robots may have changed
             in the meantime.
 
     Raises:
         SourceError: The store cannot be made or written.
-        InputError: The store belongs to another campaign, or another process uses it.
+        InputError: The store contains a validation with other robots or settings, or another process uses the
+            store.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -43,7 +43,7 @@ class Clock:
             return function(*args, **kwargs)
 
     def second_oracle(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        """Call a function of the second oracle, and add its computing time to `second`."""
+        """Call a function of the second oracle, and add its computing time to the entry "second"."""
         with self._add_time("second"):
             return function(*args, **kwargs)
 

@@ -1,8 +1,8 @@
 """Test vectors: robots, configurations, and results at 50 digits with a tolerance for every number.
 
-The file `robots/features.toml` defines small robots with one feature of URDF each. The other robots are those
-of the catalogue, which the files name but do not contain. The reader of `urdfkin.verify.exact` computes all
-values from the decimals of the URDF. The files depend on nothing but these texts: configurations are made
+The file `robots/features.toml` defines small robots with one feature of URDF each. For robots of the
+catalogue, the vectors contain the robot's name, not its URDF. The reader of `urdfkin.verify.exact` computes
+all values from the decimals of the URDF. The files depend on nothing but these texts: configurations are made
 from digests, not by a random generator.
 """
 
@@ -312,7 +312,7 @@ class _Head:
 
 
 def write_features(folder: Path, samples: int = SAMPLES) -> Iterator[Written]:
-    """Write the vectors of all features, each with its URDF, and yield what was written.
+    """Write the test vectors and the URDF of each small robot in `features.toml`. Yield the written files.
 
     Raises:
         SourceError: a file cannot be written.
@@ -383,7 +383,7 @@ def write_sums(folder: Path, written: Sequence[Written]) -> Path:
 
 
 def _write(place: Path, robot: Robot, head: _Head, frames: Sequence[str], samples: int) -> Written:
-    """Write the JSON file, and the same numbers as lines of fields between tabs."""
+    """Write a JSON file, and a text file with the same numbers, separated by tabs."""
     tree = robot.tree
     found = [_sample(robot, head.robot, frames, sample) for sample in range(samples)]
     rows = [

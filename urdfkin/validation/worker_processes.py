@@ -70,7 +70,8 @@ class WorkerProcess:
 def _interpreter(pipe: int) -> subprocess.Popen[bytes]:
     """Start a Python interpreter that imports the same packages as this process.
 
-    The new interpreter imports neither from the current folder nor the main module of this process.
+    The new interpreter does not import modules from the current folder. It does not import this process's
+    main module.
 
     The new interpreter has its own process group. Ctrl-C in the terminal therefore interrupts only the parent
     process, which then saves the finished results.
