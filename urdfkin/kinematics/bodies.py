@@ -170,7 +170,7 @@ class AccelerationParts:
         transverse: alpha x p.
         centripetal: w x (w x p), towards the axis of rotation.
         coriolis: 2 w x R v_1, perpendicular to w and to R v_1.
-        relative: R a_1, from the acceleration of the point relative to the frame.
+        relative: R a_1, where a_1 is the acceleration of the point relative to the moving frame.
         origin: d-dot-dot, the acceleration of the frame's origin.
     """
 
@@ -514,8 +514,9 @@ def representation_matrix(representation: str, R: ArrayLike) -> FloatArray:
 def representation_inverse(representation: str, R: ArrayLike, nearest: float = NEAREST) -> FloatArray:
     """Return C^-1 with x-dot = C^-1 [d-dot; w] (7.122).
 
-    For a quaternion, C has several right inverses. The function returns the right inverse with which x-dot
-    keeps the quaternion's length constant. This right inverse has no singularity.
+    For a quaternion, C has several right inverses. The function returns the one for which x-dot is
+    perpendicular to the quaternion, so that the quaternion's length stays constant. This right inverse has no
+    singularity.
 
     Args:
         representation: SciPy's name of an Euler sequence, or "quaternion".

@@ -18,9 +18,9 @@ FloatArray = NDArray[np.float64]
 #: by 4e-16 at most. A vector that is typed with six digits deviates by more. A rotation about such a vector
 #: would not be a rotation matrix.
 UNIT_TOLERANCE = 1e-12
-#: Largest deviation of R R^T from the identity for a rotation. If the entries of R are rounded to nine
-#: decimals, each has an error of 5e-10 at most. Then R R^T deviates from the identity by at most 1e-9 times
-#: the sum of the absolute values of a row. This sum is at most sqrt(3).
+#: Largest deviation of R R^T from the identity for a rotation. Suppose that the entries of R are rounded to
+#: nine decimals. Each entry then has an error of 5e-10 at most. Then R R^T deviates from the identity by at
+#: most 1e-9 times the sum of the absolute values of a row. This sum is at most sqrt(3).
 ROTATION_TOLERANCE = 2e-9
 #: Kinds of NumPy types that NumPy converts to floats without an error, although they are not real numbers:
 #: complex, bytes, text, timedelta, datetime, void.
@@ -65,7 +65,10 @@ def scalars(value: ArrayLike, name: str) -> FloatArray:
 
 
 def vectors(value: ArrayLike, name: str, size: int = 3) -> FloatArray:
-    """Return `value` as finite (..., size) float64; otherwise raise InputError with the argument's name."""
+    """Return `value` as a finite float64 array (..., size).
+
+    Otherwise raise InputError with the argument's name.
+    """
     array = scalars(value, name)
     if array.ndim < 1 or array.shape[-1] != size:
         raise InputError(f"{name} must have the shape (..., {size})", found=str(array.shape))

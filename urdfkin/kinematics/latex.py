@@ -30,7 +30,7 @@ _SYMBOLS = {
     "zero": "0",
     "one": "1",
 }
-#: For each function name, the symbols that differ from `_SYMBOLS` in this function.
+#: Symbols of single functions, by the function's name. They replace those of `_SYMBOLS`.
 _SYMBOLS_BY_FUNCTION = {
     "sliding_velocity": {"v": r"\dot{d}_i"},
     "sliding_acceleration": {"v": r"\dot{d}_i", "a": r"\ddot{d}_i"},

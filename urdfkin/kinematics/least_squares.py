@@ -22,7 +22,7 @@ _EASING, _HARDER = 0.03, 10.0
 _SLOW = 0.99
 #: The iteration ends if a full step can reduce the squared error by at most this fraction.
 _NOTHING = 1e-13
-#: Rounding error of the sum of squares: the number of eps for each residual.
+#: The rounding error of the sum of squares is at most this number times eps times the sum, for each residual.
 _ROUNDED = 4.0
 
 

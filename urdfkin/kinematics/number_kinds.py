@@ -69,7 +69,7 @@ def counted(x: FloatArray) -> FloatArray:
 
 
 def norm(x: FloatArray) -> FloatArray:
-    """Return the lengths (...) of vectors (..., n), each zero or at least `SMALLEST`."""
+    """Return the lengths (...) of vectors (..., n). A length is 0 or at least `SMALLEST`."""
     # The squares could underflow or overflow; hypot does not.
     return counted(np.hypot.reduce(x, axis=-1))
 

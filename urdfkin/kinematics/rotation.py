@@ -13,9 +13,10 @@
 Every function accepts any leading batch shape. `w_0_1` is the angular velocity of frame 1 relative to
 frame 0.
 
-A user's matrix often has only a few digits, so its columns are only approximately orthogonal. Such a matrix
-can be converted to a rotation by a quaternion, by angles or column by column. The three results differ in the
-last digit of the given matrix. `nearest_rotation` and `polar_factor` return the rotation that is nearest to
+A user's matrix often has only a few digits, so its columns are only approximately orthogonal. There are
+several ways to convert such a matrix to a rotation: over a quaternion, over Euler angles, or by Gram-Schmidt
+on its columns. The results differ in the last digit of the matrix. `nearest_rotation` and `polar_factor`
+return the rotation that is nearest to
 the matrix in the Frobenius norm. This rotation is unique: it is the orthogonal factor U of the polar
 decomposition M = U H.
 
@@ -462,8 +463,8 @@ def angular_velocity_from_quaternion_rates(
 ) -> FloatArray:
     """Return the angular velocity w = 4 E^T (q-dot, q0-dot), the inverse of 7.57.
 
-    The component of the rates along the quaternion changes only the quaternion's length, so it does not
-    belong to a rotation. The function ignores this component.
+    The function ignores the component of the rates along the quaternion, because this component changes only
+    the quaternion's length.
 
     Args:
         quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
@@ -629,7 +630,7 @@ def split_along(axis: ArrayLike, p: ArrayLike) -> tuple[FloatArray, FloatArray]:
         p: (..., 3).
 
     Returns:
-        The part along the axis (..., 3), and r (..., 3), perpendicular to it.
+        Two arrays (..., 3): the component of p along the axis, and the component r perpendicular to the axis.
 
     Raises:
         InputError: a wrong shape, or an axis that is not a unit vector.

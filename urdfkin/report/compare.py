@@ -168,12 +168,13 @@ def _cell(value: Units | str) -> str:
     return value if isinstance(value, str) else units(value)
 
 
-#: A worst disagreement may grow by this factor without a regression: the maximum of random samples varies.
+#: If the largest disagreement of a robot grows by more than this factor, the change is a regression. It may
+#: grow by a smaller factor, because the maximum over random samples varies.
 FACTOR = 2.0
-#: A worst disagreement up to this many eps * scale is no regression, because a single rounding error can have
-#: this size.
+#: A largest disagreement below this number (in units of eps * scale) is no regression, because a single
+#: rounding error can have this size.
 FLOOR = 2.0
-#: A ratio to the bound up to this value is no regression.
+#: A disagreement below this fraction of its bound is no regression.
 _SHARE_FLOOR = 0.1
 
 
@@ -246,7 +247,7 @@ class ChangeEntry(TypedDict):
 
 
 class ComparisonDocument(Header):
-    """The output of `urdfkin report compare --format json`; `sha256` lists the robots of the new report."""
+    """The output of `urdfkin report compare --format json`. Its header is that of the new report."""
 
     changes: Annotated[list[ChangeEntry], says("All changes between the two reports.")]
 
@@ -266,7 +267,7 @@ def compare(old: Document, new: Document, factor: float = FACTOR) -> Comparison:
     Args:
         old: The old report.
         new: The new report.
-        factor: Factor by which a worst disagreement may grow.
+        factor: The largest disagreement of a robot may grow by this factor without a regression.
 
     Returns:
         All changes, each marked if it is a regression.
@@ -336,7 +337,7 @@ def renamed_files(before: Mapping[str, Robot], after: Mapping[str, Robot]) -> di
 
 
 def _by_name(robots: Mapping[str, Robot], others: Mapping[str, Robot]) -> dict[str, list[str]]:
-    """Return the sources that only this report has, by the robot's name in its text."""
+    """Return, for each robot name, the sources in `robots` that are missing in `others`."""
     named: dict[str, list[str]] = {}
     for source, robot in robots.items():
         if source not in others:
@@ -371,7 +372,7 @@ def _robot(source: str, old: Robot, new: Robot, factor: float) -> Iterator[Chang
 
 
 def _tables(source: str, old: Robot, new: Robot) -> Iterator[Change]:
-    """Yield a change for each Denavit-Hartenberg table that only one report compares with Pinocchio."""
+    """Yield a change for each table that Pinocchio checked in only one of the two reports."""
     before, after = ({(c["base"], c["tip"]): bool(c["samples"]) for c in r["chains"]} for r in (old, new))
     for base, tip in dict.fromkeys([*before, *after]):
         ends = [compared.get((base, tip), False) for compared in (before, after)]

@@ -2,8 +2,8 @@
 
 The plot has one row for each quantity, with all reference frames together. The x axis of the histogram is
 logarithmic and shows the disagreement in eps * scale. The histogram shows the results, and the triangle shows
-the worst result. The bar shows the range of the bound over all frames. The bound is smallest for the frame
-with the fewest joints before it. A quantity is verified if its histogram lies left of its bar.
+the worst result. The bar shows the range of the bound over all frames. Different frames have different
+bounds, so the bar is a range. If all results are verified, the histogram lies left of the bar.
 
 The data of the 3D view is compact: links, joints and chains with their tables. The numbers of the 3D view
 have seven digits for display; the JSON document has the full numbers.

@@ -29,7 +29,7 @@ from urdfkin.validation.document import VALIDATION, Document, Robot, Units
 from urdfkin.validation.outcome import OUTCOMES
 from urdfkin.verify.oracles import versions
 
-#: Largest number of reports, and of files that a folder may have.
+#: Largest number of reports in a history, and largest number of files in a folder.
 MOST_RUNS, MOST_FILES = 1000, 20_000
 #: Number of latest runs that a terminal marks for each robot; number of latest runs in the charts of the
 #: page.
@@ -39,7 +39,7 @@ SHOWN = 20
 _LISTED = 500
 #: A mark for each verdict.
 MARKS = {"verified": "✓", "disagrees": "✗", "not verified": "!", "bad input": "✗", "": "·"}
-#: Lower end of the chart of the largest shares of a bound, as a power of ten.
+#: The chart of disagreements begins at this power of ten of the bound.
 _LOWEST = -3.0
 
 
@@ -128,7 +128,7 @@ class History:
         robots: For each robot, the results in each run. The key is the robot's latest source. Worse verdicts
             come first.
         unusable: Files that cannot be used, with the reason.
-        repeated: Files with a run that is already in another file, each with the name of the other file.
+        repeated: Files that repeat the run of another file. The value is the name of the other file.
     """
 
     runs: list[Run] = field(default_factory=list)
@@ -166,7 +166,7 @@ def history(paths: Sequence[Path]) -> History:
         paths: JSON files of `urdfkin validate --json`, stores, and folders with such files and stores.
 
     Returns:
-        The runs, the oldest first, and the points of each robot.
+        The runs in the order of their start, and the results of each robot in each run.
 
     Raises:
         InputError: No report can be used, or there are too many.
@@ -415,7 +415,7 @@ def _by_robot(found: History) -> Told:
 
 
 def _of(told: Told, points: Sequence[Point]) -> list[tuple[int, ChangeEntry]]:
-    """Return the changes of a robot whose file may have been renamed, from the names of all its files."""
+    """Return the changes of a robot under all names that its file has had."""
     return [
         one for source in dict.fromkeys(point["source"] for point in points) for one in told.get(source, [])
     ]

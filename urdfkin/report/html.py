@@ -47,9 +47,9 @@ if TYPE_CHECKING:
     from jinja2 import Environment
     from markupsafe import Markup
 
-#: Maximum number of robots for which all details are unfolded at the start.
+#: Maximum number of robots for which all details are open when the page loads.
 _OPEN = 1
-#: Number of failed robots (listed first) that are unfolded at the start.
+#: Number of failed robots whose details are open when the page loads. Failed robots come first.
 _FAILURES_OPEN = 20
 #: With more robots than this, histograms are drawn only for robots that are not verified. A histogram
 #: takes a second.

@@ -183,5 +183,5 @@ def _time(seconds: float) -> str:
 
 
 def _clean(text: str) -> str:
-    """Escape characters that XML forbids, as their code in hexadecimal."""
+    """Replace each character that XML forbids by its hexadecimal code."""
     return _FORBIDDEN.sub(lambda found: f"\\x{ord(found[0]):02x}", text)

@@ -1,4 +1,4 @@
-"""Tables for terminals of any width, and the data of one robot for the template of the HTML page."""
+"""Prepare one robot's results for display: tables for the terminal, and data for the HTML template."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def overview(robot: Robot, quantities_of: Sequence[Sequence[str]]) -> dict[str, 
 
 
 def reason(robot: Robot) -> str:
-    """Return the reason of a verdict, without errors that the list of findings below it repeats."""
+    """Return the reason of a verdict. Omit errors of the file, which the page lists below as findings."""
     first, *lines = (robot["reason"] or "").split("\n")
     found = [(one["code"], one["message"]) for one in robot["findings"] if one["severity"] == "error"]
     others = [line for line in lines if not any(code in line and words in line for code, words in found)]
@@ -189,11 +189,10 @@ def _cell(checks: Sequence[Check], where: dict[str, list[int]]) -> Cell:
 
 
 def _share(check: Check, subject: int) -> float:
-    """Return an upper bound on the ratio of a worst disagreement to its bound.
+    """Estimate from above how much of its bound the largest disagreement of one frame, joint or column uses.
 
-    The disagreement is the worst one of a frame, a joint or a column. It is divided by the tightest bound of
-    all results. The ratio is therefore an upper bound. The result is at most the largest ratio of the whole
-    check, which is known exactly.
+    The document does not contain the bound of this result. The function divides by the smallest bound of all
+    results. It returns at most `share_of_bound`, the largest such fraction of the whole check.
     """
     value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["share_of_bound"]
     if not value:  # a disagreement of 0 lies within every bound

@@ -50,7 +50,7 @@ def moving_names(model: Model) -> list[str]:
 
 
 def column_names(model: Model) -> list[str]:
-    """For each column of the Jacobian with mimic joints, return the name of its joint."""
+    """Return the joint's name for each column of a Jacobian that also has columns for mimic joints."""
     return [joint["name"] for joint in model["joints"] for _ in range(_size(joint)[1])]
 
 
@@ -254,7 +254,7 @@ def _check(check: Check, subjects: list[str], robot: Robot, document: Document) 
 
 
 def _share(check: Check) -> Iterator[str]:
-    """Yield contradictions about the largest ratio of a disagreement to its bound.
+    """Yield an error if `share_of_bound` contradicts the disagreements and bounds in the document.
 
     The ratio must lie between the worst disagreement divided by the widest bound and the worst disagreement
     divided by the tightest bound.
@@ -335,7 +335,7 @@ def read_document(path: Path) -> Document:
 
 
 def stored_document(folder: Path) -> Document:
-    """Read the document in the folder of a validation campaign, and check it like a file.
+    """Read the document from the store of a validation, with the same checks as for a JSON file.
 
     Raises:
         SourceError: The store cannot be read.

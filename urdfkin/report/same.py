@@ -26,15 +26,15 @@ from urdfkin.robot import Robot
 
 #: Number of lines that are shown for each kind of difference without --all.
 SHOWN = 12
-#: First line of the reasons if the models differ and their joints were not matched by name.
+#: This line is printed if the models differ and their joints were not matched by name.
 GUESSED = "joints are matched by their axes, because their names differ; use --map to match other joints"
 HEADS = ("frame", "at least", "at most", "angle at most")
-#: Attributes of an interval: the attained and the proven angle.
+#: Names of two attributes of `Interval`: the largest angle found, and the proven bound on the angle.
 TURNED = ("radians_seen", "radians")
 #: The default question: are the two robots equivalent?
 EQUIVALENT = Question()
-#: If a bound is at most this factor times the rounding error of one number, it counts as rounding. The factor
-#: is larger than 1 because a sum adds the rounding errors of its terms.
+#: A distance is not printed if its bound is at most this factor times the rounding error of one number. The
+#: factor is larger than 1 because a sum adds the rounding errors of its terms.
 DUST = 1.001
 #: Heading of the list of joints whose mimic joints leave their limits.
 NARROWED = "limits of mimic joints (the bounds of the distance ignore these limits)"
@@ -71,7 +71,7 @@ def headline(found: Sameness, question: Question = EQUIVALENT) -> str:
 
 
 def _within(found: Sameness, most: float) -> str:
-    """Return whether all frames stay within the distance `--within`, or which frame does not."""
+    """Return the answer to `--within`. If a frame exceeds the distance, the answer names the frame."""
     limit = f"WITHIN {most:g} m and rad without changes of B: "
     if found.within(most):
         return f"{limit}no frame is ever off by more than {_both(*found.written)}"
@@ -244,7 +244,7 @@ def pairs_markdown(found: Sequence[Sameness], question: Question = EQUIVALENT) -
 
 
 def as_document(found: Sameness) -> TextDocument:
-    """Return the answer, the reasons and the farthest frames, for `print` and notebooks."""
+    """Return the verdict, its reasons and the frames with the largest distances, for `print`."""
     a, b = (f"{name} ({source})" for name, source in zip(found.names, found.sources, strict=True))
     parts: list[str | Table] = [f"A: {a}", f"B: {b}"]
     after, words = ((), []) if found.up_to_single else _reasons(found)

@@ -158,12 +158,15 @@ def second_oracle_title(robots: Sequence[Robot]) -> str | None:
 
 
 def second_oracle_heads(title: str) -> list[str]:
-    """Return the columns of the table with a second oracle: the three pairs, and the outlier."""
+    """Return the headings for a second oracle: three pairs of libraries, and the library that disagrees."""
     return ["results", "urdfkin, Pinocchio", f"urdfkin, {title}", f"Pinocchio, {title}", "outlier"]
 
 
 def second_oracle_rows(robots: Sequence[Robot], title: str) -> Iterator[tuple[str, list[str]]]:
-    """Yield each quantity and its cells under `second_oracle_heads`, over all robots."""
+    """Yield each quantity with its cells for the columns of `second_oracle_heads`.
+
+    A cell covers all robots.
+    """
     for name in quantities(robots):
         checks = [check for robot in robots for check in of_quantity(robot, name) if "second_oracle" in check]
         if checks:
@@ -173,7 +176,7 @@ def second_oracle_rows(robots: Sequence[Robot], title: str) -> Iterator[tuple[st
 def second_oracle_cells(checks: Sequence[Check], title: str) -> list[str]:
     """Return the cells under `second_oracle_heads` for several checks.
 
-    The cell of a pair of libraries is the largest ratio of their disagreement to its bound.
+    For a pair of libraries, the cell contains the largest disagreement divided by its bound.
     """
     found = [(check, check["second_oracle"]) for check in checks if "second_oracle" in check]
     return [

@@ -111,8 +111,8 @@ class Robot(Displayable):
     - `q`: (..., nq) rad, m.
     - `v`: (..., nv) rad/s, m/s; for planar and floating joints in the axes of the moving frame.
     - `a`: (..., nv) rad/s^2, m/s^2; in the same axes as `v`.
-    - `frame`: Name of a link or joint; None: the robot's only tip. A list of names, such as `link_frames`, is
-      computed in one pass and adds an axis after the batch axes.
+    - `frame`: Name of a link or joint; None: the robot's only tip. For a list of names, such as
+      `link_frames`, the result has an axis of frames after the batch axes.
     - `reference`: LOCAL_WORLD_ALIGNED: at the frame's origin, in world axes. LOCAL: at the frame's origin, in
       the frame's axes. WORLD: at the body point that coincides with the world origin, in world axes.
     - `base`: Motion of the root link; None: fixed at the world origin.
@@ -120,8 +120,8 @@ class Robot(Displayable):
       error.
     - `verify`: True: check this call with Pinocchio. "sample": check 100 of its configurations. None: as
       chosen in `load`.
-    - `threads`: Number of threads for a batch. None: all processors from 4,096 configurations on. The result
-      does not depend on the number of threads.
+    - `threads`: Number of threads for a batch. None: one thread below 4,096 configurations, otherwise one for
+      each processor. The result does not depend on the number of threads.
 
     They share these errors:
 
@@ -163,10 +163,10 @@ class Robot(Displayable):
             urdf, tree, origin, policy=verify, mimic=mimic, unverifiable=unverifiable, oracle=oracle
         )
         self.findings = Findings(findings)
-        #: Bounds of the changes of links and joints by single precision. None if the file's numbers have
-        #: double precision.
+        #: Bounds on the errors of link and joint poses that single precision in the file causes. None if the
+        #: numbers have double precision.
         self.single: SinglePrecision | None = None
-        #: The path of the prim of each link of a USD stage that has one.
+        #: For a robot from a USD stage: the path of the prim of each link.
         self.prims: Mapping[str, str] = {}
         self.base_frame = base_frame or tree.frame_name(0)
         self._tip_frame = tip_frame
@@ -668,7 +668,7 @@ class Robot(Displayable):
     def with_convention(
         self, name: str | Path | Convention, joints: Sequence[str] | None = None
     ) -> ConventionRobot:
-        """Return this robot with methods that take and return the convention of a tool.
+        """Return this robot with methods whose arguments and results are in the convention of another tool.
 
         The arguments are those of `convention`.
 
@@ -929,9 +929,9 @@ class Robot(Displayable):
         WORLD has only terms of the first kind. LOCAL has only terms of the second kind.
 
         Symmetry in LOCAL_WORLD_ALIGNED: the linear rows are symmetric in i and j, except within one planar or
-        floating joint. The angular rows at [i, j] and [j, i] differ by w_j x w_i, where w_i are the angular
-        rows of column i of J, except within one floating joint. The difference is 0 for parallel axes. All
-        angular rows are 0 on a planar arm.
+        floating joint. Let w_i be the angular rows of column i of J. The angular rows at [i, j] and [j, i]
+        differ by w_j x w_i, unless both columns belong to one floating joint. The difference is 0 for
+        parallel axes. All angular rows are 0 on a planar arm.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link", verify=False)
@@ -1034,10 +1034,11 @@ class Robot(Displayable):
         """Return the singular values of `jacobian` with guaranteed bounds, condition and manipulability.
 
         The bounds include the rounding error of J and of the decomposition. Columns of J that are 0 for every
-        q are left out. The values are the same in LOCAL and LOCAL_WORLD_ALIGNED. With rows "all" the values
-        combine rows in metres and rows in radians. `found.manipulability_gradient(robot.hessian(q, frame))`
-        returns the gradient of the manipulability. `print(found)` shows a table, and explains a singularity:
-        `found.singularity()` names the lost direction and the joints that cause it.
+        q are left out. The values are the same in LOCAL and LOCAL_WORLD_ALIGNED. `rows="all"` mixes linear
+        rows (metres) and angular rows (radians), so the values depend on the unit of length.
+        `found.manipulability_gradient(robot.hessian(q, frame))` returns the gradient of the manipulability.
+        `print(found)` shows a table, and explains a singularity: `found.singularity()` names the lost
+        direction and the joints that cause it.
 
         Args:
             frame: Name of a link or joint; None: the robot's only tip.
@@ -1231,7 +1232,7 @@ class Robot(Displayable):
             hessian: Whether to enclose the Hessian too. This takes less than 0.1 ms for each pair of joints.
 
         Raises:
-            InputError: a batch, a wrong length, or fewer than 15 digits.
+            InputError: an argument is a batch or has a wrong length, or `digits` is below 15.
             UnknownNameError: the frame or reference does not exist.
 
         >>> import urdfkin
@@ -1638,9 +1639,9 @@ class Robot(Displayable):
 
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
         """Return the fast evaluator of a frame, which is made at the first call."""
-        # A plain name is a key by itself, because the hash of an enumeration member takes long to compute.
-        # All other keys contain the types too. Without them, a member of an enumeration equals its number.
-        # Also, `LinkFrame("link:a")` differs from a link with the literal name "link:a".
+        # For a name with the usual reference frame, the key is the name. This saves time, because the hash of
+        # an enumeration member is slow. Other keys also contain the types: an enumeration member would
+        # otherwise equal its number, and `LinkFrame("link:a")` would equal the name "link:a".
         plain = reference is _ALIGNED and type(frame) is str
         key = frame if plain else (type(frame), frame, type(reference), reference)
         known = self._checked if verify else self._prepared
@@ -1657,7 +1658,8 @@ class Robot(Displayable):
 
 # -- docstrings --------------------------------------------------------------------------------------
 
-#: An item of a list in the docstring of `Robot`, and an item of a section in a method's docstring.
+#: Patterns for list items: of a list in the docstring of `Robot`, and of the section `Args` or `Raises` of a
+#: method.
 _SHARED_ITEM = re.compile(r"^- `(\w+)`: (.*(?:\n  .*)*)", re.MULTILINE)
 _ITEM = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 
@@ -1691,7 +1693,10 @@ def _indented(items: Sequence[str]) -> str:
 
 
 def _complete_docstrings() -> None:
-    """Add the shared arguments and errors, which the docstring of `Robot` describes, to its methods."""
+    """Add the descriptions of shared arguments and errors to the methods' docstrings.
+
+    `Robot.__doc__` contains them.
+    """
     arguments, _, errors = cleandoc(Robot.__doc__ or "").partition("They share these errors:")
     shared = dict(_SHARED_ITEM.findall(arguments)), dict(_SHARED_ITEM.findall(errors))
     for method in vars(Robot).values():

@@ -54,7 +54,7 @@ class FrameMotion:
         velocity: (n, 6) m/s, rad/s.
         acceleration: (n, 6) classical, m/s^2, rad/s^2.
         jacobian: (n, 6, nv).
-        movable: (6, nv) entries of the Jacobian that are not 0 for every q.
+        movable: (6, nv) False for entries of the Jacobian that are 0 in every configuration.
         parts: The acceleration, split into the contributions of each joint and of each term of the equation.
         checks: Comparison with Pinocchio for each quantity, by its name. Empty if Pinocchio cannot check the
             robot.

@@ -95,7 +95,7 @@ def load(  # noqa: PLR0911  one branch per kind of source
         UrdfError: the file has errors; `findings` lists them with their positions.
         SourceError: the source cannot be read.
         UnknownNameError: no file and no robot has that name; the message lists the nearest names.
-        TableError: the URDF made from a table has other placements of the tip than the table itself.
+        TableError: the robot made from a table does not reproduce the tip placements of the table.
         InputError: an argument has an invalid value.
 
     >>> arm = load("planar_two_link")

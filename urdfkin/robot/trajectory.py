@@ -123,7 +123,7 @@ def _check_names(path: Path, names: Sequence[str], shapes: Shapes, required: Seq
 _FEWEST = 3
 #: Names of the arrays in an .npz file that contain the fields of `BaseMotion`.
 _BASE = "base_placement", "base_velocity", "base_acceleration"
-#: Largest rounding error of a time without a note to the user, relative to the smallest time step.
+#: If the rounding error of the times exceeds this fraction of the smallest time step, a note tells the user.
 _TIME_ROUNDING = 1e-6
 
 
@@ -159,7 +159,7 @@ class Trajectory:
         q: (n, nq) configurations, rad and m.
         v: (n, nv) joint velocities, rad/s and m/s.
         a: (n, nv) joint accelerations, rad/s^2 and m/s^2.
-        rates: Origin of v and a, as text.
+        rates: How v and a were obtained, as text.
         exact: Whether v and a are the exact derivatives of q, except for rounding. If False, their error is
             unknown.
         notes: Remarks for the user about the samples, for example about unwrapped angles. Each remark is one
@@ -187,7 +187,7 @@ class Trajectory:
         return f"<Trajectory: {len(self.t)} samples in {self.t[-1] - self.t[0]:.4g} s, rates {self.rates}>"
 
     def derivation(self) -> str:
-        """Return one line of text with the origin of v and a, and the estimates of their errors.
+        """Return one line that states how v and a were obtained, with the estimates of their errors.
 
         >>> import urdfkin
         >>> line(urdfkin.load("ur5"), "neutral", "ready", 2.0, 101).derivation()
@@ -205,12 +205,12 @@ class Trajectory:
 def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) -> Trajectory:
     """Return a straight line in joint space between two configurations, with zero velocity at both ends.
 
-    Planar and floating joints move along a single screw from start to end.
+    Planar and floating joints move from start to end with a constant twist direction (a screw motion).
 
     Args:
         robot: The robot.
         start: (nq,) rad, m.
-        end: (nq,) rad, m. A continuous joint makes all whole turns in the difference between start and end.
+        end: (nq,) rad, m. A continuous joint moves by `end - start`, also if this is more than one turn.
             Planar and floating joints make no whole turn.
         duration: Seconds.
         samples: Number of samples, including both ends.
@@ -241,7 +241,7 @@ def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) 
     for joint, at, to in zip(robot.tree.joints, robot.tree.q_index, robot.tree.v_index, strict=True):
         if joint.nq == 1:
             step[to] = q_1[at] - q_0[at]
-    # On a single screw, velocity and acceleration in the moving frame are s' and s'' times the constant step.
+    # In a screw motion, the velocity and the acceleration in the moving frame are s' and s'' times `step`.
     q = integrate(robot.tree, q_0, s * step)
     return Trajectory(frozen(t), frozen(q), frozen(s_1 * step), frozen(s_2 * step), "of the line", exact=True)
 
@@ -260,10 +260,10 @@ def read_trajectory(
     | motion of the root link | | base_placement (n, 4, 4), base_velocity (n, 6), base_acceleration (n, 6) |
 
     A heading may end with a unit: `elbow [deg]`, `elbow_deg`, `v:elbow [deg/s]`, `lift_mm`, `time [ms]`.
-    Without t, the samples are one second apart. Without a, a is computed by central differences of v. If the
-    file has no v and a, both are computed by central differences. The angles of continuous, planar and
-    floating joints are unwrapped first. The attributes `rates`, `errors` and `notes` of the result report
-    these computations.
+    Without t, the samples are one second apart. If the file has no `a`, the accelerations are computed by
+    central differences of v. If the file has no v and a, both are computed by central differences. The angles
+    of continuous, planar and floating joints are unwrapped first. The attributes `rates`, `errors` and
+    `notes` of the result report these computations.
 
     Args:
         robot: The robot.
@@ -665,8 +665,8 @@ def _check_columns(
 #: Largest difference (rad) between the angles of a column that was wrapped to one turn.
 #: It includes a margin for angles that are rounded to two decimals.
 _ONE_TURN = math.tau + 0.02
-#: Angle (rad) between two samples from which the direction of the motion is ambiguous.
-#: From this angle on, the motion in the other direction is less than twice as long.
+#: If the angle (rad) between two samples exceeds this value, the direction of the rotation is ambiguous. The
+#: rotation in the other direction is then less than twice as large.
 _AMBIGUOUS = math.tau / 3.0
 
 #: A smaller motion (radians or metres) of a mimic joint counts as rounding.
@@ -738,7 +738,7 @@ def _without_jumps(angle: FloatArray) -> FloatArray:
 
 
 def _floating(joint: Joint, own: FloatArray) -> tuple[FloatArray, list[str]]:
-    """Choose the sign of each floating joint's quaternion that is closer to the previous quaternion."""
+    """For each floating joint, choose the signs of the quaternions so that consecutive ones are close."""
     along = np.sum(own[1:, 3:] * own[:-1, 3:], axis=1)
     new = own.copy()
     new[1:, 3:] *= np.cumprod(np.where(along < 0.0, -1.0, 1.0))[:, np.newaxis]
@@ -773,7 +773,7 @@ def _ambiguity_note(joint: Joint, step: FloatArray, *, wrapped: bool) -> str:
 
 
 def _mimic_notes(tree: KinematicTree, q: FloatArray, new: FloatArray) -> Iterator[str]:
-    """Yield a note for each mimic joint that moves when the mimicked joint's angle is unwrapped."""
+    """Unwrapping adds whole turns to a joint's angle. Yield a note for each mimic joint that this changes."""
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         rule = joint.mimic
         if rule is None or np.array_equal(q[:, at], new[:, at]):

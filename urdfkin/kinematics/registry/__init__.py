@@ -3,7 +3,8 @@
 Each equation has its statement, its meaning, its functions and its tests.
 
 The TOML files in `data` are the only source. This module generates `docs/equations.md` and the output of
-`urdfkin explain 7.130` from them. Tests check that every function and test exists.
+`urdfkin explain 7.130` from them. A test checks that every function and every test that these files name
+exists.
 """
 
 from __future__ import annotations
@@ -107,7 +108,7 @@ def sections() -> tuple[Section, ...]:
 
 @cache
 def equations() -> dict[str, Equation]:
-    """Return all equations by their numbers, in the order of the chapter."""
+    """Return all equations in the order of the chapter. The key is the number of the equation."""
     return {equation.number: equation for section in sections() for equation in section.equations}
 
 
