@@ -1,9 +1,9 @@
 """Bounds on the rounding errors by which two correct computations differ; all tolerances use these bounds.
 
 The unit of an error is eps = 2^-52 times the rounded number. Each operation has an error of at most half an
-eps. Errors are counted to first order. A tolerance is a count of this module times a scale. The scales are
-computed elsewhere: in `urdfkin.verify.bounds` for the forward recursion, and in the modules of `urdfkin.dh`
-for tables.
+eps. Errors are counted to first order. A tolerance is `count * eps * scale`. This module defines the counts.
+The scales are computed elsewhere: in `urdfkin.verify.bounds` for the forward recursion, and in the modules of
+`urdfkin.dh` for tables.
 
 **A joint.** For each joint, the recursion multiplies the rotation so far by the joint's constant rotation and
 by its rotation about its axis. If *all* roundings add up, the error of a component of a rotated vector grows
@@ -21,30 +21,32 @@ the parts. The errors of urdfkin and of Pinocchio may have opposite signs, so th
 5.7 + 16.8 = 22.5. `tests/kinematics/test_roundings.py` computes these counts: it runs the same equations on
 numbers that record each of their roundings.
 
-The sum over the joints and the cross products of a term add at most 2 eps in each implementation. This is the
-total for the two or three factors of the term (`urdfkin.verify.bounds`). The count uses one joint more than
-the path has. The additional joint covers the frame's own offset and the first of these sums. `ROUNDINGS` is
-24 instead of 22.5, which covers the other sums.
+Two further operations have rounding errors: the sum over the joints, and the cross products of a term. In
+each implementation, they add at most 2 eps for all two or three factors of the term
+(`urdfkin.verify.bounds`). Two margins cover these errors. The count uses one joint more than the path has,
+which covers the frame's own offset and the first sum. `ROUNDINGS` is 24 instead of 22.5, which covers the
+other sums.
 
 The recursion expresses its vectors in the world's axes or in a link's axes. In the world's axes, each factor
-R d or z is rotated once by every joint before it. In a link's axes, the joints before link k rotate w of link
-k back. The joints between link k and the frame rotate a term of link k. Finally R, the product of all
-rotations, rotates the term once. For w x (w x d), the number of rotations is at most three times the number
-of joints of the path. The three factors have the same number of rotations in the world's axes.
+R d or z is rotated once by every joint before it. In a link's axes, w of link k is multiplied by the inverse
+rotation of each joint before link k. A term of link k is multiplied by the rotation of each joint between
+link k and the frame. Finally the term is multiplied once by R, the product of all rotations. For w x (w x d),
+the number of rotations is at most three times the number of joints of the path. In the world's axes, the
+number of rotations is the same.
 
 If a joint's axis is **not a coordinate axis**, urdfkin needs two more products before the joint's rotation.
-The first product multiplies the constant rotation by the rotation that turns z to the axis. The second
-product multiplies the constant rotation by the inverse of this rotation for the previous joint. Pinocchio
+Let A be the rotation that turns z to the joint's axis. In the first product, the constant rotation is
+multiplied by A. In the second product, it is multiplied by the inverse of A of the previous joint. Pinocchio
 uses Rodrigues' formula. In urdfkin and in Pinocchio, the result depends on the length of the axis. If all 340
 roundings add up, the error is 41. The bound does not cover this worst case. If each rounding error is
-uniformly distributed over its range, the standard deviation of the sum is 3.3. `ROUNDINGS` is seven standard
-deviations for a single joint.
+uniformly distributed over its range, the standard deviation of the sum is 3.3. For a single joint,
+`ROUNDINGS` is seven times this standard deviation.
 
 Pinocchio replaces an axis within 1e-12 of a coordinate axis by that coordinate axis. Let Q be the rotation
 that turns the file's axis to the coordinate axis, and let t be its angle (the tilt). Then |Q R Q^T - R| <= 2
 |Q - 1| <= 2 t. If the joint rotates a vector, or translates it along its axis, the error is at most 2 t. The
 same error occurs in each later factor. A tilt larger than eps is a finding (URDF514). For the frames after
-that joint, the tilt adds 2 t / eps to the roundings of each factor.
+that joint, the count of each factor is therefore larger by 2 t / eps.
 
 **An export** (`urdfkin.export`) writes the same equations without products with 0 and 1. Small numbers in a
 row of a constant rotation, or in an offset, are omitted. A number is small if it is less than half an eps of
@@ -71,11 +73,11 @@ The counts of an export's joint are
 | all of an export's joint | 6.5 | 7.2 |
 
 Each omitted component of an offset causes an error of 0.5; two components cause an error of 0.7 of the
-offset's length. The omission also removes products with a row, or products of a cross product. These products
-would have an error of 1.5, which is larger. If nothing is fused, an export and Pinocchio differ by at most
-7.2 + 16.8 = 24.0 for each joint, plus the sums above. `ROUNDINGS` does not cover this worst case. The
-standard deviation is the same as for urdfkin. In a comparison of an export with true values (test vectors),
-the error is at most 7.2, which is within `ROUNDINGS`.
+offset's length. If a component is omitted, its products in a matrix row or in a cross product are omitted
+too. These products would have an error of 1.5, which is larger. Without fused multiply-adds, an export and
+Pinocchio differ by at most 7.2 + 16.8 = 24.0 eps for each joint, plus the sums above. `ROUNDINGS` does not
+cover this worst case. The standard deviation is the same as for urdfkin. In a comparison of an export with
+true values (test vectors), the error is at most 7.2, which is within `ROUNDINGS`.
 
 **An export in single precision** has a bound of its own for each number of a test vector. The unit is eps =
 2^-23. `urdfkin.export.single` multiplies the error of each operation and of each constant by the derivative
@@ -92,8 +94,8 @@ of the result, and adds the absolute values. The error of one operation is
 A change of sign has no error. The inputs of test vectors are single-precision numbers, so they have no error.
 A number below the smallest normal number, 2^-126, has an error of 2^-126 at most, because GPUs and some
 compilers replace it by 0. The constants also have the rounding errors of the export in double precision.
-Therefore, the bound of that export is added, multiplied by 2^-52 / 2^-23. An export has no other operations,
-so there are no other errors.
+Therefore, the bound in single precision contains the bound in double precision, converted by the factor 2^-52
+/ 2^-23. An export has no other operations, so there are no other errors.
 
 **MuJoCo**, the optional second oracle, computes the orientation as a unit quaternion. For each joint, MuJoCo
 multiplies this quaternion by the quaternion of the constant rotation and by the quaternion of the joint's
@@ -104,16 +106,17 @@ converts it to a matrix. If all roundings add up, the error is
 |---|---|
 | a joint about any axis: two products of quaternions, the norm, the matrix | 21.5 |
 
-With urdfkin's 5.7 the difference is 27.2. `MUJOCO` is 30 instead of 27.2, which covers the same sums as
-above. MuJoCo uses the axes of the file.
+With urdfkin's 5.7 the difference is 27.2. `MUJOCO` is 30 instead of 27.2. The difference covers the same sums
+as above. MuJoCo uses the axes of the file.
 
 **A mimic joint** adds no rounding. urdfkin and the oracle compute its angle as fl(fl(m q) + c), with the same
 doubles m and c, and neither fuses the two operations. IEEE 754 then defines the result to the last bit. If a
 mimic joint mimics another mimic joint, urdfkin and the oracle combine the rules in the same order, from the
-mimicked joint outwards. The errors of sine and cosine are counted above. The reduction of their argument is
-exact for every size. A mistake in a mimic joint's angle is therefore detected, even at 1e12 rad.
+mimicked joint outwards. The errors of sine and cosine are counted above. Sine and cosine first subtract
+multiples of pi/2 from their argument. This subtraction is exact for every angle, also for 1e12 rad. Therefore
+a mistake in a mimic joint's angle is always detected.
 
-**A base** that is rotated counts as one joint more. A base that is not rotated adds no rounding. The user's
+**A base** that is rotated counts as one joint more. A base without a rotation adds no rounding. The user's
 matrix M has nine correct digits. Both implementations replace M by the nearest rotation, each by its own
 method. Therefore, it does not matter how far M is from a rotation. The counts, with u = eps/2, are
 
@@ -146,9 +149,9 @@ mimic rules up to the mimicked joint.
 
 **Numbers near zero.** A product below the smallest normal number loses bits. Its error is 2^-1075, half the
 smallest subnormal number, which is (eps/2) times the smallest normal number. Every scale that is not zero is
-therefore at least the smallest normal number (`urdfkin.kinematics.number_kinds`). Then the counts of this
-module cover this error too, also after later multiplications. The smallest unit is eps times the smallest
-normal number, 2^-1074.
+therefore at least the smallest normal number (`urdfkin.kinematics.number_kinds`). Therefore `count * eps *
+scale` is larger than this error, also after later multiplications. The smallest unit is eps times the
+smallest normal number, 2^-1074.
 
 **A row** of a Denavit-Hartenberg table has 8 roundings at most:
 
@@ -182,13 +185,16 @@ LEAST_UNIT = EPS * SMALLEST
 #: This number replaces a divisor 0 if the dividend is 0 too. It is smaller than every measured number.
 NOT_ZERO = 1e-300
 
-#: Roundings for each joint and each factor in a comparison of urdfkin with Pinocchio (derivation above).
+#: Allowed error (in eps) for each joint and each factor of a term, between urdfkin and Pinocchio (derivation
+#: above).
 ROUNDINGS = 24.0
-#: Roundings for each joint and each factor in a comparison of urdfkin with MuJoCo (derivation above).
+#: Allowed error (in eps) for each joint and each factor of a term, between urdfkin and MuJoCo (derivation
+#: above).
 MUJOCO = 30.0
-#: Roundings for each mimic rule of an MJCF file in a comparison of the tree with MuJoCo (derivation above).
+#: Allowed error (in eps) of a mimic rule of an MJCF file, between urdfkin's tree and MuJoCo (derivation
+#: above).
 MJCF_RULE = 8.0
-#: Roundings for each row of a Denavit-Hartenberg table (derivation above).
+#: Allowed error (in eps) for each row of a Denavit-Hartenberg table (derivation above).
 ROW = 8.0
 
 # Constants for an export in single precision (`urdfkin.export.single`); derivation above.
@@ -212,38 +218,39 @@ SINGLE_POLYNOMIAL = 1.0
 
 # Rounding errors in the constant pose between two joint axes (`urdfkin.dh.common_normals`).
 
-#: Roundings for each URDF joint whose constant transform is part of the pose, in a comparison of two parsers.
-#: The worst case is 18.9 (the table above without the rotation about the axis). The standard deviation is
-#: 2.4, so this count is nearly six standard deviations.
+#: Error (in eps) for each URDF joint in the pose, between two programs that read the same file. The worst
+#: case is 18.9 (the table above without the rotation about the axis). The standard deviation is 2.4, so this
+#: count is nearly six standard deviations.
 CONSTANT = 13.7
-#: Roundings for the two axes. The division of an axis by its length contributes 0.5. The rotation of an axis
-#: by Rodrigues' formula contributes 2.0.
+#: Error (in eps) for the directions of the two axes. The division of an axis by its length contributes 0.5.
+#: The rotation of an axis by Rodrigues' formula contributes 2.0.
 AXES = 5.0
-#: Roundings for each joint by the program that wrote the file. A double that is written with fifteen digits
-#: (DBL_DIG) has an error of half a unit in the last digit. For an angle up to pi this is 5e-15 rad or 22.5
-#: eps. The error is counted for roll and for pitch, because both tilt an axis; yaw does not tilt an axis.
+#: Error (in eps) for each joint, caused by the program that wrote the file. A double that is written with
+#: fifteen digits (DBL_DIG) has an error of half a unit in the last digit. For an angle up to pi this is 5e-15
+#: rad or 22.5 eps. The error is counted for roll and for pitch, because both tilt an axis; yaw does not tilt
+#: an axis.
 WRITTEN = 45.0
-#: Roundings for a length along an axis. The unit is eps times the length of the path whose positions are
-#: summed. The dot product contributes 2.4, and each sum contributes 0.5. Only a few sums are as large as the
-#: whole path.
+#: Error of a length along an axis, in units of eps times the length of the path. The dot product contributes
+#: 2.4, and each sum contributes 0.5. Only a few sums are as large as the whole path.
 SUMMED = 4.0
 
 # Tolerances for round numbers: a number within the tolerance of a round number becomes this round number.
 
-#: Roundings for an angle up to pi. A computed multiple of pi/12 contributes 1.2. The number in a file
+#: Error (in eps) of an angle up to pi. A computed multiple of pi/12 contributes 1.2. The number in a file
 #: contributes 1.0 (half a unit in the last place). The function arctan2 contributes 1.1.
 ANGLE = 4.0
-#: Roundings for an entry of a rotation. The entry is a difference of two products, which contributes 0.75.
-#: One of the factors is such a difference too, which contributes 0.75 more.
+#: Error (in eps) of an entry of a rotation matrix. The entry is a difference of two products, which
+#: contributes 0.75. One of the factors is itself a difference of two products, which contributes another
+#: 0.75.
 ENTRY = 2.0
-#: Roundings for a length that is rounded to twelve digits: half of `SUMMED`.
+#: Error of a length that is rounded to twelve digits. It is half of `SUMMED`, in the same unit.
 DIGITS = SUMMED / 2.0
-#: Roundings for an angle between two rotations. One rotation is computed from roll, pitch and yaw, which
+#: Error (in eps) of the angle between two rotations. One rotation is computed from roll, pitch and yaw, which
 #: contributes 3.1. The other rotation is the product of three rotations. The sine and the cosine contribute
 #: 0.5 each, and the two products contribute 1.4 and 1.8.
 TURN = 8.0
 
-#: Roundings for the limits of a mimic joint that are converted to limits of the mimicked joint. The
+#: Error (in eps) of a limit of a mimic joint after its conversion to a limit of the mimicked joint. The
 #: conversion has a difference and a quotient, and the mimic rule has a product and a sum. Each of these four
 #: operations contributes 0.5. The total is doubled, so that a value at the limits is accepted.
 FOLLOWER = 4.0
@@ -268,7 +275,7 @@ def of_joints(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
 def of_rows(rows: int) -> float:
     """Return the number of roundings of a pose that is computed from a table with `rows` rows and a tool.
 
-    The count does not contain the half eps of q, which is counted with the angles.
+    This number does not contain the rounding of the joint values (half an eps), which the caller adds.
     """
     return ROW * (rows + 1)
 
@@ -276,17 +283,20 @@ def of_rows(rows: int) -> float:
 def of_rows_read_back(rows: int) -> float:
     """Return the number of roundings in a comparison of a table with the URDF that was written from it.
 
-    The count is 4 times `of_rows`. The computation with the table and the computation by Pinocchio contribute
-    one `of_rows` each. The conversion to roll, pitch and yaw contributes two.
+    The number is `4 * of_rows(rows)`. The computation with the table contributes `of_rows(rows)`, and so does
+    the computation by Pinocchio. The conversion to roll, pitch and yaw contributes twice as much.
     """
     return 4.0 * of_rows(rows)
 
 
 def of_two_texts(joints: int) -> float:
-    """Return the number of roundings of a pose after `joints` joints, for two URDF texts of the same robot.
+    """Return the allowed error (in eps) between the poses of a link in two URDF texts of the same robot.
 
-    The parser and the writer round each joint's constant transform and its axis. If the writer merges fixed
-    joints, it rounds only the product of their constant transforms, so there are no more roundings.
+    The link comes after `joints` joints.
+
+    The parser and the writer round each joint's constant transform and its axis. If a program merges fixed
+    joints before it writes them, it rounds only the product of their constant transforms. The number of
+    roundings is then smaller.
     """
     return (CONSTANT + WRITTEN + AXES) * (joints + 1)
 
@@ -294,6 +304,6 @@ def of_two_texts(joints: int) -> float:
 def of_a_fit(rows: int) -> float:
     """Return the number of roundings in a comparison of a URDF with a table that was fitted to it.
 
-    The iteration of a fit stops at errors of up to 12.5 times `of_rows`.
+    The fit is an iteration. When it stops, its error can be up to 12.5 times `of_rows(rows)`.
     """
     return 12.5 * of_rows(rows)
