@@ -136,7 +136,7 @@ def _function(code: Code, function: Function) -> str:
 
 
 def spare(code: Code, function: Function) -> int:
-    """Return the smallest number of rows with at least eight numbers in each input and the result."""
+    """Return the number of rows in which every input and the result have at least eight numbers."""
     widths = (*code.widths(function).values(), len(function.results))
     return max(-(-8 // width) if width else 0 for width in widths)
 

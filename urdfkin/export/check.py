@@ -31,7 +31,7 @@ _COMPILE = {
     ".hpp": ("c++", "-std=c++11", "-x", "c++", *_STRICT),
     ".cuh": ("c++", "-std=c++11", "-x", "c++", *_STRICT),
 }
-#: The command that compiles a file for CUDA with its kernels.
+#: The command that compiles a CUDA file for the GPU.
 _COMPILE_FOR_GPU = ("nvcc", "-Xcompiler", "-Wall,-Wextra,-Werror", "-x", "cu")
 #: Number of characters at the start of a file that are searched for `_MARK` and for the word UNVERIFIED.
 _HEAD = 2000

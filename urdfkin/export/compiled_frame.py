@@ -1,4 +1,4 @@
-"""Compile one frame of one robot to machine code, the fastest form, for one configuration or a batch.
+"""Compile the kinematics of one frame to machine code. This is the fastest way to compute in urdfkin.
 
 The first call of a quantity exports C code and compiles the code with the system's compiler. The result is
 compared with Pinocchio before it is used. Without a C compiler, the forward recursion that Numba compiles is
@@ -203,11 +203,11 @@ class _Robot(Protocol):
 class CompiledFrame:
     """One frame of a robot in one reference frame, compiled; the result of `Robot.compiled`.
 
-    Results agree with the results of `Robot` within the error bound, but not to the last bit. A batch gives
-    the same bits as its configurations one by one. Inputs are checked: a wrong shape or a number that is not
-    finite is an error. The machine code is compared with Pinocchio once, on a hundred configurations, unless
-    the robot is loaded with `verify=False`. The results of later calls are not compared, and the certificate
-    counts them as unchecked.
+    Results agree with the results of `Robot` within the error bound, but not to the last bit. The result of a
+    configuration has the same bits in a batch and in a single call. Inputs are checked: a wrong shape or a
+    number that is not finite is an error. The machine code is compared with Pinocchio once, on a hundred
+    configurations, unless the robot is loaded with `verify=False`. The results of later calls are not
+    compared, and the certificate counts them as unchecked.
 
     Attributes:
         frame: The frame's name.
@@ -397,8 +397,8 @@ class CompiledFrame:
     ) -> TypeGuard[Sequence[FloatArray]]:
         """Return whether all arguments are arrays that the machine code can use without a copy.
 
-        For such arrays the general conversion of arguments (`Call`) is skipped. The conversion takes a tenth
-        of the time of 100,000 accelerations, because a large batch removes its code from the processor's
+        For such arrays the general conversion of arguments (`Call`) is skipped. It would take a tenth of the
+        time of 100,000 accelerations: each large batch removes the conversion's code from the processor's
         caches.
         """
         n = len(out) if type(out) is np.ndarray and out.ndim else 0

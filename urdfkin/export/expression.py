@@ -34,8 +34,8 @@ class Node:
 
     Attributes:
         op: "q", "v" or "a" for an input; "+", "-", "*", "/", "neg", "sin", "cos" or "sqrt".
-        of: The operands, which are nodes and constants. An input has one operand: its index in q, v or a.
-        index: Order of creation; operands have smaller indices.
+        of: The operands, which are nodes and constants. For an input, `of` is its index in q, v or a.
+        index: Number in the order of creation. Operands are created first, so their numbers are smaller.
         place: Index of the step of the recursion that created it.
         equation: Numbers of the equation that created it; "" if it has none.
         name: Name in the code; "" for no name.
@@ -99,7 +99,7 @@ class Graph:
         self.chapter: Any = bound(made=self._record_numbers)
 
     def input(self, letter: str, place: int) -> Node:
-        """Return the node of element `place` of q, v or a."""
+        """Return the node for one element of q, v or a, for example q[3]."""
         return self.made(letter, place)
 
     def made(self, op: str, *of: Any) -> Node:
@@ -155,7 +155,9 @@ class Graph:
         return self.made("*", *_in_order(x, y))
 
     def _record_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
-        """Return a function for an equation that also stores the equation's numbers in each new node.
+        """Wrap the function of an equation.
+
+        The wrapper also stores the numbers of the equation in each new node.
 
         If another equation calls this function, the numbers of the calling equation are stored.
         """

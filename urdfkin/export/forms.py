@@ -1,4 +1,4 @@
-"""The code of a chain in one of its forms: the URDF's joints, a Denavit-Hartenberg table, or screws.
+"""Export a chain as code, with the steps of the URDF's joints, of a Denavit-Hartenberg table, or of screws.
 
 `urdfkin.load` converts a table or a product of exponentials to a robot, with one joint for each row or screw.
 The code is generated from this robot.
@@ -36,7 +36,7 @@ def code_of_robot(
     name: str | None = None,
     verify: bool | None = None,
 ) -> Code:
-    """Return the exported code of a robot's frame, with its proof.
+    """Return the exported code of a robot's frame, with the record of its check.
 
     The arguments and the errors are those of `Robot.export`.
     """
@@ -65,8 +65,8 @@ def code_of_chain(
 
     Args:
         chain: A table, or a product of exponentials.
-        quantities: As in `Robot.export`. None: the default of `Robot.export`, but only the placement if no
-            joint moves.
+        quantities: As in `Robot.export`. None: as in `Robot.export`. If no joint moves, only the placement is
+            exported.
         reference: As in `Robot.export`.
         name: As in `Robot.export`.
         verify: Whether to compare the code with Pinocchio.

@@ -82,7 +82,7 @@ class Function:
 
     @cached_property
     def statements(self) -> list[Node]:
-        """The expressions that are statements, in the order of computation."""
+        """The expressions that the code assigns to variables, in the order of computation."""
         uses = Counter[Node]()
         for value in self.results:
             if isinstance(value, Node):
@@ -161,7 +161,7 @@ def function_of(
         plan: The compiled tree of the path.
         quantity: A quantity that can be exported.
         reference: The reference frame.
-        graph: The graph of the compiled tree's exact constants; None: the constants are doubles.
+        graph: The graph that contains exact constants of the compiled tree. None: the constants are doubles.
     """
     graph = graph or Graph()
 
@@ -183,7 +183,7 @@ def function_of(
 
 
 def _name(place: int, state: State) -> None:
-    """Give names to the numbers of a link's state, from the textbook's symbols."""
+    """Name the numbers of a link's state after the textbook's symbols, for example `w2_z`."""
     named = {f"R{place + 1}_{r}{c}": x for r, row in enumerate(state.R) for c, x in enumerate(row)}
     for letter in ("p", "w", "vel", "alpha", "acc"):
         vector = getattr(state, letter)

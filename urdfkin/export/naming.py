@@ -11,7 +11,7 @@ from collections.abc import Iterable
 
 from urdfkin.dh.export.code import plain
 
-#: Longest identifier; MATLAB allows names of 63 letters, with the prefix.
+#: Largest length of an identifier without a prefix. With a prefix, MATLAB allows 63 characters.
 _LONGEST = 40
 _LONGEST_SHOWN = 80
 

@@ -30,7 +30,7 @@ class Kind:
     """A kind of number.
 
     Attributes:
-        chapter: The textbook's equations for this kind of number.
+        chapter: A module with the textbook's equations, which compute with numbers of this kind.
         sine_cosine: Function that returns sine and cosine of an angle.
         root: Function that returns the square root.
         entering: Function that is called before each step, then before the final frame, and then before the

@@ -1,7 +1,7 @@
-"""Write and test the seal of an exported file. The seal is a digest of the whole text, in the file's header.
+"""Write and check the digest in the header of an exported file.
 
-The seal shows whether numbers, test vectors or statements of the file were changed. The seal is a digest and
-not a signature, so it does not prove who wrote the file.
+It is called the seal. The seal is a digest of the whole text. It shows whether numbers, test vectors or
+statements of the file were changed. It is no signature, so it does not prove who wrote the file.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ _LINE = re.compile(r"^([ %*]*Seal sha256 )([0-9a-f]{64})$", re.MULTILINE)
 
 
 def seal(text: str) -> str:
-    """Return a file's text with its digest in place of the zeros."""
+    """Return a file's text with the seal. In the given text, zeros stand in the place of the seal."""
     return _LINE.sub(lambda found: found[1] + _digest(text), text, count=1)
 
 

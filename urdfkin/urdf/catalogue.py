@@ -1,4 +1,4 @@
-"""Robots and packages by name: the catalogue, robot_descriptions, and `package://name/...` without ROS.
+"""Find robots by name in the catalogue and in robot_descriptions, and find ROS packages without ROS.
 
 The catalogue has the robots of example-robot-data and urdfkin's own. robot_descriptions is a Python package
 that clones the repository of a robot into its own cache at the first use. Of the modules of
@@ -6,11 +6,11 @@ robot_descriptions, urdfkin imports only those in the package's own list of desc
 
 The search for a package uses the first of these folders that exists:
 
-1. `ROS_PACKAGE_PATH`: an entry called `name`, a folder `name` in an entry, or a folder `name` one level below
-   that (`src/repository/name`).
+1. The folders of `ROS_PACKAGE_PATH`, such as `src`: the folder itself if it is called `name`, then
+   `src/name`, then `src/*/name`.
 2. `AMENT_PREFIX_PATH`: `share/name` below an entry.
-3. The folders above the file: one called `name`, one whose `package.xml` has this name, or a folder `name`
-   in one of them.
+3. The folders above the file: a folder called `name`, a folder whose `package.xml` states this name, or a
+   subfolder called `name`.
 """
 
 from __future__ import annotations

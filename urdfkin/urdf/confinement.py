@@ -46,7 +46,7 @@ class Ground:
 
     @classmethod
     def around(cls, path: Path, search: list[str], arguments: list[str]) -> Ground:
-        """Allow the folder, the package and the repository of a file, and the paths in its arguments.
+        """Allow a file's folder, package and repository, and the paths in the xacro arguments.
 
         Args:
             path: The xacro file.

@@ -177,7 +177,10 @@ class _Evaluation:
     GeneratorExp = ListComp
 
     def _rounds(self, loops: list[ast.comprehension]) -> Iterator[_Evaluation]:
-        """Yield an evaluation for each iteration of nested loops, with the values of the loop names."""
+        """Yield an evaluation for each iteration of nested loops.
+
+        It knows the values of the loop variables.
+        """
         if not loops:
             yield self
             return

@@ -1,9 +1,9 @@
-"""Findings: problems in a URDF, with a stable code, their position, the found text and a remedy.
+"""Define findings. A finding is a problem in a URDF, with a code, a position, the found text and a remedy.
 
 The parser and the rules of `urdfkin.urdf.lint` add findings to the `Reporter` of a file. The reporter
 computes the position of each finding in the bytes of the file, and applies the comments that silence
 findings. A finding is plain data: it can be printed, compared, converted to JSON or SARIF and sent to another
-process. A byte order mark does not count in positions.
+process. A byte order mark has no effect on positions.
 
 A comment in a URDF names the codes that it silences, and gives a reason.
 
@@ -105,7 +105,7 @@ def _cells(text: str) -> int:
     )
 
 
-#: Bound (rad) on the rounding error of an angle of up to one revolution that is rounded to a double.
+#: Bound (rad) on the error when an angle of at most one revolution is rounded to a double.
 ROUNDING = 2.0**-50
 
 
@@ -281,7 +281,7 @@ class Finding:
 
 
 class Findings(list[Finding], Displayable):
-    """The findings of one file, by line: a list that displays as a table."""
+    """The findings of one file, sorted by line. The list is displayed as a table."""
 
     def _sheet(self) -> TextDocument:
         rows = [(f"{f.file}:{f.line}:{f.column}", f.code, f.severity.value, f.sentence) for f in self]
@@ -352,9 +352,9 @@ class Rule:
     """A kind of finding.
 
     Attributes:
-        id: The code: `URDF` and three digits. A code is never reused. The first digit is the family:
-            1 text and XML, 2 dialect and elements, 3 numbers, 4 names and structure, 5 joints, 6 suspicious,
-            7 inertials, geometry and materials.
+        id: The code: `URDF` and three digits. A code is never reused. The first digit is the family: 1 text
+            and XML, 2 elements and attributes, 3 numbers, 4 names and structure, 5 joints, 6 probable
+            mistakes, 7 inertials, geometry and materials.
         slug: The short name.
         severity: The default severity of its findings.
         oracle: Pinocchio's behaviour, if it differs from the specification.
@@ -366,7 +366,7 @@ class Rule:
     oracle: PinocchioReading | None = None
 
 
-#: The first word of a comment for urdfkin. Spaces may precede it.
+#: A comment that begins with this word contains an instruction for urdfkin. Spaces may precede the word.
 MARK = "urdfkin:"
 
 
@@ -464,8 +464,8 @@ class Silences:
         return silence.reason
 
 
-#: Limits of the search for suggestions for a misspelt name.
-#: The limits are: misspelt names per file, known names per search, and the argument `work` of `nearest`.
+#: Limits of the search for names similar to a misspelt name: the number of misspelt names in a file, the
+#: number of known names to compare with, and the argument `work` of `nearest`.
 SEARCHES, CANDIDATES, WORK = 20, 5_000, 250_000
 
 #: If a file has at least this number of warnings or notes with one code, they are combined into one finding.
@@ -541,7 +541,8 @@ class Reporter:
             rule: The rule.
             message: The problem in one clause.
             at: The element; without it, `position` is used.
-            attribute: Name of an attribute of `at`; the excerpt underlines its text.
+            attribute: Name of an attribute of the element `at`. The printed excerpt underlines this
+                attribute.
             found: The text that causes the finding, quoted for printing.
             remedy: The remedy.
             owner: The tag for the message, if `at` is a link or joint in the wrong place. The default is the
@@ -611,7 +612,7 @@ class Reporter:
         return nearest(word, islice(known, CANDIDATES), work=WORK)
 
     def is_full(self, rule: Rule) -> bool:
-        """Return whether a rule already has `WRITTEN_OUT` findings, the largest number stored completely."""
+        """Return whether a rule has `WRITTEN_OUT` findings. Further findings of the rule are only counted."""
         kind = self._kinds.get((rule.id, rule.severity))
         return kind is not None and len(kind.found) >= WRITTEN_OUT
 

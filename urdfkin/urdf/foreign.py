@@ -222,7 +222,7 @@ class _ModelReader:
         self.rows: list[tuple[Joint, str, str]] = []
 
     def _bodies_on_joints(self) -> Iterator[tuple[int, int]]:
-        """Yield each joint with the frame of the first body that coincides with the joint."""
+        """For each joint, yield the joint and the first body whose frame coincides with the joint's frame."""
         for i in reversed(range(len(self.frames))):
             if self.kinds[i] == "BODY" and (self.places[i] == np.eye(4)).all():
                 yield int(self.frames[i].parentJoint), i

@@ -194,8 +194,8 @@ NAME_TOO_LONG = Rule("URDF117", "name-too-long", ERROR)
 INSTRUCTION = Rule("URDF118", "processing-instruction", WARNING, REFUSES)
 MARKUP_TOO_LONG = Rule("URDF119", "markup-too-long", ERROR)
 
-#: Largest number of nested elements that older versions of libxml2 accept.
-#: Programs that use such a version accept no more.
+#: Largest depth of nested elements in older versions of libxml2. Programs that use these versions have this
+#: limit.
 COMMON_DEPTH = 256
 _COMMON = ("older readers built on libxml2 refuse", COMMON_DEPTH)
 
@@ -214,7 +214,7 @@ class _Stop(Exception):  # noqa: N818  only for control flow
 
 
 def read_document(report: Reporter) -> Element | None:
-    """Return the root element of the reporter's file, or None after a finding with the reason."""
+    """Parse the reporter's file and return its root element. If this fails, add a finding and return None."""
     data, most = report.data, report.limits.bytes
     if len(data) > most:
         report.add(
@@ -361,7 +361,7 @@ class _Builder:
         return start > 0 and data[start - 1] not in b"\r\n"
 
     def instruction(self, target: str, text: str) -> None:
-        """Report a processing instruction that is not at the beginning, where urdfdom allows it."""
+        """Report a processing instruction after the beginning of the file, which urdfdom refuses."""
         if self.begun:
             self.report.add(
                 INSTRUCTION,
@@ -590,7 +590,7 @@ class NumberReader:
         return True
 
     def _check_raw(self, element: Element, attribute: str, count: int) -> None:
-        """Report a value whose tabs or line ends urdfdom refuses. XML parsers replace them by spaces."""
+        """Report tabs and newlines in a value, which urdfdom refuses. XML parsers replace them by spaces."""
         raw = self.report.raw(element, attribute)
         if raw is None or self._is_too_long(element, attribute, raw, count * self.report.limits.number):
             return
@@ -749,7 +749,7 @@ def _version(report: Reporter, root: Element) -> tuple[int, int]:
 
 
 def named(report: Reporter, element: Element) -> str:
-    """Return the name of a link or joint; an empty string after a finding that it has none."""
+    """Return the name of a link or joint. If it has no name, add a finding and return an empty string."""
     name = element.attributes.get("name")
     if not name:
         what = "has no name" if name is None else "has an empty name"
@@ -787,7 +787,7 @@ class JointReader:
         self.numbers = NumberReader(report)
 
     def read(self, element: Element) -> JointRecord:
-        """Read one joint; a value that cannot be read is reported and has its default in the record."""
+        """Read one joint. If a value cannot be read, report it and store the default value."""
         joint = JointRecord(element, named(self.report, element))
         joint.kind = self._kind(element)
         joint.parent, joint.child = self._end(element, "parent"), self._end(element, "child")

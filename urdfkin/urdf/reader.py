@@ -35,7 +35,8 @@ def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None =
         root_joint: `"floating"` or `"planar"` adds a joint `root_joint` of this kind above the root link.
 
     Raises:
-        InputError: the joints form no tree, mimic joints form a circle, or `root_joint` has another value.
+        InputError: the joints do not form a tree, mimic joints form a cycle, or `root_joint` is not one of
+            its two allowed values.
         UnknownNameError: the mimicked joint of a mimic joint does not exist.
     """
     name = urdf.element.attributes.get("name", "")

@@ -1,4 +1,4 @@
-"""Elements, links and joints of a URDF as plain data, and the limits on their size. `urdf.parser` fills them.
+"""Plain data for the elements, links and joints of a URDF, which `urdf.parser` reads. Size limits of a URDF.
 
 In the records of links and joints, None marks a value that could not be read; a finding reports it. A value
 that the file omits has the default of the specification.
@@ -17,7 +17,7 @@ ORACLE_DEPTH = 498
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """The limits on the size of a file and its parts in one check.
+    """The size limits for a file and its parts.
 
     Attributes:
         bytes: Size of the file.
@@ -103,7 +103,7 @@ class Element:
 
     @property
     def owner(self) -> str:
-        """The tag of the holder; for example, the tag `joint` for every element inside a joint."""
+        """The tag of the link or joint that contains the element; `joint` for an element inside a joint."""
         return self.holder.tag
 
     @property

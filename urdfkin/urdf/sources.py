@@ -27,7 +27,8 @@ class Origin:
     """The arguments of `load`.
 
     Attributes:
-        source: A path, a catalogue name, `-`; or `<text>`, `<bytes>` for text, bytes and unnamed streams.
+        source: A path, a catalogue name, or `-` for standard input. `<text>` and `<bytes>` stand for text,
+            bytes and streams without a name.
         mimic: The argument `mimic`.
         root_joint: The argument `root_joint`.
         xacro_args: Names and values of the xacro arguments.
@@ -35,7 +36,8 @@ class Origin:
         table: Whether the robot comes from a Denavit-Hartenberg table. The convention of the table
             determines the frames between base and tip.
         sha256: The digest of the MJCF or USD file behind the URDF; empty if the source is a URDF.
-        lock: Name and value (rad or m) of each locked joint, without its mimic joints.
+        lock: Name and value (rad or m) of each locked joint. Mimic joints are not listed; they are locked
+            with their mimicked joint.
         variants: Variant sets and variants that were selected in a USD stage.
         articulation: The articulation that was chosen in a USD stage, or None.
 
@@ -165,7 +167,8 @@ def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, objec
     Args:
         source: One of the sources in the module docstring.
         most: Size limit in bytes; for an open text file, in characters. At most one byte or character more is
-            read, which shows that a source is too long. Reading from a device without an end therefore stops.
+            read, which shows that a source is too long. Therefore even an infinite device, such as
+            `/dev/zero`, ends the reading.
         xacro_args: Arguments for a .xacro file, which is expanded.
 
     Raises:
@@ -295,7 +298,7 @@ def _read_file(path: Path, most: int) -> Text:
 
 
 def as_word(path: Path) -> str:
-    """Return the text with which `load` reads a path.
+    """Return a text that `load` interprets as this path.
 
     `./` is added before a path that would be read as an option, a URDF text or a catalogue name.
     """
@@ -304,7 +307,7 @@ def as_word(path: Path) -> str:
 
 
 def entry_of(word: str) -> Entry | None:
-    """Return the catalogue entry of a name; None for a path, which has a point or a separator."""
+    """Return the catalogue entry of a name. Return None for a path, which contains a dot or a separator."""
     return None if "." in word or os.sep in word else catalogue().get(word)
 
 

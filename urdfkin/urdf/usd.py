@@ -54,21 +54,20 @@ from urdfkin.urdf.sources import USD
 _LAYERS = 1_000
 #: Largest number in single precision. In a file, this number or infinity means that there is no limit.
 _LARGEST = float(np.finfo(np.float32).max)
-#: Largest cosine between two axes of a frame without shear, for each prim on the path.
-#: The unit is one rounding to single precision.
-#: In a rotation matrix of rounded numbers, each entry has an error of one rounding.
-#: The product of two such matrices in single precision adds three roundings to each entry.
-#: The scalar product of two columns then has an error of at most 4 * 2 sqrt(3) roundings, which is below 14.
-#: Rounding a quaternion changes its length by one rounding and the cosine by four roundings.
+#: Largest cosine between two axes of a frame without shear, for each prim on the path. Its unit is the
+#: largest relative error u of rounding to single precision. In a rotation matrix of rounded numbers, each
+#: entry has an error of u. The product of two such matrices in single precision adds 3 u to each entry. The
+#: scalar product of two columns then has an error of at most 4 * 2 sqrt(3) u, which is below 14 u. Rounding a
+#: quaternion changes its length by u, and the cosine between two axes by 4 u.
 _SHEAR = 14.0
 _NONE = (-math.inf, math.inf)
 _MIMICS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
-#: Words in the names of types and of applied schemas that couple joints or bodies.
+#: If the name of a type or of an applied schema contains one of these words, it couples joints or bodies.
 _COUPLINGS = ("Mimic", "Equality", "Tendon")
 #: Endings of the type names of joints that a tree cannot represent.
 #: OpenUSD recognizes such a type as a joint only if the plugin that defines it is installed.
 _NO_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
-#: Coefficients of a MuJoCo joint equality whose terms a mimic rule does not have.
+#: Coefficients of the quadratic and higher terms of a MuJoCo joint equality. A mimic rule has no such terms.
 _HIGHER = ("mjc:coef2", "mjc:coef3", "mjc:coef4")
 _AXES = {"X": 0, "Y": 1, "Z": 2}
 _FREEDOMS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
@@ -139,14 +138,15 @@ class Usd:
     Attributes:
         tree: The links and joints.
         prims: For each link with a prim: the prim's path.
-        rest: (n, 4, 4) placement in the world of each prim of `prims` by UsdGeom, in m with z up.
+        rest: (n, 4, 4) placement in the world of each prim of `prims`, which UsdGeom computes; in m, with z
+            up.
         rest_q: (nq,) configuration of the robot in the stage.
         single: For each joint of the tree by name: five numbers for the effect of rounding to single
             precision. The first two are bounds on the translation (m) and the rotation (rad) of the joint's
             frames. The third is the length (m) of the vectors that rotate with the frames. The fourth is a
             bound on the relative change of the joint's value by its mimic rule. The last is the length (m) of
             the origin of the joint's frame in its child.
-        joints: The numbers of each joint prim of the tree, by its path.
+        joints: The numbers of each joint prim of the tree. The key is the path of the prim.
         stage: The stage.
         unit: metersPerUnit.
         remarks: Parts of the stage that the tree does not represent, and probable mistakes.
@@ -228,7 +228,7 @@ def files_of(pxr: Any, path: str) -> tuple[str, ...]:
 
 
 def _refuse_clips(pxr: Any, layer: Any, where: str) -> None:
-    """Refuse value clips: they name files that no list of dependencies contains."""
+    """Refuse value clips. They refer to files that USD's list of dependencies does not contain."""
     found: list[str] = []
 
     def look(path: Any) -> None:
@@ -489,7 +489,7 @@ class _Reader:
     def _value(self, prim: Any, name: str) -> Any:
         """Return the value of an attribute, or its default; None if there is neither.
 
-        A blocked value counts as a missing value.
+        A value that a stronger layer blocks (`None` in the file) is treated as missing.
         """
         attribute = prim.GetAttribute(name)
         if not attribute:
@@ -605,7 +605,7 @@ class _Reader:
                     self._say("left-out-of-usd", path, what)
                 continue
             unread.append(schema)
-        # if the joint is not in the tree, a remark lists the joint already
+        # for a joint that is not in the tree, there already is a remark
         if unread and not any(one.where == path and one.kind == "left-out-of-usd" for one in self.remarks):
             self._say("left-out-of-usd", path, f"urdfkin does not read {', '.join(unread)}")
 
@@ -713,8 +713,8 @@ class _Reader:
     def _stored(self, path: str | None, body: str | None, length: float) -> tuple[float, float]:
         """Return how far rounding to single precision can move (m) and turn (rad) a prim below a body.
 
-        A transform in double precision is not rounded. A rotation in single precision does not move its own
-        prim, but it moves the prims below. A transform in half precision explains nothing.
+        A transform in double precision is not rounded. A rotation in single precision turns its prim and
+        moves the prims below. A transform in half precision has no bound here, so the result is 0.
 
         Args:
             path: Path of the prim.
@@ -1130,9 +1130,9 @@ class _Reader:
         return Limit(lower, upper, rate, math.inf)
 
     def _frames(self, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:
-        """Yield each plain Xform of a body that marks a frame, with the path of the body.
+        """Some plain Xforms below a body mark a frame. Yield each of them with the path of the body.
 
-        An Xform that only groups shapes does not mark a frame. An instance does not mark a frame either.
+        An Xform that only groups shapes does not mark a frame, and neither does an instance.
         """
         physics, geom = self.pxr.UsdPhysics, self.pxr.UsdGeom
 
@@ -1295,7 +1295,7 @@ class _Reader:
             )
 
     def _layers(self, paths: Sequence[str]) -> None:
-        """Report layers with another unit or up axis than the stage, if they describe one of these prims."""
+        """Report each layer of these prims whose unit or up axis differs from that of the stage."""
         root = self.stage.GetRootLayer()
         known = {root, self.stage.GetSessionLayer()}
         above = {str(one) for path in paths for one in self.pxr.Sdf.Path(path).GetPrefixes()}
@@ -1369,8 +1369,9 @@ def _rounding(x: FloatArray) -> FloatArray:
 def _turned(xyzw: FloatArray) -> float:
     """Return a bound (rad) on the change of a rotation when its quaternion's numbers are rounded.
 
-    The rotation changes by twice the angle between the quaternions. A change along the quaternion itself does
-    not change the rotation. The largest change across it is at a corner of the box of all changes.
+    The rotation changes by twice the angle between the quaternions. Only the component of the change that is
+    perpendicular to the quaternion matters. Each number changes by at most its rounding error, so the changes
+    form a box. The largest perpendicular component is at a corner of this box.
     """
     unit = xyzw / np.linalg.norm(xyzw)
     corners = _rounding(xyzw) * np.array(list(product((-1.0, 1.0), repeat=4)))

@@ -111,7 +111,7 @@ def attribute(text: str) -> str:
     """Escape a text as the value of an attribute.
 
     Raises:
-        InputError: XML does not allow a character of the text.
+        InputError: The text contains a character that XML does not allow.
     """
     bad = next((c for c in text if not _is_xml(c)), None)
     if bad is not None:

@@ -35,8 +35,8 @@ from urdfkin.urdf.lint.runner import Examined
 from urdfkin.urdf.records import AXIAL, FURTHER_LIMITS, JointRecord, RobotRecord
 from urdfkin.urdf.sources import Text
 
-#: Largest number of passes over a file.
-#: Each code with a fix needs one pass. If fixes overlap, further passes are needed.
+#: Largest number of passes over a file. A pass applies the fixes of one code. Fixes that overlap need further
+#: passes.
 PASSES = 100
 
 #: Bound (rad) on the rotation of a unit vector when each of its three numbers is rounded to a double.
@@ -51,7 +51,7 @@ class Mended:
     Attributes:
         text: The fixed file.
         fixed: The fixed findings.
-        kept: For each code with fixes that were not applied: the reason.
+        kept: The reasons why fixes were not applied. The key is the code.
     """
 
     text: Text
@@ -98,8 +98,8 @@ def mend(
 def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> Iterator[str]:
     """Yield the reasons why a fix must not be applied."""
     code = fixable[0].code
-    # Only a limited number of findings of one code is stored, so codes with more findings are skipped.
-    # For such a code, findings that are first stored after a fix would look new.
+    # Only a limited number of findings of one code is stored. If a file has more, a fix of one finding can
+    # bring up another that was not stored, which would look new. Such codes are skipped.
     many = {finding.code for finding in before.findings if finding.also}
     old, new = (
         Counter((f.code, f.element, f.name) for f in seen.findings if f.code not in many)
@@ -151,7 +151,8 @@ def _difference(a: JointRecord, b: JointRecord, turns: float) -> str | None:
     return next((what for what, same in equal.items() if not same), None)
 
 
-#: Factor on the bound `Fix.turns`. It allows for the rounding errors of the bound, a sum of doubles.
+#: Factor on the bound `Fix.turns`. The bound is a sum of doubles; the factor covers the rounding errors of
+#: this sum.
 _SLACK = 1 + Fraction(1, 2**50)
 
 
@@ -166,7 +167,10 @@ def _same_direction(a: tuple[float, ...] | None, b: tuple[float, ...] | None) ->
 
 
 def _limits(joint: JointRecord) -> tuple[float | None, ...]:
-    """Return the limits of a joint that have an effect for its joint type."""
+    """Return those limits of a joint that matter for its type.
+
+    For example, a continuous joint has no position limits.
+    """
     if joint.limit is None:
         return ()
     bounded = ("lower", "upper") if joint.kind in ("revolute", "prismatic") else ()

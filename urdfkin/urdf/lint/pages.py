@@ -1,4 +1,4 @@
-"""Provide the rules by code, and the documentation page of each rule as data and as text.
+"""Find a rule by its code, and return the documentation of each rule as data and as text.
 
 A topic is a module that defines rules: the parser, or a module of `lint.rules`. The pages of a topic are in a
 TOML file with the module's name, beside the module. The file is read on demand. The entries `cure`, `others`
@@ -32,13 +32,13 @@ TOPICS: dict[str, tuple[Rule, ...]] = {
     for module in _MODULES
 }
 
-#: For each code, in ascending order: the rule with this code.
+#: The rules about URDF files. The key is the code; codes are in ascending order.
 RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lambda rule: rule.id)}
-#: For each code of the findings about MJCF and USD files: the rule.
+#: The rules about MJCF and USD files. The key is the code.
 OF_OTHERS = {x.id: x for x in vars(left_out).values() if isinstance(x, Rule)}
 
-#: For each name of a rule in lower case: the code of the rule.
-#: Each rule has three names: its code, the digits of its code, and its short name.
+#: The code of each rule. The key is a name of the rule in lower case. Each rule has three names: its code,
+#: the digits of its code, and its short name.
 CODES = {word: rule.id for rule in RULES.values() for word in (rule.id.lower(), rule.id[4:], rule.slug)}
 
 _TOPIC = {rule.id: topic for topic, own in TOPICS.items() for rule in own} | dict.fromkeys(

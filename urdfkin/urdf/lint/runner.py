@@ -51,11 +51,11 @@ def check(
         source: A path, a catalogue name, URDF text, bytes, an open file, or `-` for standard input.
         limits: Limits on the size of the file.
         mimic: Whether mimic joints follow their mimicked joints. False: problems with mimic joints are notes.
-            None: as True, except for catalogue robots whose mimic rules are known to be invalid.
+            None: True, except for robots of the catalogue with invalid mimic rules.
         root_joint: `"floating"` or `"planar"` if you will load the robot with such a joint.
         xacro_args: Arguments for a .xacro file, which is expanded first. Lines refer to the expanded text.
-        fold: Whether to combine many warnings of one kind into a single warning that lists the lines. Errors
-            of one kind are combined from the hundredth error on.
+        fold: Whether to combine many warnings of one kind into a single warning that lists the lines. If
+            there are more than a hundred errors of one kind, the last printed error lists the others.
 
     Returns:
         The findings that no comment silences, as a list that displays as a table in notebooks. The list is

@@ -12,8 +12,8 @@ Files and patterns are relative to the folder of pyproject.toml. A finding is re
 and neither the baseline nor the older version of the file contains it.
 
 A baseline is a file of known findings. A finding is known if its file, code, severity, element, name and
-found text are in the baseline. The line number is not compared. Therefore, an edit of other lines does not
-make a finding new, but a change of the found text does.
+found text are in the baseline. The line number is not compared. Therefore, if you edit other lines, the
+finding is still known. If you change the found text, the finding is new.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Baseline:
     """The number of known findings of each key.
 
     Attributes:
-        counts: For each key: number of known findings that no reported finding has matched yet.
+        counts: For each key, the number of known findings minus the number of matching findings in this run.
         root: The folder to which file names are relative.
         met: The number of reported findings that matched a known finding.
     """
@@ -76,7 +76,7 @@ class Baseline:
         return True
 
     def gone(self, files: Iterable[str]) -> int:
-        """Return the number of known findings of the checked files that no longer occur."""
+        """For the checked files, return the number of known findings that no longer occur."""
         checked = {relative(file, self.root) for file in files}
         return sum(count for (file, *_), count in self.counts.items() if count > 0 and file in checked)
 
@@ -303,7 +303,7 @@ class Choice:
     def of(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
         """Return a function that decides whether a finding is reported.
 
-        The returned function is called with the findings of a file in order.
+        Call the returned function once for each finding of the file, in the order of the findings.
 
         Args:
             text: The file.

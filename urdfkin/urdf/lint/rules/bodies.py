@@ -289,8 +289,8 @@ def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
     Args:
         report: The reporter, which receives the findings.
         root: The root element of the document.
-        beside: The file of the URDF; None if the URDF is text. For text, only meshes in packages are
-            searched, in the search paths of the environment.
+        beside: The file of the URDF; None if the URDF is text. For text, urdfkin searches only for meshes
+            with `package://`, in the search paths of the environment.
     """
     packages: dict[str, Path | None] = {}
     missing: dict[str, list[Element]] = {}

@@ -1,4 +1,4 @@
-"""Check the dialect of a URDF file, which consists of its elements, attributes, names and comments."""
+"""Check the elements, attributes, names and comments of a URDF file."""
 
 from __future__ import annotations
 
@@ -45,7 +45,10 @@ _XINCLUDE = "http://www.w3.org/2001/XInclude"
 
 
 def check_dialect(report: Reporter, root: Element) -> None:
-    """Report a missing name, no links, unexpanded xacro, includes and a default namespace."""
+    """Report a robot without a name or without links.
+
+    Report unexpanded xacro, includes and a default namespace.
+    """
     prefixes = _prefixes(root)
     _check_namespaces(report, root, prefixes)
     _check_name(report, root)
@@ -193,8 +196,8 @@ _ADDED = (
 )
 EXTENSIONS = frozenset(_ADDED.split())
 
-#: Each line is `element: attributes > child elements`.
-#: The attributes of an element without a colon are not checked. No other element is checked.
+#: Each line is `element: attributes > child elements`. If a line has no colon, the attributes of the element
+#: are not checked. Other elements are not checked.
 _TABLE = """
 robot: name version > link joint material
 link: name type > inertial visual collision
@@ -607,7 +610,7 @@ def _read(report: Reporter, comment: Comment, codes: Mapping[str, str]) -> Silen
 
 
 def check_unused(report: Reporter) -> None:
-    """Report the codes in comments that silence no finding.
+    """Report each code in an `ignore` comment that does not silence any finding.
 
     This function must be called after all other rules.
     """

@@ -374,8 +374,8 @@ MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
 #: Largest plausible multiplier and offset (rad or m) of a mimic joint. Larger values are reported.
 LARGEST = 1e6
-#: Share of the mimicked joint's range that the limits of the mimic joint may exclude without a finding.
-#: Limits are often written with few digits.
+#: The limits of a mimic joint may exclude a part of the mimicked joint's range. If this part is smaller than
+#: this fraction, there is no finding, because limits are often written with few digits.
 LEAST_LOST = 1e-3
 
 
@@ -593,8 +593,8 @@ NOTICEABLE = 1e-3
 #: If an angle differs from a multiple of pi by less than this (rad), it is not reported.
 ANGLE_ROUNDING = 1e-10
 
-#: Multiples of pi that are recognized in rounded numbers.
-#: With each: the smallest number of decimals that a rounded number must have.
+#: Multiples of pi that are recognized in rounded numbers. The second entry is the smallest number of decimals
+#: for which the multiple is recognized.
 _MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
@@ -651,7 +651,7 @@ def _degrees(report: Reporter, joint: JointRecord, what: str, found: str) -> Non
 
 
 def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], reach: float) -> None:
-    """Report the angle of an origin with the largest difference from a multiple of pi."""
+    """For an origin with rounded multiples of pi, report the angle with the largest rounding error."""
     off, text, multiple, meant, turns = 0.0, "", Fraction(0), 0.0, 0.0
     whole = list(written)
     for k, (word, angle) in enumerate(zip(written, joint.rpy, strict=True)):
@@ -746,7 +746,7 @@ def _check_lengths(report: Reporter, joint: JointRecord) -> None:
 
 
 def _check_neutral(report: Reporter, joint: JointRecord) -> None:
-    """Report a joint whose limits exclude zero, its value in the neutral configuration.
+    """Report a joint whose limits exclude 0. In the neutral configuration, every joint value is 0.
 
     Mimic joints are not checked.
     """
