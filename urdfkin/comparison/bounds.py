@@ -2,9 +2,9 @@
 
 **Search.** The search looks for the configuration with the largest distance. The distance at the best
 configuration found is a lower bound of the largest distance. The true largest distance is between this lower
-bound and the upper bound (`urdfkin.model.mechanisms.upper_bound`). The search varies one coordinate at a
-time, from the worst of many random configurations. This works well because a position depends on the sine and
-the cosine of each joint value.
+bound and the upper bound (`urdfkin.model.mechanisms.upper_bound`). The search begins at the random
+configuration with the largest distance. It then varies one coordinate at a time. This works well because a
+position depends on the sine and the cosine of each joint value.
 
 **Branch and bound.** `urdfkin.model.mechanisms.upper_bound` adds the effects of all differences, each at its
 own worst configuration. If the models differ in many places, this sum is far above the largest distance.
@@ -24,7 +24,8 @@ frame. The derivatives of y and d by a joint value are
 
 with Y = e(S' t') y. Here S, u, o and t are the screw, axis, point and value of the joint in A, and S', u', o'
 and t' are the screw, axis, point and value of the matched joint in B. The joints between the base and this
-joint transform the derivatives as free vectors (`urdfkin.model.mechanisms.upper_bound`).
+joint only rotate these derivatives, because a derivative is a free vector
+(`urdfkin.model.mechanisms.upper_bound`).
 """
 
 from __future__ import annotations
@@ -160,7 +161,10 @@ class Search:
     def poses_at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
     ) -> tuple[FloatArray, FloatArray]:
-        """Return `poses` at configurations (n, nq) of each robot; the function `computed` computes them."""
+        """As `poses`, for given configurations (n, nq) of A and of B.
+
+        `computed` is the function that computes placements.
+        """
         a, b = self.robots
         Ts_a = computed(a, q_a, [a.tree.link_frames[frame.a] for frame in frames])
         base = b.tree.link_frames[self.found.base[1]]
@@ -189,7 +193,10 @@ class Search:
         return _distances(*self.poses(z, frames))
 
     def seen(self, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
-        """Return distances (n, frames) at random values and at corners of the ranges, and these values."""
+        """Compute the distances (n, frames) at random configurations and at corners of the joint ranges.
+
+        Return the distances and the configurations.
+        """
         low, high = self.ends.T
         z = self.random(SAMPLES)
         corners = np.where(self.rng.random((CORNERS, len(self.names))) < 0.5, low, high)
@@ -328,7 +335,7 @@ def curvature(
 def _second_derivatives(
     steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables, frame: FramePair
 ) -> Iterator[tuple[int, int, float]]:
-    """Yield i, j and a bound of the second derivative by the values of joints i and j, for all j <= i."""
+    """Yield i, j and a bound on the second derivative with respect to joints i and j, for all j <= i."""
     free = [_as_free_vectors(step) for step in steps]
     d, y = at_the_frame(frame, COARSE)
     for i in reversed(range(len(steps))):
@@ -349,7 +356,7 @@ def _second_derivatives(
 def _pass_to_front(
     vectors: _Vectors, steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables
 ) -> float:
-    """Return the largest length of d at the base, from d and y after the last step's rigid motion L."""
+    """Transform d and y from the last step back to the base. Return the largest length of d there."""
     vectors = before_it(steps[-1], *vectors)
     for step, pair in zip(reversed(steps[:-1]), reversed(pairs[: len(steps) - 1]), strict=True):
         slides = step.kind != "turns"
@@ -358,7 +365,10 @@ def _pass_to_front(
 
 
 def _derivatives(step: Step, pair: Pair, variables: Variables, d: Support, y: Support) -> _Vectors:
-    """Return the derivatives of d and y by a joint's value, after the rigid motion L of the joint."""
+    """Return the derivatives of d and y with respect to a joint's value.
+
+    They are valid after the rigid motion L.
+    """
     if step.kind != "turns":
         u, other = step.axis.direction, step.other.direction
         return point(d.grid, other - u), point(d.grid, other)
@@ -383,7 +393,7 @@ def _cross_products(step: Step, d: Support, y: Support) -> _Vectors:
 
 
 def _as_free_vectors(step: Step) -> Step:
-    """Return the step with its effect on free vectors, which consists of rotations without translations."""
+    """Return the step without its translations, because a free vector is only rotated."""
     axis = Screw(step.axis.direction, _ORIGIN)
     other = axis if step.other is step.axis else Screw(step.other.direction, _ORIGIN)
     before = IDENTITY if step.before is IDENTITY else pose(step.before[:3, :3])
@@ -398,7 +408,9 @@ TOGETHER = 2**16
 
 
 class Boxes:
-    """Bounds of the distance between a frame's origins in A and B, for boxes of configurations.
+    """Upper bounds on the distance between a frame's origin in A and in B.
+
+    Each bound holds for a box of configurations.
 
     Args:
         search: The search, which contains both robots.
@@ -456,7 +468,9 @@ class Boxes:
 
 
 def tightened(search: Search, frame: FramePair, target: float, upper: float, most: int = MOST) -> float:
-    """Return a proven bound (m) of a frame's distance: `target` if it can be proven, else at most `upper`.
+    """Return a proven upper bound (m) on a frame's distance.
+
+    The bound is `target` if the search proves it, otherwise at most `upper`.
 
     Args:
         search: The search, which contains both robots.
@@ -501,12 +515,12 @@ def tightened(search: Search, frame: FramePair, target: float, upper: float, mos
 def moved_together(
     found: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[Step], list[Pair | None]]:
-    """Return the steps to a frame that can change the frame's distance.
+    """Return the steps on a frame's path that have an effect on the length of D.
 
-    A joint before the first difference of the models rotates D and does not change its length. However, the
-    variable of this joint may also move a mimic joint after the difference. Then D depends on both motions,
-    and the step is included. The result begins with the first step that differs, or that shares a variable
-    with a differing step.
+    A joint before the first difference of the models rotates D and does not change its length. However, a
+    mimic joint after the difference may follow this joint. Then D depends on the joint, and the step is
+    included. The result begins with the first step that differs, or that shares a variable with a differing
+    step.
     """
     steps, pairs = found.path(frame.previous), [variables.pairs[i] for i in found.indices(frame.previous)]
     first = len(steps) - len(behind_first(found, variables, frame)[0])

@@ -30,13 +30,13 @@ from urdfkin.robot import Robot
 from urdfkin.system.documents import Count, Header, Layout, Matrix, Size, of_length, plain, says
 from urdfkin.verify.oracles import versions
 
-#: Largest number of boxes of configurations that exist at the same time in the proof of a claimed bound.
+#: Largest number of boxes in memory while a bound of a certificate is proven again.
 MOST_AGAIN = 2**22
 #: Tolerances for numbers in a certificate that was made on another machine: the relative tolerance, and the
 #: absolute tolerance (m or rad) for numbers near zero.
 _RELATIVE, _ZERO = 1e-9, 1e-15
-#: Relative tolerance of a bound that is proven again, in multiples of the machine epsilon. The tolerance is
-#: needed because sums round differently on other machines.
+#: A bound that is proven again may be larger by this number times the machine epsilon, because sums round
+#: differently on other machines.
 _LAST_BITS = 64.0
 #: Entries of the certificate that follow from the alignment of the two models.
 DERIVED = ("up_to", "remarks", "joints", "orders", "links", "base", "base_links", "rounding")
@@ -119,7 +119,7 @@ class ToolEntry(TypedDict):
 
 
 class Rounding(TypedDict):
-    """Largest distance and angle between matching frames that count as rounding."""
+    """Smaller distances and angles between matching frames count as rounding errors."""
 
     metres: Size
     radians: Size
@@ -164,7 +164,7 @@ class Confirmed(TypedDict):
 
 
 class Certificate(Header):
-    """The statement whether two models are the same robot, with the proof's data, in metres and radians."""
+    """A statement whether two models are the same robot, with the data that prove it, in m and rad."""
 
     a: Model
     b: Model
@@ -253,14 +253,14 @@ def words_of(entry: DifferenceEntry) -> str:
 
 
 def recheck(document: Certificate, a: Robot, b: Robot) -> list[str]:
-    """Return the statements of a certificate that are wrong for two models.
+    """Check a certificate against two models, and return its wrong statements.
 
-    Empty if all statements are right.
+    The list is empty if all are right.
 
     The recheck aligns the models as the certificate states, so it needs no search. First it checks that this
-    alignment is allowed. The transforms must be rigid motions, the joints must exist, and the axes must allow
-    the stated orders of joints. Then the recheck derives all statements that follow from the alignment,
-    including the remarks, and compares them with those of the certificate. A lower bound is a distance at a
+    alignment is allowed. The transforms must be rigid motions, and the joints must exist. If joints are in
+    another order, this order must give the same motion. Then the recheck derives the verdict, the changes and
+    the remarks from the alignment, and compares them with the certificate. A lower bound is a distance at a
     configuration in the certificate. urdfkin and Pinocchio both compute this distance again. Each upper bound
     is proven again.
 
@@ -315,7 +315,7 @@ def _errors(document: Certificate, comparator: Comparator) -> Iterator[str]:
 
 
 def _statement_errors(document: Certificate, comparator: Comparator, said: Sameness) -> Iterator[str]:
-    """Yield the wrong statements in entries that need no proof, such as names, verdict and differences."""
+    """Yield wrong statements in the names, the verdict and other entries that need no proof."""
     models = document["a"], document["b"]
     for which, model, robot in zip("AB", models, comparator.robots, strict=True):
         if model["name"] != robot.name:
@@ -355,7 +355,10 @@ def _place(one: DifferenceEntry) -> tuple[str, str]:
 
 
 def _same_difference(claimed: DifferenceEntry, said: DifferenceEntry, rounding: tuple[float, float]) -> bool:
-    """Return whether two differences have equal values, and sizes that are equal within rounding."""
+    """Return whether two differences agree.
+
+    Their values must be equal, and their sizes must be equal up to rounding.
+    """
     return (
         all(_equal(claimed[part], said[part]) for part in ("a", "b", "detail"))
         and math.isclose(claimed["metres"], said["metres"], rel_tol=_RELATIVE, abs_tol=rounding[0])
@@ -366,7 +369,7 @@ def _same_difference(claimed: DifferenceEntry, said: DifferenceEntry, rounding: 
 def _confirmation_errors(
     claimed: Confirmed, comparator: Comparator, found: Alignment, variables: Variables
 ) -> Iterator[str]:
-    """Yield the wrong statements about Pinocchio's confirmation.
+    """Yield wrong statements about Pinocchio's check of the distances.
 
     A certificate without a confirmation makes no statement about Pinocchio.
     """
@@ -386,10 +389,10 @@ def _confirmation_errors(
 
 
 def _gauge(document: Certificate) -> Gauge:
-    """Return the gauge in a certificate.
+    """Return the free choices that a certificate states.
 
-    The gauge contains the choices that align B with A. The choices are the base's pose, the joints' senses
-    and zeros, the conversions of planar and floating joints, and the orders of joints.
+    They align B with A. They are the pose of the base, the sense and the zero offset of each joint, the
+    conversions of planar and floating joints, and the order of joints.
     """
     joints, base = document["joints"], document["base_links"]
     return Gauge(
@@ -406,7 +409,7 @@ def _gauge(document: Certificate) -> Gauge:
 
 
 def _not_a_gauge(document: Certificate, gauge: Gauge, comparator: Comparator) -> str | None:
-    """Return the reason why the gauge in a certificate is not allowed; None if it is allowed."""
+    """Return the reason why the free choices of a certificate are not allowed; None if they are allowed."""
     a, b = comparator.mechanisms
     for joint in document["joints"]:
         a.tree.joint_index(joint["a"])
@@ -445,7 +448,7 @@ def _equal(claimed: Any, said: Any, zero: float = _ZERO) -> bool:
 def _as_written_errors(
     claim: FrameEntry, comparator: Comparator, found: Alignment, *, sharply: bool
 ) -> Iterator[str]:
-    """Yield the wrong statements about the frame that is farthest apart in the models as they are written."""
+    """Yield wrong statements about the largest distance between the models as they are written."""
     written = comparator.as_written(found)
     variables = variables_of(written, comparator.tolerance)
     names = [

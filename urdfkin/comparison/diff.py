@@ -1,8 +1,8 @@
 """List the changes between two versions of a robot description, and bound how far they move the frames.
 
-Two files of one format are compared attribute by attribute. The attributes of two formats have no common
-names, and each format has links, frames and numbers of its own. The changes between files of two formats are
-therefore the differences that `same` finds: they do not depend on the format.
+Two files of one format are compared attribute by attribute. Files of two formats cannot be compared attribute
+by attribute, because each format has its own attributes. For such files, the changes are the differences that
+`same` finds.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _AXIS = {"axis x": 1.0, "axis y": 0.0, "axis z": 0.0}
 _RULE = {"mimic multiplier": 1.0, "mimic offset": 0.0}
 #: Attributes of a joint that affect the motion of links.
 _MOVING = ("", "origin", "axis", "mimic", "type", "parent", "child", "fixed", "kind")
-#: Changes of a link between two formats that affect its motion.
+#: Names of those changes that move a link, for files of two formats.
 _MOVING_LINKS = ("origin", "place", "base", "carried by")
 
 Value = float | str
@@ -58,7 +58,7 @@ class Change:
         what: The attribute, for example "origin x" or "mass"; "" if the whole element was added or removed.
         old: The value in the old version; None if the old version has no value.
         new: The value in the new version; None if the new version has no value.
-        size: The size of the change in words, if the two formats have no common values; else empty.
+        size: For files of two formats, a text with the size of the change; otherwise empty.
     """
 
     element: str
@@ -121,11 +121,11 @@ class Changes:
     Attributes:
         sources: The sources of the old and the new version, as the user gave them.
         changes: The changes of the robot's name, then of joints, then of links, in the order of the file.
-        effects: For each joint with changes that move links, the effect of the changes of this joint alone.
-        total: The frame that all changes together move most; None if no frame moves.
-        rounding: (m, rad) how far rounding to single precision in a USD file moves a frame, if there is no
-            further difference in motion; else None. This rounding is not among the changes. It is infinite if
-            no bound was computed.
+        effects: For each changed joint that moves links, the effect if only this joint is changed.
+        total: The frame with the largest displacement if all changes are applied; None if no frame moves.
+        rounding: (m, rad) bound on the error of any frame that single precision in a USD file causes. None if
+            the files also differ in other ways. This rounding is not among the changes. It is infinite if no
+            bound was computed.
     """
 
     sources: tuple[str, str]
@@ -153,8 +153,8 @@ def diff(a: Robot | Source | DHTable, b: Robot | Source | DHTable, *, effects: b
     Args:
         a: The old version: a robot, or a source for `load`.
         b: The new version: a robot, or a source for `load`.
-        effects: Whether to bound how far the changes of each joint move the frames between this joint and the
-            tips.
+        effects: Whether to compute, for each changed joint, a bound on the displacement of the frames after
+            the joint.
 
     Raises:
         UrdfError: a version has errors. SourceError, UnknownNameError, InputError: as for `load`.
@@ -183,7 +183,7 @@ def _format(robot: Robot) -> str:
 
 
 def _across_formats(old: Robot, new: Robot, *, effects: bool) -> Changes:
-    """Return the differences that `same` finds as changes."""
+    """Run `same`, and return its differences as a `Changes`."""
     found = same(old, new, bounds=effects)
     changes = tuple(_changes_of(found, (_format(old), _format(new))))
     moving = [one.element for one in changes if one.moves and one.element != "robot"]
@@ -202,7 +202,7 @@ def _across_formats(old: Robot, new: Robot, *, effects: bool) -> Changes:
 
 
 def _changes_of(found: Sameness, formats: tuple[str, str]) -> Iterator[Change]:
-    """Yield the differences joint by joint, then those that no joint has, names and remarks."""
+    """Yield the differences of the joints, then all other differences, then names and remarks."""
     for at in found.unexplained:
         if at.what and at.a is None:
             yield Change(at.place, at.what, None, None, str(at.b))
@@ -243,7 +243,7 @@ def _not_compared(found: Sameness) -> Iterator[Change]:
 
 
 def _is_world(found: Sameness, formats: tuple[str, str], change: Change) -> bool:
-    """Return whether a change is the root link that the reader of MJCF or USD adds for the world."""
+    """Return whether a change is only the link "world", which the readers of MJCF and USD add as the root."""
     roots = [tree.links[0] for tree, name in zip(found.trees, formats, strict=True) if name != "URDF"]
     return change.element == "link world" and "world" in roots
 
@@ -335,7 +335,8 @@ def _value(text: str) -> Value:
 def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> Effect | None:
     """Compute the distances by which the changes of a single joint move the frames.
 
-    The old robot is compared with a copy of the old robot in which only this joint is the new robot's.
+    The function copies the old robot, replaces this joint by that of the new robot, and compares the copy
+    with the old robot.
 
     Args:
         old: The tree of the old robot.
@@ -363,7 +364,7 @@ def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> 
 
 
 def _quietly(tree: KinematicTree) -> Robot:
-    """Return the robot of a tree, without warnings about the URDF that is written for it."""
+    """Make a robot from a tree. Suppress warnings about its URDF, which urdfkin itself writes."""
     text = Text(to_urdf(tree).encode(), tree.name, tree.name)
     return robot_of(text, verify=False, made=True, quiet=True)
 

@@ -69,8 +69,8 @@ class LibraryReading:
         joints: The joints with a coordinate in the library, in the library's order.
         same_order: Whether the library has the same joints as urdfkin, in the same order.
         missing: Links that the library's model does not contain; in USD, only links with a prim of their own.
-        worst: Largest difference of a link's pose in the root link; 0 if all link poses are equal within
-            rounding.
+        worst: Largest difference between the link poses of the two libraries, relative to the root link; 0 if
+            all poses are equal up to rounding.
         differences: The joints that the library reads differently from urdfkin.
     """
 

@@ -46,8 +46,8 @@ _TENTH, _NINE = 0.09995, 9.0
 class Verdict(Enum):
     """The verdict: two models are the same, the same after the changes in `Sameness.up_to`, or different.
 
-    They are the same up to single precision if they are the same as written, except that each joint of one
-    differs by the rounding of its own numbers.
+    They are the same up to single precision if each joint differs only by the rounding of its own numbers to
+    single precision.
     """
 
     SAME = "same"
@@ -213,9 +213,10 @@ class JointDifference:
         place: The joint or link of A, for example "joint elbow".
         what: The parameter: "origin", "axis", "mimic multiplier", "mimic offset", "mimic joint" or "base";
             empty if the models cannot be compared at this joint or link.
-        a: The parameter's value in A; None if the value has no meaning without that in B.
+        a: The parameter's value in A; None if only the difference between A and B has a meaning.
         b: The parameter's value in B, the size of the difference, or the reason why there is no comparison.
-        explained: The largest difference that rounding explains, in words; empty without rounded numbers.
+        explained: A text with the largest difference that rounding can cause. It is empty if no number is
+            rounded.
     """
 
     place: str
@@ -253,7 +254,7 @@ class Confirmation:
     """Pinocchio's confirmation of the bounds, or the reason why there is none.
 
     Attributes:
-        state: Whether there is a confirmation, and otherwise the kind of the reason.
+        state: Whether Pinocchio confirmed the bounds. If not, the kind of reason.
         by: Name and version of the oracle: "Pinocchio 4.1.0".
         configurations: Number of configurations at which the oracle computed the distances.
         metres: The largest of these distances.
@@ -277,8 +278,8 @@ class Confirmation:
 class JointMap:
     """A joint of A and the matching joint of B: value_b = sense * value_a + offset (rad, m).
 
-    A planar or floating joint has the sense 1 and the offset 0. If the pose of such a joint differs between A
-    and B, `conversion` converts A's pose to B's.
+    For a planar or floating joint, `sense` is 1 and `offset` is 0. If the pose of such a joint differs
+    between A and B, `conversion` converts A's pose to B's.
     """
 
     a: str
@@ -307,26 +308,27 @@ class Sameness(Displayable):
             model has.
         joints: The matched joints of A and B.
         links: The matched links of A and B.
-        tools: The matched links that count as different tools.
-        orders: Groups of consecutive joints of B that are matched in another order than in B. The joints'
-            axes must allow the exchange without a change of motion.
+        tools: Pairs of links on the same body with different poses. They are reported as different tools.
+        orders: Groups of consecutive joints that B has in another order than A. The robot moves in the same
+            way with both orders.
         base: (4, 4) pose of B's root in A's root frame, in the zero configuration. The pose is the identity
             if the two roots coincide.
         base_links: A link of A and a link of B. The poses of A are compared relative to the first link, and
             the poses of B relative to the second link. The two links belong to matching rigid bodies.
-        rounding: (m, rad) largest distance and angle between matching frames that count as rounding.
-        single: (m, rad) largest distance and angle between matching frames that rounding the numbers of a USD
-            file to single precision can cause; None if both files have double precision.
+        rounding: (m, rad) a smaller distance and a smaller angle between matching frames count as rounding
+            errors.
+        single: (m, rad) bound on the distance and the angle between matching frames that single precision can
+            cause. None if no file has single precision.
         unexplained: The differences of the models as they are written, joint by joint, beyond rounding. The
             numbers of a USD file are rounded to single precision.
         frames: The interval for each pair of matching links, after the changes in `after`.
-        as_written: The interval for the frame that is farthest apart without the changes in `after`. None if
-            there are no changes.
-        written: (m, rad) proven bound of the distance and the angle for all pairs of matching frames, without
-            the changes in `after`. The bound is infinite if no bound was proven. If one model is a
+        as_written: The interval for the frame with the largest distance between the models as they are
+            written. None if `after` is empty.
+        written: (m, rad) proven bound on the distance and the angle of all pairs of matching frames, for the
+            models as they are written. The bound is infinite if no bound was proven. If one model is a
             Denavit-Hartenberg table, only frames with the same name in A and B count.
-        narrowed: Mimicked joints that can drive a mimic joint out of the mimic joint's limits, with one line
-            of text for each mimicked joint. The intervals still cover the whole range of the mimicked joint.
+        narrowed: The mimicked joints whose mimic joint can leave its own limits. The value is a line of text.
+            The intervals still cover the whole range of the mimicked joint.
         checked: Pinocchio's confirmation, or the reason why there is none.
         trees: The two robot models.
 
@@ -377,7 +379,7 @@ class Sameness(Displayable):
     def worst(self) -> Interval | None:
         """The interval with the largest bound; None if no frame differs by more than rounding.
 
-        The bounds of distances are compared first. The bounds of angles decide between equal distances.
+        If two intervals have equal bounds on the distance, their bounds on the angle are compared.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -416,7 +418,7 @@ class Sameness(Displayable):
 
     @property
     def within_single(self) -> bool:
-        """Whether the models differ, but no frame by more than single precision can move any frame.
+        """Whether the models differ by less than the bound on the error of single precision.
 
         The models are compared as they are written. The sum of the roundings of all joints can be larger than
         an error in one of them, so this does not prove that rounding is the cause: see `up_to_single`.
@@ -461,7 +463,8 @@ class Sameness(Displayable):
 
         Args:
             strict: Whether models that are only equivalent, or that have remarks, count as different.
-            within: Largest allowed distance of a frame as written, in metres and in radians.
+            within: Largest allowed distance (m) and angle (rad) between matching frames of the models as they
+                are written.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -487,7 +490,7 @@ class Sameness(Displayable):
         return _mapped(self.trees, {one.a: one for one in self.joints}, checked(self.trees[0], q, "q"))
 
     def convention(self) -> Convention:
-        """Return B's joint names, order, senses and zeros as a convention of A.
+        """Return a convention for A with the names, order, senses and zero offsets of B's joints.
 
         A's `robot.convention(...)` then converts q, v, a and Jacobians of A to q, v, a and Jacobians of B. At
         a configuration of A and the converted configuration of B, A and B have the same poses, except for
@@ -616,12 +619,12 @@ def demand_joint_names(tree: KinematicTree, names: list[str], which: str) -> Non
 
 
 def put_right(found: Alignment, rounding: Tolerance, *, tables: bool = False) -> tuple[tuple[str, str], ...]:
-    """Correct the tools of an alignment, and return the changes that turn B into A.
+    """Decide which differing frames are tools, and return the changes that make B equal to A.
 
-    Each change is a pair of a kind from `FREE` and a line of text.
+    A change consists of its kind, which is an entry of `FREE`, and a line of text.
 
     Args:
-        found: The alignment of the models; differing tools are corrected in it.
+        found: The alignment of the models. The function changes the poses of its tools.
         rounding: The tolerance within which numbers are equal.
         tables: Whether one model is a Denavit-Hartenberg table. The frames of a table depend on its
             convention. All its frames that differ therefore count as tools.
@@ -656,7 +659,7 @@ def put_right(found: Alignment, rounding: Tolerance, *, tables: bool = False) ->
 
 
 def _tools_put_right(found: Alignment, rounding: Tolerance, *, tables: bool) -> Iterator[tuple[str, str]]:
-    """Treat differing frames without children, and differing frames near the base, as tools.
+    """Two kinds of differing frames are tools: frames without children, and frames of the robot's mounting.
 
     The function yields a pair for each tool: the kind "tools" and a line of text.
     """
@@ -666,7 +669,7 @@ def _tools_put_right(found: Alignment, rounding: Tolerance, *, tables: bool) -> 
         if frame.differs and (beside or tables or _is_tool(found, frame)):
             found.frames[k] = frame.put_right()
             if beside and rounding.holds(*apart(found.a.homes[frame.a], found.b.homes[frame.b])):
-                continue  # the pose in the root frame is unchanged, so the line about the base is enough
+                continue  # the line about the base already reports this pose
         if (tool := found.frames[k].tool) is not IDENTITY:
             moved = pose_words(tool, rounding)
             yield (
@@ -676,7 +679,7 @@ def _tools_put_right(found: Alignment, rounding: Tolerance, *, tables: bool) -> 
 
 
 def _around(found: Alignment) -> set[tuple[int, int]]:
-    """Return the matching frames on the root body with a pose that only describes the robot's mounting.
+    """Return those matching frames on the root body that only describe the mounting of the robot.
 
     There are two kinds of such frames. The first kind is a link between the root and the first link to which
     a moving joint is attached. The second kind is a link, such as a world or a table, that carries no moving
@@ -698,10 +701,11 @@ def _around(found: Alignment) -> set[tuple[int, int]]:
 
 
 def _beside_the_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
-    """Return the root body's links from which all moving joints descend, and its links from which none does.
+    """Return two sets of links of the root body.
 
-    A link of the first set has a fixed child link from which all moving joints descend. From a link of the
-    second set no moving joint descends. The two sets are empty if no joint moves.
+    The first set has the links before the robot: all moving joints are below a fixed child of such a link.
+    The second set has the links beside the robot: no moving joint is below such a link. Both sets are empty
+    if no joint moves.
     """
     tree = mechanism.tree
     carried = [0] * len(tree.links)
@@ -743,7 +747,7 @@ def _rounded(x: float, rounding: float) -> float:
 def _is_tool(found: Alignment, frame: FramePair) -> bool:
     """Return whether a frame is fixed and has no children, in A as well as in B.
 
-    The child link of a mimic joint with the multiplier 0 is no tool, because it has a joint.
+    The child link of a mimic joint is not fixed and is therefore no tool, also if the multiplier is 0.
     """
     for tree, link in ((found.a.tree, frame.a), (found.b.tree, frame.b)):
         if link == 0 or tree.joints[link - 1].kind.nv or idle(tree.joints[link - 1]):
@@ -777,7 +781,7 @@ def differences(found: Alignment, variables: Variables) -> tuple[Difference, ...
 
 
 def _of_the_pair(found: Alignment, tree_a: KinematicTree, tree_b: KinematicTree, link: str) -> bool:
-    """Return whether the rigid bodies that carry a link in A and in B match.
+    """Return whether a link belongs to matching rigid bodies in A and in B.
 
     If they do not match, one of these bodies moves by a joint that only one model has. This joint is already
     reported as a difference.
@@ -842,7 +846,8 @@ def remarks(
         variables: Their common variables.
         tolerance: The tolerance within which numbers are equal.
         single: The relative error of rounding a number to single precision; 0 if no model is rounded so.
-        as_written: Compare limits without the change of a joint's sense and zero.
+        as_written: Whether to compare limits as written, and not after the change of a joint's sense and zero
+            offset.
     """
     some = list[Difference]()
     for step in found.steps:
@@ -864,12 +869,15 @@ def remarks(
 
 
 def _in_order(which: str, value: Value) -> tuple[Value, Value]:
-    """Return the parameter's values in A and in B, where only the model `which` has a value."""
+    """Return (value, None) if only A has the value, or (None, value) if only B has it."""
     return (value, None) if which == "A" else (None, value)
 
 
 def idle(joint: Joint) -> Lock | None:
-    """Return the lock of a mimic joint with the multiplier 0 that is compared as a fixed joint; else None."""
+    """`same` compares a mimic joint with the multiplier 0 as a fixed joint.
+
+    Return the `Lock` of such a joint, otherwise None.
+    """
     lock = joint.lock
     return lock if lock and lock.joint.mimic and lock.joint.mimic.multiplier == 0.0 else None
 
@@ -882,7 +890,7 @@ def limit_differences(
     Args:
         a: The joint of A.
         b: The joint of B.
-        tolerance: Tolerance of a limit (rad or m), as a share of its size or of 1.
+        tolerance: Tolerance of a limit, relative to the larger of its absolute value and 1 (rad or m).
         single: The relative error of rounding a limit to single precision; 0 if it is not rounded so.
         zero: Sense and offset of B's coordinate. They convert the limits of B to the coordinate of A.
     """

@@ -1,20 +1,22 @@
 """Prove joint by joint that single precision is the cause of every difference between two models.
 
-A bound on how far rounding moves a frame is a sum over all joints, over the whole range of each slide. So the
-rounding of one joint can be larger than an error in another. This proof has no such sum: each joint may
-differ by the rounding of its own numbers only.
+A bound on the displacement of a frame by rounding is a sum over all joints. It depends on the whole range of
+each prismatic joint. So the bound on rounding can be larger than an error in one joint. This proof has no
+such sum: each joint may differ by the rounding of its own numbers only.
 
 **What is compared.** The frames of a joint in its two bodies may be chosen freely, up to a motion along the
-axis, and a converter may add links or merge fixed ones. So the proof compares no numbers of a file. It
-compares quantities that have only one value, in the zero configuration and in the frame of a link P. For each
-link that both models have, P is the nearest link before it in A that both models have:
+axis, and a converter may add links or merge fixed ones. So the proof does not compare the numbers in the
+files. It compares quantities that do not depend on these choices. They are computed in the zero configuration
+and expressed in the frame of a link P. Each link that both models have has its own P. P is the nearest
+ancestor in A that both models have. The quantities are
 
 - the pose of the link;
 - the direction and the line of the axis of each joint between P and the link;
 - the multiplier and the offset of each mimic rule.
 
 By the product of exponentials, these determine the pose of each common link in every configuration. The
-models are compared as they are written: the roots coincide, and no sense, zero or tool is changed.
+models are compared as they are written. The roots coincide, and no joint sense, zero offset or tool frame is
+changed.
 
 **The bound.** Let the path from P to the link have the joints 1 to n. Rounding can move the frame after joint
 i by w_i and turn it by e_i, as `urdfkin.verify.usd_check.single_precision` derives from the numbers of this
@@ -22,30 +24,33 @@ joint. Let R_i be the constant rotation of joint i, and p_i its origin; a star m
 
     R_1 ... R_n    and    R*_1 ... R*_n    are apart by at most    e_1 + ... + e_n,
 
-because angles of rotations add at most. Let the frame before joint i be off by W in place and by E in
-rotation. The frame after the joint is then off by at most
+because angles of rotations add at most. Let W be the position error (m) and E the rotation error (rad) of the
+frame before joint i. The position error of the frame after the joint is then at most
 
     W + E |p_i| + w_i,
 
 because R p_i - R* p*_i = (R - R*) p_i + R* (p_i - p*_i). The axis of joint i passes through the origin of the
-frame after it and is fixed in that frame, so the same two sums bound its tilt and its shift. A number of a
-mimic rule is off by at most 2^-24 of itself.
+frame after the joint, and is fixed in this frame. So the position error and the rotation error of this frame
+also bound the errors of the axis. The multiplier and the offset of a mimic rule have a relative error of at
+most 2^-24.
 
-In B, P may be on another branch of the rigid body than the link. Let W, E be the bounds of the link and V, F
-those of P, both from the last common link of the two branches. Seen from P, a link at the distance d is off
-by at most W + V + F d, and turned by at most E + F. The rounding of double precision, which `same` ignores,
-comes on top. If both models are rounded, their bounds add.
+In B, the paths to P and to the link may branch at a common ancestor. Let W and E be the position error and
+the rotation error of the link relative to this ancestor. Let V and F be those of P. If the distance of the
+link from P is d, the position error of the link relative to P is at most W + V + F d. Its rotation error is
+at most E + F. The rounding errors of double precision, which `same` ignores, are added. If both models are
+rounded, their bounds are added.
 
-**Both orders.** A link that only B has can carry a joint, or P can be far from the joint in B. Then the bound
-contains the rounding of other joints. `same` therefore compares A with B and B with A. In the order that
-starts with a rounded model, the path from P has at most one moving joint, and its fixed joints all lie
-between P and the link. Otherwise, the answer is that the difference is not explained.
+**Both orders.** A link that only B has can be the parent of a joint, or P can be far from the joint in B.
+Then the bound contains the rounding of other joints. `same` therefore compares A with B, and B with A. In one
+of the two comparisons, the first model is rounded. The path from P to the link in this model must have at
+most one moving joint, and only fixed joints between P and the link. Otherwise, the difference is reported as
+not explained.
 
-**What the proof means.** If a difference exceeds its bound, single precision is not its cause, and the first
-such joint is named. If no difference exceeds its bound, an error that is smaller than the rounding of the
-joint's own numbers may remain. Nothing can distinguish such an error from rounding. Planar and floating
-joints, joints in another order, and links on other branches must agree to double precision, or the models are
-not compared: then the answer is that the difference is not explained.
+**What the proof means.** If a difference exceeds its bound, single precision is not its cause. `same` names
+the first joint with such a difference. If no difference exceeds its bound, an error that is smaller than the
+rounding of the joint's own numbers may remain. Nothing can distinguish such an error from rounding. Some
+parts are not compared joint by joint: planar and floating joints, joints in another order, and links on other
+branches. They must agree up to double precision. Otherwise, the difference is reported as not explained.
 """
 
 from __future__ import annotations
@@ -73,8 +78,8 @@ class JointComparison:
 
     Args:
         found: The alignment. Only its pairs of joints and links are used.
-        joints: For A and B the bounds of each joint (joints, 3), as in `SinglePrecision.joints`; zeros for a
-            model without rounded numbers.
+        joints: Bounds (joints, 3) of A and of B, as in `SinglePrecision.joints`. They are zero for a model in
+            double precision.
         base: (4, 4) pose of B's root in A's root frame, for models as they are written.
         tolerance: The largest differences that count as rounding of double precision.
     """
@@ -116,9 +121,9 @@ class JointComparison:
                 yield JointDifference(f"joint {joints[step.a].name}", "", None, why)
 
     def _way(self, link: int) -> tuple[int, list[int]]:
-        """Return the nearest link of A before a link that both models have, and the joints between the two.
+        """Return the nearest ancestor in A that both models have, and the joints from it to the link.
 
-        Return the link at which the paths begin if there is no such link.
+        If there is no such ancestor, return the link at which all paths begin.
         """
         joints, path = self.found.a.tree.joints, list[int]()
         while link:
@@ -129,7 +134,7 @@ class JointComparison:
         return self.start[0], path
 
     def _paths(self, which: int, start: int, end: int) -> tuple[list[int], list[int]]:
-        """Return the joints to two links, without the joints that lead to both."""
+        """Return the joints on the paths from the last common ancestor to two links."""
         tree = self.mechanisms[which].tree
         ways = tree.path(start), tree.path(end)
         n = sum(1 for _ in takewhile(lambda two: two[0] == two[1], zip(*ways, strict=False)))
@@ -162,7 +167,9 @@ class JointComparison:
             joint = f"joint {trees[0].joints[step.a].name}"
             pair, bound = zip(*(screws[k][i] for k, i in enumerate((step.a, step.b))), strict=True)
             beyond = list(self._beyond(joint, "axis", *self._between(step, *pair), bound[0] + bound[1]))
-            if beyond and off:  # another origin moves the axis too: compare it as the link sees it
+            if (
+                beyond and off
+            ):  # another origin of the link also moves the axis, so compare the axes in the frame of the link
                 seen = [screw.moved(inverse(T)) for screw, T in zip(pair, poses, strict=True)]
                 beyond = list(
                     self._beyond(joint, "axis", *self._between(step, *seen), sum(bound) + sum(bounds))
@@ -170,13 +177,13 @@ class JointComparison:
             yield from beyond
 
     def _sums(self, back: Sequence[int]) -> bool:
-        """Return whether the joints to the link in whose frame B is seen are rounded."""
+        """Return whether the path of B back to the reference link contains rounded joints."""
         return bool(back) and bool(self.joints[1][list(back)].any())
 
     def _between(self, step: Step, axis: Screw, other: Screw) -> tuple[float, float]:
         """Return the angle and the distance of two axes.
 
-        The point of a rounded axis is near the line of the exact axis, wherever it is along this line.
+        Only the distance from the other line is compared, because a point may lie anywhere along its axis.
         """
         ends = (axis, other) if self.joints[0].any() else (other, axis)
         return between(*ends, turns=step.kind == "turns")[1:]
@@ -184,11 +191,12 @@ class JointComparison:
     def _passed(
         self, which: int, back: Sequence[int], path: Sequence[int]
     ) -> tuple[Mapping[int, tuple[Screw, FloatArray]], FloatArray, FloatArray]:
-        """Return the screw of each joint on a path, the pose after the path, and the bounds (m, rad) of each.
+        """Return the screws of the joints on a path, the pose at the end, and bounds (m, rad) for all of them.
 
         Args:
             which: 0 for A, 1 for B.
-            back: The fixed joints from the last common link to the link in whose frame the results are.
+            back: The fixed joints from the last common link to the reference link. Results are in the frame
+                of this link.
             path: The joints from the last common link to the end.
         """
         tree = self.mechanisms[which].tree
@@ -199,7 +207,7 @@ class JointComparison:
         screws: dict[int, tuple[Screw, FloatArray]] = {}
 
         def placed() -> FloatArray:
-            """Return the bounds of a frame, seen from the link at the end of `back`."""
+            """Return the bounds of a frame relative to the reference link, which is at the end of `back`."""
             lever = float(np.linalg.norm((seen @ T)[:3, 3])) if back else 0.0
             return np.asarray(off + own + np.array([own[1] * lever, 0.0]))
 
@@ -227,7 +235,10 @@ class JointComparison:
             yield JointDifference(place, what, None, " and ".join(sizes), explained)
 
     def _of_free_joint(self, name: str, paths: Sequence[list[int]]) -> Iterator[JointDifference]:
-        """Yield a line if a planar or floating joint is not the only joint from the root body, or differs."""
+        """Compare a planar or floating joint, which must be the only joint of the root body.
+
+        Yield its differences.
+        """
         a, b = self.found.a, self.found.b
         ends = [(a, paths[0]), (b, paths[1])]
         if not all(len(path) == 1 and not _body_before(mechanism, path[0]) for mechanism, path in ends):
@@ -243,7 +254,10 @@ class JointComparison:
                 yield JointDifference(name, "", None, why)
 
     def _of_rule(self, step: Step) -> Iterator[JointDifference]:
-        """Yield the numbers of two mimic rules that differ by more than rounding."""
+        """Compare the multipliers and the offsets of two mimic rules.
+
+        Yield each difference that exceeds rounding.
+        """
         trees = self.found.a.tree, self.found.b.tree
         a, b = trees[0].joints[step.a].mimic, trees[1].joints[step.b].mimic
         place = f"joint {trees[0].joints[step.a].name}"
