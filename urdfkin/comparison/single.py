@@ -41,9 +41,9 @@ at most E + F. The rounding errors of double precision, which `same` ignores, ar
 rounded, their bounds are added.
 
 **Both orders.** A link that only B has can be the parent of a joint, or P can be far from the joint in B.
-Then the bound contains the rounding of other joints. `same` therefore compares A with B, and B with A. In one
-of the two comparisons, the first model is rounded. The path from P to the link in this model must have at
-most one moving joint, and only fixed joints between P and the link. Otherwise, the difference is reported as
+Then the bound contains the rounding of other joints. `same` therefore compares A with B, and B with A. In the
+comparison that starts with a rounded model, the path from P to the link must have at most one moving joint,
+and all its fixed joints must lie between P and the link. Otherwise, the difference is reported as
 not explained.
 
 **What the proof means.** If a difference exceeds its bound, single precision is not its cause. `same` names
@@ -191,7 +191,7 @@ class JointComparison:
     def _passed(
         self, which: int, back: Sequence[int], path: Sequence[int]
     ) -> tuple[Mapping[int, tuple[Screw, FloatArray]], FloatArray, FloatArray]:
-        """Return the screws of the joints on a path, the pose at the end, and bounds (m, rad) for all of them.
+        """Return the screws of the joints on a path, the pose at the end, and bounds (m, rad) for them.
 
         Args:
             which: 0 for A, 1 for B.
