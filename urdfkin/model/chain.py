@@ -3,8 +3,8 @@
 As in section 7.5 of the textbook, joint i rotates about, or translates along, z_{i-1} at O_{i-1}. The vector
 d_{i-1,i} leads from O_{i-1} to O_i. The path may lead from parent to child, from child to parent, or through
 a common ancestor (left foot to right hand). Fixed joints are merged into the constant poses. If the path
-passes a joint backwards, from child to parent, the joint's axis is reversed. The sign of the joint's
-coordinate is then the same as in the URDF, because (Rz(q))^-1 about z equals Rz(q) about -z.
+passes a joint backwards, from child to parent, the joint's axis is reversed. The joint's coordinate keeps the
+sign of the URDF, because the inverse of a rotation by q about z is a rotation by q about -z.
 """
 
 from __future__ import annotations
@@ -274,8 +274,8 @@ def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
             joints.append(ChainJoint(joint.name, joint.kind, backwards, frozen(A), joint.limit, joint.mimic))
             lengths.append(length)
             folded.append(count)
-            # The constant pose of a joint that the path passes backwards comes after the joint's motion; the
-            # constant pose of any other joint comes before the motion.
+            # If the path passes a joint backwards, the joint's constant pose comes after its motion.
+            # Otherwise the constant pose comes before the motion.
             A, length, count = np.eye(4), 0.0, int(backwards)
         A = A @ from_joint
         length += joint.length if backwards else 0.0

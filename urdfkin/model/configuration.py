@@ -212,7 +212,7 @@ def rate_names(tree: KinematicTree) -> tuple[str, ...]:
 def _names_and_units(
     tree: KinematicTree, of: Mapping[JointKind, Mapping[str, str]]
 ) -> Iterator[tuple[str, str]]:
-    """Yield a unique name and the unit of each number of q or v. A name with a suffix is never a joint's."""
+    """Yield a unique name and the unit of each number of q or v. Joint names have no suffix."""
     taken = set[str]()
     for joint in tree.joints:
         if not joint.nv:
@@ -269,7 +269,10 @@ def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
 
 
 def _other_lengths(tree: KinematicTree, what: str) -> dict[int, Hint]:
-    """Return a hint for each length of q or v that is correct in Pinocchio but not in urdfkin."""
+    """Pinocchio may use other lengths of q and v than urdfkin.
+
+    Return an explanation for each of these lengths.
+    """
     follow = any(joint.mimic for joint in tree.joints)
     free = Hint(
         "leave out the mimic joints, which have no coordinate, or load with mimic=False (--no-mimic)",
@@ -429,7 +432,7 @@ def with_unit_quaternions(tree: KinematicTree, q: FloatArray) -> FloatArray:
 
 
 def numbers(tree: KinematicTree, value: Given, what: str) -> FloatArray:
-    """Return q, v or a as float64 with the right last axis (`urdfkin.model.configuration_like`)."""
+    """Return q, v or a as a float64 array whose last axis has nq or nv numbers."""
     if (named := by_name(value, what)) is not None:
         return places(tree, what).read(named)
     array, width = floats(cast("ArrayLike", value), what), tree.nq if what == "q" else tree.nv

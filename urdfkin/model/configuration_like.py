@@ -98,7 +98,9 @@ keeps: 'neutral, elbow=...'
     def named(
         self, value: str | Mapping[str, ArrayLike], where: str
     ) -> tuple[dict[str, ArrayLike], FloatArray | None]:
-        """Return the values by name from a text or mapping, and the named pose that begins the text or None.
+        """Read a text or mapping with names.
+
+        Return the values by name, and the pose with which the text begins, or None.
 
         Raises:
             InputError: the text has numbers without names, or a name twice.
@@ -130,7 +132,7 @@ keeps: 'neutral, elbow=...'
 
     @staticmethod
     def _is_in_order(cells: Sequence[str]) -> bool:
-        """Return whether a text has numbers in order, without names and without a pose."""
+        """Return whether a text is a plain list of numbers, without joint names and pose names."""
         is_pose = len(cells) == 1 and _is_word(cells[0])
         return not is_pose and all(_pair(cell)[0] is None for cell in cells)
 
@@ -245,9 +247,10 @@ keeps: 'neutral, elbow=...'
 
 
 def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
-    """Return values that are given by name: a text or mapping unchanged, a table with labels as a mapping.
+    """Return values that have names.
 
-    The result is None if the values are numbers in order.
+    A text or a mapping is returned unchanged, and a table with labels becomes a mapping. Return None for a
+    plain list of numbers.
 
     Raises:
         InputError: a label occurs twice, or `value` is a list of tables with labels.

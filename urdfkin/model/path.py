@@ -5,7 +5,8 @@
 Chains, Denavit-Hartenberg tables, screws, and the models that `dh --compare` and `calibrate` fit have this
 form. Only the meaning of the amounts x_k differs: joint values, cells of a table, or parameters. Let p be the
 position of the path's end. The derivative of the end's pose with respect to an amount is a twist (dp/dx, w).
-Let e be the axis of the motion and O a point of this axis, in the frame before the path. The twist is
+Let e be the direction of the motion's axis, and O a point of this axis, both in the first frame of the path.
+The twist is
 
     rotation   dp/dx = e x (p - O),   w = e;       translation   dp/dx = e,   w = 0
 
@@ -91,7 +92,7 @@ class Path:
     def columns(self, amounts: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return the pose at the path's end, and its Jacobian (..., 6, motions), [linear; angular].
 
-        Each column is the derivative with respect to one amount.
+        Column k is the derivative with respect to the amount x_k.
         """
         return self.columns_at(self.frames(amounts))
 

@@ -16,7 +16,7 @@ Number = Any
 Vector = tuple[Number, Number, Number]
 Matrix = tuple[Vector, Vector, Vector]
 Six = tuple[Number, ...]
-#: Numbers of q, v or a; the first number in the sequence is the first number of the joint.
+#: A part of q, v or a that begins with the numbers of one joint.
 Numbers = Sequence[Number]
 
 ZERO: Vector = (0, 0, 0)
@@ -223,8 +223,8 @@ class Recursion:
             six: The Jacobian column whose derivative is returned.
             by: The Jacobian column of the joint that moves.
             reference: The reference frame.
-            before: Whether the joint that moves belongs to the column `six`, or is before the joint of this
-                column on the path.
+            before: True if the moving joint is before the joint of the column `six` on the path, or is the
+                same joint.
         """
         eq = self.eq
         change: tuple[Vector, Vector] = ZERO, ZERO

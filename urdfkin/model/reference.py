@@ -25,11 +25,12 @@ class Reference(IntEnum):
     """
 
     own_axes: bool  #: The axes of the results: the frame's axes if True, the world's axes if False.
-    #: The point of the results: the point at the world's origin if True, the frame's origin if False.
+    #: Which point the results describe. True: the body point at the world's origin. False: the frame's
+    #: origin.
     at_world: bool
 
     def __new__(cls, number: int, own_axes: bool, at_world: bool) -> Reference:
-        """Create a member from its number, its axes and its point; all three are required."""
+        """Create a member. A member needs a number, its axes and its point."""
         member = int.__new__(cls, number)
         member._value_, member.own_axes, member.at_world = number, own_axes, at_world
         return member

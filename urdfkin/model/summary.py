@@ -69,10 +69,7 @@ class Joints(dict[str, Joint], Displayable):
 
 
 def guides(tree: KinematicTree) -> Iterator[str]:
-    """Yield the line characters that draw the tree before each link name, root first.
-
-    An only child gets none.
-    """
+    """Yield the box-drawing characters before each link name, such as `├─`. An only child has none."""
     children = [0] * len(tree.links)
     for joint in tree.joints:
         children[joint.parent] += 1

@@ -98,7 +98,7 @@ class JointKind(Enum):
     bounded: bool  #: Whether a URDF gives such a joint a lower and an upper limit.
 
     def __new__(cls, word: object, *properties: Any) -> JointKind:
-        """Create a member; a member without all six properties is an error."""
+        """Create a member. A member needs all six properties."""
         member = object.__new__(cls)
         member._value_ = word
         member.nq, member.nv, member.nq_pinocchio, member.has_axis, member.turns, member.bounded = properties
@@ -467,9 +467,9 @@ class KinematicTree:
         return None
 
     def _unambiguous(self, *names: FrameName) -> list[str]:
-        """Return the first given frame name that is not also the name of a link or joint, as a list.
+        """Return a list with the first of these frame names that is no name of a link or joint.
 
-        The list is empty if there is no such name.
+        If there is none, the list is empty.
         """
         known = self._link_index.keys() | self._joint_index.keys()
         return [str(name) for name in names if name not in known][:1]

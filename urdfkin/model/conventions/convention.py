@@ -83,7 +83,7 @@ class JointRule:
 
     @property
     def factor(self) -> float | None:
-        """The sign times the number of units in one rad or m; None if `unit` is None."""
+        """The factor from rad or m to `unit`, multiplied by `sign`; None if `unit` is None."""
         if self.unit is None:
             return None
         return self.sign * (_UNITS[self.unit] if isinstance(self.unit, str) else self.unit / math.tau)
@@ -152,7 +152,7 @@ BUILT_IN = (
 
 
 def find_convention(name: str | Path | Convention) -> Convention:
-    """Return a convention by its name, from a TOML file, or unchanged.
+    """Find a convention by its name or read it from a TOML file. Return a `Convention` unchanged.
 
     Raises:
         UnknownNameError: there is no such convention, and no such file.
@@ -342,10 +342,11 @@ def transcoded(name: str) -> str:
 
     Different names give different results.
 
-    The result begins with "tn__". The characters of the name that OpenUSD allows follow, and then "_". Then a
-    number with digits of base 62 follows for each other character, in the order of code points. This number
-    encodes the character and its position in the name (Bootstring encoding). It is d n + p. Here d is the
-    difference of the code point from the previous code point, n is the number of possible positions, and p is
+    The result has three parts: "tn__", the allowed characters of the name with a final "_", and numbers for
+    the other characters. These numbers have digits of base 62 and are in the order of the code points. Each
+    number encodes a character and its position in the name (Bootstring encoding). It is d n + p. Here d is
+    the difference of the code point from the previous code point, n is the number of possible positions, and
+    p is
     the position. Source: github.com/PixarAnimationStudios/OpenUSD-proposals,
     proposals/transcoding_invalid_identifiers.
 

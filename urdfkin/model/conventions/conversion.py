@@ -26,8 +26,8 @@ from urdfkin.model.conventions.convention import Convention, JointRule, spelled
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 from urdfkin.system.plain_xml import plain_xml
 
-#: Largest allowed difference (rad or m) between a mimic joint's given value and the value from its mimic
-#: rule.
+#: Largest allowed difference (rad or m) between the value that a user gives for a mimic joint and the value
+#: that its mimic rule gives.
 _MIMIC_TOLERANCE = 1e-9
 _SWAPPED = [3, 4, 5, 0, 1, 2]
 
@@ -70,7 +70,8 @@ class Conversion:
 
     Args:
         tree: The robot.
-        urdf: The URDF text of the robot. It defines the order of joints in the file, and the centres of mass.
+        urdf: The URDF text of the robot. Some conventions need the order of the joints in the text, or the
+            centres of mass.
         convention: The convention.
         joints: Order of the joints. It replaces the convention's own order, and is required if the convention
             has none.
@@ -425,8 +426,8 @@ class Conversion:
             a: (..., nv); its conversion depends on q and v.
 
         Returns:
-            The target program's q (..., program's nq), or a tuple of the target program's q and v, or of its
-            q, v and a.
+            q, (q, v) or (q, v, a) in the target's convention, depending on the arguments. The shape of q is
+            (..., nq) with the target's nq.
 
         Raises:
             InputError: a wrong length, or a number that is not finite.

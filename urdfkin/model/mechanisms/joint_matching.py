@@ -4,11 +4,11 @@ Joints at two matched bodies are paired in three ways: by the names that the use
 by geometry. The module also computes candidates for the pose of a body and for the zero of a joint. The
 matcher tries each candidate.
 
-Two subtrees match exactly if joint zeros exist with which every axis of one subtree coincides with an axis of
+Two subtrees match exactly if suitable zero offsets make every axis of one subtree coincide with an axis of
 the other. Each subtree follows a joint. The angle of this joint does not matter, because another zero of the
 joint can compensate for the angle. Therefore, the result depends only on the two joints, and on the
-directions and positions of their axes. Each result is computed once and then stored. The search visits each
-pair of joints only a few times, even for long chains and for many joints with two possible zeros.
+directions and positions of their axes. Each result is computed once and then stored. The search therefore
+visits each pair of joints only a few times, even in long chains.
 """
 
 from __future__ import annotations
@@ -74,7 +74,8 @@ class Pairing:
         self.a, self.b, self.given, self._tolerance = a, b, given, tolerance
         self._named = {name for pair in given.items() for name in pair}
         self._signatures: dict[tuple[bool, int, int], str] = {}
-        #: The pairs by name are used for thousands of candidate poses, so they are computed once and stored.
+        #: Pairs of joints with the same name. They are needed for thousands of candidate poses, so they are
+        #: computed once.
         self._links: dict[tuple[int, int], tuple[tuple[int, int], ...]] = {}
         self._by_names = dict[
             tuple[tuple[int, int], Via], tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]
@@ -94,9 +95,9 @@ class Pairing:
     def edges(
         self, bodies: tuple[int, int], via: Via, G: FloatArray, XC: FloatArray
     ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
-        """Return the pairs of matched joints that follow two bodies, and the joints without a partner.
+        """Match the joints that are attached to a body of A with those of a body of B.
 
-        The joints without a partner are returned separately for A and for B.
+        Return three lists: the pairs, the other joints of A, and the other joints of B.
 
         Args:
             bodies: The body of A and the body of B.
@@ -136,7 +137,7 @@ class Pairing:
         return known
 
     def same_shape(self, bodies: tuple[int, int], via: Via) -> bool:
-        """Return whether the subtrees after two bodies have equal branches with equal kinds of joints."""
+        """Return whether the subtrees below two bodies have the same shape and the same kinds of joints."""
         shapes = (
             sorted(self._signature(m, body, edge) for edge in m.edges_of[body] if edge is not by)
             for m, body, by in zip((self.a, self.b), bodies, via, strict=True)
@@ -164,7 +165,9 @@ class Pairing:
         )
 
     def likeliest(self, bodies: tuple[int, int], e: Edge, edges: Sequence[Edge], X: FloatArray) -> list[Edge]:
-        """Sort joints of B by similarity to a joint of A, without the joints whose partners the user named.
+        """Sort joints of B by their similarity to a joint of A.
+
+        Omit joints that the user matched with `--map`.
 
         The most similar joint comes first.
 
@@ -371,7 +374,7 @@ def behind(
 
 
 def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
-    """Yield poses of B's root that align the first axis of B with the first axis of A, then the later axes.
+    """Yield poses of B's root that align the first axes of A and B, and also some later axes.
 
     After the first axis is aligned, a rotation about it and a translation along it are still free. The axes
     after the first axis determine this rotation and this translation. If no axes follow the first axis, the
@@ -394,7 +397,7 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
 def root_poses_by_siblings(
     a: Mechanism, b: Mechanism, bodies: Both[int], alike: Callable[[Edge, Edge], bool]
 ) -> Iterator[FloatArray]:
-    """Yield poses of B's root that align up to three joint axes of a body of B with axes of a body of A.
+    """Yield poses of B's root. Each pose aligns up to three joint axes of two matching bodies.
 
     Args:
         a: One mechanism.
@@ -456,7 +459,9 @@ def _guesses(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: boo
 def _firsts(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], near: tuple[Both[Axis], ...]
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
-    """Return pairs of the first revolute axes after two bodies, with the axes before and after each pair.
+    """Find the first revolute axes below two bodies.
+
+    Return pairs of them, with the neighbouring axes of each pair.
 
     Each pair has an axis of A and an axis of B. If there is no revolute axis, pairs of prismatic axes are
     returned.
@@ -476,7 +481,7 @@ def _firsts(
 def _next_joints(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int]
 ) -> Iterator[Both[Edge]]:
-    """Yield all pairs of a joint of A and a joint of B that follow two bodies and are of the same kind.
+    """Yield all pairs of joints of the same kind at two bodies, one joint of A and one of B.
 
     Joints without an axis are left out.
     """
@@ -494,26 +499,27 @@ def _axis(mechanism: Mechanism, edge: Edge, seen: Screw | None = None) -> Axis:
     return Axis(screw, mechanism.joint(edge).kind.turns, seen or screw)
 
 
-#: A function that returns candidate poses of B's body after two joints. The arguments of the function are
-#: the bodies after the joints, the joints, and the pose of B's body before the joints.
+#: A function for a pair of matched joints. It returns candidate poses of the child body of B's joint. Its
+#: arguments are the two child bodies, the joints, and the pose of the parent body in B.
 Poses = Callable[[tuple[int, int], Pair, FloatArray], Iterable[FloatArray]]
 
-#: Largest number of joints on a path for the recursive search. The matcher matches robots with longer paths
-#: joint by joint.
+#: Largest number of joints on a path for the recursive search. For longer paths, the matcher proceeds joint
+#: by joint.
 DEEPEST = 200
-#: Largest number of attempts to find a partner at B's body for each joint at A's body.
+#: Largest number of assignments that the search tries between the joints of two bodies.
 MOST_ASSIGNMENTS = 5000
 
 IDENTITY = np.eye(4)
 
 #: For each coordinate of A: the corresponding coordinate of B, and the velocity of B's coordinate divided by
-#: the velocity of A's coordinate. The ratio is negative if the two coordinates have opposite senses.
+#: the velocity of A's coordinate. The ratio is negative if the two coordinates increase in opposite
+#: directions.
 Rates = Mapping[str, tuple[str, float]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Match:
-    """The match of the subtrees after two joints.
+    """The result of matching the subtrees below two joints.
 
     Attributes:
         X: (4, 4) pose of B's body after the joint.
@@ -566,7 +572,7 @@ class Congruence:
             e: Joint of A.
             f: Joint of B.
             bodies: The bodies before the joints.
-            X: (4, 4) pose of B's body before the joint, as in the method `at`.
+            X: (4, 4) pose of the parent body of B's joint, as in the method `at`.
         """
         found = None if self._off else self._behind(e, f, bodies, X)
         return None if found is None else found.X

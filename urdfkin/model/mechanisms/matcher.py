@@ -4,15 +4,15 @@ The alignment matches the joints of A and B. It chooses the base of B, the order
 and the zero of each joint. The sense is the sign of the joint's coordinate.
 
 The matcher starts at a common body and goes outwards through A and B at the same time. At each joint it
-chooses the sense and the zero of B's joint. The best choice is the one with which most of B's later links and
-axes coincide with links and axes of A. `align` calls the matcher for several starting bodies and joint
-orders, and returns the best result.
+chooses the sense and the zero offset of B's joint. With the best choice, most of B's later links and axes
+coincide with links and axes of A. `align` calls the matcher for several starting bodies and joint orders, and
+returns the best result.
 
-Most joint zeros are determined by axes or link frames. If neither an axis nor a common link frame follows a
-joint, only a mimic rule determines the joint's zero. Let v = m w + c be a mimic rule of A, and let v' = m' w'
-+ c' be the corresponding rule of B. The two rules are equivalent if the substitution v' = s v + o, w' = s' w
-+ o' converts one rule to the other. If nothing is attached to the joint's link, the joint's offset o is free,
-and the mimic rules determine o. For a revolute joint, a multiple of a full turn may always be added to o.
+Most zero offsets follow from the axes or link frames below the joint. If there are none below a joint, only a
+mimic rule can determine the zero offset. Let v = m w + c be a mimic rule of A, and let v' = m' w' + c' be the
+corresponding rule of B. The two rules are equivalent if the substitution v' = s v + o, w' = s' w + o'
+converts one rule to the other. If nothing is attached to the joint's link, the joint's offset o is free, and
+the mimic rules determine o. For a revolute joint, a multiple of a full turn may always be added to o.
 """
 
 from __future__ import annotations
@@ -59,8 +59,8 @@ from urdfkin.model.tree import FloatArray, Joint, inverse
 
 #: Number of further joints that the matcher examines if the next axis does not decide between two choices.
 AHEAD = 6
-#: Largest number of poses of B's root that the search for an exact match tries. In each such pose, all axes
-#: of a body of B coincide with axes of a body of A.
+#: The search for an exact match tries at most this number of poses of B's root. In each pose, all axes of a
+#: body of B coincide with axes of a body of A.
 MOST_ROOT_POSES = 48
 #: If two choices have equally many agreements, one choice is better only if its largest difference is less
 #: than this fraction of the other choice's largest difference.
@@ -81,7 +81,7 @@ class Ahead:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Place:
-    """A position of the matcher: a body of A and the corresponding body of B.
+    """The current state of the matcher, at a body of A and the corresponding body of B.
 
     Attributes:
         bodies: The current body of A and of B.
@@ -105,8 +105,8 @@ class MechanismMatcher:
         a: One mechanism.
         b: The other mechanism, which is aligned with `a`.
         pairing: Finds the joints of `a` and `b` that may be matched.
-        gauge: Prescribed free choices. If this is None, the matcher makes the choices with which most joints
-            and links agree.
+        gauge: Prescribed free choices. None: the matcher searches for the choices with the most matching
+            joints and links.
         ahead: The number of look-ahead steps that the matcher may make.
         tolerance: Tolerance for the comparison of poses and axes.
         base: A link of `a` and a link of `b`. The matcher begins at the bodies of these links. If this is
@@ -126,13 +126,16 @@ class MechanismMatcher:
         self.a, self.b, self.pairing, self.gauge, self.ahead = a, b, pairing, gauge, ahead
         self.tolerance, self.base = tolerance, base
         self.size = size_of(a, b)
-        #: Finds subtrees that match exactly; None if the free choices are prescribed.
+        #: The search for exact matches of subtrees. It is None if `gauge` prescribes the choices.
         self.exact = Congruence(a, b, pairing, tolerance, self._poses_behind) if gauge is None else None
 
     # -- where to begin ------------------------------------------------------------------------------
 
     def beginnings(self) -> Iterator[tuple[tuple[int, int], FloatArray]]:
-        """Yield common bodies with possible poses of B's root in A's root frame; the likeliest come first."""
+        """Yield pairs of bodies at which the matcher can begin, with a pose of B's root in A's root frame.
+
+        The most likely pair comes first.
+        """
         if self.gauge is not None:
             names = self.gauge.base
             base = next(self._bases()) if names is None else self._bodies_of(*names)
@@ -180,8 +183,8 @@ class MechanismMatcher:
     def _places(self, base: tuple[int, int]) -> Iterator[FloatArray]:
         """Yield candidate poses of B's root.
 
-        The first is the pose of A's root. Poses that align links of equal names follow, and then poses that
-        align axes.
+        The first candidate is the pose of A's root. The next candidates align links with equal names. The
+        last candidates align axes.
         """
         yield from self._by_names(base)
         yield from self._by_axes(base)
@@ -220,7 +223,7 @@ class MechanismMatcher:
             yield ours, 0
 
     def _by_axes(self, base: tuple[int, int]) -> Iterator[FloatArray]:
-        """Yield the poses of B's root that align B's first axes best with A's first axes."""
+        """Yield poses of B's root that align the first axes of A and B. The best alignment comes first."""
         scored = list[tuple[float, Place, Score]]()
         for X in root_poses_by_axes(self.a, self.b, base):
             place = Place(base, (None, None), -1, IDENTITY, X)
@@ -262,9 +265,9 @@ class MechanismMatcher:
         return None if self.exact is None else self.exact.at(bodies, via, X)
 
     def _poses_behind(self, beyond: tuple[int, int], via: Pair, X: FloatArray) -> Iterator[FloatArray]:
-        """Yield candidate poses of B's body after two joints of the same kind.
+        """Yield candidate poses of the child body of B's joint.
 
-        The candidates follow from the pose of B's body before the joint.
+        They follow from the pose of its parent body. The two matched joints are of the same kind.
         """
         there = Place(beyond, via, -1, IDENTITY, X)
         kind, f = family(self.a.joint(via[0]).kind), via[1]
@@ -296,7 +299,7 @@ class MechanismMatcher:
             found.frames.append(FramePair(link_a, link_b, place.previous, home, end, angle, way))
 
     def _as_tools(self, place: Place, taken: list[tuple[int, int]]) -> FramePair | None:
-        """Return one link of each body as a pair of different end-effector frames, or None.
+        """Return a pair of links, one of each body, that can be different end-effector frames; or None.
 
         The result is None if links of the two bodies match, or if a body has no link of its own.
         """
@@ -325,13 +328,13 @@ class MechanismMatcher:
         return pairs
 
     def _own_links(self, place: Place) -> tuple[list[int], list[int]]:
-        """Return those links of two matched bodies that have no link of the same name in the other model."""
+        """Return the links of two matched bodies whose names do not occur in the other model."""
         names_a, names_b = self.a.labels, self.b.labels
         ours = [i for i in self.a.bodies[place.bodies[0]] if names_a[i] not in names_b]
         return ours, [j for j in self.b.bodies[place.bodies[1]] if names_b[j] not in names_a]
 
     def _step(self, place: Place, e: Edge, f: Edge, index: int, depth: int) -> tuple[Step, Place, Score]:
-        """Return the step over a pair of joints, the position after them, and the score of this position."""
+        """Match a pair of joints. Return the resulting step, the state after the joints, and its score."""
         kinds = family(self.a.joint(e).kind), family(self.b.joint(f).kind)
         via = e, f
         backwards = e.outer == place.bodies[0], f.outer == place.bodies[1]
@@ -346,7 +349,7 @@ class MechanismMatcher:
     def _unlike(
         self, place: Place, via: tuple[Edge, Edge], kinds: tuple[str, str], backwards: tuple[bool, bool]
     ) -> Step:
-        """Return the step over two joints of different kinds; one of the joints may be fixed."""
+        """Return the step for two joints of different kinds. One of the joints may be fixed."""
         unlike = {kinds[0]: "a", kinds[1]: "b"}.get("fixed", "kind")
         if unlike == "a":
             axis = _outwards(self.b.screw(via[1]), backwards[1]).moved(inverse(place.G) @ place.XC)
@@ -413,9 +416,9 @@ class MechanismMatcher:
             there: The position after the joint, with B in its zero configuration.
             at: (4, 4) the joint's frame.
             home_b: (4, 4) the frame of B's joint in the zero configuration.
-            plane: (4, 4) a valid N of a planar joint; all others differ by a motion in the joint's plane.
-                None for a floating joint.
-            poses_behind: (4, 4) poses that align B's axes after the joint with A's.
+            plane: (4, 4) one possible matrix N of a planar joint. All other possible matrices differ from it
+                by a motion in the plane. None for a floating joint.
+            poses_behind: (4, 4) poses that align the axes of A and B below the joint.
         """
         yield IDENTITY if plane is None else plane
         wanted = [there.XC]
@@ -464,7 +467,10 @@ class MechanismMatcher:
         return Step(a, b, kind, place.previous, sense, with_it[0], before, s, s, tilt, shift), *with_it[1:]
 
     def _exact_pose(self, place: Place, there: Place) -> FloatArray | None:
-        """Return the motion XC (4, 4) after two joints that gives an exact match, or None."""
+        """Return the motion XC (4, 4) for an exact match of the subtrees below two joints.
+
+        Return None if there is no exact match.
+        """
         if self.exact is None:
             return None
         X = self.exact.behind(*_both(there.via), place.bodies, inverse(place.G) @ place.XC)
@@ -479,7 +485,10 @@ class MechanismMatcher:
     def _best_zero(
         self, there: Place, G: FloatArray, t: Screw, turns: bool, zero: float | None, depth: int
     ) -> tuple[float, Place, Score]:
-        """Return the offset of B's joint with which most links and axes after it agree; 0 is tried first."""
+        """Return the zero offset of B's joint for which most links and axes below the joint agree.
+
+        Offset 0 is tried first.
+        """
         offsets = self._offsets(there, G, t, turns) if zero is None else (zero,)
         moved = (
             (offset, there.XC @ along(t, offset, turns=turns) if offset else there.XC) for offset in offsets
@@ -521,7 +530,7 @@ class MechanismMatcher:
         return sum(count for count, _ in scores), max(off for _, off in scores)
 
     def _score(self, place: Place) -> Score:
-        """Return the number of links and axes that agree at a position, and the largest difference (m)."""
+        """Return the number of matching links and axes of two bodies, and the largest difference (m)."""
         off = [
             apart(place.G @ self.a.homes[i], place.XC @ self.b.homes[j])
             for i, j in self.pairing.links(*place.bodies)
@@ -532,7 +541,7 @@ class MechanismMatcher:
         return len(off) - len(wrong), max(wrong, default=0.0)
 
     def _offsets(self, there: Place, G: FloatArray, t: Screw, turns: bool) -> Iterator[float]:
-        """Yield candidate zeros of B's joint: 0, then zeros that align a link or an axis after the joint."""
+        """Yield zero offsets of B's joint: 0, then offsets that align a link or an axis below the joint."""
         yield 0.0
         u = t.moved(there.XC)
         for i, j in self.pairing.links(*there.bodies):
@@ -548,7 +557,7 @@ class MechanismMatcher:
 def _most_shared(one: Mechanism, other: Mechanism) -> int | None:
     """Return the body of `other` that has most link names in common with the root body of `one`.
 
-    If no body has a name in common, the result is None.
+    Return None if no body of `other` has such a name.
     """
     names = {one.labels[link] for link in one.bodies[0]}
     shared = [len(names & {other.labels[k] for k in body}) for body in other.bodies]
@@ -564,11 +573,11 @@ def _best_of(scored: Sequence[tuple[_Free, Place, Score]]) -> tuple[_Free, Place
 
 
 def better(score: Score, than: Score) -> bool:
-    """Return whether `score` is better than the score `than`.
+    """Return whether `score` is better than `than`.
 
     A score with more agreements is better. If both scores have equally many agreements, the largest
-    differences decide. In this case a score is better only if its largest difference is less than half of the
-    other one.
+    differences decide. Then `score` is better if its largest difference is less than half of the largest
+    difference of `than`.
     """
     return score[0] > than[0] or (score[0] == than[0] and score[1] < TWICE_AS_WELL * than[1])
 
@@ -596,7 +605,7 @@ def _both(via: tuple[Edge | None, Edge | None]) -> tuple[Edge, Edge]:
 
 
 def _all_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> list[int]:
-    """Return the indices of the given joints at a body and of all joints after these joints."""
+    """Return the indices of some joints of a body and of all joints below them."""
     found, stack = [], [(body, edge) for edge in edges]
     while stack:
         here, edge = stack.pop()
@@ -621,8 +630,8 @@ MOST_AHEAD = 2000
 #: Larger tolerances that are tried when the exact match fails: an angle in rad, and a distance as a fraction
 #: of the robot's size.
 NEARLY = (1e-11, 1e-9, 1e-7, 1e-5, 1e-3)
-#: Largest number of exchanges between joint pairs that are tried. The joints of such a pair have different
-#: names.
+#: Largest number of times that the partners of two matched joints are exchanged on trial. Only joints with
+#: different names are exchanged.
 MOST_EXCHANGED = 12
 
 
@@ -666,7 +675,7 @@ def _orders_to_try(
         a: One mechanism.
         b: The other mechanism.
         given: Names of joints of A, each with the name of the matched joint in B.
-        run: Names of the commuting joints of B, from the inner body outwards.
+        run: Names of consecutive joints of B whose order does not matter, in the order from base to tip.
         orders: All other orders of these joints that give the same motion.
     """
     called = {given.get(joint.name, joint.name): i for i, joint in enumerate(a.tree.joints)}
@@ -680,9 +689,9 @@ def _orders_to_try(
 
 
 def _by_rules(best: Alignment) -> Alignment:
-    """Return the alignment in which the mimic rules determine joint zeros.
+    """Compute zero offsets from the mimic rules, and align the robots again with these offsets.
 
-    If this alignment is worse than the given alignment, the function returns the given alignment.
+    Return the better of the two alignments.
     """
     zeros = zeros_by_rules(best, tolerance_of(best.a, best.b))
     if not zeros:
@@ -698,7 +707,9 @@ def _exchanged(best: Alignment, given: Mapping[str, str]) -> Alignment:
     Partners are exchanged only between joints at the same body, and only in pairs of joints with different
     names.
     """
-    if best.only_a or best.only_b:  # A and B are different robots, and an exchange cannot make them equal
+    if (
+        best.only_a or best.only_b
+    ):  # a joint without a partner remains, so an exchange of partners cannot make A and B equal
         return best
     tried, ahead = set[frozenset[tuple[int, int]]](), Ahead(MOST_AHEAD)
     while (two := next((two for two in best.exchangeable(given) if two not in tried), None)) is not None:
@@ -721,9 +732,9 @@ def _nearly(best: Alignment, given: Mapping[str, str]) -> Alignment:
 
     If every axis differs slightly, no axes agree exactly, so the search cannot decide between two candidates.
     Therefore, the search is repeated with increasing tolerances until everything agrees. Then the mechanisms
-    are aligned once more. This last alignment uses the exact tolerance and the free choices of the last
-    search, so it reports the small differences. Only tolerances between the smallest difference and half of
-    the largest difference are tried.
+    are aligned once more. The last alignment uses the free choices of this search, and the tolerance for
+    rounding errors. So it reports the small differences. Only tolerances between the smallest difference and
+    half of the largest difference are tried.
     """
     a, b, (least, most), ahead = best.a, best.b, best.inner_off, Ahead(MOST_AHEAD)
     for angle in NEARLY:
@@ -764,10 +775,10 @@ def _best_alignment(
     return best
 
 
-#: Numbers of full turns that may be added to the zero of a mimicked joint.
+#: These numbers of full turns are tried as additions to the zero offset of a mimicked joint.
 TURNS = (0, 1, -1)
-#: Tolerance of a joint zero that follows from the positions of axes, as a multiple of the angle tolerance. It
-#: is large because a joint zero is inexact if it follows from two axes that are close together.
+#: If a zero offset is computed from the positions of axes, its tolerance is the angle tolerance times this
+#: factor. The factor is large, because the offset is inexact if the axes are close together.
 LEVER = 1e4
 
 
@@ -780,8 +791,8 @@ class _Rule:
 
     Attributes:
         step: Index of the step.
-        slope: The slope m of A's rule, multiplied by the sense s.
-        constant: The constant c of A's rule, multiplied by the sense s.
+        slope: The multiplier m of A's mimic rule, multiplied by the joint's sense s.
+        constant: The offset c of A's mimic rule, multiplied by the joint's sense s.
         n: Multiplier of B's rule.
         d: Offset of B's rule.
         offset: The offset o that the alignment found.
@@ -805,7 +816,7 @@ class _Rule:
         return (self.constant + self.offset + 2.0 * math.pi * turn - self.d) / self.n
 
     def wanted(self, beta: float) -> float:
-        """Return the offset o of the joint for which y = alpha x + beta has the given constant beta."""
+        """Return the joint's offset o that leads to the given constant beta in y = alpha x + beta."""
         return self.n * beta + self.d - self.constant
 
     def allows(self, offset: float, tolerance: Tolerance) -> bool:
@@ -817,11 +828,11 @@ class _Rule:
 
 
 def zeros_by_rules(found: Alignment, tolerance: Tolerance) -> Mapping[str, tuple[int, float]]:
-    """Return the new sense and offset of each joint of A whose zero must change because of a mimic rule."""
+    """Find joints of A whose zero offset follows from a mimic rule. Return their new senses and offsets."""
     zeros = dict[str, tuple[int, float]]()
     for rules in _groups(found):
         alphas = [rule.slope / rule.n for rule in rules if rule.n]
-        # The zero of a joint with a different slope is not changed; the zeros of the other joints are set.
+        # Only joints with the common slope get a new zero offset.
         alpha = max(
             alphas, key=lambda one: sum(_near(one, other, tolerance) for other in alphas), default=0.0
         )
@@ -845,7 +856,10 @@ def _near(x: float, y: float, tolerance: Tolerance) -> bool:
 
 
 def _groups(found: Alignment) -> Iterator[list[_Rule]]:
-    """Yield groups of steps; all joints of a group move with the same coordinate of A and of B."""
+    """Yield groups of steps.
+
+    All joints of a group depend on the same coordinate of A and the same coordinate of B.
+    """
     groups = dict[tuple[str, str], list[_Rule]]()
     for i, step in enumerate(found.steps):
         if step.unlike or step.kind not in ("turns", "prismatic"):
@@ -866,10 +880,10 @@ def _as_rule(joint: Joint) -> tuple[str, float, float]:
 
 
 def _is_determined(found: Alignment, i: int) -> tuple[bool, bool]:
-    """Return whether a joint's zero is determined, and whether links after the joint coincide.
+    """Return two results.
 
-    The zero is determined by axes, or by links with common names. The second result is True if a link of A
-    and a link of B after the joint coincide, even if their names differ.
+    The first is True if axes, or links with equal names, determine the joint's zero offset. The second is
+    True if a link of A and a link of B below the joint coincide, also with different names.
     """
     names = set(found.a.labels) & set(found.b.labels)
     behind = {i}

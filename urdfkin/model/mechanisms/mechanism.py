@@ -1,4 +1,4 @@
-"""A robot as a mechanism of rigid bodies and joint screws in the zero configuration; two aligned mechanisms.
+"""Describe a robot by its rigid bodies and joint screws in the zero configuration, and align two such robots.
 
 By the product of exponentials, a link's pose is exp(S_1 t_1) ... exp(S_n t_n) H. The unit screws S_i and the
 pose H are those of the zero configuration, in one common frame. This product does not contain the links
@@ -17,8 +17,9 @@ plane over, or neither of them does.
 **Alignment.** The matcher starts from a body of A that corresponds to a body of B. A rigid motion G moves a
 body of A to the corresponding body of B, both in the zero configuration. A joint of A moves by exp(S t), and
 the matched joint of B moves by exp(S' t'). B's coordinate may have the opposite sense (sign) and a different
-zero. Therefore, S' and t' are converted to A's sense and zero. G stays the same from body to body where the
-models agree. G changes at a joint if the joint's axis, or the body after the joint, has different poses in A
+zero. Therefore, S' and t' are expressed with the sense and the zero offset of A's joint. G stays the same
+from body to body where the models agree. G changes at a joint if the joint's axis, or the body after the
+joint, has different poses in A
 and B. Therefore, B is the same as A, with two exceptions: some axes are different, and a rigid motion L is
 inserted before some joints:
 
@@ -29,10 +30,10 @@ and only if nothing differs. There is one exception: two revolute joints on a co
 of their rotations differently.
 
 **Variables.** The joint values of A and of B are linear functions of shared variables. Each coordinate of A
-is a variable. The coordinates of B are computed from these variables, with the senses and zeros of the
-joints. Each joint value of A or B is therefore a constant plus a multiple of one variable. If a joint can
-move independently only in B, its coordinate is a separate variable. Examples are a joint that is a mimic
-joint in A, and a joint that is fixed in A.
+is a variable. The senses and zero offsets of the joints convert these variables to the coordinates of B. Each
+joint value of A or B is therefore a constant plus a multiple of one variable. If a joint can move
+independently only in B, its coordinate is a separate variable. Examples are a joint that is a mimic joint in
+A, and a joint that is fixed in A.
 """
 
 from __future__ import annotations
@@ -146,7 +147,7 @@ class JointTransform:
         return coordinates_of(kind, self.before @ (np.linalg.inv(P) if self.back else P) @ self.behind)
 
     def holds_for(self, kind: JointKind) -> bool:
-        """Return whether M and N are rigid and the joint can reach M P N.
+        """Return whether M and N are rigid motions, and M P N is a possible pose of the joint.
 
         The function tests two poses P: the identity and a generic pose.
         """
@@ -192,7 +193,7 @@ def turn_in_plane(P: FloatArray) -> FloatArray:
 
 
 def onto_plane(P: FloatArray) -> FloatArray:
-    """Return the pose (4, 4) in the plane that is nearest to another pose."""
+    """Return the planar pose (4, 4) that is nearest to a pose."""
     return pose_of(JointKind.PLANAR, coordinates_of(JointKind.PLANAR, P))
 
 
@@ -290,9 +291,9 @@ class Mechanism:
         return known
 
     def in_order(self, names: Sequence[str]) -> Mechanism:
-        """Return the same mechanism with consecutive joints in another order that gives the same motion.
+        """Return a mechanism with some consecutive joints in another order. The motion stays the same.
 
-        Links between reordered joints belong to no body in the result.
+        The result has no bodies for the links between these joints.
 
         Args:
             names: Names of consecutive joints in their new order, from the inner body outwards.
@@ -311,7 +312,7 @@ class Mechanism:
         return other
 
     def may_be_taken(self, names: Sequence[str], tolerance: Tolerance) -> bool:
-        """Return whether the named joints are consecutive and all pairs that change places commute."""
+        """Return whether the joints are consecutive and this order leaves the motion unchanged."""
         joints = [self.tree.joint_index(name) for name in names]
         run = [edge for edge in self.edges if edge.joint in joints]
         one_line = all(
@@ -329,7 +330,9 @@ class Mechanism:
     def orders_of_runs(self, tolerance: Tolerance) -> Iterator[Iterator[list[str]]]:
         """For each run of consecutive joints, yield the joint orders that give the same motion."""
         run: list[Edge] = []
-        for edge in self.edges:  # depth first: a run ends at a body with several child joints
+        for edge in (
+            self.edges
+        ):  # the order is depth first; a sequence of joints ends at a body with several child joints
             if run and edge.inner == run[-1].outer and len(self.edges_of[edge.inner]) == 2:
                 run.append(edge)
                 continue
@@ -338,9 +341,9 @@ class Mechanism:
         yield self._orders(run, tolerance)
 
     def _orders(self, run: Sequence[Edge], tolerance: Tolerance) -> Iterator[list[str]]:
-        """Yield all joint orders that exchanges of commuting neighbours produce.
+        """Yield all orders of joints with the same motion.
 
-        The given order comes first.
+        Neighbours are exchanged if they commute. The given order comes first.
         """
         if not run:
             yield []
@@ -483,8 +486,8 @@ class FramePair:
         previous: Index of the last step on the path to the links; -1 if no joint moves the links.
         home: (4, 4) pose of A's link in the zero configuration.
         end: (4, 4) the rigid motion L that is inserted after the last joint, in A's zero configuration.
-        tilt: Angle (rad) between the frames of A's link and B's link on the matched body.
-        shift: Distance (m) between the origins of these two frames on the matched body.
+        tilt: Angle (rad) between the frame of A's link and the frame of B's link.
+        shift: Distance (m) between the origins of these two frames.
         tool: (4, 4) pose of B's link in the frame of A's link, if B's link counts as a different end-effector
             frame on the same body.
     """
@@ -499,7 +502,7 @@ class FramePair:
     tool: FloatArray = field(default_factory=lambda: IDENTITY)
 
     def put_right(self) -> FramePair:
-        """Return the same pair, but count B's frame as a different end-effector frame on the same body."""
+        """Return a pair that describes the difference as a different end-effector frame of B."""
         tool = inverse(self.home) @ self.end @ self.home
         return replace(self, end=IDENTITY, tilt=0.0, shift=0.0, tool=tool)
 
@@ -559,10 +562,7 @@ class Alignment:
 
     @property
     def inner_off(self) -> tuple[float, float]:
-        """Smallest and largest difference (m) of matched joint axes and of matched links with child joints.
-
-        Pairs that agree are not counted. If all pairs agree, the two results are 0.
-        """
+        """Smallest and largest difference (m) between matched axes or matched links with child joints."""
         carry = [{joint.parent for joint in m.tree.joints} for m in (self.a, self.b)]
         links = [one for one in self.frames if one.a in carry[0] or one.b in carry[1]]
         off = [(step.tilt, step.shift) for step in self.steps] + [(link.tilt, link.shift) for link in links]
@@ -579,7 +579,7 @@ class Alignment:
     def gauge(self) -> Gauge:
         """The free choices of this alignment.
 
-        The free choices contain no joint orders, because the joints of `b` are already in the chosen order.
+        They contain no order of joints, because the joints of `b` already have the chosen order.
         """
         joints = self.a.tree.joints
         return Gauge(
@@ -590,10 +590,10 @@ class Alignment:
         )
 
     def exchangeable(self, given: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
-        """Yield two joint pairs at a time whose partners in B could be exchanged.
+        """Yield two pairs of matched joints whose partners in B could be exchanged.
 
-        Both pairs are at the same body. The user named no partner for their joints of A, and B has no joints
-        with the same names. A joint or link that differs follows on the path after each of these pairs.
+        Four conditions hold. Both pairs are attached to the same body. The user did not match their joints.
+        The names of A's joints do not occur in B. Below each pair, a joint or a link differs.
         """
         known_names = {joint.name for joint in self.b.tree.joints} | set(given)
         ends = [i for i, step in enumerate(self.steps) if step.differs]
@@ -606,15 +606,15 @@ class Alignment:
                     yield frozenset(((one.a, one.b), (other.a, other.b)))
 
     def frames_of(self, pairs: Sequence[tuple[int, int]]) -> list[FramePair]:
-        """Return pairs of links, one of A and one of B on aligned bodies, as frame pairs."""
+        """Make a `FramePair` for each pair of a link of A and a link of B on matched bodies."""
         on = {(self.a.body_of[frame.a], self.b.body_of[frame.b]): frame for frame in self.frames}
         rounding = tolerance_of(self.a, self.b)
         found = []
         for a, b in pairs:
             if (known := on.get((self.a.body_of[a], self.b.body_of[b]))) is None:
                 continue
-            # Any known frame pair on the body gives the motion from B's body in B's zero configuration to A's
-            # body.
+            # A known frame pair on the body gives the transform from B's body to A's body in the zero
+            # configuration.
             T_a_b = known.end @ known.home @ known.tool @ inverse(self.b.homes[known.b])
             home, at = self.a.homes[a], T_a_b @ self.b.homes[b]
             tilt, shift = apart(home, at)
@@ -645,17 +645,16 @@ class Alignment:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gauge:
-    """Prescribed values of the free choices: the pose of B's root, and the sense and zero of each joint.
+    """The free choices of an alignment: B's root pose, and each joint's sense and zero offset.
 
     Attributes:
         base: A link of A and a link of B. The matcher begins at the bodies of these links. If this is None,
             it chooses the bodies by names.
         X: (4, 4) pose of B's root in A's root frame.
-        zeros: Sense and offset of joints of A, by name. All other joints have the sense 1 and the offset 0.0.
+        zeros: (sense, offset) of joints; the key is the name in A. For all other joints it is (1, 0.0).
         conversions: For each planar or floating joint whose coordinates in A and B differ: the conversion
             from A's coordinates to B's coordinates.
-        orders: New orders of consecutive joints of B. Each entry lists some consecutive joints in their new
-            order.
+        orders: Each entry lists some consecutive joints of B in their new order.
     """
 
     base: tuple[str, str] | None = None
@@ -665,8 +664,7 @@ class Gauge:
     orders: tuple[tuple[str, ...], ...] = ()
 
 
-#: Free choices that change nothing: the roots of A and B have the same pose, and the coordinates of A and B
-#: are equal.
+#: The choices for models that are compared as they are written: equal root poses, equal coordinates.
 AS_WRITTEN = Gauge()
 
 
@@ -689,11 +687,14 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """The joint values of one step in models A and B, expressed with the sense and zero of A's joint."""
+    """The values of two matched joints, as functions of the variables.
+
+    Both have the sense and the zero of A's joint.
+    """
 
     a: Line
     b: Line
-    #: Sense and offset for the value of B's joint in B's own coordinates, which is sense * b + offset.
+    #: (sense, offset) for the conversion to B's own coordinate, which is sense * b + offset.
     written: Line
     #: Because of rounding, the two constants may differ by this value (rad or m), in addition to the rounding
     #: error of one step.
@@ -831,8 +832,8 @@ class _Maker:
 
         The constant of a mimic rule depends on the zeros of two joints. Each joint zero is computed from
         poses at the end of a path. The tolerance for the constants is therefore the sum of the rounding
-        errors of all steps of the path. A slope does not depend on a zero, so its tolerance is the rounding
-        error of one step.
+        errors of all steps of the path. The slope of a mimic rule does not depend on zero offsets, so its
+        tolerance is the rounding error of one step.
         """
         same = a.variable == b.variable or not (a.slope or b.slope)
         one = self._one_step(a)

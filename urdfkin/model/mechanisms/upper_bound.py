@@ -2,16 +2,16 @@
 
 Support functions. The support function of a set W of points is h(u) = max over p in W of u . p. A bound on
 distances needs only h. If a joint moves W, the new support function h' follows from h. Suppose that W rotates
-about an axis by any angle of a range. If u is rotated back by these angles, it takes a range of directions.
-Then h'(u) is the largest h over these directions. If W translates, h'(u) is h(u) plus the largest product of
-u and the translation. Therefore, one function of the direction describes the reach of a chain with any number
-of joints. No search over joint values is necessary.
+about an axis by any angle of a range. Rotate u by the negative angles; this gives a range of directions.
+h'(u) is the largest h over these directions. If W translates, h'(u) is h(u) plus the largest product of u and
+the translation. Therefore, one function of the direction describes the reach of a chain with any number of
+joints. No search over joint values is necessary.
 
 The values of h are stored at the points of a grid on the surface of a cube. The function h is convex, and h(s
 u) = s h(u) for s >= 0, so interpolation between grid points gives an upper bound. For a rotation, the
 directions form an arc. The arc lies in a circumscribed polygon, and h on the polygon is largest at a corner.
-At each joint, the grid makes the bound too large by a relative error. This error decreases with the square of
-the distance between grid points.
+The interpolation makes the bound too large at each joint. This relative error is proportional to the square
+of the distance between grid points.
 
 Recursion. Let y be the position of B's frame if only the joints after joint i move. Let d be y minus the
 position of A's frame. The motions of joint i and its L change d to
@@ -19,10 +19,11 @@ position of A's frame. The motions of joint i and its L change d to
     d' = (L - 1) e(S' t') y  +  (e(S' t') - e(S t')) y  +  (e(S t') - e(S t)) y  +  e(S t) d.
 
 If nothing differs at the joint, all terms but the last are 0. For each direction u, the maximum of u . d' is
-at most the sum of the maxima of u times each term. The support functions of y and d give these maxima. If the
-models have a single difference, there is a single term, and only the grid makes the bound larger than the
-true maximum. Several differences may be largest in different configurations, so their bound is larger than
-the true maximum. If only fixed offsets differ, a sum of path lengths gives a second bound without grid error.
+at most the sum of four maxima, one for each term. These maxima follow from the support functions of y and d.
+If the models differ at one joint, only the interpolation makes the bound larger than the true maximum. If
+they differ at several joints, the terms may have their maxima in different configurations, which makes the
+bound larger still. If only fixed offsets differ, there is a second bound without interpolation: a sum of
+lengths.
 """
 
 from __future__ import annotations
@@ -59,7 +60,7 @@ class Grid:
 
     Attributes:
         cells: Number of cells along an edge of a face.
-        segments: Number of sides of a polygon that is circumscribed about a full circle of directions.
+        segments: A circle of directions is replaced by a circumscribed polygon with this number of sides.
     """
 
     cells: int
@@ -134,7 +135,7 @@ class Support:
         return np.where(largest > 0.0, found, 0.0).reshape(u.shape[:-1])
 
     def turned(self, screw: Screw, low: float, high: float) -> Support:
-        """Return the support function of the set after rotations about a screw by all angles of a range."""
+        """Rotate the set about a screw by all angles of a range. Return the support function of the union."""
         angles, factors = np.array(_corners(low, high, self.grid.segments)).T
         G = self.grid.points
         centred = Support(self.grid, self.values - G @ screw.point)
@@ -155,7 +156,9 @@ class Support:
         return self.at(along + across)
 
     def slid(self, direction: FloatArray, low: float, high: float) -> Support:
-        """Return the support function of the set after translations along a direction.
+        """Translate the set along a direction by all distances of a range.
+
+        Return the support function of the union.
 
         The set is translated by every distance (m) from `low` to `high`.
         """
@@ -295,7 +298,7 @@ def _off(L: FloatArray, reach: float) -> float:
 
 
 def at_the_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
-    """Return the support functions of d and y after the last joint."""
+    """Return the support functions of d and y at the frame, after the last joint."""
     p, end = frame.home[:3, 3], frame.end
     y = end[:3, :3] @ p + end[:3, 3]
     return point(grid, y - p), point(grid, y)
@@ -304,7 +307,7 @@ def at_the_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
 def passed(
     step: Step, pair: Pair | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
-    """Compute the support functions of d and y before a step from the support functions after the step."""
+    """Compute the support functions of d and y before a joint from those after the joint."""
     # A planar or floating joint has no limits, so it may rotate d into any direction.
     # The largest value of d's support function therefore holds for all directions.
     if pair is None:
@@ -340,7 +343,7 @@ def difference(step: Step, pair: Pair, variables: Variables, y: Support, d: Supp
 
 
 def _prismatic_difference(step: Step, pair: Pair, variables: Variables, grid: Grid) -> Support:
-    """Return the support function of the difference between the translations of two prismatic joints.
+    """Return the support function of the difference between the translations by two matched prismatic joints.
 
     The difference is largest at the ends of the ranges.
     """
@@ -382,16 +385,16 @@ def _values(pair: Pair, variables: Variables, grid: Grid) -> FloatArray | None:
 
 
 def _common_difference(step: Step, pair: Pair, z: FloatArray, y: Support, d: Support) -> Support:
-    """Return the support function of the difference of two matched joints that the same variable moves.
+    """Return the support function of the difference between two revolute joints with one variable.
 
     Consider two neighbouring values of the variable, which differ by h. For all values between these two
     values, the bound is the sum of two terms. The first term is the larger of the two bounds at the
     neighbouring values. The second term is h^2/8 times the largest second derivative. For t' = t + c the
     second derivative is, up to its sign, R' P' x' - R P x. Here x is the vector from the axis to y, P
     projects perpendicular to the axis, and R' rotates about the other axis: |R' - R| <= 2 |u' - u| + |c|, |P'
-    - P| <= |u' - u|, and the perpendicular part of x' - x is the offset of the axes. If t' is not t + c, each
-    of the two rotations has its own second derivative, multiplied by its squared slope. The second derivative
-    of the difference is at most the sum of these two.
+    - P| <= |u' - u|, and the perpendicular part of x' - x is the offset of the axes. Otherwise each rotation
+    has its own second derivative, multiplied by the square of the slope of t or t'. The second derivative of
+    the difference is at most the sum of these two.
     """
     G = y.grid.points
     axis, other = step.axis, step.other
@@ -424,8 +427,8 @@ def _independent_difference(step: Step, pair: Pair, variables: Variables, y: Sup
 
     The joint has different variables in A and B, or its variable has no limits.
 
-    If the axes in A and B are equal, the bound is the chord of the largest difference between t' and t. If
-    the axes differ, the bound is the sum of the full ranges of the two rotations.
+    If A and B have the same axis, the difference is at most the chord of the largest angle between t' and t.
+    If the axes differ, the bound is the sum of the full ranges of the two rotations.
     """
     G, u = y.grid.points, step.axis.direction
     if step.other is not step.axis:
