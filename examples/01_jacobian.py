@@ -1,6 +1,7 @@
 """Compute the Jacobian at a pose given by joint names, and interpret one of its columns.
 
-Learn: joints by name, units, the order of rows and columns, and the automatic check.
+You learn how to name joints, which units apply, how rows and columns are ordered, and how results are
+    checked.
 """
 
 import numpy as np

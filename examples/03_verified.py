@@ -1,6 +1,6 @@
 """Read the certificate of verified results, and make the check cheaper.
 
-Learn: `verify` for a single call, and `certificate()`, the record of all calls with the worst disagreement.
+You learn how to check a single call with `verify`, and how `certificate()` lists all checked calls.
 """
 
 import urdfkin

@@ -1,6 +1,6 @@
 """Split an acceleration into its transverse, centripetal, Coriolis and sliding parts, by joint.
 
-Learn: accelerations are classical, and the parts of 7.130 add up to the acceleration.
+You learn that accelerations are classical, and that the terms of equation 7.130 add up to the acceleration.
 """
 
 import numpy as np

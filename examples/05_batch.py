@@ -1,7 +1,7 @@
 """Compute a hundred thousand Jacobians in one call, and write them into an existing array.
 
-Learn: every function accepts any leading batch shape; `out=` avoids an allocation; `verify="sample"`
-checks only a sample, which is fast.
+You learn that every function accepts any leading batch shape. `out=` avoids the allocation of a result.
+`verify="sample"` saves time, because it checks only a sample.
 """
 
 import time
@@ -13,7 +13,7 @@ import urdfkin
 robot = urdfkin.load("panda")
 q = robot.sample(100_000, seed=0)  # (100000, 8)
 J = np.empty((len(q), 6, robot.nv))
-robot.jacobian(q[:1], "panda_hand", verify=False)  # compiles the kernel, once on a machine
+robot.jacobian(q[:1], "panda_hand", verify=False)  # compiles the kernel; the cache keeps it
 
 start = time.perf_counter()
 robot.jacobian(q, "panda_hand", out=J, verify="sample")

@@ -1,6 +1,6 @@
 """Compute one velocity in three reference frames, and convert between them.
 
-Learn: LOCAL, WORLD and LOCAL_WORLD_ALIGNED have the same meaning as in Pinocchio.
+You learn that LOCAL, WORLD and LOCAL_WORLD_ALIGNED have the same meaning as in Pinocchio.
 """
 
 import numpy as np

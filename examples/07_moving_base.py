@@ -1,6 +1,6 @@
 """Compute the motion of a robot on a moving base.
 
-Learn: pass a known motion of the base as `BaseMotion`, or add its coordinates with a floating root joint.
+You learn two ways: pass a known motion of the base as `BaseMotion`, or add a floating root joint.
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """Use mimic joints: a finger that mimics another one has no coordinate.
 
-Learn: `q` has no mimic joints. The motion of a mimic joint is part of the column of the mimicked joint.
+You learn that `q` contains no mimic joints. The motion of a mimic joint is part of the column of the mimicked joint.
 `mimic=False` makes mimic joints free.
 """
 

@@ -1,6 +1,6 @@
 """Check your own URDF in CI: first its text, then every quantity of every frame against Pinocchio.
 
-Learn: `check` checks the text, `validate` the numbers. Commands with the same names work without Python.
+You learn that `check` checks the text and `validate` checks the numbers. Commands with these names do the same.
 """
 
 import urdfkin

@@ -246,10 +246,10 @@ def _seconds(store: Store, counts: dict[int, tuple[int, bool]]) -> float | None:
 @click.argument("folder", metavar="DIR", type=_FOLDER)
 @click.argument("stores", metavar="STORE...", nargs=-1, required=True, type=_FOLDER)
 def merge(folder: Path, stores: tuple[Path, ...]) -> None:
-    """Merge other stores of the same campaign into DIR.
+    """Merge other stores of the same validation into DIR.
 
-    The stores can be the shards of several machines. Results of the accuracy study are copied too. Each file
-    is read and checked; damaged files are reported and skipped. DIR is made if it does not exist.
+    For example, several machines each computed a part. Results of the accuracy study are copied too. Each
+    file is read and checked; damaged files are reported and skipped. DIR is made if it does not exist.
     """
     from urdfkin.validation.accuracy_store import AccuracyResult  # noqa: PLC0415  keeps --help fast
     from urdfkin.validation.store import Store, opened  # noqa: PLC0415

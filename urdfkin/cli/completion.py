@@ -1,8 +1,8 @@
 """Shell completion of commands, options, robots, files, frames, tables, codes and equations.
 
 Completion runs at each press of the Tab key, so it imports nothing heavy and reads only the names in a file.
-Names with characters that a shell interprets are not offered. A robot's file may come from a stranger, and
-the shell runs the completed command line.
+Names with characters that a shell interprets are not offered. The names come from files that may be hostile,
+and the shell interprets the completed command line.
 """
 
 from __future__ import annotations

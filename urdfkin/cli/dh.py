@@ -196,7 +196,7 @@ def command(robot: str, verify: bool, **options: Any) -> Answer:
     """Write the Denavit-Hartenberg table of the path between two frames. Pinocchio checks the table.
 
     The path may lead down the tree, up, or through the common ancestor. The table has the file's angles and
-    lengths, without rounding. --snap rounds angles; the table then states a bound of the tip's motion. ROBOT
+    lengths, without rounding. --snap rounds angles, and prints a bound on the displacement of the tip. ROBOT
     is a path, a name that `urdfkin robots` lists, - for standard input, or a table (.toml, .json, .csv, .tsv,
     .md, .tex, .txt). If ROBOT is a table, its numbers stay the same, in the chosen convention. With options
     that choose rows, a new table is derived from the table's robot. See `urdfkin explain urdf-to-dh`.

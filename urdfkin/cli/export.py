@@ -72,7 +72,7 @@ def command(
     verify: bool,
     output: Path | None,
 ) -> None:
-    """Write a frame's kinematics as straight-line code for one robot, with its proof in the file.
+    """Write a frame's kinematics as code without loops, for one robot, with test vectors in the file.
 
     The robot's constants are part of the code, and each joint's sine and cosine are computed once. The
     expressions are compared with Pinocchio before they are written. The file states how closely they agree.

@@ -374,7 +374,7 @@ def read_motion(robot: Robot, path: Path, convention: str | None) -> Trajectory:
 
 
 def tell_notes(motion: Trajectory) -> None:
-    """Write the notes of a trajectory to stderr, and the origin of v and a if they are computed."""
+    """Write the notes of a trajectory to stderr. If v and a were computed, write how."""
     for note in motion.notes:
         say(f"warning: {note}", err=True)
     if motion.rates != "as given":
@@ -563,7 +563,7 @@ def read_batch(
     also state a unit.
 
     Returns:
-        The (n, width) numbers, and the layout with as many columns as the file.
+        The numbers (n, columns), and the layout that fits the number of columns in the file.
     """
     import numpy as np  # noqa: PLC0415  keeps --help fast
 

@@ -41,7 +41,8 @@ _SUFFIXES = {
     "json": ".json", "csv": ".csv", "npy": ".npy", "table": ".txt", "markdown": ".md", "html": ".html",
     "latex": ".tex",
 }  # fmt: skip
-#: Largest width of a table in characters. The limit saves memory, because cells are padded.
+#: Largest width of a table in characters. Without a limit, one long cell would pad all other cells and fill
+#: the memory.
 _WIDEST = 10_000
 
 output_option = click.option(

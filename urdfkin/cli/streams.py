@@ -191,7 +191,7 @@ class SafeStream:
         before = len(self._line)
         whole = self._line + piece
         at = [m.start(1) for command in COMMANDS for m in command.finditer(whole) if m.start(1) >= before]
-        # Of a long line, keep only its end; an "x" before the end means that the line is not blank.
+        # If the line is long, store only its end. An "x" replaces the beginning if it is not blank.
         self._line = whole if len(whole) <= _STORED else ("x" if whole.strip() else "") + whole[-16:]
         return "".join(escape(c) if before + k in at else c for k, c in enumerate(piece)) if at else piece
 

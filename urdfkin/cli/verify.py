@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from urdfkin.validation.functions import FunctionCheck
 
-#: Quantities that a user's function may compute: commands with one result for each configuration.
+#: Names of the quantities that can be checked. Each has one result for each configuration.
 _QUANTITIES = ("placement", "velocity", "jacobian", "jacobian-rate", "hessian", "acceleration", "imu")
 
 

@@ -61,7 +61,7 @@ def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6, work: int =
 class Question(Enum):
     """A section of docs/questions.md, by the anchor of its heading.
 
-    The text of a question is the command that prints the section:
+    If you print a question, you see the command that prints its section:
 
     >>> print(Question.MIMIC_JOINTS)
     see `urdfkin explain mimic-joints`

@@ -178,7 +178,8 @@ class TextDocument:
 
     Attributes:
         title: The title; empty if the document has no title.
-        parts: Sentences, tables and matrices, in order. An empty sentence is a blank line in plain text.
+        parts: Sentences, tables and matrices, in order. In plain text, an empty string is printed as a blank
+            line.
     """
 
     title: str

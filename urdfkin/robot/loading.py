@@ -80,7 +80,8 @@ def load(  # noqa: PLR0911  one branch per kind of source
             False: no comparison.
         mimic: True: mimic joints follow the mimicked joints, as the URDF states. False: each mimic joint
             moves freely. None: True, except for catalogue robots with unusable mimic rules.
-        root_joint: "floating" or "planar" connects the root link to the world by that joint. None: fixed.
+        root_joint: Kind of the joint between the world and the root link: "floating" or "planar". None: the
+            root link is fixed.
         xacro_args: Arguments for a .xacro file, which is expanded first (needs the extra `xacro`).
         oracle: Oracle that checks quantities, "pinocchio" or "mujoco" (needs the extra `mujoco`).
         lock: Value (rad or m) of each joint to lock, such as `{"finger": 0.04}`; see `Robot.locked`.

@@ -662,8 +662,8 @@ def _check_columns(
         )
 
 
-#: Largest difference (rad) between the angles of a column that was wrapped to one turn.
-#: It includes a margin for angles that are rounded to two decimals.
+#: If the angles of a column were wrapped to one turn, they differ by at most this value (rad). It includes a
+#: margin for angles that are rounded to two decimals.
 _ONE_TURN = math.tau + 0.02
 #: If the angle (rad) between two samples exceeds this value, the direction of the rotation is ambiguous. The
 #: rotation in the other direction is then less than twice as large.

@@ -34,8 +34,8 @@ from urdfkin.system.files import MOST_DATA, read_bytes, read_if_there
 _CHECKSUM_VERSION = "sealed with its name"
 _A_MONTH = 30 * 24 * 3600.0
 _USED = ".used"
-#: User ids that may own the parent folders: 0 (root) and 65534. Inside a container, the root user of the host
-#: has the id 65534.
+#: User ids that may own the parent folders: 0 (root) and 65534. A container may show the root user of the
+#: host as 65534.
 _TRUSTED = (0, 65534)
 
 

@@ -82,7 +82,7 @@ def install_remedy(extra: str) -> str:
 
 
 def own_version() -> str:
-    """Return the version of urdfkin; "of a checkout" if urdfkin is not installed."""
+    """Return the version of urdfkin. If urdfkin is not installed, return the text "of a checkout"."""
     return installed_version("urdfkin") or "of a checkout"
 
 

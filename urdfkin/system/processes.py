@@ -100,7 +100,7 @@ def ask_python(command: list[str], request: bytes, patience: float, most: int) -
 def not_reading(settings: str) -> Iterator[None]:
     """Hide a settings file in the current folder from libraries.
 
-    If the file exists, the process changes to the root folder inside the context. Otherwise nothing happens.
+    If the file exists, the current folder is `/` until the `with` block ends. Otherwise nothing changes.
 
     Args:
         settings: Name of the settings file.

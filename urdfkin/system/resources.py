@@ -58,7 +58,7 @@ def example_robots_dir() -> Path:
 
 def _example_candidates() -> Iterator[Path]:
     below = Path("share", "example-robot-data", "robots")
-    from importlib import metadata  # noqa: PLC0415  its imports take as long as a robot takes to load
+    from importlib import metadata  # noqa: PLC0415  this import is as slow as loading a robot
 
     try:
         distribution = metadata.distribution("example-robot-data")
