@@ -1,7 +1,7 @@
 """Compare a URDF with the Denavit-Hartenberg table that its vendor publishes.
 
-You learn that `compare` first fits the base, the tool and the zero positions of the table. It then compares the
-cells of the table, and the positions of the tip in mm.
+You learn that `compare` first fits the base, the tool and the zero positions of the table. It then compares
+the cells of the table, and the positions of the tip in mm.
 """
 
 from dataclasses import replace

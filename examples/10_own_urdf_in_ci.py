@@ -1,6 +1,6 @@
 """Check your own URDF in CI: first its text, then every quantity of every frame against Pinocchio.
 
-You learn that `check` checks the text and `validate` checks the numbers. Commands with these names do the same.
+You learn that `check` checks the text and `validate` checks the numbers. Two commands have the same names.
 """
 
 import urdfkin

@@ -1,6 +1,6 @@
 """Find a frame's largest velocity, largest acceleration and smallest singular value along a trajectory.
 
-Learn: a motion from rest to rest, one call for the whole motion of a frame, and Pinocchio's check.
+You learn to plan a motion from rest to rest, to compute the whole motion of a frame, and to check it.
 """
 
 import numpy as np

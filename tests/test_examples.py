@@ -22,7 +22,7 @@ def test_an_example_runs_and_prints_what_it_found(
 def test_an_example_is_short_and_says_what_one_learns(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     assert len(text.splitlines()) <= 40
-    assert "\nLearn: " in (ast.get_docstring(ast.parse(text)) or "")
+    assert "\nYou learn " in (ast.get_docstring(ast.parse(text)) or "")
 
 
 def test_examples_are_numbered_without_a_gap() -> None:
