@@ -91,22 +91,6 @@ def test_a_chain_of_followers_is_read_in_linear_time_both_times() -> None:
     grows_like_its_size(read, 100_000)
 
 
-def test_a_chain_of_followers_is_multiplied_out() -> None:
-    rules = [('<mimic joint="j0" multiplier="2" offset="3"/>', 0), ('<mimic joint="j1" multiplier="5"/>', 1)]
-    joint = (
-        '<joint name="j{i}" type="continuous"><parent link="l{i}"/><child link="l{c}"/>'
-        '<axis xyz="0 0 1"/>{rule}</joint>'
-    )
-    rows = [joint.format(i=i, c=i + 1, rule=rule) for i, rule in enumerate(["", *(r for r, _ in rules)])]
-    links = "".join(f'<link name="l{i}"/>' for i in range(4))
-    text = f'<robot name="r">{links}{"".join(reversed(rows))}</robot>'
-    tree = tree_of(text.encode())
-    again = rules_of_text(text, [joint.name for joint in tree.joints])
-    for mimic in (tree.joints[2].mimic, again[tree.joints[2].name]):
-        assert mimic is not None
-        assert (mimic.leader, mimic.multiplier, mimic.offset) == ("j0", 10.0, 15.0)
-
-
 def test_of_a_text_only_the_beginning_is_kept() -> None:
     root = read_document(Reporter("f", b"<robot>" + b"some &lt; words " * 10_000 + b"</robot>"))
     assert root is not None

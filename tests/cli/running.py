@@ -53,6 +53,29 @@ def urdfkin(*words: str, stdin: str | bytes = b"") -> Done:
     return Done(code, out.getvalue(), err.getvalue())
 
 
+def good(*words: str, stdin: str | bytes = b"") -> Done:
+    """The same, of a command that ends with exit code 0."""
+    done = urdfkin(*words, stdin=stdin)
+    assert done.code == 0, done.err or done.text
+    return done
+
+
+def refused(*words: str, stdin: str | bytes = b"") -> str:
+    """The message of a command that is a mistake: exit code 2, nothing on standard output, no traceback."""
+    done = urdfkin(*words, stdin=stdin)
+    assert (done.code, done.out) == (2, b""), done.err or done.text
+    assert "Traceback" not in done.err
+    return done.err
+
+
+def python(code: str, *words: str, check: bool = True, **how: Any) -> subprocess.CompletedProcess[str]:
+    """A program in a process of its own, which succeeds unless `check` is false."""
+    command = [sys.executable, "-c", code, *words]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, **how)
+    assert done.returncode == 0 or not check, done.stderr
+    return done
+
+
 @contextmanager
 def _streams(
     words: tuple[str, ...], stdin: io.TextIOWrapper, stdout: io.TextIOWrapper, stderr: io.StringIO
