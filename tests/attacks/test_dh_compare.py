@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests.cli.running import good
 from tests.cli.running import urdfkin as command
 from urdfkin.dh import DHTable, dh_table, read_table, units_of
 from urdfkin.dh.compare import compare, document
@@ -203,8 +204,7 @@ def test_the_kinova_sheet_is_said_to_be_rounded() -> None:
 def test_the_command_knows_no_fit(tmp_path: Path) -> None:
     file = tmp_path / "wrong.toml"
     file.write_text(reference_path("ur5").read_text().replace("0.089159", "0.099159"))
-    fitted = command("dh", "ur5", "--compare", str(file))
-    assert fitted.code == 0
+    fitted = good("dh", "ur5", "--compare", str(file))
     assert "Every cell" not in fitted.text
     assert "10 mm" in fitted.text
     assert command("dh", "ur5", "--compare", str(file), "--no-fit").code == 1

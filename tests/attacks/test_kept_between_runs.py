@@ -1,4 +1,4 @@
-"""What is kept between runs: damage is mended, a full disc ends nothing, what a stranger keeps is not run."""
+"""Files kept between runs: damage is mended, a full disc ends nothing, old files go, a stranger's are not run."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import signal
 import stat
 import subprocess
 import sys
+import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,9 @@ import numpy as np
 import pytest
 
 from tests.cli.running import Done, process
+from urdfkin import compiled as recursion
+from urdfkin import kinematics
+from urdfkin.compiled import kept, machine
 from urdfkin.compiled.machine import compiling
 from urdfkin.compiled.machine.compiling import NUMBERS, Kernel
 from urdfkin.system import cache
@@ -348,3 +352,95 @@ def test_a_folder_that_can_only_be_read_is_still_read(
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert kept_folder("kernels", [], root=tmp_path) == folder
+
+
+# -- a folder for each state of the sources --------------------------------------------------------
+
+
+@pytest.mark.parametrize("changed", [0, 1, 2])
+def test_a_change_in_any_source_leads_to_another_folder(changed: int, tmp_path: Path) -> None:
+    sources = [tmp_path / f"{name}.py" for name in "abc"]
+    for source in sources:
+        source.write_text("x = 1")
+    before = kept_folder("kernels", sources, root=tmp_path)
+    sources[changed].write_text("x = 2")
+    assert kept_folder("kernels", sources, root=tmp_path) not in (before, None)
+
+
+@pytest.mark.parametrize(
+    ("module", "ask", "needed"),
+    [
+        (cache, kept.cache_folder, [recursion, machine, kinematics]),
+    ],
+    ids=["kernels"],
+)
+def test_every_file_of_the_part_is_among_the_sources(
+    module: Any, ask: Any, needed: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[Path] = []
+
+    def noting(kind: str, sources: Iterable[Path], *besides: str, root: Path | None = None) -> Path:
+        seen.extend(sources)
+        return tmp_path
+
+    monkeypatch.setattr(module, "kept_folder", noting)
+    uncached: Callable[[], Path | None] = ask.__wrapped__
+    assert uncached() == tmp_path
+    files = {path for each in needed for path in _files(Path(str(each.__file__)))}
+    assert len(files) > 5
+    assert files <= set(seen)
+
+
+def _files(path: Path) -> list[Path]:
+    return sorted(path.parent.glob("*.py")) if path.stem == "__init__" else [path]
+
+
+def test_even_whom_one_trusts_above_a_folder_may_not_own_the_folder_itself(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    owner = tmp_path.stat().st_uid
+    assert cache._unsafe_reason(tmp_path) is None
+    monkeypatch.setattr(cache, "_TRUSTED", (0, owner))
+    monkeypatch.setattr("os.geteuid", lambda: owner + 1)
+    assert str(cache._unsafe_reason(tmp_path)).startswith(f"{tmp_path} belongs to another user")
+
+
+def test_a_folder_is_the_same_until_its_sources_or_anything_beside_them_change(tmp_path: Path) -> None:
+    source = tmp_path / "source.py"
+    source.write_text("a")
+    first = kept_folder("things", [source], "1.0", root=tmp_path)
+    assert first == kept_folder("things", [source], "1.0", root=tmp_path)
+    others = [
+        kept_folder("things", [source], "1.1", root=tmp_path),
+        kept_folder("trees", [source], root=tmp_path),
+    ]
+    source.write_text("b")
+    others.append(kept_folder("things", [source], "1.0", root=tmp_path))
+    assert len({first, *others}) == 4
+    assert all(folder is not None and folder.is_dir() for folder in (first, *others))
+
+
+def test_what_nobody_used_for_a_month_is_deleted_and_nothing_else(tmp_path: Path) -> None:
+    def made(kind: str, state: str) -> Path:
+        folder = kept_folder(kind, [], state, root=tmp_path)
+        assert folder is not None
+        return folder
+
+    old, recent, other = made("kernels", "old"), made("kernels", "recent"), made("trees", "old")
+    foreign = tmp_path / "kernels-of-somebody-else"
+    foreign.mkdir()
+    (old / "kernel.nbc").write_bytes(b"compiled")
+    for folder, days in ((old, 30.1), (recent, 29.9), (other, 30.1)):
+        then = time.time() - days * 24 * 3600
+        os.utime(folder / ".used", (then, then))
+    used = made("kernels", "new")
+    assert not old.exists()
+    assert set(tmp_path.iterdir()) == {recent, other, foreign, used}
+    assert made("trees", "old") == other
+    assert other.exists()
+
+
+def test_a_root_that_cannot_be_written_gives_no_folder(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.warns(CacheWarning, match="the cache cannot be written in .*file: .*set XDG_CACHE_HOME"):
+        assert kept_folder("kernels", [], root=tmp_path / "file") is None

@@ -42,7 +42,7 @@ from urdfkin.validation.campaign import validate
 from urdfkin.validation.document import VALIDATION, Document
 from urdfkin.view.dh_drawing import drawing
 
-pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.urdf.findings.UrdfWarning")
+pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::urdfkin.urdf.findings.UrdfWarning")]
 
 Skeleton = list[tuple[str, tuple[str, ...]]]
 
@@ -129,12 +129,10 @@ def report(called: Callable[[str], str]) -> Document:
     return cast("Document", json.loads(_report(called)))
 
 
-@pytest.mark.slow
 def test_a_report_of_hostile_names_fits_the_schema() -> None:
     jsonschema.validate(report(same), VALIDATION.schema())
 
 
-@pytest.mark.slow
 def test_a_page_has_the_same_elements_attributes_and_scripts_under_any_names() -> None:
     hostile, plain = (_Elements(as_html(report(called))) for called in (same, tame))
     assert hostile.found == plain.found
@@ -146,7 +144,6 @@ def test_a_page_has_the_same_elements_attributes_and_scripts_under_any_names() -
     assert code[0] == code[1]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("html", [True, False])
 def test_a_comment_in_markdown_has_the_same_elements_under_any_names(html: bool) -> None:
     for write in (as_markdown, _compared):
@@ -162,7 +159,6 @@ def _compared(document: Document) -> str:
     return markdown_of(document, empty, compare(document, empty))
 
 
-@pytest.mark.slow
 def test_junit_has_the_same_elements_and_attributes_under_any_names() -> None:
     trees = [etree.fromstring(as_junit(report(called))) for called in (same, tame)]
     skeletons = [[(element.tag, sorted(element.attrib)) for element in tree.iter()] for tree in trees]
@@ -187,7 +183,6 @@ def table(name: str) -> DHTable:
     return replace(_table(), robot=name, base_frame=name, tip_frame=name, rows=rows)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", IN_XML)
 def test_what_was_snapped_is_told_with_names_as_words(kind: str) -> None:
     def page(name: str) -> _Elements:
@@ -200,7 +195,6 @@ def test_what_was_snapped_is_told_with_names_as_words(kind: str) -> None:
     assert page(IN_XML[kind]).found == page("tame_name").found
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("html", [True, False])
 @pytest.mark.parametrize("kind", NAMES)
 def test_a_table_in_markdown_has_the_same_elements_under_any_name(kind: str, html: bool) -> None:
@@ -239,7 +233,6 @@ def test_a_name_in_latex_is_words(kind: str) -> None:
     assert lines[0] == lines[1]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("form", ["sympy", "roboticstoolbox", "ets"])
 @pytest.mark.parametrize("kind", NAMES)
 def test_python_code_is_the_same_under_any_name(kind: str, form: str) -> None:
@@ -255,7 +248,6 @@ def test_python_code_is_the_same_under_any_name(kind: str, form: str) -> None:
     assert code(NAMES[kind]) == code("tame_name")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", NAMES)
 def test_code_with_a_proof_is_the_same_under_any_name_and_compiles(kind: str, tmp_path: Path) -> None:
     def code(name: str) -> list[str]:
@@ -288,7 +280,6 @@ def test_matlab_code_is_the_same_under_any_name(kind: str, form: str) -> None:
     assert code(NAMES[kind]) == code("tame_name")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("form", ["json", "toml", "csv"])
 @pytest.mark.parametrize("kind", NAMES)
 def test_a_table_that_is_read_back_has_its_names(kind: str, form: str, tmp_path: Path) -> None:
@@ -309,7 +300,6 @@ def test_no_spreadsheet_takes_a_name_for_a_formula(name: str) -> None:
         assert from_csv_cell(cell) == name
 
 
-@pytest.mark.slow
 def test_a_drawing_has_names_as_words_alone() -> None:
     def elements(called: Callable[[str], str]) -> list[Any]:
         names = [called(name) for name in IN_XML.values()]
@@ -324,7 +314,6 @@ def test_a_drawing_has_names_as_words_alone() -> None:
     assert elements(same) == elements(tame)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["J$$(x)", "$x^2$", "J$$", r"$\frac{", r"\$x$"])
 def test_dollars_in_a_name_are_no_mathematics(name: str) -> None:
     svg = etree.fromstring(drawing(table(name)).encode())

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from tests.attacks.hostile import IN_XML, NAMES, chain_of_all, urdf
-from tests.cli.running import Done, urdfkin
+from tests.cli.running import Done, good, urdfkin
 from urdfkin.cli import commands
 from urdfkin.cli.paths import SCREW_FORMATS as SCREWS
 from urdfkin.cli.streams import SafeStream
@@ -112,8 +112,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     folder.mkdir()
     made = {name: str(folder / f"{FILE}{ending}") for name, ending in ENDINGS.items()}
     Path(made["ROBOT"]).write_text(chain_of_all(), encoding="utf-8")
-    done = urdfkin("validate", made["ROBOT"], "--samples", "1", "--json", made["REPORT"])
-    assert done.code == 0, done.err
+    good("validate", made["ROBOT"], "--samples", "1", "--json", made["REPORT"])
     report = json.loads(Path(made["REPORT"]).read_text())
     entry = report["robots"][0]
     entry["source"] = NAMES["colours"] + NAMES["line"]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import urdfkin as library
-from tests.cli.running import urdfkin
+from tests.cli.running import refused, urdfkin
 from urdfkin.robot.trajectory import read_trajectory
 
 #: What Python's float takes, and nobody means.
@@ -21,18 +21,18 @@ MEANT = {"1": 1.0, "+1.5": 1.5, "-.5": -0.5, "1.": 1.0, "1e-3": 1e-3, " 2E+2 ": 
 
 @pytest.mark.parametrize("text", [text for text in NOT_MEANT if "," not in text])
 def test_it_is_refused_in_a_list_on_the_command_line(text: str) -> None:
-    done = urdfkin("placement", "ur5", "--q", f"0,0,{text},0,0,0")
-    assert done.code == 2
-    assert "--q, elbow_joint: not a finite number: found" in done.err
+    assert "--q, elbow_joint: not a finite number: found" in refused(
+        "placement", "ur5", "--q", f"0,0,{text},0,0,0"
+    )
 
 
 @pytest.mark.parametrize("text", NOT_MEANT)
 def test_it_is_refused_in_a_file_with_its_line_and_column(text: str, tmp_path: Path) -> None:
     path = tmp_path / "q.csv"
     path.write_text(f'0,0,0,0,0,0\n# a remark\n0,0,0,"{text}",0,0\n', encoding="utf-8")
-    done = urdfkin("placement", "ur5", "--q", f"@{path}")
-    assert done.code == 2
-    assert "q.csv:3, wrist_1_joint: not a finite number: found" in done.err
+    assert "q.csv:3, wrist_1_joint: not a finite number: found" in refused(
+        "placement", "ur5", "--q", f"@{path}"
+    )
 
 
 @pytest.mark.parametrize("text", NOT_MEANT)
@@ -61,9 +61,7 @@ def test_it_is_refused_as_an_option(
     words: tuple[str, ...], text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    done = urdfkin(*words, text)
-    assert done.code == 2
-    assert f"Invalid value for '{words[-1]}'" in done.err
+    assert f"Invalid value for '{words[-1]}'" in refused(*words, text)
 
 
 @pytest.mark.parametrize("count", ["1_0", "\u0661", "0", "-1", "1.5", ""])
@@ -104,9 +102,7 @@ def test_a_column_too_many_or_missing_is_told_with_file_line_and_name(
     content: str, message: str, tmp_path: Path
 ) -> None:
     (tmp_path / "q.csv").write_text(content)
-    done = urdfkin("placement", "ur5", "--q", f"@{tmp_path / 'q.csv'}")
-    assert done.code == 2
-    assert message in done.err
+    assert message in refused("placement", "ur5", "--q", f"@{tmp_path / 'q.csv'}")
 
 
 def test_columns_in_any_order_are_read_by_name_and_a_mistake_is_told_by_name(tmp_path: Path) -> None:

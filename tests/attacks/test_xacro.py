@@ -12,6 +12,7 @@ from urdfkin.urdf.confinement import Ground
 from urdfkin.urdf.expressions import RefusedError, evaluate
 from urdfkin.urdf.xacro import XacroError, expand
 
+pytestmark = pytest.mark.slow
 NAMESPACE = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
 SECRET = "hunter2"
 
@@ -72,7 +73,6 @@ REFUSALS = (
 )
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_an_expression_that_is_a_program_is_refused_by_name(expanded: Expand, program: str) -> None:
     ways = [as_eval(program)]
@@ -85,7 +85,6 @@ def test_an_expression_that_is_a_program_is_refused_by_name(expanded: Expand, pr
             expanded(inside)
 
 
-@pytest.mark.slow
 def test_eval_has_no_builtins(expanded: Expand, tmp_path: Path) -> None:
     mark = tmp_path / "mark"
     for program in (f"open('{mark}', 'w')", f"map(open, ['{mark}'], ['w'])", "open('/etc/passwd').read()"):
@@ -95,7 +94,6 @@ def test_eval_has_no_builtins(expanded: Expand, tmp_path: Path) -> None:
     assert 'name="3"' in expanded(as_eval("1 + 2"))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("expression", "value"),
     [
@@ -160,7 +158,6 @@ def refused(expanded: Expand, inside: str) -> str:
     return str(caught.value)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     ["../../neighbour/secret", "{tmp}/neighbour/secret", "../urdf/../../neighbour/secret", "link/secret"],
@@ -175,7 +172,6 @@ def test_files_of_others_are_not_read(expanded: Expand, secret: Path, tmp_path: 
         refused(expanded, f"<xacro:include {how.format(name)}/>")
 
 
-@pytest.mark.slow
 def test_a_folder_becomes_a_package_only_by_its_manifest_or_a_search_path(
     expanded: Expand, secret: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -189,14 +185,12 @@ def test_a_folder_becomes_a_package_only_by_its_manifest_or_a_search_path(
     assert SECRET in expanded(inside)
 
 
-@pytest.mark.slow
 def test_a_file_that_the_user_names_is_read(expanded: Expand, secret: Path) -> None:
     inside = '<xacro:arg name="file" default=""/>' + link("${xacro.load_yaml('$(arg file)')['password']}")
     assert SECRET in expanded(inside, file=str(secret))
     refused(expanded, inside.replace('default=""', f'default="{secret}"'))
 
 
-@pytest.mark.slow
 def test_hidden_files_and_entities_are_not_read(expanded: Expand, tmp_path: Path, secret: Path) -> None:
     hidden = tmp_path / "robot" / "urdf" / ".git" / "config"
     hidden.parent.mkdir(parents=True)
@@ -247,7 +241,6 @@ def test_links_in_an_installed_package_lead_to_its_sources_and_to_nothing_else(t
         assert not ground.holds(str(installed / other)), other
 
 
-@pytest.mark.slow
 def test_a_repository_on_a_search_path_is_trusted_with_no_links(
     expanded: Expand, secret: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -261,7 +254,6 @@ def test_a_repository_on_a_search_path_is_trusted_with_no_links(
 # -- the environment, programs, the net ---------------------------------------------------------------
 
 
-@pytest.mark.slow
 def test_the_environment_is_empty(expanded: Expand, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TOKEN", SECRET)
     assert "'TOKEN' is not set" in refused(expanded, link("$(env TOKEN)"))
@@ -279,7 +271,6 @@ confine(lambda path: path == "/etc/hostname")
 """
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "deed",
     [
@@ -323,7 +314,6 @@ def test_even_a_program_in_the_expanding_process_is_refused(deed: str) -> None:
 # -- what it takes ------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "inside",
     [
@@ -338,7 +328,6 @@ def test_memory_has_an_end(expanded: Expand, inside: str) -> None:
         expanded(inside)
 
 
-@pytest.mark.slow
 def test_time_has_an_end(expanded: Expand) -> None:
     with pytest.raises(XacroError, match="did not finish: found 2 s"):
         expanded(link("${max(python.range(10**12))}"), patience=2.0)
@@ -346,7 +335,6 @@ def test_time_has_an_end(expanded: Expand) -> None:
         expanded('<xacro:macro name="m"><xacro:m/></xacro:macro><xacro:m/>')
 
 
-@pytest.mark.slow
 def test_what_it_writes_has_an_end(expanded: Expand, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("urdfkin.urdf.xacro.MOST", 10_000)
     with pytest.raises(XacroError, match="URDF is too long: found more than 10000 bytes"):

@@ -1,13 +1,16 @@
 """`urdfkin check` through its real entry point: exit codes, formats, options."""
 
 import json
+import os
+import re
 import subprocess
 import sys
 from pathlib import Path
+from urllib.parse import unquote_to_bytes, urlsplit
 
 import pytest
 
-from tests.cli.running import urdfkin
+from tests.cli.running import good, refused, urdfkin
 
 GOOD = '<robot name="r">\n  <link name="a"/>\n</robot>\n'
 WARNED = '<robot name="">\n  <link name="a"/>\n</robot>\n'
@@ -55,9 +58,7 @@ def test_a_missing_file_exits_2_and_the_others_are_checked(folder: None) -> None
 
 
 def test_an_unknown_code_exits_2_with_the_nearest(folder: None) -> None:
-    done = urdfkin("check", "--ignore", "URDF4022", "bad.urdf")
-    assert done.code == 2
-    assert "did you mean URDF402" in done.err
+    assert "did you mean URDF402" in refused("check", "--ignore", "URDF4022", "bad.urdf")
 
 
 def test_standard_input_is_a_file_like_any_other() -> None:
@@ -82,8 +83,7 @@ def test_limits_can_be_lowered(folder: None) -> None:
 
 
 def test_explain_prints_a_page_and_lists_all_codes() -> None:
-    page = urdfkin("explain", "urdf502")
-    assert page.code == 0
+    page = good("explain", "urdf502")
     assert page.text.startswith("URDF502 axis-without-direction (error)")
     assert urdfkin("explain").text.count("\n") > 60
     assert urdfkin("explain", "URDF999").code == 2
@@ -96,3 +96,29 @@ def test_checking_imports_neither_yourdfpy_nor_pinocchio_nor_a_compiler() -> Non
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout == "set()\n"
+
+
+NAMES = [b"r\xff\xe9.urdf", b"a b:c%41?#\\[].urdf", "ä\u202e.urdf".encode(), b"a\nb.urdf"]
+
+#: What RFC 3986 lets a path hold.
+PATH = re.compile(r"(?:[A-Za-z0-9._~!$&'()*+,;=:@/-]|%[0-9A-F]{2})+")
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("absolute", [False, True])
+def test_a_file_of_any_name_is_named_by_a_uri_that_gives_its_bytes_back(
+    tmp_path: Path, name: bytes, absolute: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place = tmp_path / os.fsdecode(name)
+    place.write_bytes(b"<robot name='r'><link name='a'/><link name='a'/></robot>")
+    given = os.fsencode(place) if absolute else name
+    monkeypatch.chdir(tmp_path)
+    done = urdfkin("check", "--format", "sarif", os.fsdecode(given))
+    assert done.code == 1, done.err
+    (result,) = done.data["runs"][0]["results"]
+    uri = result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"]
+    parts = urlsplit(uri)
+    assert PATH.fullmatch(parts.path)
+    assert (parts.scheme, parts.netloc) == ("file" if absolute else "", "")
+    assert (parts.query, parts.fragment) == ("", "")
+    assert unquote_to_bytes(parts.path) == given

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.attacks.hostile import urdf
-from tests.cli.running import urdfkin
+from tests.cli.running import good, refused, urdfkin
 
 
 @pytest.mark.slow
@@ -20,8 +20,7 @@ def test_a_file_is_written_and_checks_itself(tmp_path: Path) -> None:
     done = urdfkin("export", "planar_two_link", *words)
     assert (done.code, done.out) == (0, b"")
     assert "verified by Pinocchio" in done.err
-    checked = urdfkin("export", "--check", str(path))
-    assert checked.code == 0
+    checked = good("export", "--check", str(path))
     assert re.findall(r"^good (\w+): 4 test vectors", checked.text, re.MULTILINE) == [
         "jacobian",
         "velocity",
@@ -34,8 +33,7 @@ def test_a_file_is_written_and_checks_itself(tmp_path: Path) -> None:
 
 
 def test_it_goes_to_standard_output_where_no_file_is_named() -> None:
-    done = urdfkin("export", "planar_two_link", "--to", "c", "--name", "my arm")
-    assert done.code == 0
+    done = good("export", "planar_two_link", "--to", "c", "--name", "my arm")
     assert "void my_arm_jacobian_batch(size_t n" in done.text
 
 
@@ -61,10 +59,9 @@ def test_what_was_not_verified_says_so_everywhere(tmp_path: Path) -> None:
     ],
 )
 def test_a_mistake_is_one_clear_line(words: tuple[str, ...], said: str) -> None:
-    done = urdfkin("export", *words)
-    assert done.code == 2
-    assert said in done.err
-    assert done.err.count("\n") == 1
+    err = refused("export", *words)
+    assert said in err
+    assert err.count("\n") == 1
 
 
 def test_a_file_on_a_terminal_commands_nobody() -> None:
@@ -122,8 +119,7 @@ def test_a_check_runs_nothing_that_lies_beside_the_file(beside: str, exported: s
     planted.parent.mkdir(parents=True)
     planted.write_text(f"open({str(mark)!r}, 'w').close()")
     (tmp_path / "arm" / "arm.py").write_text(exported, "utf-8")
-    done = urdfkin("export", "--check", str(tmp_path / "arm" / "arm.py"))
-    assert done.code == 0, done.err
+    good("export", "--check", str(tmp_path / "arm" / "arm.py"))
     assert not mark.exists()
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import urdfkin as library
-from tests.cli.running import imported, process, urdfkin
+from tests.cli.running import Done, good, imported, process, urdfkin
 from tests.robots.odd_urdfs import urdf_of
 from urdfkin.cli import _ABSENT, _SYNONYMS, cli, commands, groups
 from urdfkin.robot import Robot
@@ -37,8 +37,7 @@ def run_examples(command: str) -> None:
     assert examples(command)
     for example in examples(command):
         words = [sorted(glob.glob(word)) or [word] for word in shlex.split(example)]  # noqa: PTH207  relative
-        done = urdfkin(*(word for expanded in words for word in expanded))
-        assert done.code == 0, (example, done.err, done.text)
+        done = good(*(word for expanded in words for word in expanded))
         assert done.out or done.err
 
 
@@ -57,8 +56,7 @@ def elbow() -> str:
 @pytest.mark.slow
 @pytest.mark.parametrize("command", commands())
 def test_every_command_has_help_with_an_example_of_itself(command: str) -> None:
-    done = urdfkin(command, "--help")
-    assert done.code == 0
+    done = good(command, "--help")
     assert done.text.startswith(f"Usage: urdfkin {command} ")
     assert examples(command)
     assert urdfkin(command, "-h").out == done.out
@@ -125,8 +123,7 @@ def _seconds() -> float:
 
 
 def test_the_version_names_pinocchios_too() -> None:
-    done = urdfkin("--version")
-    assert done.code == 0
+    done = good("--version")
     assert done.text.strip().endswith(f"Pinocchio {metadata.version('pin')}")
 
 
@@ -155,3 +152,24 @@ def test_a_command_that_computes_has_the_librarys_name() -> None:
     assert [
         name for name in ("same", "diff", "calibrate", "validate", "check") if not hasattr(library, name)
     ] == []
+
+
+def explain(topic: str) -> Done:
+    return urdfkin("explain", topic)
+
+
+def test_an_equations_number_gives_its_page() -> None:
+    page = explain("7.130")
+    assert page.code == 0, page.err
+    for part in ("Equation 7.130", "w-dot_0i x d_{i-1,i}", "Robot.acceleration", "Pinocchio", "tests/text/"):
+        assert part in page.text
+
+
+def test_a_lost_equation_is_said_to_be_lost() -> None:
+    assert "page 2" in explain("7.8").text
+
+
+def test_a_number_that_the_chapter_does_not_have_is_no_topic() -> None:
+    answer = explain("7.131")
+    assert answer.code == 2
+    assert answer.text == ""

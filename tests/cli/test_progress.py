@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.running import urdfkin
+from tests.cli.running import good, refused, urdfkin
 from urdfkin.cli import campaign
 from urdfkin.cli.campaign import Pace, line
 from urdfkin.validation.collector import CampaignProgress
@@ -89,17 +89,14 @@ def test_options_that_do_not_go_together_are_refused(
     words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    done = urdfkin("validate", "planar_two_link", "--samples", "0", *words)
-    assert done.code == 2
-    assert said in done.err
+    assert said in refused("validate", "planar_two_link", "--samples", "0", *words)
 
 
 @pytest.mark.slow
 def test_a_shard_says_what_it_came_to_and_what_comes_next(tmp_path: Path) -> None:
     where = str(tmp_path / "s")
     words = ("validate", "planar_two_link", "double_pendulum", "--samples", "0", "--store", where)
-    done = urdfkin(*words, "--shard", "2/2")
-    assert done.code == 0
+    done = good(*words, "--shard", "2/2")
     assert f"shard 2/2 of {where}: 1 robot, " in done.text
     assert "next: run `urdfkin report merge" in done.text
     assert urdfkin("report", where).code == 130

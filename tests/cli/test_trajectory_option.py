@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests.cli.running import good, refused
 from tests.cli.running import urdfkin as run
 from urdfkin.cli import cli
 from urdfkin.model.tree import FloatArray
@@ -84,8 +85,7 @@ def test_each_row_has_the_bits_of_the_single_command(
 ) -> None:
     inputs, *options = COMMANDS.get(command, ["q"])
     words = (command, "panda", "--frame", "panda_hand", *options)
-    done = run(*words, "--trajectory", str(log), "--format", "json")
-    assert done.code == 0, done.err
+    done = good(*words, "--trajectory", str(log), "--format", "json")
     assert done.data["t"] == motion["t"].tolist()
     assert f" {N} " in done.data["check"]
     results = [key for key in done.data if key in ("result", "singular_values", "manipulability_gradient")]
@@ -166,8 +166,7 @@ def test_a_file_in_a_convention_gives_the_results_of_the_robot_in_it(name: str, 
         str(path),
     )
     for command in ("placement", "velocity", "acceleration", "jacobian", "analytical-jacobian", "imu"):
-        done = run(command, "a1", *words, "--format", "json")
-        assert done.code == 0, done.err
+        done = good(command, "a1", *words, "--format", "json")
         method = getattr(other, command.replace("-", "_"))
         inputs = COMMANDS.get(command, ["q"])[0]
         options = {"representation": "quaternion"} if command == "analytical-jacobian" else {}
@@ -252,9 +251,9 @@ def test_a_base_of_the_options_or_of_the_file_moves_the_robot(
 
 @pytest.mark.parametrize("option", ["--q=ready", "--seed=1"])
 def test_a_value_beside_a_trajectory_is_refused(option: str, log: Path) -> None:
-    done = run("placement", "panda", "--trajectory", str(log), option)
-    assert done.code == 2
-    assert "does nothing along a --trajectory" in done.err
+    assert "does nothing along a --trajectory" in refused(
+        "placement", "panda", "--trajectory", str(log), option
+    )
 
 
 def _spoiled(log: Path) -> dict[str, tuple[str, str]]:
@@ -292,10 +291,11 @@ def test_what_is_wrong_with_a_file_is_one_line(what: str, log: Path) -> None:
 
 @pytest.mark.parametrize("command", ["placement", "singular-values", "chain", "imu", "view"])
 def test_an_unknown_convention_points_to_the_list_of_all(command: str) -> None:
-    done = run(command, "panda", "--convention", "mujocco", *(["--q", "ready"] if command == "view" else []))
-    assert done.code == 2
-    assert "did you mean mujoco" in done.err
-    assert "`urdfkin order ROBOT` lists all" in done.err
+    err = refused(
+        command, "panda", "--convention", "mujocco", *(["--q", "ready"] if command == "view" else [])
+    )
+    assert "did you mean mujoco" in err
+    assert "`urdfkin order ROBOT` lists all" in err
 
 
 def test_a_chain_reads_q_in_a_convention_and_says_so() -> None:
@@ -326,10 +326,9 @@ def test_measured_poses_in_a_convention_and_in_degrees_are_those_in_radians(tmp_
         np.savetxt(path, np.hstack([values[name], p]), delimiter=",", header=f"{head},x,y,z", comments="")
         how = str(tmp_path / "motors.toml")
         more = ["--convention", how] if name == "motors" else []
-        done = run(
+        done = good(
             "calibrate", "planar_two_link", "--poses", str(path), "--fit", "base", *more, "--format", "json"
         )
-        assert done.code == 0, done.err
         found[name] = done.data["origins"]
     for name in ("degrees", "motors"):
         for joint, T in found["plain"].items():
@@ -351,8 +350,7 @@ def test_a_plot_reads_the_motion_in_a_convention(tmp_path: Path) -> None:
         words = ("plot", "planar_two_link", "--frame", "tip", *given, "--convention", str(how), "--samples=5")
         if "--trajectory" in given:
             words = words[:-1]
-        done = run(*words, "--panel", "position", "-o", str(tmp_path / "x.svg"))
-        assert done.code == 0, done.err
+        good(*words, "--panel", "position", "-o", str(tmp_path / "x.svg"))
         end = robot.placement([np.pi / 6, np.pi / 2], "tip")[:2, 3]
         title = " ".join((tmp_path / "x.svg").read_text().split())
         assert f"to ({end[0]:.3g}, {end[1]:.3g}, 0)" in title
@@ -368,9 +366,8 @@ def test_a_hundred_thousand_rows_are_read_computed_and_checked(tmp_path: Path) -
         header=",".join(["time", *robot.coordinate_names]),
     )  # fmt: skip
     out = tmp_path / "v.csv"
-    done = run(
+    done = good(
         "velocity", "ur5", "--frame", "tool0", "--trajectory", str(tmp_path / "log.csv"), "-o", str(out)
     )
-    assert done.code == 0
     assert f"{n} velocity results" in done.err
     assert len(out.read_text().splitlines()) == n + 1

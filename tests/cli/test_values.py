@@ -1,15 +1,18 @@
 """Values in and numbers out: every way of giving q, v and a, every format, to the last digit."""
 
+from __future__ import annotations
+
 import csv
 import io
 import json
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import urdfkin as library
-from tests.cli.running import process, urdfkin
+from tests.cli.running import good, process, refused, urdfkin
 from tests.robots.odd_urdfs import urdf_of
 from urdfkin.dh import read_table
 from urdfkin.dh.parse_table import references
@@ -52,8 +55,7 @@ def command(quantity: str, n: int, reference: str, format_: str) -> bytes:
         words += ["--reference", reference]
     for letter in QUANTITIES[quantity]:
         words += [f"--{letter}", f"random:{n}"]
-    done = urdfkin(*words)
-    assert done.code == 0, done.err
+    done = good(*words)
     return done.out
 
 
@@ -199,8 +201,7 @@ def test_a_batch_comes_from_a_csv_file_with_or_without_a_header(layout: str, tmp
         text = "\ufeff" + text.replace("\n", "\r\n")
     path = tmp_path / "q.csv"
     path.write_text(text, encoding="utf-8", newline="")
-    done = urdfkin("jacobian", "panda", "--q", f"@{path}", "--format", "npy")
-    assert done.code == 0, done.err
+    done = good("jacobian", "panda", "--q", f"@{path}", "--format", "npy")
     assert np.array_equal(np.load(io.BytesIO(done.out)), robot.jacobian(q, "panda_hand_tcp"))
 
 
@@ -209,8 +210,7 @@ def test_a_batch_may_come_from_standard_input_as_a_robot_may() -> None:
     rows = "\n".join(",".join(map(repr, row)) for row in robot.sample(3, 1).tolist())
     done = urdfkin("jacobian", "ur5", "--q", "@-", "--format", "npy", stdin=rows)
     assert np.array_equal(np.load(io.BytesIO(done.out)), robot.jacobian(robot.sample(3, 1), robot.tip_frame))
-    done = urdfkin("jacobian", "-", "--frame", "tool0", "--format", "json", stdin=robot.urdf)
-    assert done.code == 0, done.err
+    done = good("jacobian", "-", "--frame", "tool0", "--format", "json", stdin=robot.urdf)
     assert done.data["source"] == "-"
     assert np.array_equal(done.data["result"][0], robot.jacobian(np.zeros(6), "tool0"))
 
@@ -218,9 +218,7 @@ def test_a_batch_may_come_from_standard_input_as_a_robot_may() -> None:
 def test_one_sample_of_v_goes_with_a_batch_of_q() -> None:
     done = urdfkin("velocity", "ur5", "--q", "random:5", "--v", "1,0,0,0,0,0", "--format", "json")
     assert np.shape(done.data["v"]) == (5, 6)
-    done = urdfkin("velocity", "ur5", "--q", "random:5", "--v", "random:4")
-    assert (done.code, done.out) == (2, b"")
-    assert "different lengths: found 5, 4" in done.err
+    assert "different lengths: found 5, 4" in refused("velocity", "ur5", "--q", "random:5", "--v", "random:4")
 
 
 def test_a_seed_gives_the_same_numbers_and_another_one_others() -> None:
@@ -262,8 +260,7 @@ def test_an_output_that_is_a_link_or_a_device_is_written_through(tmp_path: Path)
 
 
 def test_limits_that_are_left_are_warned_of_by_name_and_computed_all_the_same() -> None:
-    done = urdfkin("placement", "panda", "--q", "0,0,0,-1,0,0,0,0.5", "--format", "json")
-    assert done.code == 0
+    done = good("placement", "panda", "--q", "0,0,0,-1,0,0,0,0.5", "--format", "json")
     assert "warning: joint panda_finger_joint1: 0.5 is outside [0, 0.04]" in done.err
     assert "warning: joint panda_finger_joint2: 0.5 is outside [0, 0.04]" in done.err
     assert "panda_joint4" not in done.err
@@ -295,8 +292,7 @@ def test_mimic_joints_follow_or_are_free_as_asked() -> None:
 def test_odd_robots_pass_through_the_command(quantity: str, name: str) -> None:
     words = [word for letter in QUANTITIES[quantity] for word in (f"--{letter}", "random:2")]
     for format_ in ("table", "json", "csv", "npy"):
-        done = urdfkin(quantity, "-", *words, "--format", format_, stdin=urdf_of(name))
-        assert done.code == 0, done.err
+        done = good(quantity, "-", *words, "--format", format_, stdin=urdf_of(name))
         assert done.out
 
 
@@ -312,8 +308,7 @@ def test_without_verification_exit_3_says_so() -> None:
 
 def test_a_table_is_a_robot_to_every_command() -> None:
     path = str(references()["ur5"])
-    done = urdfkin("jacobian", path, "--q", "0.1,0.2,0.3,0.4,0.5,0.6", "--format", "json")
-    assert done.code == 0, done.err
+    done = good("jacobian", path, "--q", "0.1,0.2,0.3,0.4,0.5,0.6", "--format", "json")
     robot = library.load(read_table(path))
     J = robot.jacobian([0.1, 0.2, 0.3, 0.4, 0.5, 0.6], robot.tip_frame)
     assert json.loads(done.out)["result"] == [J.tolist()]
@@ -342,8 +337,7 @@ def test_names_are_never_folded_nothing_wraps_and_no_line_ends_in_blanks_in_a_pi
         f'<joint name="{LONG}" type="continuous"><parent link="{LONG}_base"/><child link="{LONG}_tool"/>'
         '<origin xyz="1 0 0"/><axis xyz="0 1 0"/></joint></robot>'
     )
-    done = urdfkin(*words.replace("ROBOT", str(path)).split())
-    assert done.code == 0, done.err
+    done = good(*words.replace("ROBOT", str(path)).split())
     assert not any(line.endswith(" ") for line in done.text.splitlines())
     named = [line for line in done.text.splitlines() if "a_joint_of" in line]
     assert named
@@ -395,8 +389,7 @@ def test_all_but_the_named_joints_are_locked_at_a_pose_and_single_values() -> No
     ],
 )
 def test_every_command_with_one_robot_can_lock_joints(words: tuple[str, ...]) -> None:
-    done = urdfkin(*words, "--lock", "panda_finger_joint1=0.04", "--joints", "panda_joint4,panda_joint5")
-    assert done.code == 0, done.err
+    done = good(*words, "--lock", "panda_finger_joint1=0.04", "--joints", "panda_joint4,panda_joint5")
     assert "panda_joint3" not in done.text or "locked" in done.text
 
 
@@ -421,7 +414,58 @@ def test_a_replay_of_a_locked_robot_locks_the_same_joints() -> None:
     ],
 )
 def test_a_wrong_lock_is_one_clear_error(words: tuple[str, ...], message: str) -> None:
-    done = urdfkin("info", "panda", *words)
-    assert done.code == 2
-    assert message in done.err
-    assert done.err.count("\n") == 1
+    err = refused("info", "panda", *words)
+    assert message in err
+    assert err.count("\n") == 1
+
+
+# -- by name, in degrees, as a pose ----------------------------------------------------------------
+
+
+NAMED = "panda_joint1=30deg,panda_joint4=-pi/2,panda_joint6=1.5"
+RADIANS = [math.pi / 6, -0.785398, 0.0, -math.pi / 2, 0.0, 1.5, 0.785398, 0.001]
+
+
+def test_a_pose_in_degrees_by_joint_names_is_what_the_numbers_are() -> None:
+    named = good("jacobian", "panda", "--q", f"ready,{NAMED}", "--format", "json")
+    assert "warning" not in named.err
+    assert named.data["q"] == [RADIANS]
+    blanks = urdfkin("jacobian", "panda", "--q", f"[{' '.join(map(repr, RADIANS))}]", "--format", "json")
+    assert blanks.data["result"] == named.data["result"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--q", NAMED), "error: --q: no value for panda_joint2, panda_joint3, panda_joint5, panda"),
+        (("--q", NAMED), "or begin with a pose that they keep: 'neutral, panda_joint1=...'"),
+        (("--q", "raedy"), "error: --q: unknown pose 'raedy'; did you mean ready?"),
+        (("--q", "0 0 0 0 0 0 0 0 0"), "robot.from_pinocchio(q, mimic=False) converts it to urdfkin's; "),
+        (("--q", "ready", "--v", "neutral,panda_joint1=1mm/s"), "--v, panda_joint1: wrong unit: found"),
+    ],
+)  # fmt: skip
+def test_what_is_missing_or_not_meant_is_said(words: tuple[str, ...], message: str) -> None:
+    assert message in refused("velocity", "panda", *words)
+
+
+def test_degrees_typed_as_radians_are_recognised() -> None:
+    done = urdfkin("placement", "panda", "--q", "ready,panda_joint1=30", "--no-verify")
+    assert "warning: joint panda_joint1: 30 is outside [-2.8973, 2.8973]; degrees? write 30deg" in done.err
+
+
+@pytest.mark.slow
+def test_every_command_that_takes_q_reads_it_so(tmp_path: Path) -> None:
+    q = "shoulder_pan_joint=30deg, shoulder_lift_joint=-90deg, elbow_joint=90deg, wrist_1_joint=0,"
+    q += "wrist_2_joint=pi/2 , wrist_3_joint=0"
+    at = library.load("ur5").placement(q, "tool0")[:3, 3]
+    for command in ("imu", "singular-values"):
+        done = urdfkin(command, "ur5", "--q", q, "--format", "json")
+        assert (done.code, done.data["q"][0][0]) == (0, math.pi / 6)
+    picture = tmp_path / "way.svg"
+    done = urdfkin("plot", "ur5", "--to", "raedy", "-o", str(picture))
+    assert "error: --to: unknown pose 'raedy'; did you mean ready?" in done.err
+    assert (
+        urdfkin("plot", "ur5", "--from", "ready", "--to", q, "--panel", "position", "-o", str(picture)).code
+        == 0
+    )
+    assert ", ".join(f"{x:.3g}" for x in np.round(at, 9)) in picture.read_text()

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.running import urdfkin
+from tests.cli.running import good, refused, urdfkin
 from tests.report.documents import HOSTILE_ROBOT, arms, failing, hostile, months_runs, run_on
 from urdfkin.errors import InputError
 from urdfkin.report import history as module
@@ -61,8 +61,7 @@ def test_changes_name_their_run_and_regressions_come_first(month: Path) -> None:
 
 
 def test_a_terminal_shows_runs_robots_changes_and_the_latest_verdict(month: Path) -> None:
-    done = urdfkin("report", "history", str(month))
-    assert done.code == 0
+    done = good("report", "history", str(month))
     assert "run 5, REGRESSION panda: verdict: verified -> disagrees" in done.text
     assert "panda        ✓✓✓✓✗✓✓✓  verified" in done.text
     assert done.text.splitlines()[-1] == "8 runs; latest verdict: verified, as in the 2 runs before"
@@ -149,10 +148,9 @@ def test_a_file_beyond_the_limit_of_its_size_is_named(month: Path, monkeypatch: 
 
 
 def test_no_report_at_all_is_an_error_with_the_remedy(tmp_path: Path) -> None:
-    done = urdfkin("report", "history", str(tmp_path))
-    assert done.code == 2
-    assert "no report to show" in done.err
-    assert "urdfkin validate ROBOT --json FILE" in done.err
+    err = refused("report", "history", str(tmp_path))
+    assert "no report to show" in err
+    assert "urdfkin validate ROBOT --json FILE" in err
     assert urdfkin("report", "history").code == 2
 
 
