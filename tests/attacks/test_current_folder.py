@@ -11,30 +11,10 @@ import pytest
 pytestmark = pytest.mark.long
 ROBOTS = Path(__file__).parents[2] / "robots"
 PLANTED = [
-    *(
-        "urdfkin",
-        "multiprocessing",
-        "concurrent",
-        "subprocess",
-        "signal",
-        "threading",
-        "json",
-        "pickle",
-        "ast",
-    ),
-    *(
-        "sitecustomize",
-        "usercustomize",
-        "resource",
-        "tempfile",
-        "xacrodoc",
-        "xacro",
-        "yaml",
-        "numpy",
-        "numba",
-    ),
-    *("pinocchio", "click", "matplotlib", "platformdirs"),
-]
+    "urdfkin", "multiprocessing", "concurrent", "subprocess", "signal", "threading", "json", "pickle",
+    "ast", "sitecustomize", "usercustomize", "resource", "tempfile", "xacrodoc", "xacro", "yaml",
+    "numpy", "numba", "pinocchio", "click", "matplotlib", "platformdirs",
+]  # fmt: skip
 #: What Python has imported from the folder already, before a line of urdfkin is run.
 BEFORE_MAIN = {"urdfkin", "threading", "ast"}
 XACRO = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="l${1 + 1}"/></robot>'

@@ -92,38 +92,19 @@ def test_codes_equations_and_tables_are_offered(offered: Offered) -> None:
 def test_no_name_is_offered_that_a_shell_would_carry_out(offered: Offered, tmp_path: Path) -> None:
     """What is completed stands on the command line, and the next key may be the return."""
     path = tmp_path / "hostile.urdf"
-    harmful = (
-        *IN_XML.values(),
-        "$(reboot)",
-        "`reboot`",
-        "a;reboot",
-        "a b",
-        "-o",
-        "a'b",
-        "*",
-        "~x",
-        "a\\b",
-        "!x",
-    )
+    harmful = [
+        *IN_XML.values(), "$(reboot)", "`reboot`", "a;reboot", "a b", "-o", "a'b", "*", "~x", "a\\b", "!x",
+    ]  # fmt: skip
     path.write_text(chain_of_all([*dict.fromkeys(harmful), "fine.name-1"]), encoding="utf-8")
     assert set(offered(f"jacobian {path} --frame ")) == {"base", "fine.name-1", "__proto__"}
 
 
-@pytest.mark.parametrize(
-    "robot",
-    [
-        "nowhere.urdf",
-        "BROKEN",
-        "PIPE",
-        "FOLDER",
-        "-",
-        "arm.xacro",
-        "'",
-        "<robot/>",
-        "/dev/zero",
-        "no such name",
-    ],
-)
+UNREADABLE = [
+    "nowhere.urdf", "BROKEN", "PIPE", "FOLDER", "-", "arm.xacro", "'", "<robot/>", "/dev/zero", "no such name",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("robot", UNREADABLE)
 def test_what_cannot_be_read_offers_nothing_and_says_nothing(
     offered: Offered, robot: str, tmp_path: Path
 ) -> None:
