@@ -9,6 +9,7 @@ import pytest
 
 import urdfkin as library
 from tests.cli.running import refused, urdfkin
+from tests.urdfs import joint, robot
 from urdfkin.robot.trajectory import read_trajectory
 
 #: What Python's float takes, and nobody means.
@@ -81,23 +82,25 @@ def test_what_is_a_number_is_taken(text: str) -> None:
 NAMES = "shoulder_pan_joint,shoulder_lift_joint,elbow_joint,wrist_1_joint,wrist_2_joint,wrist_3_joint"
 
 
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (f"{NAMES},more\n0,0,0,0,0,0,0\n", "q.csv:1: the first line must name the columns of --q"),
-        (f"{NAMES},more\n0,0,0,0,0,0,0\n", "found unknown: more;"),
-        (NAMES.replace(",elbow_joint", "") + "\n0,0,0,0,0\n", "found missing: elbow_joint;"),
-        (NAMES.replace("elbow_joint", "wrist_1_joint") + "\n", "missing: elbow_joint; duplicate: wrist_1_"),
-        (
-            f"{NAMES}\n0,0,0,0,0,0,0\n",
-            f"q.csv:2: 6 numbers are expected ({NAMES.replace(',', ', ')}): found 7",
-        ),
-        (f"{NAMES}\n0,0,0,0,0\n", "q.csv:2: 6 numbers are expected"),
-        (f"{NAMES}\n0,0,0,0,0\n", "found 5, none for wrist_3_joint"),
-        (f'# remark\n\n{NAMES}\n"0",0,0,0,0,0\n\n0,0\n', "q.csv:6: 6 numbers are expected"),
-        (f'{NAMES}\n0,0,0,0,0,"0\n', "q.csv:2: not valid CSV"),
-    ],
-)
+#: What is wrong with a file of --q, and what is said.
+FILES = [
+    ("1,2\n", "q.csv:1: 6 numbers are expected"),
+    ("a,b,c,d,e,f\n0,0,0,0,0,0\n", "q.csv:1: the first line must name the columns of --q"),
+    (f"{NAMES},more\n0,0,0,0,0,0,0\n", "q.csv:1: the first line must name the columns of --q"),
+    (f"{NAMES},more\n0,0,0,0,0,0,0\n", "found unknown: more;"),
+    (NAMES.replace(",elbow_joint", "") + "\n0,0,0,0,0\n", "found missing: elbow_joint;"),
+    (NAMES.replace("elbow_joint", "wrist_1_joint") + "\n", "missing: elbow_joint; duplicate: wrist_1_"),
+    (f"{NAMES}\n0,0,0,0,0,0,0\n", f"q.csv:2: 6 numbers are expected ({NAMES.replace(',', ', ')}): found 7"),
+    (f"{NAMES}\n0,0,0,0,0\n", "q.csv:2: 6 numbers are expected"),
+    (f"{NAMES}\n0,0,0,0,0\n", "found 5, none for wrist_3_joint"),
+    (f'# remark\n\n{NAMES}\n"0",0,0,0,0,0\n\n0,0\n', "q.csv:6: 6 numbers are expected"),
+    (f'{NAMES}\n0,0,0,0,0,"0\n', "q.csv:2: not valid CSV"),
+    ("\x00\x00", "q.csv"),
+    ("0;0;0;0;0;0\n", "q.csv:1"),
+]
+
+
+@pytest.mark.parametrize(("content", "message"), FILES)
 def test_a_column_too_many_or_missing_is_told_with_file_line_and_name(
     content: str, message: str, tmp_path: Path
 ) -> None:
@@ -119,13 +122,7 @@ def test_columns_in_any_order_are_read_by_name_and_a_mistake_is_told_by_name(tmp
 
 
 def test_joints_that_are_called_like_numbers_may_head_a_file(tmp_path: Path) -> None:
-    joint = (
-        '<joint name="{}" type="continuous"><parent link="{}"/><child link="{}"/><axis xyz="0 0 1"/></joint>'
-    )
-    links = "".join(f'<link name="{link}"/>' for link in "abc")
-    (tmp_path / "r.urdf").write_text(
-        f'<robot name="r">{links}{joint.format(1, "a", "b")}{joint.format(2, "b", "c")}</robot>'
-    )
+    text = robot(joint("1", "continuous", "a", "b"), joint("2", "continuous", "b", "c"))
     (tmp_path / "q.csv").write_text("2,1\n0.2,0.1\n")
-    done = urdfkin("placement", str(tmp_path / "r.urdf"), "--format", "json", "--q", f"@{tmp_path / 'q.csv'}")
+    done = urdfkin("placement", "-", "--format", "json", "--q", f"@{tmp_path / 'q.csv'}", stdin=text)
     np.testing.assert_array_equal(done.data["q"], [[0.1, 0.2]])

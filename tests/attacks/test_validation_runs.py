@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -141,8 +142,6 @@ def test_the_chunks_of_a_robot_that_failed_are_not_run(how: Any, monkeypatch: py
 
 
 def test_a_disagreement_stays_one_whatever_else_goes_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
-    from dataclasses import replace  # noqa: PLC0415
-
     def failing(chunk: Chunk) -> ChunkResult:
         if chunk.index == 1:
             raise MemoryError
@@ -190,9 +189,11 @@ def test_a_run_over_no_robot_has_not_passed() -> None:
 
 
 def test_an_interrupted_run_has_not_passed_even_where_every_robot_is_verified() -> None:
-    found = outcome(["verified", "verified"], asked=2, interrupted=True)
-    assert (found.passed, found.exit_code) == (False, 130)
-    assert outcome(["verified"], asked=1, interrupted=False).exit_code == 0
+    whole = validate(["planar_two_link"], samples=0)
+    ended = replace(whole, interrupted=True)
+    assert (whole.passed, whole.exit_code, whole.as_dict()["verdict"]) == (True, 0, "verified")
+    assert (ended.passed, ended.exit_code, ended.as_dict()["verdict"]) == (False, 130, "interrupted")
+    assert ended.robots[0].verdict == "verified"
 
 
 @pytest.mark.parametrize(

@@ -89,29 +89,6 @@ def test_a_mistake_gives_one_clear_message_and_exit_2(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        ("1,2\n", "q.csv:1: 6 numbers are expected"),
-        ("0,0,0,0,0,0\n0,0,0,0,x,0\n", "q.csv:2, wrist_2_joint: not a finite number: found 'x'"),
-        ("0,0,0,0,0,0\n\n0,0,0,0,nan,0\n", "q.csv:3, wrist_2_joint: not a finite number: found 'nan'"),
-        ("a,b,c,d,e,f\n0,0,0,0,0,0\n", "q.csv:1: the first line must name the columns of --q"),
-        ("\x00\x00", "q.csv"),
-        ("0;0;0;0;0;0\n", "q.csv:1"),
-    ],
-)
-def test_a_mistake_in_a_csv_file_is_located(content: str, message: str, tmp_path: Path) -> None:
-    path = tmp_path / "q.csv"
-    path.write_text(content)
-    assert message in refused("jacobian", "ur5", "--q", f"@{path}")
-
-
-def test_a_column_named_twice_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "q.csv"
-    path.write_text("shoulder_pan_joint," * 6 + "\n" + "0," * 6 + "\n")
-    assert urdfkin("jacobian", "ur5", "--q", f"@{path}").code == 2
-
-
 def test_a_report_that_must_not_be_written_is_refused_before_the_work(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

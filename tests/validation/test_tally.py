@@ -10,6 +10,7 @@ import pytest
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.validation.error_stats import HISTOGRAM_EDGES, Inputs, Tally, histogram_bin, percentile, tally
 from urdfkin.verify.bounds import Bound
+from urdfkin.verify.certificate import Comparison
 
 FRAMES = ("a", "b", "c")
 
@@ -24,14 +25,15 @@ def made(units: np.ndarray, first: int = 0, names: tuple[str, ...] = FRAMES) -> 
 
 
 @pytest.mark.parametrize(
-    ("units", "failed"), [(9.0, 0), (10.0, 0), (11.0, 1), (14.0, 1), (math.inf, 1), (math.nan, 1)]
+    ("units", "failed"), [(9.0, 0), (10.0, 0), (11.0, 1), (14.0, 1), (30.0, 1), (math.inf, 1), (math.nan, 1)]
 )
-def test_a_result_outside_its_bound_is_counted_however_little_it_lies_outside(
+def test_a_result_outside_its_bound_is_counted_however_little_and_disagrees(
     units: float, failed: int
 ) -> None:
     found = made(np.array([[1.0, units, 2.0]]))
     assert (found.results, found.failed) == (3, failed)
     assert (found.share > 1.0) == bool(failed)
+    assert Comparison(3, 1.0, found.share, ()).agrees == (not failed)
     assert found.case is not None
     assert found.case.frame == "b"
 

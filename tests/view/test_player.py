@@ -14,8 +14,9 @@ import pytest
 from PIL import Image
 
 import urdfkin
+from tests.attacks.test_viewer_gate import free_port
 from tests.report.browser import opened, require_chromium
-from tests.view.test_viewer import _PRESS, _until, free_port
+from tests.view.test_viewer import _PRESS, _until
 from urdfkin.robot.trajectory import line
 from urdfkin.view.player import Player, as_gif, as_png
 from urdfkin.view.server import new_server

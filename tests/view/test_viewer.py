@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -18,6 +17,7 @@ import pytest
 from click.testing import CliRunner
 
 import urdfkin
+from tests.attacks.test_viewer_gate import free_port
 from tests.report.browser import Browser, opened, require_chromium
 from urdfkin.cli.view import command
 from urdfkin.errors import InputError
@@ -39,29 +39,11 @@ from urdfkin.view.viewer import (
 viser = pytest.importorskip("viser")
 
 
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
 @pytest.fixture(scope="module")
 def viewer() -> Iterator[Viewer]:
     server = new_server(port=free_port())
     yield Viewer(server, urdfkin.load("ur5"))
     server.stop()
-
-
-@pytest.mark.slow
-def test_it_answers_on_loopback_and_nowhere_else(viewer: Viewer) -> None:
-    port = viewer.server.get_port()
-    assert viewer.server.get_host() == "127.0.0.1"
-    with urlopen(viewer.server.address) as answer:
-        assert answer.status == 200
-    own = socket.gethostbyname(socket.gethostname())
-    if not own.startswith("127."):
-        with pytest.raises(OSError, match="refused"):
-            socket.create_connection((own, port), timeout=2).close()
 
 
 @pytest.mark.slow
