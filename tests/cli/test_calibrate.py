@@ -5,11 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from tests.calibration.arms import BRANCHED, bench
 from tests.calibration.test_way import table
-from tests.cli.running import good, refused, urdfkin
+from tests.cli.running import good, urdfkin
 from urdfkin.calibration.parameters import table_model
 from urdfkin.dh.export import export
 from urdfkin.dh.parse_table import read_table
@@ -54,11 +53,6 @@ def test_a_calibration_that_is_not_plausible_is_written_by_force_alone(tmp_path:
     assert out.exists()
 
 
-def test_radians_all_and_force_do_nothing_without_poses() -> None:
-    for option in ("--radians", "--all", "--force"):
-        assert f"{option} does nothing without --poses" in refused("calibrate", "ur5", option)
-
-
 def test_a_tables_file_becomes_a_table(tmp_path: Path) -> None:
     drawn = table(Convention.STANDARD)
     model = table_model(drawn, ("origins",))
@@ -69,27 +63,3 @@ def test_a_tables_file_becomes_a_table(tmp_path: Path) -> None:
     out = tmp_path / "new.toml"
     good("calibrate", f"{tmp_path}/arm.toml", "--poses", f"{tmp_path}/poses.npz", "-o", str(out))
     assert np.abs(read_table(out).placement(q) - model.way.poses(q, truth)).max() < 1e-13
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--noise", "1,1"], "--noise does nothing without --poses"),
-        (["--drop-odd"], "--drop-odd does nothing without --poses"),
-        (["-o", "x.urdf"], "does nothing without --poses and --ur"),
-        (["--order", "urdf"], "--order does nothing without --ur"),
-        (["--ur", "x.yaml", "--tip", "tool0"], "--tip does nothing with --ur"),
-        (["--ur", "x.yaml", "--fit", "base"], "--fit does nothing with --ur"),
-        (["--poses", "x.csv", "--ur", "x.yaml"], "--poses and --ur cannot be used together"),
-        (["--poses", "x.csv", "--positions"], "--positions does nothing with --poses"),
-        (["--poses", "none.csv"], "none.csv"),
-        (["--fit", "origin"], "did you mean origins"),
-        (["--tip", "tool1"], "did you mean tool0"),
-    ],
-)
-def test_what_has_no_effect_or_is_not_there_is_refused(
-    words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert said in refused("calibrate", "ur5", *words)
-    assert not any(tmp_path.iterdir())

@@ -100,7 +100,8 @@ def test_no_name_is_offered_that_a_shell_would_carry_out(offered: Offered, tmp_p
 
 
 UNREADABLE = [
-    "nowhere.urdf", "BROKEN", "PIPE", "FOLDER", "-", "arm.xacro", "'", "<robot/>", "/dev/zero", "no such name",
+    "nowhere.urdf", "BROKEN", "PIPE", "FOLDER", "-", "arm.xacro", "'", "<robot/>", "/dev/zero",
+    "no such name",
 ]  # fmt: skip
 
 

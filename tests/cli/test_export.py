@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.attacks.hostile import urdf
-from tests.cli.running import good, refused, urdfkin
+from tests.cli.running import good, urdfkin
 
 
 @pytest.mark.slow
@@ -45,23 +45,6 @@ def test_what_was_not_verified_says_so_everywhere(tmp_path: Path) -> None:
     checked = urdfkin("export", "--check", str(path))
     assert checked.code == 3
     assert "UNVERIFIED" in checked.err
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ((), "give either a ROBOT to export, or --check FILE"),
-        (("planar_two_link", "--check", "x.c"), "give either a ROBOT to export, or --check FILE"),
-        (("--check", "x.c", "--to", "c"), "--to does nothing with --check"),
-        (("--check", "nowhere.c"), "cannot be read"),
-        (("planar_two_link", "--quantity", "speed"), "speed"),
-        (("planar_two_link", "--frame", "nowhere"), "nowhere"),
-    ],
-)
-def test_a_mistake_is_one_clear_line(words: tuple[str, ...], said: str) -> None:
-    err = refused("export", *words)
-    assert said in err
-    assert err.count("\n") == 1
 
 
 def test_a_file_on_a_terminal_commands_nobody() -> None:

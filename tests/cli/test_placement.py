@@ -179,20 +179,6 @@ def test_a_batch_of_bases_goes_with_one_configuration_and_with_as_many(tmp_path:
     )
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--base-placement", "0,0,0"], "6 numbers are expected (x, y, z, roll, pitch, yaw)"),
-        (["--base-placement", "0,0,0,0,0,0,2"], "must be a unit quaternion: found norm 2"),
-        (["--base-velocity", "0,0,0,0,0,x"], "--base-velocity, wz: not a finite number: found 'x'"),
-        (["--base-acceleration", "0,0,0,0,0,0"], "No such option"),
-        (["--base-velocity", "@nowhere.csv"], "nowhere.csv: cannot be read"),
-    ],
-)
-def test_a_base_that_is_none_is_refused_with_its_option(words: list[str], message: str) -> None:
-    assert message in refused("velocity", "ur5", *words)
-
-
 def test_the_forms_are_told_apart_by_their_rows() -> None:
     labels = [row.labels for row in quantity._FORMS.values()]
     assert sorted(map(len, labels)) == [6, 7, 7]

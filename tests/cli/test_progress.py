@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.running import good, refused, urdfkin
+from tests.cli.running import good, urdfkin
 from urdfkin.cli import campaign
 from urdfkin.cli.campaign import Pace, line
 from urdfkin.validation.collector import CampaignProgress
@@ -72,24 +72,6 @@ def test_a_log_gets_a_line_now_and_then_and_a_short_run_none(monkeypatch: pytest
     done = urdfkin("validate", "planar_two_link", "--samples", "50")
     assert "urdfkin: 1 of 1 robots, 2 of 2 chunks; " in done.err
     assert done.err.endswith("left, none failed; planar_two_link\n")
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--retry", "failed"], "need --store"),
-        (["--shard", "1/2"], "need --store"),
-        (["--store", "s", "--shard", "1/2", "--json", "x"], "a shard has no report"),
-        (["--store", "s", "--shard", "3/2"], "must have the form i/n"),
-        (["--scheduler", "local:2", "--jobs", "2"], "--scheduler cannot be combined"),
-        (["--scheduler", "local:none"], "N in local:N must be the number"),
-    ],
-)
-def test_options_that_do_not_go_together_are_refused(
-    words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert said in refused("validate", "planar_two_link", "--samples", "0", *words)
 
 
 @pytest.mark.slow

@@ -127,30 +127,6 @@ def test_compare_lists_a_changed_axis_and_states_that_changes_alone_exit_with_0(
     assert words.endswith("no regression, 1 change (exit 0: changes without a regression)")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("report", "none.json"), "none.json: cannot be read"),
-        (("report",), "name the file"),
-        (("report", "compare", "none.json", "none.json"), "cannot be read"),
-        (("validate", "ur5", "--html", "/nowhere/a.html"), "/nowhere/a.html: cannot be written"),
-        (("plot", "ur5", "-o", "a.svg"), "--to VALUES"),
-        (("plot", "ur5", "--to", "neutral", "-o", "/nowhere/a.svg"), "cannot be written"),
-        (("plot", "ur5", "--to", "neutral", "-o", "a.bmp"), "unknown picture format"),
-        (("plot", "ur5", "--to", "random:3", "-o", "a.svg"), "--from and --to need one configuration each"),
-    ],
-)
-def test_mistakes_are_one_line_and_exit_2(
-    words: tuple[str, ...], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    done = urdfkin(*words)
-    assert done.code == 2, (done.text, done.err)
-    assert message in done.err
-    assert "Traceback" not in done.err
-
-
 def test_an_unwritable_report_spoils_no_file_that_is_there(tmp_path: Path) -> None:
     there = tmp_path / "a.json"
     there.write_text("old")

@@ -401,24 +401,6 @@ def test_a_replay_of_a_locked_robot_locks_the_same_joints() -> None:
     assert found["result"] == [robot.placement("ready").tolist()]
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("--lock", "elbow=1"), "unknown coordinate 'elbow'"),
-        (("--lock", "panda_joint1=200deg"), "3.49066 is outside [-2.8973, 2.8973]"),
-        (("--lock", "panda_joint1=90"), "degrees? write 90deg"),
-        (("--lock", "panda_finger_joint2=0.01"), "it mimics panda_finger_joint1"),
-        (("--lock", "0.4"), "give each number with its name"),
-        (("--joints", "elbow"), "unknown coordinate 'elbow'"),
-        (("--joints", "panda_joint1"), "--lock panda_joint4=VALUE"),
-    ],
-)
-def test_a_wrong_lock_is_one_clear_error(words: tuple[str, ...], message: str) -> None:
-    err = refused("info", "panda", *words)
-    assert message in err
-    assert err.count("\n") == 1
-
-
 # -- by name, in degrees, as a pose ----------------------------------------------------------------
 
 
@@ -432,20 +414,6 @@ def test_a_pose_in_degrees_by_joint_names_is_what_the_numbers_are() -> None:
     assert named.data["q"] == [RADIANS]
     blanks = urdfkin("jacobian", "panda", "--q", f"[{' '.join(map(repr, RADIANS))}]", "--format", "json")
     assert blanks.data["result"] == named.data["result"]
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("--q", NAMED), "error: --q: no value for panda_joint2, panda_joint3, panda_joint5, panda"),
-        (("--q", NAMED), "or begin with a pose that they keep: 'neutral, panda_joint1=...'"),
-        (("--q", "raedy"), "error: --q: unknown pose 'raedy'; did you mean ready?"),
-        (("--q", "0 0 0 0 0 0 0 0 0"), "robot.from_pinocchio(q, mimic=False) converts it to urdfkin's; "),
-        (("--q", "ready", "--v", "neutral,panda_joint1=1mm/s"), "--v, panda_joint1: wrong unit: found"),
-    ],
-)  # fmt: skip
-def test_what_is_missing_or_not_meant_is_said(words: tuple[str, ...], message: str) -> None:
-    assert message in refused("velocity", "panda", *words)
 
 
 def test_degrees_typed_as_radians_are_recognised() -> None:

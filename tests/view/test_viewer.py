@@ -14,12 +14,10 @@ from urllib.request import urlopen
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import urdfkin
 from tests.attacks.test_viewer_gate import free_port
 from tests.report.browser import Browser, opened, require_chromium
-from urdfkin.cli.view import command
 from urdfkin.errors import InputError
 from urdfkin.errors.escape import markdown_text
 from urdfkin.model.configuration import checked
@@ -433,14 +431,6 @@ def test_in_a_browser_every_slider_equals_q_and_none_speaks_for_another(tmp_path
             browser.screenshot(f"viewer-{width}")
     finally:
         server.stop()
-
-
-def test_a_start_and_a_trajectory_exclude_each_other(tmp_path: Path) -> None:
-    file = tmp_path / "motion.csv"
-    words = ["planar_two_link", "--q", "0,0", "--trajectory", str(file), "--no-browser"]
-    found = CliRunner().invoke(command, words)
-    assert found.exit_code == 2
-    assert "--q and --trajectory cannot be used together" in found.output
 
 
 @pytest.mark.slow
