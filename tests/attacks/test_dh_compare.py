@@ -1,7 +1,5 @@
 """A comparison says what it fitted, what it did not compare, and which cell is wrong by how much."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

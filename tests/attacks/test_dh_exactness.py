@@ -1,7 +1,5 @@
 """A table is the robot to rounding, or says by how much it is not; an idle option is an error."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Each wrong table file gets one error that names the file, the row, the column, the value and the remedy."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

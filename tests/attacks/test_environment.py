@@ -1,7 +1,5 @@
 """Whatever a shell, a disc or a terminal does to a command: a result, or a clear line and the right code."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

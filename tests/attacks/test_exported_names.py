@@ -1,7 +1,5 @@
 """Nothing that a URDF calls a link, a joint or itself becomes code in any language that is exported."""
 
-from __future__ import annotations
-
 import ast
 import re
 import shutil

@@ -1,7 +1,5 @@
 """From the smallest numbers to the largest: no false alarm, no result refused that exists, no slip hidden."""
 
-from __future__ import annotations
-
 import math
 import shlex
 from collections.abc import Callable

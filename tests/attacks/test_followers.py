@@ -1,7 +1,5 @@
 """Mimic joints: rules are read twice, angles are the same doubles on both sides, samples keep limits."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math

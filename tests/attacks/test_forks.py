@@ -3,8 +3,6 @@
 Each case is a process of its own: Python warns of forks beside threads, and a child that hangs must be ended.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import textwrap

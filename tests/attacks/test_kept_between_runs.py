@@ -1,7 +1,5 @@
 """Files kept between runs: damage is mended, a full disc ends nothing, old files go, a stranger's are not run."""
 
-from __future__ import annotations
-
 import errno
 import os
 import pickle

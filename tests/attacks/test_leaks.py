@@ -1,7 +1,5 @@
 """Robots that are let go leave nothing behind, and a copy of a robot begins with an empty certificate."""
 
-from __future__ import annotations
-
 import copy
 import json
 import pickle

@@ -1,7 +1,5 @@
 """A base's rotation means one thing, is kept as it was given, and is brought to Pinocchio by another way."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 

@@ -1,7 +1,5 @@
 """Names that look like ours: each stands for one frame, the same to urdfkin and to Pinocchio, or for none."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from xml.sax.saxutils import quoteattr

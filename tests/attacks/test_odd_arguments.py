@@ -1,7 +1,5 @@
 """Whatever is handed to a public argument, the answer is a result or one of urdfkin's own errors."""
 
-from __future__ import annotations
-
 import inspect
 import math
 import os

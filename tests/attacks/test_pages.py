@@ -4,8 +4,6 @@ Where a form can be parsed, its skeleton (what there is besides the words) is co
 thing under tame names: whatever a name adds is found, also what nobody thought of.
 """
 
-from __future__ import annotations
-
 import ast
 import json
 import re

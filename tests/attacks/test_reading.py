@@ -3,8 +3,6 @@
 The device here is /dev/zero: who reads it to its end runs out of memory.
 """
 
-from __future__ import annotations
-
 import ast
 import io
 import os

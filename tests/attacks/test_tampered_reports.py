@@ -1,7 +1,5 @@
 """An edited report is refused with its contradiction, or `report compare` names it: never a traceback."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The page on threats names tests that exist, and says nothing that no test shows."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A number that a user types or writes is decimal digits in ASCII; what looks like one is refused."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

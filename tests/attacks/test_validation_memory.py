@@ -1,10 +1,6 @@
 """Memory is asked for before it is taken, bounded, and grows with the robot's size, not with its square."""
 
-from __future__ import annotations
-
 import resource
-import subprocess
-import sys
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +9,7 @@ from typing import Any
 import pytest
 
 import urdfkin
+from tests.cli.running import python
 from urdfkin.compiled import evaluate
 from urdfkin.compiled.plan import compile_tree
 from urdfkin.errors import OracleError
@@ -206,7 +203,7 @@ def test_a_limit_of_the_process_counts() -> None:
         "import resource; resource.setrlimit(resource.RLIMIT_AS, (3 * 10**9,) * 2)\n"
         "from urdfkin.validation import memory; print(memory.share())"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = python(code)
     assert 0 < int(done.stdout) < 1.5 * GB
 
 
@@ -224,5 +221,5 @@ def test_many_fixed_links_are_checked_in_little_memory() -> None:
         "assert validate(chain(5000, 'fixed'), samples=1).passed\n"
         "print(peak() - before)"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = python(code)
     assert int(done.stdout) < 400  # MB; paths of all frames alone took 1 GB

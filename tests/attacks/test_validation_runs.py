@@ -1,7 +1,5 @@
 """No robot takes a validation with it, whatever it raises; none is passed over in silence."""
 
-from __future__ import annotations
-
 import os
 import resource
 import subprocess

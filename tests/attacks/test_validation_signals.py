@@ -1,7 +1,5 @@
 """SIGTERM and SIGHUP end a validation as Ctrl-C does, and workers end with their parent, however it dies."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal
@@ -14,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.cli.running import python
 from urdfkin.cli.exit import Stop, stoppable
 
 pytestmark = pytest.mark.long
@@ -128,13 +127,12 @@ def test_a_worker_ends_at_the_end_of_its_pipe_alone(tmp_path: Path) -> None:
         "    if time.monotonic() > deadline: os.kill(child, 9); sys.exit('still there')\n"
         "    time.sleep(0.05)\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    python(code)
 
 
 def test_a_worker_whose_parent_is_gone_already_does_not_begin() -> None:
     code = "from urdfkin.validation.worker_processes import _end_with; _end_with(1 << 22); print('began')"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    done = python(code, check=False)
     assert (done.returncode, done.stdout) == (0, "")
 
 

@@ -1,7 +1,5 @@
 """Every form of a report tells every verdict with its reason, and how the whole run ended."""
 
-from __future__ import annotations
-
 import io
 import json
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The viewer in a real browser: other pages try to read, drive, frame and redirect it, names to script it."""
 
-from __future__ import annotations
-
 import socket
 import threading
 import time

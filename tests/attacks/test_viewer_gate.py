@@ -1,7 +1,5 @@
 """The viewer answers its own page with its key, and nobody else: asked over a socket, as a stranger would."""
 
-from __future__ import annotations
-
 import http.client
 import inspect
 import socket

@@ -1,7 +1,5 @@
 """A log that wraps its angles is read as the motion that was logged, and what was done to it is said."""
 
-from __future__ import annotations
-
 import warnings
 from pathlib import Path
 from typing import Any

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.cli.running import python
 from urdfkin.urdf.confinement import Ground
 from urdfkin.urdf.expressions import RefusedError, evaluate
 from urdfkin.urdf.xacro import XacroError, expand
@@ -298,15 +299,13 @@ confine(lambda path: path == "/etc/hostname")
     ],
 )
 def test_even_a_program_in_the_expanding_process_is_refused(deed: str) -> None:
-    import subprocess  # noqa: PLC0415
-    import sys  # noqa: PLC0415
 
     with socket.create_server(("127.0.0.1", 0)) as server:
         connected: list[object] = []
         thread = threading.Thread(target=lambda: connected.append(server.accept()), daemon=True)
         thread.start()
         code = WORST.format(deed.replace("PORT", str(server.getsockname()[1])))
-        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+        done = python(code, check=False)
     assert "RefusedError: " in done.stderr.splitlines()[-1]
     assert not connected
 

@@ -1,7 +1,5 @@
 """Run the `urdfkin` command: in this process where its entry point will do, in one of its own where not."""
 
-from __future__ import annotations
-
 import io
 import json
 import os

@@ -1,7 +1,5 @@
 """`urdfkin calibrate` writes what it says, and refuses what has no effect."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

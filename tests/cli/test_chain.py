@@ -1,7 +1,5 @@
 """`urdfkin chain`: axes and origins as Pinocchio's frames have them, up the tree and down."""
 
-from __future__ import annotations
-
 import csv
 import io
 

@@ -3,14 +3,12 @@
 import json
 import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 from urllib.parse import unquote_to_bytes, urlsplit
 
 import pytest
 
-from tests.cli.running import good, refused, urdfkin
+from tests.cli.running import good, python, refused, urdfkin
 
 GOOD = '<robot name="r">\n  <link name="a"/>\n</robot>\n'
 WARNED = '<robot name="">\n  <link name="a"/>\n</robot>\n'
@@ -94,7 +92,7 @@ def test_checking_imports_neither_yourdfpy_nor_pinocchio_nor_a_compiler() -> Non
         "import sys; from urdfkin.urdf.lint import check; check('<robot/>');"
         "print({'numba', 'yourdfpy', 'pinocchio', 'lxml', 'trimesh'} & set(sys.modules))"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    done = python(program)
     assert done.stdout == "set()\n"
 
 

@@ -1,7 +1,5 @@
 """`urdfkin check` where maintainers live: folders, settings, what is known, what changed, what is mended."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """What a shell offers as one types, asked as its script asks, and in the shells themselves."""
 
-from __future__ import annotations
-
 import json
 import os
 import pty

@@ -1,10 +1,6 @@
 """`--convention NAME` and `urdfkin order`: the numbers of other tools, and the code that converts them."""
 
-from __future__ import annotations
-
 import itertools
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +8,7 @@ import numpy as np
 import pytest
 
 import urdfkin
-from tests.cli.running import good, refused
+from tests.cli.running import good, python, refused
 from tests.cli.running import urdfkin as run
 from urdfkin.model.conventions import BUILT_IN
 from urdfkin.verify.quantities import by_command
@@ -117,7 +113,7 @@ def test_a_batch_without_the_option_runs_no_line_of_conventions() -> None:
         "loaded = [name for name in sys.modules if name.startswith('urdfkin.model.conventions')]\n"
         "print(done.code, len(done.text.splitlines()) > 100, loaded)\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = python(code)
     assert done.stdout == "0 True []\n"
 
 

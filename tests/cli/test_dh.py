@@ -1,7 +1,5 @@
 """`urdfkin dh` prints tables with their check, converts them, and exits with what it found."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`urdfkin export`: a file with its proof, and its check."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Every table has every format, a file's suffix selects it, and a file is written whole or not at all."""
 
-from __future__ import annotations
-
 import csv
 import errno
 import io

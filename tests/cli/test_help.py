@@ -3,8 +3,6 @@
 import glob
 import os
 import shlex
-import subprocess
-import sys
 from importlib import metadata
 from pathlib import Path
 
@@ -13,7 +11,7 @@ import numpy as np
 import pytest
 
 import urdfkin as library
-from tests.cli.running import Done, good, imported, process, urdfkin
+from tests.cli.running import Done, good, imported, process, python, urdfkin
 from tests.robots.odd_urdfs import urdf_of
 from urdfkin.cli import _ABSENT, _SYNONYMS, cli, commands, groups
 from urdfkin.robot import Robot
@@ -100,7 +98,7 @@ def test_the_examples_of_validation_run_one_after_the_other(
 def test_help_imports_nothing_heavy() -> None:
     for words in ("import urdfkin", "import urdfkin.cli", "from urdfkin.cli import cli; cli.get_help"):
         code = f"import sys; {words}; print(sorted({HEAVY!r} & set(sys.modules)))"
-        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        done = python(code)
         assert done.stdout == "[]\n"
 
 

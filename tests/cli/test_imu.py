@@ -1,7 +1,5 @@
 """`urdfkin imu` and `urdfkin singular-values`: the library's numbers in every form."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -1,7 +1,5 @@
 """`urdfkin info`: the tree as it hangs, and all that a joint needs in one line."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

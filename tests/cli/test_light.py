@@ -1,7 +1,5 @@
 """`check` works where nothing but click is installed, and a command is one thread."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess
@@ -9,6 +7,8 @@ import sys
 from pathlib import Path
 
 import pytest
+
+from tests.cli.running import python
 
 pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
@@ -46,7 +46,7 @@ def installed() -> list[str]:
 
 def bare(*words: str) -> subprocess.CompletedProcess[str]:
     code = BARE.format(words=words, installed=installed())
-    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    return python(code, check=False)
 
 
 @pytest.mark.parametrize("style", ["terminal", "json", "sarif", "github"])

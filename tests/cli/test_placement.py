@@ -1,7 +1,5 @@
 """`urdfkin placement` in other forms, `analytical-jacobian`, a base that moves, an acceleration's parts."""
 
-from __future__ import annotations
-
 import csv
 import io
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Progress says what is done, how fast, how long still and what failed; in lines where nobody watches."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

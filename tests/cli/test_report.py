@@ -3,8 +3,6 @@
 One run of `validate` is a process of its own; the others call the entry point here.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """`--trajectory FILE`: each row is the command at that configuration, in any units and names of the file."""
 
-from __future__ import annotations
-
 import csv
 import io
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Values in and numbers out: every way of giving q, v and a, every format, to the last digit."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

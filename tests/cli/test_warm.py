@@ -1,7 +1,5 @@
 """What is compiled is said, once and by its name, and nothing is compiled for input that cannot be used."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 from typing import NoReturn

@@ -1,7 +1,5 @@
 """Reports to test with: real runs on a few robots, one of them hostile, and runs that went wrong."""
 
-from __future__ import annotations
-
 import copy
 import json
 import math

@@ -1,7 +1,5 @@
 """The page in a real browser: it loads alone, draws, moves, sorts, filters, changes its theme, is safe."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

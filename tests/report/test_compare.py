@@ -1,7 +1,5 @@
 """A comparison finds every kind of change, and calls a regression what is one and nothing else."""
 
-from __future__ import annotations
-
 import copy
 import math
 from functools import reduce

@@ -1,7 +1,5 @@
 """The JSON document keeps to its published schema, and nothing else is read."""
 
-from __future__ import annotations
-
 import copy
 import json
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The history of several reports: its order, its robots, its changes, and the files that cannot be used."""
 
-from __future__ import annotations
-
 import json
 import os
 from html.parser import HTMLParser

@@ -1,7 +1,5 @@
 """The page is whole in itself, says everything, escapes everything, and stays small."""
 
-from __future__ import annotations
-
 import copy
 import hashlib
 import json

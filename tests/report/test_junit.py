@@ -1,7 +1,5 @@
 """JUnit XML keeps to the schema that Jenkins publishes and says everything in its bodies."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A report in Markdown and on a terminal: whole tables, no name that acts, never too long or too wide."""
 
-from __future__ import annotations
-
 import copy
 import io
 from typing import Any

@@ -1,7 +1,5 @@
 """A cluster computes what one process does, whoever is killed, and blames a robot and no neighbour."""
 
-from __future__ import annotations
-
 import contextlib
 import gc
 import json

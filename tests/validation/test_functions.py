@@ -1,7 +1,5 @@
 """`verify_function` accepts correct functions, and names the usual mistake of a wrong one."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """What the judge found is kept: it goes on where it was ended, and trusts no file."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import asdict
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A report tells what a robot is, and the commands that it tells to type work."""
 
-from __future__ import annotations
-
 import json
 import shlex
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A store goes on where it was ended, trusts no file, and reports what one run would have reported."""
 
-from __future__ import annotations
-
 import gc
 import itertools
 import json

@@ -1,7 +1,5 @@
 """A tally counts what lies outside its bound, adds up in any cut, and knows the worst case."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@ The values are computed a second time by `tests/urdf_standard.py`, and the toler
 docs/vectors.md. Both share no code with urdfkin.
 """
 
-from __future__ import annotations
-
 import hashlib
 import importlib.util
 import json

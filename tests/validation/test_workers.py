@@ -1,7 +1,5 @@
 """A process that dies costs its robot and nothing else, and every task is dealt once."""
 
-from __future__ import annotations
-
 import os
 import pickle
 import signal

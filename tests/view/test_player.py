@@ -1,7 +1,5 @@
 """The viewer plays a trajectory sample by sample, checks each, and saves pictures and motions."""
 
-from __future__ import annotations
-
 import io
 import re
 import struct

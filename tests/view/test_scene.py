@@ -1,7 +1,5 @@
 """Shapes are read from the URDF, their files are found, and ellipsoids and arrows are the numbers."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The viewer listens to this machine alone, follows its controls, and says what to install without viser."""
 
-from __future__ import annotations
-
 import re
 import signal
 import subprocess

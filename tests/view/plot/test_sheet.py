@@ -1,7 +1,5 @@
 """The sheet draws the numbers, says what was checked, and the same motion gives the same file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
