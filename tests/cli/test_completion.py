@@ -43,11 +43,18 @@ def offered(monkeypatch: pytest.MonkeyPatch) -> Offered:
     return ask
 
 
-def test_commands_options_and_choices_are_offered(offered: Offered) -> None:
+def test_commands_options_choices_codes_equations_and_tables_are_offered(offered: Offered) -> None:
     assert offered("") == list(commands())
     assert offered("jaco") == ["jacobian", "jacobian-rate"]
     assert offered("jacobian panda --refe") == ["--reference"]
     assert offered("jacobian panda --reference lo") == ["local", "local_world_aligned"]
+    slugs = {rule.slug for rule in RULES.values()}
+    assert set(offered("explain ")) == {*RULES, *slugs, *equations()}
+    assert offered("explain 7.13") == ["7.13", "7.130"]
+    assert set(offered("check --ignore ")) == {*RULES, *slugs}
+    assert set(offered("dh ur5 --compare ")) == {"file", *references()}
+    assert offered("check ") == ["file"]
+    assert offered("nonsense x") == []
 
 
 @pytest.mark.parametrize("line", ["info ", "validate ur5 ", "diff ur5 ", "same ur5 ", "export ", "dh "])
@@ -78,15 +85,6 @@ def test_frames_of_an_mjcf_file_are_its_bodies_sites_and_joints(offered: Offered
     assert offered(f"jacobian {path} --frame ") == ["upper", "hinge", "lower", "grip"]
 
 
-def test_codes_equations_and_tables_are_offered(offered: Offered) -> None:
-    slugs = {rule.slug for rule in RULES.values()}
-    assert set(offered("explain ")) == {*RULES, *slugs, *equations()}
-    assert offered("explain 7.13") == ["7.13", "7.130"]
-    assert set(offered("check --ignore ")) == {*RULES, *slugs}
-    assert set(offered("dh ur5 --compare ")) == {"file", *references()}
-    assert offered("check ") == ["file"]
-
-
 def test_no_name_is_offered_that_a_shell_would_carry_out(offered: Offered, tmp_path: Path) -> None:
     """What is completed stands on the command line, and the next key may be the return."""
     path = tmp_path / "hostile.urdf"
@@ -114,10 +112,6 @@ def test_what_cannot_be_read_offers_nothing_and_says_nothing(
     begin = time.monotonic()
     assert offered(f"jacobian {made.get(robot, robot)} --frame ") in ([], ["file", *catalogue()])
     assert time.monotonic() - begin < 5.0  # a pipe is not waited for
-
-
-def test_an_unknown_command_offers_no_robots_and_says_nothing(offered: Offered) -> None:
-    assert offered("nonsense x") == []
 
 
 def test_completing_imports_nothing_heavy() -> None:

@@ -48,33 +48,37 @@ def test_a_placement_reads_q_of_the_convention_and_says_so() -> None:
     assert "convention mujoco" in run("placement", *DOG, "mujoco", "--q", text).text
 
 
-def test_the_table_names_the_angular_part_first_where_the_tool_does() -> None:
+def test_the_table_names_the_convention_and_what_was_checked() -> None:
     lines = run("velocity", "ur5", "--convention", "drake", "--v", "random").text.splitlines()
     assert "convention drake" in lines[0]
     named = [line.split()[0] for line in lines if line.startswith(("linear", "angular"))]
     assert named == ["angular", "linear"]
-
-
-def test_the_check_is_that_of_the_numbers_before_the_conversion() -> None:
     done = run("velocity", "ur5", "--convention", "drake", "--v", "random")
     assert "before the conversion to drake" in done.err + done.text
     assert "before the conversion" not in run("velocity", "ur5", "--v", "random").err
 
 
-def test_a_users_file_and_names_are_read(tmp_path: Path) -> None:
+def test_a_users_file_and_its_units_zeros_and_names_are_read(tmp_path: Path) -> None:
     file = tmp_path / "motors.toml"
     file.write_text('joints = ["elbow", "joint_1"]\nangle = "deg"\n[joint.joint_2]\nname = "elbow"\n')
     for q in ("90,0", "elbow=90, joint_1=0"):
         done = run("placement", "planar_two_link", "--convention", str(file), "--q", q, "--format", "json")
         assert np.allclose(np.array(done.data["result"])[0, :3, 3], [0.5, 0.4, 0.0])
+    file = tmp_path / "motors.toml"
+    file.write_text('joints = ["joint_2", "joint_1"]\nangle = "deg"\n[joint.joint_1]\nsign = -1\nzero = 5\n')
+    space: dict[str, Any] = {"q_from": np.array([1.0, 2.0]), "v_from": np.array([1.0, 2.0]), "np": np}
+    exec(run("order", "planar_two_link", "--to", str(file)).text, space)
+    assert np.allclose(space["q_to"], [np.degrees(2), 5 - np.degrees(1)])
+    assert np.allclose(space["v_to"], [np.degrees(2), -np.degrees(1)])
 
 
-def test_a_wrong_convention_is_one_line(tmp_path: Path) -> None:
+def test_a_wrong_convention_is_one_line_with_the_nearest(tmp_path: Path) -> None:
     done = run("jacobian", "ur5", "--convention", "mujocco")
     assert (done.code, done.err.count("\n")) == (2, 1)
     assert "--no-mimic" in refused("jacobian", "panda", "--convention", "mujoco")
     assert run("jacobian", "panda", "--convention", "mujoco", "--no-mimic").code == 0
     refused("acceleration", "ur5", "--convention", "mujoco", "--breakdown")
+    assert "unknown convention 'mujocco'; did you mean mujoco" in refused("order", "a1", "--to", "mujocco")
 
 
 @pytest.mark.parametrize(
@@ -180,15 +184,6 @@ def test_the_printed_code_converts(start: str, end: str) -> None:
     assert ("six_to" in text) == ((start == "drake") != (end == "drake"))
 
 
-def test_units_and_motor_zeros_are_in_the_code(tmp_path: Path) -> None:
-    file = tmp_path / "motors.toml"
-    file.write_text('joints = ["joint_2", "joint_1"]\nangle = "deg"\n[joint.joint_1]\nsign = -1\nzero = 5\n')
-    space: dict[str, Any] = {"q_from": np.array([1.0, 2.0]), "v_from": np.array([1.0, 2.0]), "np": np}
-    exec(run("order", "planar_two_link", "--to", str(file)).text, space)
-    assert np.allclose(space["q_to"], [np.degrees(2), 5 - np.degrees(1)])
-    assert np.allclose(space["v_to"], [np.degrees(2), -np.degrees(1)])
-
-
 def test_json_has_the_same_numbers_as_the_library() -> None:
     data = run("order", "a1", "--to", "isaaclab", "--format", "json").data
     permutation = urdfkin.load("a1", verify=False).convention("isaaclab").permutation
@@ -197,7 +192,3 @@ def test_json_has_the_same_numbers_as_the_library() -> None:
     every = run("order", "a1", "--format", "json").data["conventions"]
     assert list(every) == TOOLS
     assert every["isaaclab"]["sources"]
-
-
-def test_an_unknown_convention_is_one_line_with_the_nearest() -> None:
-    assert "unknown convention 'mujocco'; did you mean mujoco" in refused("order", "a1", "--to", "mujocco")

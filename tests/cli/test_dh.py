@@ -16,17 +16,20 @@ def run(*words: str) -> Done:
     return urdfkin("dh", *words)
 
 
-def test_the_table_is_printed_with_its_check() -> None:
+def test_the_table_is_printed_with_its_check_in_the_forms_of_the_package() -> None:
     result = run(*UR5, "--snap", "1e-6", "--degrees", "--millimetres")
     assert result.code == 0
     assert "ur5: base to tool0, standard Denavit-Hartenberg parameters" in result.text
     assert "2  shoulder_lift_joint     -425            0       0           q2" in result.text
     assert "guaranteed" in result.text
     assert "agrees within rounding and snapping" in result.text
-
-
-def test_the_forms_of_the_command_are_those_of_the_package() -> None:
     assert set(FORMATS) == {*EXPORTED, "urdf", "svg"}
+    result = run(*UR5, "--no-verify")
+    assert result.code == 3
+    assert "NOT VERIFIED" in result.text
+    page = (Path(__file__).parents[2] / "docs" / "dh.md").read_text()
+    command, shown = page.split("```console\n$ urdfkin dh ")[1].split("```")[0].split("\n", 1)
+    assert run(*command.split()).text.startswith(shown)
 
 
 @pytest.mark.slow
@@ -81,15 +84,3 @@ def test_a_comparison_exits_with_its_verdict(tmp_path: Path) -> None:
     data = json.loads(run("kinova", "--compare", "kinova", "--format", "json").text)
     assert data["agrees"]
     assert [one["cell"] for one in data["differences"]] == ["d"]
-
-
-def test_unverified_tables_exit_3() -> None:
-    result = run(*UR5, "--no-verify")
-    assert result.code == 3
-    assert "NOT VERIFIED" in result.text
-
-
-def test_the_table_in_the_docs_is_what_the_command_prints() -> None:
-    page = (Path(__file__).parents[2] / "docs" / "dh.md").read_text()
-    command, shown = page.split("```console\n$ urdfkin dh ")[1].split("```")[0].split("\n", 1)
-    assert run(*command.split()).text.startswith(shown)

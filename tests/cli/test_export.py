@@ -30,9 +30,14 @@ def test_a_file_is_written_and_checks_itself(tmp_path: Path) -> None:
     assert "WRONG placement" in wrong.text
 
 
-def test_it_goes_to_standard_output_where_no_file_is_named() -> None:
+def test_standard_output_has_the_file_and_commands_nobody() -> None:
     done = good("export", "planar_two_link", "--to", "c", "--name", "my arm")
     assert "void my_arm_jacobian_batch(size_t n" in done.text
+    done = urdfkin(
+        "export", "-", "--to", "numpy", "--no-verify", stdin=urdf("x ##vso[task.setvariable]y ::error::")
+    )
+    assert done.code == 3
+    assert "##vso[" not in done.text
 
 
 def test_what_was_not_verified_says_so_everywhere(tmp_path: Path) -> None:
@@ -43,14 +48,6 @@ def test_what_was_not_verified_says_so_everywhere(tmp_path: Path) -> None:
     checked = urdfkin("export", "--check", str(path))
     assert checked.code == 3
     assert "UNVERIFIED" in checked.err
-
-
-def test_a_file_on_a_terminal_commands_nobody() -> None:
-    done = urdfkin(
-        "export", "-", "--to", "numpy", "--no-verify", stdin=urdf("x ##vso[task.setvariable]y ::error::")
-    )
-    assert done.code == 3
-    assert "##vso[" not in done.text
 
 
 @pytest.fixture(scope="module")

@@ -131,14 +131,11 @@ def test_each_ending_gets_its_form_and_the_same_numbers(tmp_path: Path) -> None:
     assert (tmp_path / "J.CSV").read_bytes() == (tmp_path / "J.csv").read_bytes()
 
 
-def test_the_form_stands_where_the_ending_says_nothing(tmp_path: Path) -> None:
+def test_the_form_stands_where_the_ending_says_nothing_and_a_breakdown_goes_by_it_too(tmp_path: Path) -> None:
     assert urdfkin(*WORDS, "--format", "json", "-o", str(tmp_path / "J.dat")).code == 0
     assert len(json.loads((tmp_path / "J.dat").read_text())["result"]) == 2
     assert urdfkin(*WORDS, "-o", str(tmp_path / "J")).code == 0
     assert (tmp_path / "J").read_text().startswith("sample,row,joint_1")
-
-
-def test_a_breakdown_goes_by_the_ending_too(tmp_path: Path) -> None:
     words = ("acceleration", "elbow", "--breakdown", "--v", "random", "-o", str(tmp_path / "parts.json"))
     assert urdfkin(*words).code == 0
     assert json.loads((tmp_path / "parts.json").read_text())["quantity"] == "acceleration breakdown"
@@ -216,14 +213,11 @@ def test_what_cannot_be_finished_leaves_the_file_as_it_was_and_nothing_beside_it
     assert place.read_bytes() == b"before"
 
 
-def test_asking_whether_a_file_can_be_written_leaves_nothing(tmp_path: Path) -> None:
+def test_a_file_is_written_through_a_link_and_asking_for_it_leaves_nothing(tmp_path: Path) -> None:
     check_writable(tmp_path / "out.json", None)
     assert list(tmp_path.iterdir()) == []
     with pytest.raises(SourceError, match="cannot be written"):
         check_writable(tmp_path / "no such folder" / "out.json")
-
-
-def test_a_link_is_followed_and_stays_a_link(tmp_path: Path) -> None:
     (tmp_path / "there").mkdir()
     link = tmp_path / "link.json"
     link.symlink_to(tmp_path / "there" / "out.json")

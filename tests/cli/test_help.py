@@ -39,11 +39,19 @@ def run_examples(command: str) -> None:
         assert done.out or done.err
 
 
-def test_every_command_stands_on_the_help_page_with_a_summary() -> None:
+def test_the_help_page_has_every_command_the_version_pinocchios_and_the_families_that_exist() -> None:
     text = urdfkin("--help").text
     for name, (_, summary) in commands().items():
         assert f"  {name} " in text
         assert summary.split()[0] in text
+    group = click.Context(cli)
+    for name in commands():
+        assert isinstance(cli.get_command(group, name), click.Command)
+    done = good("--version")
+    assert done.text.strip().endswith(f"Pinocchio {metadata.version('pin')}")
+    page = " ".join(urdfkin("robots", "--help").text.split())
+    named = page.partition("Show only the robots of one family: ")[2].partition(".")[0].split(", ")
+    assert named == sorted({entry.family for entry in catalogue().values()})
 
 
 def elbow() -> str:
@@ -95,14 +103,11 @@ def test_the_examples_of_validation_run_one_after_the_other(
         run_examples(command)
 
 
-def test_help_imports_nothing_heavy() -> None:
+def test_help_imports_nothing_heavy_of_any_command() -> None:
     for words in ("import urdfkin", "import urdfkin.cli", "from urdfkin.cli import cli; cli.get_help"):
         code = f"import sys; {words}; print(sorted({HEAVY!r} & set(sys.modules)))"
         done = python(code)
         assert done.stdout == "[]\n"
-
-
-def test_a_commands_help_imports_neither_numpy_nor_pinocchio() -> None:
     assert imported(["--help", *(f"{command} --help" for command in commands())], HEAVY) == {}
 
 
@@ -120,31 +125,11 @@ def _seconds() -> float:
     return end.children_user + end.children_system - begin.children_user - begin.children_system
 
 
-def test_the_version_names_pinocchios_too() -> None:
-    done = good("--version")
-    assert done.text.strip().endswith(f"Pinocchio {metadata.version('pin')}")
-
-
-def test_every_summary_and_module_is_there() -> None:
-    group = click.Context(cli)
-    for name in commands():
-        assert isinstance(cli.get_command(group, name), click.Command)
-
-
-def test_the_families_that_the_help_names_are_those_that_exist() -> None:
-    page = " ".join(urdfkin("robots", "--help").text.split())
-    named = page.partition("Show only the robots of one family: ")[2].partition(".")[0].split(", ")
-    assert named == sorted({entry.family for entry in catalogue().values()})
-
-
-def test_each_other_word_for_a_command_leads_to_a_command_and_is_none_itself() -> None:
+def test_words_for_commands_lead_to_commands_and_these_have_the_librarys_names() -> None:
     assert set(_SYNONYMS) & set(commands()) == set()
     assert set(_ABSENT) & (set(commands()) | set(_SYNONYMS)) == set()
     for meant in _SYNONYMS.values():
         assert meant.split()[0] in commands()
-
-
-def test_a_command_that_computes_has_the_librarys_name() -> None:
     own = set(groups()["Compute"]) | {"dh", "screws", "chain", "export", "view"}
     assert [name for name in own if not hasattr(Robot, name.replace("-", "_"))] == []
     assert [
@@ -156,18 +141,12 @@ def explain(topic: str) -> Done:
     return urdfkin("explain", topic)
 
 
-def test_an_equations_number_gives_its_page() -> None:
+def test_an_equations_number_gives_its_page_and_no_other_number_does() -> None:
     page = explain("7.130")
     assert page.code == 0, page.err
     for part in ("Equation 7.130", "w-dot_0i x d_{i-1,i}", "Robot.acceleration", "Pinocchio", "tests/text/"):
         assert part in page.text
-
-
-def test_a_lost_equation_is_said_to_be_lost() -> None:
     assert "page 2" in explain("7.8").text
-
-
-def test_a_number_that_the_chapter_does_not_have_is_no_topic() -> None:
     answer = explain("7.131")
     assert answer.code == 2
     assert answer.text == ""

@@ -47,7 +47,7 @@ def test_the_guides_say_whom_each_link_hangs_from(name: str) -> None:
     assert parents_of_the_drawing(drawn) == [-1, *(one.parent for one in tree.joints)]
 
 
-def test_only_children_do_not_move_to_the_right_however_long_the_chain() -> None:
+def test_the_guides_of_only_children_do_not_move_to_the_right() -> None:
     rows = [(joint(f"j{k}"), f"l{k}", f"l{k + 1}") for k in range(300)]
     assert set(guides(build_tree("long", "l0", rows))) == {""}
 
@@ -79,13 +79,10 @@ def test_a_file_with_another_order_is_told_with_the_first_joint_that_differs() -
     assert urdfkin("info", urdf, "--root-joint", "planar").text.splitlines()[-1].endswith("the same order")
 
 
-def test_a_joint_of_several_numbers_shows_where_all_of_them_are() -> None:
+def test_a_joint_of_several_numbers_shows_where_all_are_and_the_last_links_are_tips() -> None:
     text = urdfkin("info", to_urdf(forked()), "--root-joint", "floating").text
     (line,) = [line for line in text.splitlines() if "root_joint" in line]
     assert line.split()[1:5] == ["root_joint", "floating", "q[0:7]", "v[0:6]"]
-
-
-def test_the_last_links_are_named_as_tips() -> None:
     assert "; tips: D, F, B" in urdfkin("info", to_urdf(forked())).text
 
 

@@ -40,13 +40,18 @@ def test_few_numbers_are_the_same_pose(written: str, relative_to: str | None) ->
     np.testing.assert_array_equal(np.array(rows[1:], dtype=float)[:, 1:], found)
 
 
-def test_the_table_says_from_where_and_in_which_units() -> None:
+def test_the_table_says_from_where_and_in_which_units_and_a_base_does_nothing_to_a_relative_placement() -> (
+    None
+):
     text = urdfkin("placement", "ur5", "--relative-to", "forearm_link").text
     assert "ur5: placement of tool0, relative to forearm_link" in text
     assert "axis of forearm_link" in text
     text = urdfkin("placement", "ur5", "--as", "rpy").text
     assert "roll, pitch, yaw [rad]" in text
     assert "qw" in urdfkin("placement", "ur5", "--as", "quaternion").text
+    assert "--base-placement does nothing with --relative-to" in refused(
+        "placement", "ur5", "--relative-to", "base_link", "--base-placement", MOVED
+    )
 
 
 def test_numbers_of_another_rotation_are_a_disagreement(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -87,12 +92,6 @@ def test_where_roll_and_yaw_turn_about_one_axis_the_numbers_are_right_all_the_sa
     )
 
 
-def test_a_base_does_nothing_to_a_relative_placement_and_that_is_said() -> None:
-    assert "--base-placement does nothing with --relative-to" in refused(
-        "placement", "ur5", "--relative-to", "base_link", "--base-placement", MOVED
-    )
-
-
 # -- the analytical Jacobian ---------------------------------------------------------------------------
 
 
@@ -108,14 +107,14 @@ def test_the_analytical_jacobian_is_the_librarys_with_its_rows_named(representat
     assert done.data["rows"][3] in urdfkin(*words).text
 
 
-def test_it_knows_every_sequence() -> None:
+def test_forms_are_told_apart_every_sequence_is_known_and_a_singularity_is_told_with_the_cure() -> None:
     assert set(REPRESENTATIONS) == {"rpy", "quaternion", *SEQUENCES}
-
-
-def test_a_representational_singularity_is_told_with_the_cure() -> None:
     err = refused("analytical-jacobian", "planar_two_link", "--q", "0.3,0.4")
     assert "representational singularity" in err
     assert "another sequence or by a quaternion" in err
+    labels = [row.labels for row in quantity._FORMS.values()]
+    assert sorted(map(len, labels)) == [6, 7, 7]
+    assert len(set(labels)) == len(labels)
 
 
 # -- a base that moves ---------------------------------------------------------------------------------
@@ -177,12 +176,6 @@ def test_a_batch_of_bases_goes_with_one_configuration_and_with_as_many(tmp_path:
     )
 
 
-def test_the_forms_are_told_apart_by_their_rows() -> None:
-    labels = [row.labels for row in quantity._FORMS.values()]
-    assert sorted(map(len, labels)) == [6, 7, 7]
-    assert len(set(labels)) == len(labels)
-
-
 # -- the parts of an acceleration, and the rate of the Jacobian ------------------------------------
 
 
@@ -205,7 +198,7 @@ def test_the_parts_of_the_polar_robots_acceleration_are_shown_with_their_sum() -
 
 
 @pytest.mark.slow
-def test_as_json_the_parts_sum_to_the_acceleration_exactly() -> None:
+def test_as_data_the_parts_sum_to_the_acceleration() -> None:
     result = urdfkin("acceleration", *POLAR, "--breakdown", "--format", "json")
     document = result.data
     terms = np.array(document["terms"])
@@ -216,10 +209,6 @@ def test_as_json_the_parts_sum_to_the_acceleration_exactly() -> None:
     expected = library.load("polar").acceleration([0.3, 0.7], [1.0, 2.0], [0.5, -1.0], "slider")
     assert np.abs(total[0] - expected).max() <= 1e-14
     assert document["verified"] is True
-
-
-@pytest.mark.slow
-def test_as_csv_there_is_a_line_for_each_part_and_one_for_the_sum() -> None:
     result = urdfkin("acceleration", *POLAR, "--breakdown", "--format", "csv")
     rows = list(csv.DictReader(io.StringIO(result.text)))
     assert [row["kind"] for row in rows] == ["transverse", "centripetal", "coriolis", "sliding", ""]

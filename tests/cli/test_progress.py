@@ -26,7 +26,7 @@ class Clock:
         return self.now
 
 
-def test_what_was_kept_from_before_makes_nobody_fast() -> None:
+def test_what_was_kept_or_compiled_before_makes_nobody_fast_or_slow() -> None:
     clock = Clock()
     pace = Pace(clock)
     assert pace.of(replace(STANDING, chunks_done=10)) == (None, None)
@@ -37,9 +37,6 @@ def test_what_was_kept_from_before_makes_nobody_fast() -> None:
         " failed; panda"
     )
     assert "3 failed" in line(replace(STANDING, failures=3), pace)
-
-
-def test_what_was_compiled_before_makes_nobody_slow() -> None:
     clock = Clock()
     pace = Pace(clock)
     clock.now += 90.0
@@ -48,16 +45,13 @@ def test_what_was_compiled_before_makes_nobody_slow() -> None:
     assert pace.of(STANDING) == (4.0, 128.5)
 
 
-def test_programs_are_told_in_json_from_the_first_to_the_last_chunk() -> None:
+def test_programs_are_told_in_json_from_before_any_work_to_the_last_chunk() -> None:
     done = urdfkin("validate", "planar_two_link", "nosuch", "--samples", "50", "--json-progress")
     lines = [json.loads(text) for text in done.err.splitlines() if text.startswith("{")]
     assert lines[-1]["chunks_done"] == lines[-1]["chunks"] == 4
     assert (lines[-1]["robots_done"], lines[-1]["failures"]) == (2, 1)
     assert lines[-1]["seconds_left"] == 0.0
     assert set(lines[0]) == {*STANDING.__slots__, "chunks_per_second", "seconds_left"}
-
-
-def test_the_first_is_told_before_any_work_so_that_a_pace_counts_from_there() -> None:
     done = urdfkin("validate", "planar_two_link", "--samples", "50", "--json-progress")
     first = next(json.loads(text) for text in done.err.splitlines() if text.startswith("{"))
     assert (first["chunks_done"], first["chunks"], first["label"]) == (0, 2, "planar_two_link")

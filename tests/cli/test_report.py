@@ -81,16 +81,15 @@ def test_a_report_rendered_later_is_the_one_rendered_at_once(tmp_path: Path) -> 
     assert [path.read_bytes() for path in first] == [path.read_bytes() for path in later]
 
 
-def test_report_prints_where_no_form_is_asked_for_and_exits_as_the_run_did(good: Path, bad: Path) -> None:
+def test_report_prints_where_no_form_is_asked_for_exits_as_the_run_did_and_hands_out_the_schema(
+    good: Path, bad: Path
+) -> None:
     done = urdfkin("report", good)
     assert done.code == 0
     assert "2 robots" in done.text
     done = urdfkin("report", bad)
     assert done.code == 1
     assert "urdfkin velocity panda --frame" in done.text
-
-
-def test_report_hands_out_the_schema() -> None:
     done = urdfkin("report", "--schema")
     assert json.loads(done.text)["$id"] == "urn:urdfkin:validation:1"
 

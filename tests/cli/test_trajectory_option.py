@@ -65,13 +65,10 @@ def commands_with(*names: str) -> dict[str, set[str]]:
     return found
 
 
-def test_every_command_that_takes_joint_values_has_a_convention() -> None:
+def test_every_command_that_takes_joint_values_has_a_convention_and_of_a_batch_a_trajectory() -> None:
     found = commands_with("q", "trajectory", "poses")
     assert {*COMMANDS, "placement", "chain", "plot", "view", "calibrate"} <= found.keys()
     assert [name for name, given in found.items() if "convention" not in given] == []
-
-
-def test_every_command_that_takes_a_batch_takes_a_trajectory() -> None:
     of_one_configuration = {"chain"}
     found = commands_with("q").items()
     assert {name for name, given in found if "trajectory" not in given} == of_one_configuration
@@ -115,20 +112,19 @@ def test_csv_has_one_row_for_each_time(command: str, motion: dict[str, FloatArra
         assert head[1:3] == ["vx panda_joint1", "vx panda_joint2"]
 
 
-def test_every_sample_is_checked_and_the_worst_case_is_printed(log: Path) -> None:
+def test_every_sample_is_checked_and_a_breakdown_has_the_times_too(
+    log: Path, motion: dict[str, FloatArray]
+) -> None:
     line = run("velocity", "panda", "--frame", "panda_hand", "--trajectory", str(log)).text.splitlines()[-1]
     assert f"{N} velocity results, worst disagreement " in line
     assert "of the bound" in line
-
-
-def test_a_breakdown_has_the_times_too(motion: dict[str, FloatArray], log: Path) -> None:
     words = ("acceleration", "panda", "--frame", "panda_hand", "--breakdown", "--trajectory", str(log))
     head, first, *_ = csv.reader(io.StringIO(run(*words, "--format", "csv").text))
     assert head[:3] == ["t", "joint", "kind"]
     assert float(first[0]) == motion["t"][0]
 
 
-def test_degrees_and_milliseconds_in_a_heading_are_the_texts_with_these_units(tmp_path: Path) -> None:
+def test_units_in_a_heading_are_those_of_the_texts_also_in_a_batch_of_q(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text(
         "time [ms],joint_1 [deg],joint_2_deg,v:joint_1_deg_s,v:joint_2 [deg/s]\n250,30,-7.7,90,1e1\n"
@@ -138,9 +134,6 @@ def test_degrees_and_milliseconds_in_a_heading_are_the_texts_with_these_units(tm
     one = run(*words, "--q", "30deg,-7.7deg", "--v", "90deg/s,10deg/s").data
     assert (along["result"], along["q"], along["v"]) == (one["result"], one["q"], one["v"])
     assert along["t"] == [0.25]
-
-
-def test_units_are_read_in_a_batch_of_q_too(tmp_path: Path) -> None:
     (tmp_path / "q.csv").write_text("joint_2_deg,joint_1\n90,0.5\n")
     found = run("placement", "planar_two_link", "--q", f"@{tmp_path / 'q.csv'}", "--format", "json").data
     assert found["q"] == [[0.5, np.pi / 2]]

@@ -176,10 +176,17 @@ def test_the_json_says_all_that_is_needed_to_use_it() -> None:
     assert np.array_equal(again, data["result"])
 
 
-def test_numbers_are_taken_as_they_are_written() -> None:
+def test_numbers_are_taken_as_they_are_written_by_name_in_degrees_or_with_blanks() -> None:
     data = urdfkin("placement", "panda", "--q", ",".join(map(repr, Q)), "--format", "json").data
     assert data["q"] == [list(Q)]
     assert np.array_equal(data["result"][0], library.load("panda").placement(Q, "panda_hand_tcp"))
+    named = good("jacobian", "panda", "--q", f"ready,{NAMED}", "--format", "json")
+    assert "warning" not in named.err
+    assert named.data["q"] == [RADIANS]
+    blanks = urdfkin("jacobian", "panda", "--q", f"[{' '.join(map(repr, RADIANS))}]", "--format", "json")
+    assert blanks.data["result"] == named.data["result"]
+    done = urdfkin("placement", "panda", "--q", "ready,panda_joint1=30", "--no-verify")
+    assert "warning: joint panda_joint1: 30 is outside [-2.8973, 2.8973]; degrees? write 30deg" in done.err
 
 
 @pytest.mark.parametrize("layout", ["plain", "header", "header in another order", "crlf and bom", "comments"])
@@ -213,38 +220,31 @@ def test_a_batch_may_come_from_standard_input_as_a_robot_may() -> None:
     assert np.array_equal(done.data["result"][0], robot.jacobian(np.zeros(6), "tool0"))
 
 
-def test_one_sample_of_v_goes_with_a_batch_of_q() -> None:
+def test_a_batch_goes_with_one_sample_a_seed_repeats_it_and_a_long_one_is_shown_in_part() -> None:
     done = urdfkin("velocity", "ur5", "--q", "random:5", "--v", "1,0,0,0,0,0", "--format", "json")
     assert np.shape(done.data["v"]) == (5, 6)
     assert "different lengths: found 5, 4" in refused("velocity", "ur5", "--q", "random:5", "--v", "random:4")
-
-
-def test_a_seed_gives_the_same_numbers_and_another_one_others() -> None:
     one, again, other = (
         urdfkin("jacobian", "panda", "--q", "random:2", "--seed", seed, "--format", "csv").out
         for seed in ("3", "3", "4")
     )
     assert one == again
     assert one != other
-
-
-def test_a_long_batch_is_shown_in_part_and_says_where_the_rest_is() -> None:
     text = urdfkin("velocity", "ur5", "--q", "random:9", "--v", "random").text
     assert "sample 4" in text
     assert "sample 5" not in text
     assert "4 more samples" in text
 
 
-def test_output_goes_to_a_file_whole_and_the_check_to_stderr(tmp_path: Path) -> None:
+def test_output_goes_to_a_file_whole_through_a_link_or_to_a_device_and_the_check_to_stderr(
+    tmp_path: Path,
+) -> None:
     path = tmp_path / "J.npy"
     done = urdfkin("jacobian", "panda", "--format", "npy", "--output", str(path))
     assert (done.code, done.out) == (0, b"")
     assert "verified by Pinocchio" in done.err
     assert np.load(path).shape == (1, 6, 8)
     assert [entry.name for entry in tmp_path.iterdir()] == ["J.npy"]
-
-
-def test_an_output_that_is_a_link_or_a_device_is_written_through(tmp_path: Path) -> None:
     target, link = tmp_path / "target.csv", tmp_path / "link.csv"
     target.write_text("old")
     link.symlink_to(target)
@@ -257,17 +257,20 @@ def test_an_output_that_is_a_link_or_a_device_is_written_through(tmp_path: Path)
     assert dash.text.startswith("sample,row,panda_joint1")
 
 
-def test_limits_that_are_left_are_warned_of_by_name_and_computed_all_the_same() -> None:
+def test_the_default_frame_is_the_catalogues_tip_limits_are_warned_of_and_mimic_joints_follow_as_asked() -> (
+    None
+):
+    assert "jacobian of panda_hand_tcp" in urdfkin("jacobian", "panda").text
+    assert "jacobian of tool0" in urdfkin("jacobian", "ur5").text
     done = good("placement", "panda", "--q", "0,0,0,-1,0,0,0,0.5", "--format", "json")
     assert "warning: joint panda_finger_joint1: 0.5 is outside [0, 0.04]" in done.err
     assert "warning: joint panda_finger_joint2: 0.5 is outside [0, 0.04]" in done.err
     assert "panda_joint4" not in done.err
     assert done.data["verified"] is True
-
-
-def test_the_default_frame_is_said_and_is_the_catalogues_tip() -> None:
-    assert "jacobian of panda_hand_tcp" in urdfkin("jacobian", "panda").text
-    assert "jacobian of tool0" in urdfkin("jacobian", "ur5").text
+    assert len(urdfkin("jacobian", "panda", "--format", "json").data["rates"]) == 8
+    assert len(urdfkin("jacobian", "panda", "--no-mimic", "--format", "json").data["rates"]) == 9
+    assert urdfkin("jacobian", "alex_psyonic_hands").code == 0
+    assert urdfkin("jacobian", "alex_psyonic_hands", "--mimic").code == 2
 
 
 @pytest.mark.parametrize("root_joint", ["planar", "floating"])
@@ -275,13 +278,6 @@ def test_a_root_joint_adds_its_coordinates(root_joint: str) -> None:
     data = urdfkin("velocity", "a1", "--root-joint", root_joint, "--v", "random", "--format", "json").data
     assert data["rates"][0] == "root_joint.vx"
     assert len(data["q"][0]) == 12 + (7 if root_joint == "floating" else 3)
-
-
-def test_mimic_joints_follow_or_are_free_as_asked() -> None:
-    assert len(urdfkin("jacobian", "panda", "--format", "json").data["rates"]) == 8
-    assert len(urdfkin("jacobian", "panda", "--no-mimic", "--format", "json").data["rates"]) == 9
-    assert urdfkin("jacobian", "alex_psyonic_hands").code == 0
-    assert urdfkin("jacobian", "alex_psyonic_hands", "--mimic").code == 2
 
 
 @pytest.mark.slow
@@ -350,7 +346,7 @@ def test_names_are_never_folded_nothing_wraps_and_no_line_ends_in_blanks_in_a_pi
 # -- locked joints -----------------------------------------------------------------------------------
 
 
-def test_a_locked_joint_has_no_number_in_q_and_no_column() -> None:
+def test_locked_joints_have_no_number_and_no_column_also_in_a_replay() -> None:
     done = urdfkin(
         "jacobian", "panda", "--lock", "panda_finger_joint1=40mm", "--q", "ready", "--format", "json"
     )
@@ -359,13 +355,15 @@ def test_a_locked_joint_has_no_number_in_q_and_no_column() -> None:
     assert done.data["result"] == [robot.jacobian("ready").tolist()]
     assert done.data["rates"] == list(robot.rate_names)
     assert done.data["lock"] == {"panda_finger_joint1": 0.04}
-
-
-def test_all_but_the_named_joints_are_locked_at_a_pose_and_single_values() -> None:
     words = ("--joints", "panda_joint1, panda_joint2", "--lock", "ready", "--lock", "panda_joint7=30deg")
     found = urdfkin("placement", "panda", *words, "--q", "0.1,0.2", "--format", "json").data
     robot = library.load("panda").locked("ready, panda_joint7=30deg", joints=["panda_joint1", "panda_joint2"])
     assert found["result"] == [robot.placement([0.1, 0.2]).tolist()]
+    robot = library.load("panda").locked({"panda_joint4": -1.0 / 3.0})
+    words = robot.origin.words.split()
+    assert words == ["panda", "--lock", f"panda_joint4={-1.0 / 3.0!r}"]
+    found = urdfkin("placement", *words, "--q", "ready", "--format", "json").data
+    assert found["result"] == [robot.placement("ready").tolist()]
 
 
 @pytest.mark.parametrize(
@@ -391,32 +389,11 @@ def test_every_command_with_one_robot_can_lock_joints(words: tuple[str, ...]) ->
     assert "panda_joint3" not in done.text or "locked" in done.text
 
 
-def test_a_replay_of_a_locked_robot_locks_the_same_joints() -> None:
-    robot = library.load("panda").locked({"panda_joint4": -1.0 / 3.0})
-    words = robot.origin.words.split()
-    assert words == ["panda", "--lock", f"panda_joint4={-1.0 / 3.0!r}"]
-    found = urdfkin("placement", *words, "--q", "ready", "--format", "json").data
-    assert found["result"] == [robot.placement("ready").tolist()]
-
-
 # -- by name, in degrees, as a pose ----------------------------------------------------------------
 
 
 NAMED = "panda_joint1=30deg,panda_joint4=-pi/2,panda_joint6=1.5"
 RADIANS = [math.pi / 6, -0.785398, 0.0, -math.pi / 2, 0.0, 1.5, 0.785398, 0.001]
-
-
-def test_a_pose_in_degrees_by_joint_names_is_what_the_numbers_are() -> None:
-    named = good("jacobian", "panda", "--q", f"ready,{NAMED}", "--format", "json")
-    assert "warning" not in named.err
-    assert named.data["q"] == [RADIANS]
-    blanks = urdfkin("jacobian", "panda", "--q", f"[{' '.join(map(repr, RADIANS))}]", "--format", "json")
-    assert blanks.data["result"] == named.data["result"]
-
-
-def test_degrees_typed_as_radians_are_recognised() -> None:
-    done = urdfkin("placement", "panda", "--q", "ready,panda_joint1=30", "--no-verify")
-    assert "warning: joint panda_joint1: 30 is outside [-2.8973, 2.8973]; degrees? write 30deg" in done.err
 
 
 @pytest.mark.slow
