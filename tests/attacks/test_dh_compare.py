@@ -38,7 +38,7 @@ def wrong_d1() -> DHTable:
     return with_cell(table, 0, d=table.rows[0].d + 0.01)
 
 
-def test_a_wrong_d1_that_the_base_takes_up_is_told_with_its_millimetres() -> None:
+def test_the_wrong_d1_is_told_with_its_millimetres_fitted_or_not() -> None:
     found = compare(ur5(), wrong_d1())
     assert found.agrees  # with a base fitted, it does
     assert not found.as_written
@@ -52,9 +52,6 @@ def test_a_wrong_d1_that_the_base_takes_up_is_told_with_its_millimetres() -> Non
     assert "has the same effect: d1" in text
     assert [(one.row, one.cell) for one in found.instead] == [(0, "d")]
     assert found.instead[0].difference == pytest.approx(-0.01, rel=1e-6)
-
-
-def test_without_fitting_the_wrong_d1_differs_and_is_named() -> None:
     found = compare(ur5(), wrong_d1(), fit=False)
     assert not found.agrees
     assert [(one.row, one.cell) for one in found.differences] == [(0, "d")]
@@ -77,21 +74,16 @@ def test_without_fitting_every_wrong_cell_differs(convention: str, row: int, cel
     assert found.metres > 1e-3 or found.radians > 1e-3
 
 
-def test_only_a_table_that_is_the_urdf_as_written_has_every_cell() -> None:
+def test_only_a_table_that_is_the_urdf_as_written_has_every_cell_and_a_turned_tool_differs() -> None:
     robot = urdfkin.load("panda")
-    table = robot.dh("panda_link8", "panda_link0")
-    found = compare(robot.chain("panda_link8", "panda_link0"), table)
+    table, path = robot.dh("panda_link8", "panda_link0"), robot.chain("panda_link8", "panda_link0")
+    found = compare(path, table)
     assert found.as_written
     assert "Every cell agrees with the URDF." in document(found, units_of()).text()
     assert found.base.metres == found.base.radians == found.tool.metres == found.tool.radians == 0.0
-
-
-def test_a_turned_tool_is_a_difference_where_nothing_is_fitted() -> None:
-    robot = urdfkin.load("panda")
-    table = robot.dh("panda_link8", "panda_link0")
     tool = np.array(table.tool)
     tool[:3, :3] = tool[:3, :3] @ exp_rotation(np.array([0.0, 0.0, 0.5]))
-    found = compare(robot.chain("panda_link8", "panda_link0"), replace(table, tool=tool), fit=False)
+    found = compare(path, replace(table, tool=tool), fit=False)
     assert found.metres <= 1e-12
     assert not found.agrees
 
@@ -192,14 +184,11 @@ def test_a_difference_within_the_last_digit_is_told_from_one_beyond_it(
     assert ("within the last digit" in document(found, units_of()).text()) == is_rounding
 
 
-def test_the_kinova_sheet_is_said_to_be_rounded() -> None:
+def test_the_command_says_what_is_rounded_and_knows_no_fit(tmp_path: Path) -> None:
     done = command("dh", "kinova", "--compare", "kinova")
     assert "All differ only within the last digit of the table (*)." in done.text
     data = json.loads(command("dh", "kinova", "--compare", "kinova", "--format", "json").text)
     assert [one["within_last_digit"] for one in data["differences"]] == [True]
-
-
-def test_the_command_knows_no_fit(tmp_path: Path) -> None:
     file = tmp_path / "wrong.toml"
     file.write_text(reference_path("ur5").read_text().replace("0.089159", "0.099159"))
     fitted = good("dh", "ur5", "--compare", str(file))

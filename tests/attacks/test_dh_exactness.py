@@ -13,6 +13,7 @@ from tests.cli.running import good, refused
 from tests.cli.running import urdfkin as command
 from tests.dh.arms import arm
 from tests.random_chains import rotation, shift
+from tests.urdfs import joint, limit, mimic, robot
 from urdfkin.dh import DHTable, Units, dh_table, export
 from urdfkin.dh.parse_table import reference_path
 from urdfkin.dh.printed import printed
@@ -99,15 +100,17 @@ def test_a_wrong_strict_table_is_a_disagreement_however_long_its_rows_are() -> N
         robot.verifier.table(replace(table, rows=tuple(rows)))
 
 
-RACK = """<robot name="rack"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
-<joint name="rack" type="prismatic"><parent link="a"/><child link="b"/>
- <origin xyz="0.1 0.2 0.3" rpy="0.3 0.4 0.5"/><axis xyz="0.6 0 0.8"/>
- <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
-<joint name="pinion" type="revolute"><parent link="b"/><child link="c"/>
- <origin xyz="0.1 0.2 0.3" rpy="1.3 0.4 0.5"/><axis xyz="0.6 0 0.8"/>
- <limit lower="-100000" upper="100000" effort="1" velocity="1"/><mimic joint="rack" multiplier="{m}"/></joint>
-<joint name="j" type="continuous"><parent link="c"/><child link="d"/>
- <origin xyz="0.4 0.1 0.3" rpy="1.3 0.4 0.5"/><axis xyz="0 0.6 0.8"/></joint></robot>"""
+def rack(multiplier: float) -> str:
+    """A slide, a joint that turns with it, and one that turns alone, all askew."""
+    origin, follows = 'xyz="0.1 0.2 0.3" rpy="{} 0.4 0.5"', mimic("rack", multiplier)
+    return robot(
+        joint("rack", "prismatic", "a", "b", origin.format(0.3), "0.6 0 0.8", limit()),
+        joint(
+            "pinion", "revolute", "b", "c", origin.format(1.3), "0.6 0 0.8", limit(-100000, 100000) + follows
+        ),
+        joint("j", "continuous", "c", "d", 'xyz="0.4 0.1 0.3" rpy="1.3 0.4 0.5"', "0 0.6 0.8"),
+        name="rack",
+    )
 
 
 @pytest.mark.slow
@@ -116,20 +119,20 @@ RACK = """<robot name="rack"><link name="a"/><link name="b"/><link name="c"/><li
 def test_a_right_table_of_a_rack_and_pinion_is_right_whatever_the_multiplier(
     multiplier: float, ends: tuple[str, str]
 ) -> None:
-    robot = urdfkin.load(RACK.format(m=multiplier))
+    found = urdfkin.load(rack(multiplier))
     for convention in ("standard", "modified"):
-        check = checked(robot, robot.dh(*ends, convention))
+        check = checked(found, found.dh(*ends, convention))
         assert check.within
 
 
 @pytest.mark.parametrize("multiplier", [30, 1000])
 def test_a_wrong_multiplier_in_a_table_is_still_found(multiplier: float) -> None:
-    robot = urdfkin.load(RACK.format(m=multiplier))
-    table = robot.dh("d", "a")
+    found = urdfkin.load(rack(multiplier))
+    table = found.dh("d", "a")
     wrong = Mimic("rack", multiplier * (1.0 + 1e-9), 0.0)
     rows = (table.rows[0], replace(table.rows[1], mimic=wrong), table.rows[2])
     with pytest.raises(TableError, match="DISAGREES"):
-        robot.verifier.table(replace(table, rows=rows))
+        found.verifier.table(replace(table, rows=rows))
 
 
 # -- noise ----------------------------------------------------------------------------------------------
@@ -183,15 +186,12 @@ def test_a_tilt_that_is_no_rounding_is_kept(tilt: float) -> None:
     assert error <= 20 * EPS
 
 
-def test_so101_has_no_foot_at_the_inverse_of_rounding() -> None:
+@pytest.mark.slow
+def test_so101_has_no_foot_at_the_inverse_of_rounding_and_baxter_is_told_to_snap() -> None:
     robot = urdfkin.load("so101")
     table = robot.dh(near_parallel="strict")
     assert checked(robot, table).within
     assert max(abs(row.d) for row in table.rows) < 1.0
-
-
-@pytest.mark.slow
-def test_a_table_with_cells_of_rounded_angles_recommends_the_snap_that_cures_it() -> None:
     done = good("dh", "baxter")
     hint = next(line for line in done.text.splitlines() if line.startswith("hint: "))
     assert "--snap 1e-11" in hint
@@ -242,12 +242,9 @@ def test_an_option_that_does_nothing_is_an_error(words: tuple[str, ...]) -> None
     assert re.search(rf"{idle}\S* does nothing .*; leave out this option", err)
 
 
-def test_what_stands_at_its_default_is_not_refused() -> None:
+def test_what_stands_at_its_default_is_not_refused_but_an_idle_seed_is() -> None:
     assert command("dh", "ur5", "--compare", "ur5", "--tolerance", "0.2").code == 0
     assert command("dh", "ur5", "--tree", "--digits", "10").code == 0
-
-
-def test_a_seed_that_nothing_is_drawn_from_is_an_error() -> None:
     assert "--seed does nothing without a random --q, --v or --a" in refused(
         "placement", "panda", "--seed", "3"
     )
@@ -278,11 +275,8 @@ def _nowhere(package: str) -> str:
     raise LookupError(package)
 
 
-def test_declared_used_and_included_arguments_are_known(xacro: Path) -> None:
+def test_declared_used_and_included_arguments_are_known_unless_an_include_is_computed(xacro: Path) -> None:
     assert arguments_of(xacro, _nowhere) == {"length", "width", "colour"}
-
-
-def test_where_an_include_is_computed_nothing_is_known(xacro: Path) -> None:
     xacro.write_text(XACRO.replace("part.xacro", "$(arg width).xacro"))
     assert arguments_of(xacro, _nowhere) is None
     xacro.write_text(XACRO.replace("part.xacro", "missing.xacro"))
@@ -323,12 +317,9 @@ def test_three_digits_are_said_to_lose_nearly_a_millimetre(form: str, units: tup
     assert "Pinocchio" in done.text
 
 
-def test_latex_says_it_on_stderr() -> None:
+def test_latex_says_it_on_stderr_and_the_whole_tree_as_well() -> None:
     done = command("dh", "ur10", "--base", "base", "--tip", "tool0", "--digits", "3", "--format", "latex")
     assert lost(done.err)[0] > 5e-4
-
-
-def test_the_whole_tree_says_it_as_well() -> None:
     text = command("dh", "ur10", "--tree", "--digits", "3").text
     line = next(line for line in text.splitlines() if line.startswith("printed with 3 digits"))
     found = re.search(r"within (\S+) m", line)

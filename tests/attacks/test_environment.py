@@ -78,21 +78,20 @@ def test_a_closed_standard_output_is_told_in_a_line(words: str) -> None:
     assert "standard output: cannot be written: found Bad file descriptor" in one_line(err)
 
 
-def test_a_closed_standard_output_is_no_matter_where_a_file_is_written(tmp_path: Path) -> None:
+def test_a_closed_standard_output_is_no_matter_where_a_file_is_written_and_a_closed_input_is_told(
+    tmp_path: Path,
+) -> None:
     code, _, err = shell("$URDFKIN placement ur5 -o T.csv >&-", tmp_path)
     assert code == 0, err
     assert (tmp_path / "T.csv").read_text().startswith("sample,T00")
+    code, out, err = shell("$URDFKIN info - <&-")
+    assert (code, out) == (2, "")
+    assert "standard input: cannot be read: found Bad file descriptor" in one_line(err)
 
 
 @pytest.mark.parametrize("closed", ["2>&-", "2>/dev/full", "2>&- >&-"])
 def test_a_standard_error_that_takes_nothing_changes_no_exit_code(closed: str) -> None:
     assert shell(f"$URDFKIN info nothing_of_this_name {closed}")[0] == 2
-
-
-def test_a_closed_standard_input_is_told_in_a_line() -> None:
-    code, out, err = shell("$URDFKIN info - <&-")
-    assert (code, out) == (2, "")
-    assert "standard input: cannot be read: found Bad file descriptor" in one_line(err)
 
 
 @pytest.mark.parametrize("words", ["robots", "--help", "explain 7.130"])
@@ -147,14 +146,10 @@ def test_a_table_of_names_of_any_script_is_the_same_file_on_an_ascii_terminal(
         ).out
 
 
-def test_numba_told_not_to_compile_is_no_matter_where_kernels_are_kept() -> None:
+def test_numba_told_not_to_compile_is_no_matter_whether_kernels_are_kept_or_not(tmp_path: Path) -> None:
     code, out, err = shell("$URDFKIN placement ur5", NUMBA_DISABLE_JIT="1")
     assert code == 0, err
     assert "verified by Pinocchio" in out
-
-
-def test_numba_told_not_to_compile_is_no_matter_where_none_is(tmp_path: Path) -> None:
-    """The kernel that takes the least time to compile, and is made of parts as all are."""
     compiling = "from urdfkin.compiled.machine.single import one_configuration as made; print(made.compiled)"
     done = subprocess.run(
         [sys.executable, "-c", compiling],

@@ -184,12 +184,9 @@ def test_a_table_of_lengths_whose_squares_overflow_is_refused_and_no_error_of_ou
     assert robot.placement(robot.neutral(), "c").shape == (4, 4)
 
 
-def test_tree_parameters_of_such_lengths_are_not_measured_by_infinity() -> None:
+def test_tables_and_tree_parameters_of_lengths_up_to_there_are_verified_and_beyond_refused() -> None:
     with pytest.raises(RangeError, match="square of this length"):
         urdfkin.load(two_axes(1e160, 0.3)).tree_parameters()
-
-
-def test_tables_of_lengths_up_to_there_are_verified() -> None:
     robot = urdfkin.load(two_axes(1e148, 1e147))
     for convention in ("standard", "modified"):
         robot.dh("c", "a", convention)

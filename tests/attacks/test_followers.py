@@ -226,15 +226,18 @@ def test_a_leader_stays_where_its_follower_keeps_its_limits(
     assert reached >= 0.4 * wanted, "the range that is left is used"
 
 
-def test_a_validation_covers_the_files_limits_where_a_mimic_joint_leaves_its_own() -> None:
+def test_a_validation_covers_the_files_limits_and_a_continuous_leader_any_angle() -> None:
     robot = gripper(*MIRRORED)
     drawn = draw(robot.tree, 2000, np.random.default_rng(0), with_special=True).q
     assert drawn[1:3].tolist() == [[-0.005], [0.055]]
     assert np.ptp(drawn[3:]) > 0.059
     assert np.ptp(robot.sample(2000)) <= 0.01
+    robot = gripper("continuous", (0.0, 0.0))
+    assert np.ptp(robot.sample(1000)) > 1.99 * math.pi
 
 
-def test_info_and_the_data_say_what_mimic_joints_leave_of_a_range() -> None:
+@pytest.mark.slow
+def test_info_the_data_and_the_report_say_what_mimic_joints_leave_of_a_range() -> None:
     robot = gripper(*MIRRORED)
     said = "joint leader ranges over -0.005 to 0.055 m; its mimic joints keep their limits from -0.005 to "
     assert f"{said}0.005 only (f1)" in robot._sheet().text()
@@ -242,10 +245,6 @@ def test_info_and_the_data_say_what_mimic_joints_leave_of_a_range() -> None:
     assert kept == [{"lower": pytest.approx(-0.005), "upper": pytest.approx(0.005), "by": ["f1"]}, None]
     (none,) = narrowed_ranges(gripper("prismatic", (0.0, 1.0), (1.0, 0.0, 3.0, 4.0)).tree)
     assert str(none).endswith("no value keeps all its mimic joints within their limits (f1)")
-
-
-@pytest.mark.slow
-def test_the_report_shows_what_mimic_joints_leave_of_a_range() -> None:
     robot = gripper(*MIRRORED)
     document = json.loads(json.dumps(validate([robot], samples=8).as_dict()))
     jsonschema.validate(document, VALIDATION.schema())
@@ -295,8 +294,3 @@ DIGESTS = {
 def test_a_seed_gives_the_numbers_it_gave_before_where_followers_cut_nothing(name: str) -> None:
     drawn = urdfkin.load(name).sample(20, seed=3)
     assert hashlib.sha256(drawn.tobytes()).hexdigest()[:16] == DIGESTS[name]
-
-
-def test_a_continuous_leader_without_a_followers_limit_takes_any_angle() -> None:
-    robot = gripper("continuous", (0.0, 0.0))
-    assert np.ptp(robot.sample(1000)) > 1.99 * math.pi

@@ -1,4 +1,4 @@
-"""Files kept between runs: damage is mended, a full disc ends nothing, old files go, a stranger's are not run."""
+"""Files kept between runs: damage is mended, a full disc ends nothing, a stranger's files are not run."""
 
 import errno
 import os
@@ -80,11 +80,16 @@ DAMAGE: dict[str, Callable[[bytes], bytes]] = {
 }
 
 
-def test_a_kernel_is_compiled_once_and_read_afterwards(folder: Path) -> None:
+def test_a_kernel_is_compiled_once_and_read_unless_it_is_of_another_time(folder: Path) -> None:
     assert was_compiled(fresh())
     again = fresh()
     assert not was_compiled(again)
     assert ask(again) == 7
+    (file,) = folder.iterdir()
+    put(file, pickle.dumps(("not", "a", "kernel")))
+    with pytest.warns(CacheWarning, match="is damaged and is computed again"):
+        assert ask(fresh()) == 7
+    assert not was_compiled(fresh())
 
 
 @pytest.mark.long
@@ -99,15 +104,6 @@ def test_a_damaged_kernel_is_said_compiled_again_and_mended(damage: str, folder:
     assert was_compiled(kernel)
     assert not was_compiled(fresh())
     assert list(folder.iterdir()) == [file]
-
-
-def test_a_kernel_that_is_whole_but_of_another_time_is_compiled_again(folder: Path) -> None:
-    ask(fresh())
-    (file,) = folder.iterdir()
-    put(file, pickle.dumps(("not", "a", "kernel")))
-    with pytest.warns(CacheWarning, match="is damaged and is computed again"):
-        assert ask(fresh()) == 7
-    assert not was_compiled(fresh())
 
 
 def test_a_kept_file_in_another_folder_of_its_name_is_noticed(tmp_path: Path) -> None:
@@ -234,6 +230,12 @@ def refused(root: Path, words: str) -> None:
         assert kept_folder("kernels", [], root=root) is None
 
 
+def made(root: Path, *words: str, kind: str = "kernels") -> Path:
+    folder = kept_folder(kind, [], *words, root=root)
+    assert folder is not None
+    return folder
+
+
 def test_a_folder_of_ones_own_is_closed_to_others(tmp_path: Path) -> None:
     before = os.umask(0)
     try:
@@ -246,26 +248,29 @@ def test_a_folder_of_ones_own_is_closed_to_others(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("mode", [0o777, 0o1777, 0o702])
 def test_a_folder_that_everybody_may_write_in_is_refused(mode: int, tmp_path: Path) -> None:
-    folder = kept_folder("kernels", [], root=tmp_path)
-    assert folder is not None
+    folder = made(tmp_path)
     folder.chmod(mode)
     refused(tmp_path, r"every user can write to .*chmod go-w.* and delete")
 
 
-def test_a_folder_in_which_everybody_could_put_another_in_its_place_is_refused(tmp_path: Path) -> None:
+def test_a_folder_in_which_everybody_could_put_another_or_of_a_root_without_writing_is_refused(
+    tmp_path: Path,
+) -> None:
     shared = tmp_path / "shared"
     shared.mkdir()
     shared.chmod(0o777)
     refused(shared / "urdfkin", "every user can write to")
     shared.chmod(0o1777)  # sticky, as /tmp: nobody can move what another owns
     assert kept_folder("kernels", [], root=shared / "urdfkin") is not None
+    (tmp_path / "file").write_text("")
+    with pytest.warns(CacheWarning, match="the cache cannot be written in .*file: .*set XDG_CACHE_HOME"):
+        assert kept_folder("kernels", [], root=tmp_path / "file") is None
 
 
 def test_a_folder_of_a_group_is_refused_but_not_that_of_a_users_own_group(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    folder = kept_folder("kernels", [], root=tmp_path)
-    assert folder is not None
+    folder = made(tmp_path)
     folder.chmod(0o770)
     monkeypatch.setattr(cache, "_is_private", lambda group: True)
     assert kept_folder("kernels", [], root=tmp_path) == folder
@@ -279,8 +284,7 @@ def test_a_folder_of_another_user_is_refused(
 ) -> None:
     """Its files would be unpickled, and could do anything. Only the superuser can give folders away."""
     root = tmp_path / "shared" / "urdfkin"
-    folder = kept_folder("kernels", [], root=root)
-    assert folder is not None
+    folder = made(root)
     stranger = {"the folder": folder, "the one above": root.parent}.get(whose, folder)
     if whose == "the file behind a link":
         (tmp_path / "link").symlink_to(root)
@@ -330,8 +334,7 @@ def run_planted() -> None:
 def test_the_month_old_folder_of_another_user_is_left_alone(tmp_path: Path) -> None:
     if os.geteuid() != 0:
         pytest.skip("only the superuser can give a folder away")
-    old = kept_folder("kernels", [], "old", root=tmp_path)
-    assert old is not None
+    old = made(tmp_path, "old")
     os.utime(old / ".used", (0.0, 0.0))
     os.chown(old / ".used", 12345, 12345)
     kept_folder("kernels", [], "new", root=tmp_path)
@@ -341,7 +344,7 @@ def test_the_month_old_folder_of_another_user_is_left_alone(tmp_path: Path) -> N
 def test_a_folder_that_can_only_be_read_is_still_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    folder = kept_folder("kernels", [], root=tmp_path)
+    folder = made(tmp_path)
 
     def refuse(*_: object, **__: object) -> None:
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))
@@ -365,32 +368,20 @@ def test_a_change_in_any_source_leads_to_another_folder(changed: int, tmp_path: 
     assert kept_folder("kernels", sources, root=tmp_path) not in (before, None)
 
 
-@pytest.mark.parametrize(
-    ("module", "ask", "needed"),
-    [
-        (cache, kept.cache_folder, [recursion, machine, kinematics]),
-    ],
-    ids=["kernels"],
-)
-def test_every_file_of_the_part_is_among_the_sources(
-    module: Any, ask: Any, needed: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_file_of_the_part_is_among_the_sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[Path] = []
 
     def noting(kind: str, sources: Iterable[Path], *besides: str, root: Path | None = None) -> Path:
         seen.extend(sources)
         return tmp_path
 
-    monkeypatch.setattr(module, "kept_folder", noting)
-    uncached: Callable[[], Path | None] = ask.__wrapped__
+    monkeypatch.setattr(cache, "kept_folder", noting)
+    uncached: Callable[[], Path | None] = kept.cache_folder.__wrapped__
     assert uncached() == tmp_path
-    files = {path for each in needed for path in _files(Path(str(each.__file__)))}
+    folders = [Path(str(module.__file__)).parent for module in (recursion, machine, kinematics)]
+    files = {path for folder in folders for path in folder.glob("*.py")}
     assert len(files) > 5
     assert files <= set(seen)
-
-
-def _files(path: Path) -> list[Path]:
-    return sorted(path.parent.glob("*.py")) if path.stem == "__init__" else [path]
 
 
 def test_even_whom_one_trusts_above_a_folder_may_not_own_the_folder_itself(
@@ -419,26 +410,15 @@ def test_a_folder_is_the_same_until_its_sources_or_anything_beside_them_change(t
 
 
 def test_what_nobody_used_for_a_month_is_deleted_and_nothing_else(tmp_path: Path) -> None:
-    def made(kind: str, state: str) -> Path:
-        folder = kept_folder(kind, [], state, root=tmp_path)
-        assert folder is not None
-        return folder
-
-    old, recent, other = made("kernels", "old"), made("kernels", "recent"), made("trees", "old")
+    old, recent, other = made(tmp_path, "old"), made(tmp_path, "recent"), made(tmp_path, "old", kind="trees")
     foreign = tmp_path / "kernels-of-somebody-else"
     foreign.mkdir()
     (old / "kernel.nbc").write_bytes(b"compiled")
     for folder, days in ((old, 30.1), (recent, 29.9), (other, 30.1)):
         then = time.time() - days * 24 * 3600
         os.utime(folder / ".used", (then, then))
-    used = made("kernels", "new")
+    used = made(tmp_path, "new")
     assert not old.exists()
     assert set(tmp_path.iterdir()) == {recent, other, foreign, used}
-    assert made("trees", "old") == other
+    assert made(tmp_path, "old", kind="trees") == other
     assert other.exists()
-
-
-def test_a_root_that_cannot_be_written_gives_no_folder(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.warns(CacheWarning, match="the cache cannot be written in .*file: .*set XDG_CACHE_HOME"):
-        assert kept_folder("kernels", [], root=tmp_path / "file") is None

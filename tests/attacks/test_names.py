@@ -33,7 +33,7 @@ LIKE_OURS = urdf(
 )
 
 
-def test_an_exact_name_wins() -> None:
+def test_an_exact_name_wins_and_a_link_frame_is_that_link() -> None:
     robot = loaded(LIKE_OURS)
     for base in (None, BaseMotion()):
         assert robot.placement([0.0, 0.0], "link:foo", base=base)[:3, 3].tolist() == [1.0, 2.0, 0.0]
@@ -41,9 +41,6 @@ def test_an_exact_name_wins() -> None:
         assert robot.placement([0.0, 0.0], "foo", base=base)[:3, 3].tolist() == [1.0, 0.0, 0.0]
         assert robot.placement([0.0, 0.0], LinkFrame.of("foo"), base=base)[:3, 3].tolist() == [1.0, 0.0, 0.0]
     assert robot.certificate().verified
-
-
-def test_a_placement_relative_to_a_link_frame_is_relative_to_that_link() -> None:
     robot = loaded(LIKE_OURS)
     seen = robot.relative_placement([0.0, 0.0], "base", LinkFrame.of("foo"))
     assert seen[:3, 3].tolist() == [-1.0, 0.0, 0.0]
@@ -74,15 +71,12 @@ def test_a_prepared_frame_is_not_taken_for_another_of_its_text() -> None:
     assert again.placement(q)[1, 3] == 0.0
 
 
-def test_every_frame_of_all_frames_stands_for_itself() -> None:
+def test_every_frame_of_all_frames_stands_for_itself_also_in_a_validation() -> None:
     robot = loaded(LIKE_OURS)
     assert robot.all_frames == ("link:base", "link:foo", "link:link:foo", "joint:j1", "joint:j2")
     assert [robot.tree.frame_link(frame) for frame in robot.all_frames] == [0, 1, 2, 1, 2]
     for copied in (copy.deepcopy(robot.all_frames), pickle.loads(pickle.dumps(robot.all_frames))):
         assert [robot.tree.frame_link(frame) for frame in copied] == [0, 1, 2, 1, 2]
-
-
-def test_a_validation_and_the_judge_tell_such_links_apart() -> None:
     assert urdfkin.validate([LIKE_OURS.encode()], samples=2).passed
     lines = judge(loaded(LIKE_OURS), samples=1).lines
     assert max(line.pinocchio.worst for line in lines) < 10.0

@@ -39,12 +39,9 @@ def test_a_follower_beside_an_undeclared_prefix_is_verified(more: str) -> None:
 
 
 @pytest.mark.slow
-def test_the_judge_reads_a_file_with_an_undeclared_prefix() -> None:
+def test_the_judge_and_the_viewer_read_a_file_with_an_undeclared_prefix() -> None:
     with_prefix, without = (judge(load(arm(follow=FOLLOWS, more=more)), samples=2) for more in ("<d:x/>", ""))
     assert with_prefix.lines[0] == without.lines[0]
-
-
-def test_the_viewer_finds_the_shapes_of_a_file_with_an_undeclared_prefix() -> None:
     (shape,) = shapes(load(arm(base=SPHERE, more="<drake:x/>")))
     assert (shape.link, shape.kind) == ("base", "sphere")
 

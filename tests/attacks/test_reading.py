@@ -120,18 +120,12 @@ def test_settings_that_are_a_link_to_a_device_are_refused(
     assert "pyproject.toml: not a regular file: found a character device" in refused("check", "ur5")
 
 
-def test_a_packages_manifest_that_is_a_link_to_a_device_is_none(tmp_path: Path) -> None:
+def test_a_manifest_a_kept_file_or_a_pipe_in_place_of_a_file_is_none(tmp_path: Path) -> None:
     (tmp_path / "package.xml").symlink_to("/dev/zero")
     assert find_package("arm", tmp_path / "arm.urdf", {}) is None
-
-
-def test_a_kept_file_that_is_a_link_to_a_device_is_damaged(tmp_path: Path) -> None:
     (tmp_path / "kernel").symlink_to("/dev/zero")
     with pytest.warns(UserWarning, match="is damaged and is computed again: a character device"):
         assert get(tmp_path / "kernel") is None
-
-
-def test_a_pipe_that_is_called_as_an_mjcf_file_holds_nobody_up(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "arm.xml")
     assert not mjcf.is_mjcf(tmp_path / "arm.xml")
 

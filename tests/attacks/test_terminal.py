@@ -23,11 +23,13 @@ from urdfkin.export import LANGUAGES
 #: A file may be called so.
 FILE = "\x1b[31m\n::error::forged\u202e ##vso[x]"
 
-#: Lines after each command and its robot. Words in capitals are files and names, as hostile as what is in them.
+#: Lines after each command and its robot. Words in capitals are hostile files and names.
 ROBOT = {
     "info": ["", "--format json"],
     "order": ["", "--format csv", "--from isaaclab --format json", "--to FILE"],
-    "readers": [*(f"--with yourdfpy {form}" for form in ("", "--format json", "--format csv")), "--with FILE"],
+    "readers": [
+        "--with yourdfpy", "--with yourdfpy --format json", "--with yourdfpy --format csv", "--with FILE",
+    ],
     "placement": [
         "", "--format json", "--format csv", "--frame FRAME", "--relative-to FRAME", "--as rpy",
         "--base-placement FILE", "--trajectory FILE", "--convention FILE",
@@ -81,6 +83,7 @@ WORDS = {
     "FILE": FILE, "ARCHIVE": f"{FILE}.npz", "FUNCTION": f"{FILE}.py:{FILE}", "FRAME": NAMES["line"],
     "COLOUR": "\x1b[31mx", "MATH": NAMES["math"], "PROGRAM": "echo '\x1b[31m::error::forged'",
 }  # fmt: skip
+BREAKDOWN = "acceleration --breakdown --v random"
 LINES = [f"{command} ROBOT {more}" for command, lines in ROBOT.items() for more in lines]
 LINES += [f"{command} {more}" for command, lines in OTHERS.items() for more in lines]
 
@@ -188,8 +191,7 @@ def test_each_name_alone_adds_no_line(kind: str, tmp_path: Path, monkeypatch: py
     """As many lines as for a robot with tame names of that length: a name is one line, or part of one."""
     monkeypatch.setenv("COLUMNS", "10000")
     counts: list[list[int]] = []
-    lines = "info", "jacobian", "dh", "dh --format markdown", "dh --tree", "dh --format c"
-    lines = *lines, "acceleration --breakdown --v random"
+    lines = "info", "jacobian", "dh", "dh --format markdown", "dh --tree", "dh --format c", BREAKDOWN
     for name in (IN_XML[kind], "x" * len(IN_XML[kind].encode("unicode_escape"))):
         path = tmp_path / f"{len(counts)}.urdf"
         path.write_text(urdf(name), encoding="utf-8")

@@ -169,8 +169,14 @@ def system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str, st
     return write
 
 
-def test_the_machines_memory_counts(system: Callable[[str, str], None]) -> None:
+def test_the_machines_memory_counts_and_a_containers_own_topmost_group(
+    system: Callable[[str, str], None],
+) -> None:
     assert memory.share() == 8_000_000 * 1024 // 2
+    system("proc/self/cgroup", "4:memory:/docker/abc\n2:cpu:/docker/abc\n")
+    system("cgroup/memory/memory.limit_in_bytes", "3000000000\n")
+    system("cgroup/memory/memory.usage_in_bytes", "1000000000\n")
+    assert memory.share() == 1_000_000_000
 
 
 def test_the_control_groups_limits_count_less_what_they_would_give_back(
@@ -185,15 +191,6 @@ def test_the_control_groups_limits_count_less_what_they_would_give_back(
     assert memory.share() == 1_500_000_000
     system("cgroup/outer/inner/memory.max", "1500000000\n")
     assert memory.share() == 250_000_000
-
-
-def test_a_container_that_sees_its_own_group_as_the_topmost_counts(
-    system: Callable[[str, str], None],
-) -> None:
-    system("proc/self/cgroup", "4:memory:/docker/abc\n2:cpu:/docker/abc\n")
-    system("cgroup/memory/memory.limit_in_bytes", "3000000000\n")
-    system("cgroup/memory/memory.usage_in_bytes", "1000000000\n")
-    assert memory.share() == 1_000_000_000
 
 
 @pytest.mark.long

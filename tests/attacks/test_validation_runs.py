@@ -172,15 +172,12 @@ def test_what_the_machinery_itself_raises_is_every_unfinished_robots_result(
     assert "Traceback" in str(report.robots[2].error)
 
 
-def test_a_run_that_reports_on_fewer_robots_than_it_was_asked_for_has_not_passed() -> None:
+def test_a_run_over_fewer_robots_than_asked_for_or_over_none_has_not_passed() -> None:
     whole = validate(["planar_two_link", "double_pendulum"], samples=0)
     part = ValidationReport(whole.robots[:1], 2, 0, 0, whole.started, 1.0)
     assert whole.passed
     assert (part.passed, part.exit_code) == (False, 3)
     assert part.outcome.reason == "1 of 2 robots without a report"
-
-
-def test_a_run_over_no_robot_has_not_passed() -> None:
     report = validate([])
     assert (report.passed, report.exit_code) == (False, 3)
     assert report.as_dict()["reason"] == "no robot was validated"

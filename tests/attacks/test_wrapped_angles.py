@@ -65,14 +65,11 @@ def test_a_wheel_that_turns_steadily_has_a_steady_rate_wherever_its_log_wraps(
     assert "after unwrapping wheel" in motion.rates
 
 
-def test_a_wheel_may_turn_backwards_and_forwards(tmp_path: Path) -> None:
+def test_a_wheel_turns_backwards_and_forwards_and_what_was_not_wrapped_keeps_its_bits(tmp_path: Path) -> None:
     angle = 7.0 * np.sin(T)
     motion = read(wheel(), tmp_path / "w.csv", wrapped(angle))
     np.testing.assert_allclose(motion.q[:, 0], angle, atol=1e-12)
     np.testing.assert_allclose(motion.v[2:-2, 0], 7.0 * np.cos(T)[2:-2], atol=0.01)
-
-
-def test_what_was_not_wrapped_keeps_its_bits_and_nothing_is_said(tmp_path: Path) -> None:
     angle = np.sin(T)
     motion = read(wheel(), tmp_path / "w.csv", angle)
     np.testing.assert_array_equal(motion.q[:, 0], angle)
@@ -80,13 +77,12 @@ def test_what_was_not_wrapped_keeps_its_bits_and_nothing_is_said(tmp_path: Path)
     assert motion.rates == "by central differences"
 
 
-def test_a_revolute_joint_is_taken_as_written(tmp_path: Path) -> None:
+def test_a_revolute_joint_and_a_fast_wheel_that_was_never_wrapped_are_taken_as_written(
+    tmp_path: Path,
+) -> None:
     angle = np.where(T < 2.0, 3.0, -3.0)
     motion = read(robot_of(joint("arm", "revolute", "a", "b", LIMIT)), tmp_path / "r.csv", angle)
     np.testing.assert_array_equal(motion.q[:, 0], angle)
-
-
-def test_a_fast_wheel_that_was_never_wrapped_is_taken_as_written_and_said(tmp_path: Path) -> None:
     angle = 3.5 * np.arange(len(T))
     motion = read(wheel(), tmp_path / "w.csv", angle)
     np.testing.assert_array_equal(motion.q[:, 0], angle)

@@ -327,14 +327,11 @@ def test_memory_has_an_end(expanded: Expand, inside: str) -> None:
         expanded(inside)
 
 
-def test_time_has_an_end(expanded: Expand) -> None:
+def test_time_and_what_it_writes_have_an_end(expanded: Expand, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(XacroError, match="did not finish: found 2 s"):
         expanded(link("${max(python.range(10**12))}"), patience=2.0)
     with pytest.raises(XacroError, match="recursion"):
         expanded('<xacro:macro name="m"><xacro:m/></xacro:macro><xacro:m/>')
-
-
-def test_what_it_writes_has_an_end(expanded: Expand, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("urdfkin.urdf.xacro.MOST", 10_000)
     with pytest.raises(XacroError, match="URDF is too long: found more than 10000 bytes"):
         expanded(link("${'x' * 20000}"))
@@ -343,7 +340,7 @@ def test_what_it_writes_has_an_end(expanded: Expand, monkeypatch: pytest.MonkeyP
 # -- the walk itself ----------------------------------------------------------------------------------
 
 
-def test_a_function_is_called_only_if_it_was_offered() -> None:
+def test_a_function_is_called_only_if_it_was_offered_and_and_stops_where_python_stops() -> None:
     names = {"f": len, "g": max, "d": {"h": print}, "x": [1, 2]}
     assert evaluate("g(x)", names, [max]) == 2
     for expression in (
@@ -357,8 +354,5 @@ def test_a_function_is_called_only_if_it_was_offered() -> None:
     ):
         with pytest.raises(RefusedError):
             evaluate(expression, names, [max])
-
-
-def test_and_and_or_stop_where_python_stops() -> None:
     for expression in ("0 and 1 / 0", "2 or 1 / 0", "1 and 0 or 5", "1 < 0 < 1 / 0", "[] or ''", "3 and 4"):
         assert evaluate(expression, {}, []) == eval(expression)

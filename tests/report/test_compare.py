@@ -16,8 +16,15 @@ def words(old: Any, new: Any, **how: Any) -> list[tuple[bool, str]]:
     return [(change.regression, str(change)) for change in compare(old, new, **how).changes]
 
 
-def test_a_report_equals_itself() -> None:
+def test_a_report_equals_itself_and_a_robot_is_known_again_in_one_file_of_another_name() -> None:
     assert compare(arms(), arms()).changes == ()
+    moved = arms()
+    moved["robots"][1]["source"] = "models/ur5_v2.urdf"
+    assert words(arms(), moved) == [(False, "ur5: file: ur5 -> models/ur5_v2.urdf")]
+    doubled = arms()
+    ur5 = doubled["robots"].pop(1)
+    doubled["robots"] += [ur5 | {"source": "first.urdf"}, ur5 | {"source": "second.urdf"}]
+    assert (True, "ur5: robot: verified -> nothing") in words(arms(), doubled)
 
 
 #: What changed: its place in the document, its new value (none: it is gone), and what is said.
@@ -72,25 +79,16 @@ def test_growth_counts_from_the_factor_on_and_above_a_single_rounding(
     assert compare(old, new, factor).exit_code == int(regression)
 
 
-def test_a_robot_is_known_again_in_a_file_of_another_name() -> None:
-    moved = arms()
-    moved["robots"][1]["source"] = "models/ur5_v2.urdf"
-    assert words(arms(), moved) == [(False, "ur5: file: ur5 -> models/ur5_v2.urdf")]
-
-
-def test_of_two_new_files_that_call_their_robot_alike_none_is_taken_for_the_old_one() -> None:
-    doubled = arms()
-    ur5 = doubled["robots"].pop(1)
-    doubled["robots"] += [ur5 | {"source": "first.urdf"}, ur5 | {"source": "second.urdf"}]
-    assert (True, "ur5: robot: verified -> nothing") in words(arms(), doubled)
-
-
-def test_a_run_that_passed_and_does_not_is_a_regression_with_the_reason() -> None:
+def test_a_run_that_passed_and_does_not_and_fewer_samples_are_regressions() -> None:
     new = arms()
     new["asked"] = 3
     line = "outcome: passed -> not passed, 1 of 3 robots without a report"
     assert (True, line) in words(arms(), new)
     assert compare(new, arms()).exit_code == 0
+    new = arms()
+    new["samples"] = 2
+    assert (True, "samples: 6 -> 2") in words(arms(), new)
+    assert (False, "samples: 2 -> 6") in words(new, arms())
 
 
 def test_a_robot_that_moves_otherwise_is_told_joint_by_joint_and_is_no_regression() -> None:
@@ -190,13 +188,6 @@ def test_versions_settings_and_new_robots_are_changes_and_no_regressions() -> No
     assert (False, "seed: 0 -> 7") in lines
     assert (False, "ur5: robot: nothing -> verified") in lines
     assert compare(old, new).exit_code == 0
-
-
-def test_fewer_samples_are_a_regression_and_more_are_none() -> None:
-    new = arms()
-    new["samples"] = 2
-    assert (True, "samples: 6 -> 2") in words(arms(), new)
-    assert (False, "samples: 2 -> 6") in words(new, arms())
 
 
 def test_the_markdown_leads_with_regressions_and_fits_a_comment() -> None:

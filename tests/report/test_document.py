@@ -33,26 +33,19 @@ def test_every_report_keeps_to_the_schema(make: Any) -> None:
     assert errors(make()) == []
 
 
-def test_a_robot_that_cannot_be_read_keeps_to_the_schema_and_brings_its_findings() -> None:
+@pytest.mark.slow
+def test_every_other_run_keeps_to_the_schema_which_describes_everything() -> None:
     document = validate(REFUSED, samples=1).as_dict()
     assert errors(document) == []
     robot = document["robots"][0]
     assert robot["verdict"] == "bad input"
     assert robot["model"] is None
     assert {finding["severity"] for finding in robot["findings"]} >= {"error"}
-
-
-@pytest.mark.slow
-def test_a_judged_run_keeps_to_the_schema() -> None:
     report = validate("panda", samples=0)
     judged = replace(report, judgements=(judge(load("panda"), samples=1),))
     document: Any = judged.as_dict()
     assert errors(document) == []
     assert len(document["robots"][0]["judge"]["lines"]) > 5
-
-
-@pytest.mark.slow
-def test_the_schema_describes_everything_that_is_written() -> None:
     strict = copy.deepcopy(VALIDATION.schema())
     for part in [strict, *strict["$defs"].values()]:
         if part.get("properties") and "additionalProperties" not in part:
@@ -86,13 +79,10 @@ def test_a_spoiled_document_is_refused_with_its_place(spoil: Any) -> None:
         checked(document, "results.json")
 
 
-def test_entries_of_a_later_version_are_ignored() -> None:
+def test_a_file_reads_back_as_it_was_written_without_later_entries(tmp_path: Path) -> None:
     document: Any = arms()
     document["robots"][0]["checks"][0]["later"] = document["later"] = {"a": 1}
     assert checked(document, "results.json") == arms()
-
-
-def test_a_file_reads_back_as_it_was_written_and_one_that_is_missing_says_so(tmp_path: Path) -> None:
     path = tmp_path / "results.json"
     with pytest.raises(SourceError, match="cannot be read"):
         read_document(path)

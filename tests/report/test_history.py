@@ -29,11 +29,16 @@ def month(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_runs_are_ordered_by_their_start_and_not_by_the_names_of_files(month: Path) -> None:
+def test_runs_are_ordered_by_their_start_and_a_copy_is_counted_once(month: Path) -> None:
     found = history([month])
     assert [run["started"][8:10] for run in found.runs] == [f"{day:02}" for day in range(1, 9)]
     assert [Path(run["file"]).stem for run in found.runs] == list("76543210")
     assert [run["verdict"] for run in found.runs] == ["verified"] * 4 + ["disagrees"] + ["verified"] * 3
+    put(month / "latest.json", months_runs()[-1])
+    found = history([month])
+    assert len(found.runs) == 8
+    assert [one["reason"] for one in found.repeated] == [f"the same run as {month / '0.json'}"]
+    assert found.exit_code == 0
 
 
 def test_each_robot_has_a_point_for_each_run_that_has_it(month: Path) -> None:
@@ -58,16 +63,13 @@ def test_changes_name_their_run_and_regressions_come_first(month: Path) -> None:
     assert [run for run, *_ in told] == sorted((run for run, *_ in told), reverse=True)
 
 
-def test_a_terminal_shows_runs_robots_changes_and_the_latest_verdict(month: Path) -> None:
+def test_a_terminal_shows_runs_robots_and_changes_the_latest_only_unless_all_are_asked_for(
+    month: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     done = good("report", "history", str(month))
     assert "run 5, REGRESSION panda: verdict: verified -> disagrees" in done.text
     assert "panda        ✓✓✓✓✗✓✓✓  verified" in done.text
     assert done.text.splitlines()[-1] == "8 runs; latest verdict: verified, as in the 2 runs before"
-
-
-def test_only_the_latest_runs_and_changes_are_shown_unless_all_are_asked_for(
-    month: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
     monkeypatch.setattr(module, "SHOWN", 3)
     found = history([month])
     some, everything = document(found).text(), document(found, all_=True).text()
@@ -88,14 +90,6 @@ def test_a_broken_file_is_named_and_the_rest_is_shown(month: Path) -> None:
     assert f"not used: {month / 'other.json'}: not a file with the layout urdfkin-validation/1" in done.text
     assert f"not used: {month / 'edited.json'}: the report contradicts itself" in done.text
     assert "8 runs;" in done.text
-
-
-def test_a_copy_of_a_report_is_counted_once(month: Path) -> None:
-    put(month / "latest.json", months_runs()[-1])
-    found = history([month])
-    assert len(found.runs) == 8
-    assert [one["reason"] for one in found.repeated] == [f"the same run as {month / '0.json'}"]
-    assert found.exit_code == 0
 
 
 def test_a_renamed_file_continues_the_history_of_its_robot(tmp_path: Path) -> None:
@@ -127,9 +121,7 @@ def test_a_pipe_in_a_folder_is_named_and_not_waited_for(month: Path) -> None:
     ]
 
 
-def test_the_numbers_of_reports_and_of_files_in_a_folder_have_limits(
-    month: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_numbers_and_sizes_of_reports_have_limits(month: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MOST_FILES", 7)
     with pytest.raises(InputError, match="more than 7 files"):
         history([month])
@@ -137,9 +129,7 @@ def test_the_numbers_of_reports_and_of_files_in_a_folder_have_limits(
     monkeypatch.setattr(module, "MOST_RUNS", 7)
     with pytest.raises(InputError, match="more than 7 reports"):
         history([month])
-
-
-def test_a_file_beyond_the_limit_of_its_size_is_named(month: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.undo()
     monkeypatch.setattr(module, "MOST", 1000)
     with pytest.raises(InputError, match=r"no report to show: found .*too large"):
         history([month])

@@ -73,33 +73,18 @@ SIX = ("velocity", "jacobian", "jacobian rate", "hessian", "acceleration")
 MISTAKES: dict[str, tuple[tuple[str, ...], str, Wrong]] = {
     "angular rows first": (SIX, "the angular rows come first", lambda f, r, x: lambda *i: f(*i)[_HALVES]),
     "transposed": (("placement", "jacobian"), "transposed", lambda f, r, x: lambda *i: f(*i).T),
-    "degrees": (
-        ("placement", "jacobian", "acceleration"),
-        "takes q in degrees",
-        lambda f, r, x: lambda q, *i: f(turned(q, r, np.pi / 180), *i),
-    ),
-    "millimetres": (
-        ("velocity", "jacobian"),
-        "millimetres",
-        lambda f, r, x: lambda *i: (f(*i).T * ([1000.0] * 3 + [1.0] * 3)).T,
-    ),
-    "spatial acceleration": (
-        ("acceleration",),
-        "the spatial acceleration was computed",
-        lambda f, r, x: lambda q, v, a: f(q, v, a) - bend(r, q, v, x),
-    ),
-    "gravity": (
-        ("acceleration",),
-        "gravity",
-        lambda f, r, x: lambda *i: f(*i) + np.array([0, 0, 9.81, 0, 0, 0]),
-    ),
-    "no J-dot term": (
-        ("acceleration",),
-        "the term J' v is missing",
-        lambda f, r, x: lambda q, v, a: f(q, 0 * v, a),
-    ),
+    "degrees": (("placement", "jacobian", "acceleration"), "takes q in degrees",
+                lambda f, r, x: lambda q, *i: f(turned(q, r, np.pi / 180), *i)),
+    "millimetres": (("velocity", "jacobian"), "millimetres",
+                    lambda f, r, x: lambda *i: (f(*i).T * ([1000.0] * 3 + [1.0] * 3)).T),
+    "spatial acceleration": (("acceleration",), "the spatial acceleration was computed",
+                             lambda f, r, x: lambda q, v, a: f(q, v, a) - bend(r, q, v, x)),
+    "gravity": (("acceleration",), "gravity",
+                lambda f, r, x: lambda *i: f(*i) + np.array([0, 0, 9.81, 0, 0, 0])),
+    "no J-dot term": (("acceleration",), "the term J' v is missing",
+                      lambda f, r, x: lambda q, v, a: f(q, 0 * v, a)),
     "inverted": (("placement",), "inverted", lambda f, r, x: lambda q: np.linalg.inv(f(q))),
-}
+}  # fmt: skip
 
 
 def bend(robot: Robot, q: np.ndarray, v: np.ndarray, frame: str) -> np.ndarray:
@@ -196,15 +181,12 @@ def test_a_missing_mimic_column_is_named(name: str) -> None:
     assert any("mimic joint" in words and "not added" in words for words in found.diagnoses), found
 
 
-def test_two_mistakes_are_named_together() -> None:
+def test_two_mistakes_and_the_order_of_another_tool_are_named() -> None:
     robot = robot_of("ur5")
     found = check("ur5", "jacobian", lambda q: robot.jacobian(q, "tool0", "local", verify=False)[_HALVES])
     (words,) = found.diagnoses
     assert "is in LOCAL" in words
     assert words.endswith("and the angular rows come first")
-
-
-def test_the_order_of_another_tool_is_named() -> None:
     robot = robot_of("a1")
     mujoco = robot.with_convention("isaaclab")
     found = check("a1", "jacobian", lambda q: mujoco.jacobian(q, "FL_foot", verify=False))
@@ -247,17 +229,25 @@ def test_no_correct_function_is_called_wrong(seed: int) -> None:
     assert not found.diagnoses
 
 
-def test_a_function_by_another_algorithm_agrees() -> None:
+def test_a_function_by_another_algorithm_or_that_reuses_its_arrays_agrees() -> None:
     robot = robot_of("ur5")
     screws = robot.screws("tool0")
     found = verify_function(screws.placement, robot, "placement", frame="tool0", samples=200)
     assert found.agrees, found
+    robot, out = robot_of("ur5"), np.zeros((6, 6))
+
+    def function(q: np.ndarray) -> np.ndarray:
+        out[:] = robot.jacobian(q, "tool0", verify=False)
+        q[:] = 0.0
+        return out
+
+    assert check("ur5", "jacobian", function).agrees
 
 
 # -- what a check reports -------------------------------------------------------------------------------
 
 
-def test_one_wrong_number_is_found_in_its_row_and_column() -> None:
+def test_one_wrong_number_is_found_in_its_place_and_the_factor_that_suffices_is_reported() -> None:
     robot = robot_of("ur5")
 
     def function(q: np.ndarray) -> np.ndarray:
@@ -270,9 +260,6 @@ def test_one_wrong_number_is_found_in_its_row_and_column() -> None:
     assert [name for name, share in found.rows.items() if share > 1] == ["vy"]
     assert [name for name, share in found.columns.items() if share > 1] == ["wrist_1_joint"]
     assert "The number vy, wrist_1_joint is" in str(found)
-
-
-def test_the_factor_that_suffices_is_reported() -> None:
     robot = robot_of("ur5")
     single = lambda q: robot.jacobian(q, "tool0", verify=False).astype(np.float32)  # noqa: E731
     found = check("ur5", "jacobian", single)
@@ -299,22 +286,18 @@ def test_exceptions_and_wrong_shapes_are_results() -> None:
     assert found.share == 0.0
 
 
-def test_numbers_that_are_not_finite_disagree() -> None:
+def test_numbers_that_are_not_finite_disagree_and_the_end_of_the_process_is_an_error() -> None:
     found = check("ur5", "jacobian", lambda q: np.full((6, 6), np.nan))
     assert not found.agrees
     assert found.diagnoses == ("63 results are not finite",)
     assert found.as_dict()["share"] is None
 
-
-def test_a_function_that_changes_its_input_or_reuses_its_output_is_compared_rightly() -> None:
-    robot, out = robot_of("ur5"), np.zeros((6, 6))
-
     def function(q: np.ndarray) -> np.ndarray:
-        out[:] = robot.jacobian(q, "tool0", verify=False)
-        q[:] = 0.0
-        return out
+        raise SystemExit(0)
 
-    assert check("ur5", "jacobian", function).agrees
+    found = check("ur5", "jacobian", function)
+    assert not found.agrees
+    assert found.errors == found.samples
 
 
 def test_a_batch_is_one_call() -> None:
@@ -387,15 +370,6 @@ def test_a_result_that_is_no_array_of_real_numbers_is_an_error(
     found = check("ur5", "jacobian", lambda q: result(robot.jacobian(q, "tool0", verify=False)))
     assert not found.agrees
     assert words in found.first_errors[0].message
-
-
-def test_a_function_that_ends_the_process_is_an_error() -> None:
-    def function(q: np.ndarray) -> np.ndarray:
-        raise SystemExit(0)
-
-    found = check("ur5", "jacobian", function)
-    assert not found.agrees
-    assert found.errors == found.samples
 
 
 def test_a_robot_without_a_moving_joint_is_compared() -> None:

@@ -69,27 +69,20 @@ def test_a_percentile_is_the_upper_edge_of_its_bin_and_never_above_the_worst() -
     assert percentile([0, 0, 0, 0], edges, 0.0, 50.0) == 0.0
 
 
-def test_what_lies_on_an_edge_is_counted_above_it() -> None:
+def test_the_histogram_has_ten_bins_a_decade_and_counts_an_edge_above_it() -> None:
     edge = float(HISTOGRAM_EDGES[30])
     assert histogram_bin(edge, HISTOGRAM_EDGES) == 31
     assert histogram_bin(math.nextafter(edge, 0.0), HISTOGRAM_EDGES) == 30
     assert histogram_bin(math.inf, HISTOGRAM_EDGES) == len(HISTOGRAM_EDGES)
     assert histogram_bin(0.0, HISTOGRAM_EDGES) == 0
-
-
-def test_the_histogram_has_ten_bins_a_decade_from_a_thousandth_to_a_hundred_thousand() -> None:
     assert len(HISTOGRAM_EDGES) == 81
     np.testing.assert_allclose(HISTOGRAM_EDGES[[0, 10, 30, 80]], [1e-3, 1e-2, 1.0, 1e5])
 
 
-def test_results_without_numbers_agree_and_have_no_bound() -> None:
-    """The Jacobian of a robot that does not move."""
+def test_results_without_numbers_agree_and_tallies_of_other_frames_do_not_add_up() -> None:
     nothing = np.zeros((4, 3, 6, 0))
     bound = Bound(nothing, np.ones((4, 3, 1, 1)))
     found = tally(nothing, nothing, bound, FRAMES, 0, [([], [], [])] * 4)
     assert found == Tally(12, 0, 0.0, 0.0, (12, *([0] * 81)), (0.0,) * 3, None, (math.inf, 0.0))
-
-
-def test_tallies_of_other_frames_do_not_add_up() -> None:
     with pytest.raises(ValueError, match=r"shorter|longer"):
         _ = made(np.ones((1, 3))) + made(np.ones((1, 2)), 0, FRAMES[:2])

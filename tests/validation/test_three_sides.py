@@ -183,14 +183,11 @@ def test_one_that_errs_stands_alone_in_the_report(
         assert "urdfkin differs from the two others in 0, Pinocchio in 0" in (robot["reason"] or "")
 
 
-def test_a_second_oracle_that_cannot_read_the_robot_leaves_it_unverified() -> None:
+def test_a_second_oracle_that_cannot_read_the_robot_leaves_it_unverified_and_none_is_not_told() -> None:
     text = arm(robot='name="r" version="1.1"', origin='<origin quat_xyzw="0 0 1 0"/>')
     report = validate(text, samples=0, oracle="mujoco")
     assert report.exit_code == 3
     assert "MuJoCo does not know quat_xyzw" in (report.robots[0].reason or "")
-
-
-def test_without_a_second_oracle_nothing_is_said_of_one() -> None:
     document = validate(arm(), samples=0).as_dict()
     assert "second_oracle" not in str(document)
     assert "mujoco" not in document["versions"]

@@ -35,6 +35,7 @@ from urdfkin.validation.vectors import (
     write_robot,
     write_sums,
 )
+from urdfkin.verify.adapters import LIBRARIES
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")]
 
@@ -401,11 +402,12 @@ def test_the_reader_in_python_finds_every_number_changed_by_a_billionth_of_its_s
     assert len(kinds) == 19
 
 
-def test_the_reader_reports_nan_and_a_wrong_shape_and_skips_what_is_not_computed(folder: Path) -> None:
+def test_the_reader_reports_nan_and_a_wrong_shape_and_stands_on_the_page(folder: Path) -> None:
     path = folder / "mimic.json"
     assert len(list(wrong(path, lambda *_: np.full(16, np.nan)))) == 3 * 16 + 3 * 18
     assert "1 numbers, expected 16" in next(wrong(path, lambda *_: 1.0))
     assert not list(wrong(path, lambda *_: None))
+    assert (EXAMPLES / "compare.py").read_text("utf-8") in (ROOT / "docs" / "vectors.md").read_text("utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -459,10 +461,6 @@ def test_the_reader_in_cpp_finds_every_number_changed_by_a_billionth_of_its_size
     assert compared(program, vectors, tmp_path / "missing")[0] == 2
 
 
-def test_the_page_prints_the_reader() -> None:
-    assert (EXAMPLES / "compare.py").read_text("utf-8") in (ROOT / "docs" / "vectors.md").read_text("utf-8")
-
-
 # -- the files ------------------------------------------------------------------------------------------
 
 
@@ -513,24 +511,16 @@ def test_all_files_with_the_catalogue_are_written_twice_the_same(tmp_path: Path)
             assert one["k"] * EPS < 1e-10
 
 
-def test_the_features_are_many_and_have_names_and_files_of_their_own() -> None:
+def test_the_features_are_many_have_names_of_their_own_and_notes_on_libraries_that_differ() -> None:
     assert len(features()) >= 60
     names = [stem(name).casefold() for name in (*features(), *catalogue())]
     assert len(set(names)) == len(names)
     assert len({feature.data for feature in features().values()}) == len(features())
-
-
-def test_the_note_of_a_feature_names_each_library_that_the_table_shows_to_differ() -> None:
-    from urdfkin.verify.adapters import LIBRARIES  # noqa: PLC0415
-
     table = document(ROOT / "docs" / "libraries.json")["cells"]
     for library, column in table.items():
         for name, cell in column.items():
             named = LIBRARIES[library].title in (features()[name].note or "")
             assert named == (cell["verdict"] != "right"), (library, name)
-
-
-def test_the_files_that_urdfkin_refuses_have_a_note_that_states_it() -> None:
     for feature in features().values():
         try:
             urdfkin.load(feature.data, verify=False)

@@ -244,7 +244,7 @@ def test_two_have_a_robot_each_and_share_the_last() -> None:
     assert deal.first() is None
 
 
-def test_help_goes_to_the_robot_of_which_most_is_left() -> None:
+def test_help_goes_to_the_robot_of_which_most_is_left_and_nobody_helps_where_each_is_alone() -> None:
     deal = WorkQueue(work(2))
     (_, first), (_, second) = deal.first() or ((), Row(())), deal.first() or ((), Row(()))
     for _ in range(2):
@@ -253,9 +253,6 @@ def test_help_goes_to_the_robot_of_which_most_is_left() -> None:
     assert task is not None
     assert row is second
     assert (task.robot, task.chunk.index) == (1, 1)
-
-
-def test_where_each_is_alone_nobody_helps() -> None:
     deal = WorkQueue(work(1), shared=False)
     assert deal.first() is not None
     assert deal.first() is None

@@ -81,21 +81,18 @@ def test_the_whole_trajectory_is_checked_for_each_frame(viewer: Viewer) -> None:
     assert "9 samples, verified by Pinocchio" in player(viewer).words.content
 
 
-def test_a_saved_motion_has_all_frames_and_takes_as_long_as_the_motion() -> None:
+def test_a_saved_motion_has_all_frames_and_a_saved_picture_is_opaque() -> None:
     frames = [np.full((8, 10, 3), 40 * k, dtype=np.uint8) for k in range(5)]
     image = Image.open(io.BytesIO(as_gif(frames, 0.08)))
     assert image.size == (10, 8)
     assert image.n_frames == 5
     assert image.info["duration"] == 80
     assert image.info["loop"] == 0
-
-
-def test_a_saved_picture_is_opaque() -> None:
     clear = np.zeros((4, 4, 4), dtype=np.uint8)
     assert np.asarray(Image.open(io.BytesIO(as_png(clear)))).tolist() == [[[255, 255, 255]] * 4] * 4
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.browser
 def test_in_a_browser_the_picture_and_the_motion_are_saved(viewer: Viewer, tmp_path: Path) -> None:
     require_chromium()

@@ -16,6 +16,8 @@ import pytest
 import urdfkin
 from tests.attacks.test_viewer_gate import free_port
 from tests.report.browser import Browser, opened, require_chromium
+from tests.urdfs import joint
+from tests.urdfs import robot as robot_of
 from urdfkin.errors import InputError
 from urdfkin.errors.escape import markdown_text
 from urdfkin.model.configuration import checked
@@ -98,7 +100,7 @@ def test_the_field_of_q_shows_and_reads_the_numbers_of_a_convention() -> None:
         server.stop()
 
 
-def test_a_slider_ends_where_its_joint_does() -> None:
+def test_a_slider_ends_where_its_joint_does_and_a_joint_without_a_range_has_none() -> None:
     robot = urdfkin.load("panda")
     rows = {row.name: row for row in coordinate_rows(robot)}
     limit = robot.tree.joints[[joint.name for joint in robot.tree.joints].index("panda_joint4")].limit
@@ -108,34 +110,26 @@ def test_a_slider_ends_where_its_joint_does() -> None:
     assert [row.name for row in coordinate_rows(urdfkin.load("ur5", root_joint="floating"))][:4] == [
         "root_joint.x", "root_joint.y", "root_joint.z", "shoulder_pan_joint",
     ]  # fmt: skip
+    with pytest.warns(UrdfWarning, match="its limits are equal"):
+        robot = urdfkin.load(
+            robot_of(
+                joint("turns", "revolute", "a", "b", 'xyz="0 0 1"', "0 1 0", limit(-1, 1)),
+                joint("stays", "revolute", "b", "c", 'xyz="0 0 1"', "0 1 0", limit(0.5, 0.5)),
+            )
+        )
+    assert [row.name for row in coordinate_rows(robot)] == ["turns"]
+    assert fixed_coordinates(robot) == ["stays"]
+    assert within_limits(robot, robot.neutral()).tolist() == [0.0, 0.5]
 
 
-def test_angles_are_in_degrees_at_first_and_a_step_is_one_degree(viewer: Viewer) -> None:
+def test_a_step_is_one_degree_and_the_limits_stand_at_both_ends_of_a_slider(viewer: Viewer) -> None:
     assert viewer.units.value == "degrees"
     assert {handle.step for handle in viewer.sliders.handles} == {1.0}
-
-
-def test_the_limits_stand_at_both_ends_of_a_slider(viewer: Viewer) -> None:
     viewer.set_q(np.zeros(6))
     for row, handle in zip(viewer.sliders.rows, viewer.sliders.handles, strict=True):
         ends = np.rad2deg([row.lower, row.upper])
         assert [mark.value for mark in handle._marks] == pytest.approx(ends)
         assert [float(mark.label) for mark in handle._marks] == pytest.approx(ends, abs=0.05)
-
-
-_FIXED = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
-<joint name="turns" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0 0 1"/>
-<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
-<joint name="stays" type="revolute"><parent link="b"/><child link="c"/><origin xyz="0 0 1"/>
-<axis xyz="0 1 0"/><limit lower="0.5" upper="0.5" effort="1" velocity="1"/></joint></robot>"""
-
-
-def test_a_joint_without_a_range_has_no_slider_and_is_named() -> None:
-    with pytest.warns(UrdfWarning, match="its limits are equal"):
-        robot = urdfkin.load(_FIXED)
-    assert [row.name for row in coordinate_rows(robot)] == ["turns"]
-    assert fixed_coordinates(robot) == ["stays"]
-    assert within_limits(robot, robot.neutral()).tolist() == [0.0, 0.5]
 
 
 def test_missing_meshes_are_named_with_the_remedy() -> None:
@@ -251,7 +245,7 @@ def test_robots_of_other_kinds_are_shown_too(name: str) -> None:
         server.stop()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.browser
 def test_a_browser_draws_it_without_errors_and_without_asking_elsewhere(
     viewer: Viewer, tmp_path: Path
@@ -283,7 +277,7 @@ _UNNAMED = """return [...document.querySelectorAll("[role=slider], [role=button]
   .map((e) => e.outerHTML.slice(0, 300))"""
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.browser
 @pytest.mark.parametrize("dark", [False, True])
 def test_the_page_follows_the_theme_of_the_browser_and_its_words_stand_out(
@@ -347,7 +341,7 @@ _RING = """const e = document.activeElement, style = getComputedStyle(e);
     numbers(style.outlineColor), numbers(colour(behind))];"""
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.browser
 def test_folders_open_by_the_keyboard(viewer: Viewer, tmp_path: Path) -> None:
     require_chromium()
@@ -386,7 +380,7 @@ def _until(holds: Callable[[], bool]) -> bool:
     return False
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.browser
 @pytest.mark.parametrize("width", [1280, 390])
 def test_in_a_browser_every_slider_equals_q_and_none_speaks_for_another(tmp_path: Path, width: int) -> None:
