@@ -38,10 +38,14 @@ def robot(*joints: str, name: str = "r", attributes: str = "") -> str:
 
 
 def chain(
-    inside: Iterable[str], kind: str = "continuous", origin: str = 'xyz="0.1 0.2 0.3"', **how: Any
+    inside: Iterable[str],
+    kind: str = "continuous",
+    origin: str = 'xyz="0.1 0.2 0.3"',
+    axis: str = "0 0 1",
+    **how: Any,
 ) -> str:
     """Links l0, l1, ... in a chain, with a joint j0, j1, ... for each text, which stands inside the joint."""
-    parts = [joint(f"j{i}", kind, f"l{i}", f"l{i + 1}", origin, more=x) for i, x in enumerate(inside)]
+    parts = [joint(f"j{i}", kind, f"l{i}", f"l{i + 1}", origin, axis, x) for i, x in enumerate(inside)]
     return robot(*parts, **how)
 
 

@@ -185,14 +185,14 @@ def test_a_difference_within_the_last_digit_is_told_from_one_beyond_it(
 
 
 def test_the_command_says_what_is_rounded_and_knows_no_fit(tmp_path: Path) -> None:
-    done = command("dh", "kinova", "--compare", "kinova")
+    done = command("dh kinova --compare kinova")
     assert "All differ only within the last digit of the table (*)." in done.text
-    data = json.loads(command("dh", "kinova", "--compare", "kinova", "--format", "json").text)
+    data = json.loads(command("dh kinova --compare kinova --format json").text)
     assert [one["within_last_digit"] for one in data["differences"]] == [True]
     file = tmp_path / "wrong.toml"
     file.write_text(reference_path("ur5").read_text().replace("0.089159", "0.099159"))
-    fitted = good("dh", "ur5", "--compare", str(file))
+    fitted = good("dh ur5 --compare", str(file))
     assert "Every cell" not in fitted.text
     assert "10 mm" in fitted.text
-    assert command("dh", "ur5", "--compare", str(file), "--no-fit").code == 1
-    assert command("dh", "ur5", "--compare", "ur5", "--no-fit").code == 0
+    assert command("dh ur5 --compare", str(file), "--no-fit").code == 1
+    assert command("dh ur5 --compare ur5 --no-fit").code == 0

@@ -83,12 +83,12 @@ def test_a_strict_table_that_loses_more_than_the_robots_rounding_says_how_many_m
 def test_such_a_table_exits_3_and_its_hayati_form_and_its_snapped_form_exit_0() -> None:
     text = text_of(leaning(TWELVE_DIGITS))
     ends = ("--base", "l0", "--tip", "tip")
-    lossy = command("dh", "-", *ends, "--near-parallel", "strict", stdin=text)
+    lossy = command("dh -", *ends, "--near-parallel", "strict", stdin=text)
     assert lossy.code == 3
     assert "agrees" not in lossy.text
     assert "LOSES" in lossy.text
-    assert command("dh", "-", *ends, stdin=text).code == 0
-    assert command("dh", "-", *ends, "--near-parallel", "strict", "--snap", "1e-12", stdin=text).code == 0
+    assert command("dh -", *ends, stdin=text).code == 0
+    assert command("dh -", *ends, "--near-parallel", "strict", "--snap", "1e-12", stdin=text).code == 0
 
 
 def test_a_wrong_strict_table_is_a_disagreement_however_long_its_rows_are() -> None:
@@ -192,12 +192,12 @@ def test_so101_has_no_foot_at_the_inverse_of_rounding_and_baxter_is_told_to_snap
     table = robot.dh(near_parallel="strict")
     assert checked(robot, table).within
     assert max(abs(row.d) for row in table.rows) < 1.0
-    done = good("dh", "baxter")
+    done = good("dh baxter")
     hint = next(line for line in done.text.splitlines() if line.startswith("hint: "))
     assert "--snap 1e-11" in hint
     snapped = urdfkin.load("baxter").dh(snap=1e-11)
     assert noisy_cells(snapped) == []
-    assert "--snap" not in command("dh", "baxter", "--snap", "1e-11").text
+    assert "--snap" not in command("dh baxter --snap 1e-11").text
 
 
 @pytest.mark.parametrize("name", ["panda", "elbow"])
@@ -243,12 +243,10 @@ def test_an_option_that_does_nothing_is_an_error(words: tuple[str, ...]) -> None
 
 
 def test_what_stands_at_its_default_is_not_refused_but_an_idle_seed_is() -> None:
-    assert command("dh", "ur5", "--compare", "ur5", "--tolerance", "0.2").code == 0
-    assert command("dh", "ur5", "--tree", "--digits", "10").code == 0
-    assert "--seed does nothing without a random --q, --v or --a" in refused(
-        "placement", "panda", "--seed", "3"
-    )
-    assert command("placement", "panda", "--seed", "3", "--q", "random").code == 0
+    assert command("dh ur5 --compare ur5 --tolerance 0.2").code == 0
+    assert command("dh ur5 --tree --digits 10").code == 0
+    assert "--seed does nothing without a random --q, --v or --a" in refused("placement panda --seed 3")
+    assert command("placement panda --seed 3 --q random").code == 0
 
 
 # -- xacro ----------------------------------------------------------------------------------------------
@@ -309,18 +307,16 @@ def lost(text: str) -> tuple[float, float]:
 @pytest.mark.parametrize("form", ["terminal", "markdown"])
 @pytest.mark.parametrize("units", [(), ("--degrees", "--millimetres")])
 def test_three_digits_are_said_to_lose_nearly_a_millimetre(form: str, units: tuple[str, ...]) -> None:
-    done = command(
-        "dh", "ur10", "--base", "base", "--tip", "tool0", "--digits", "3", "--format", form, *units
-    )
+    done = command("dh ur10 --base base --tip tool0 --digits 3 --format", form, *units)
     measured, guaranteed = lost(done.text)
     assert 5e-4 < measured <= guaranteed < 2e-3
     assert "Pinocchio" in done.text
 
 
 def test_latex_says_it_on_stderr_and_the_whole_tree_as_well() -> None:
-    done = command("dh", "ur10", "--base", "base", "--tip", "tool0", "--digits", "3", "--format", "latex")
+    done = command("dh ur10 --base base --tip tool0 --digits 3 --format latex")
     assert lost(done.err)[0] > 5e-4
-    text = command("dh", "ur10", "--tree", "--digits", "3").text
+    text = command("dh ur10 --tree --digits 3").text
     line = next(line for line in text.splitlines() if line.startswith("printed with 3 digits"))
     found = re.search(r"within (\S+) m", line)
     assert found is not None
@@ -349,8 +345,8 @@ def test_the_loss_is_the_distance_to_the_table_that_the_text_says() -> None:
     """Cells as `--digits 3 --millimetres --degrees` prints them, typed in again."""
     robot = urdfkin.load("ur10")
     table = robot.dh("tool0", "base", snap=1e-6)
-    typed = rows_of(command("dh", "ur10", "--base", "base", "--tip", "tool0", "--snap", "1e-6",
-                            "--digits", "3", "--millimetres", "--degrees").text)  # fmt: skip
+    line = "dh ur10 --base base --tip tool0 --snap 1e-6 --digits 3 --millimetres --degrees"
+    typed = rows_of(command(line).text)
     again = replace(
         table,
         rows=tuple(

@@ -15,6 +15,7 @@ import pytest
 import urdfkin
 from tests.cli import running
 from tests.report.documents import arms, failing
+from tests.urdfs import joint, robot
 from urdfkin.cli import exit
 from urdfkin.errors import InputError, SourceError
 from urdfkin.report import html, junit
@@ -24,11 +25,7 @@ from urdfkin.validation import campaign
 from urdfkin.verify.tables import TableError
 
 pytestmark = pytest.mark.slow
-ARM = (
-    '<robot name="Ärmchen"><link name="a"/><link name="Hand Größe 3 手"/>'
-    '<joint name="Gelenk_θ" type="continuous"><parent link="a"/><child link="Hand Größe 3 手"/>'
-    '<axis xyz="0 0 1"/></joint></robot>'
-)
+ARM = robot(joint("Gelenk_θ", "continuous", "a", "Hand Größe 3 手"), name="Ärmchen")
 
 
 @pytest.fixture
@@ -106,7 +103,7 @@ def test_a_reader_that_leaves_ends_a_command_quietly_and_as_no_disagreement(word
 @pytest.mark.parametrize("columns", ["", "abc", "0", "-5", "1_0", "1e3", "9999", "7", "1"])
 def test_any_columns_give_a_table(columns: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", columns)
-    done = running.good("info", "ur5")
+    done = running.good("info ur5")
     assert "shoulder_pan_joint" in "".join(done.text.split())
 
 
@@ -266,7 +263,7 @@ def test_a_crash_has_a_code_of_its_own_and_says_what_to_do(
     error: Exception, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(campaign, "validate", _raising(error))
-    done = running.urdfkin("validate", "ur5")
+    done = running.urdfkin("validate ur5")
     assert done.code == 70
     assert "Traceback (most recent call last)" in done.err
     last = done.err.splitlines()[-1]
@@ -317,7 +314,7 @@ def test_when_one_form_fails_the_others_are_written_and_the_report_is_printed(
             Path, "replace", lambda self, to: right(self, to) if to.suffix != ".html" else _full(self)
         )
     forms = ("--html", "r.html", "--json", "r.json", "--junit", "r.xml", "--markdown", "r.md")
-    done = running.urdfkin("validate", "planar_two_link", "--samples", "2", *forms)
+    done = running.urdfkin("validate planar_two_link --samples 2", *forms)
     assert done.code == {"write": 2, "render": 70}[broken]
     assert ("r.html: cannot be written" if broken == "write" else "RuntimeError: odd") in done.err
     assert {path.name for path in tmp_path.iterdir()} == {"r.json", "r.xml", "r.md"}

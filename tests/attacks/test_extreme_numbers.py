@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 
 import urdfkin
 from tests.cli.running import urdfkin as command
+from tests.urdfs import joint, limit, mimic
+from tests.urdfs import robot as robot_of
 from urdfkin.compiled import breakdown
 from urdfkin.compiled.breakdown import AccelerationBreakdown
 from urdfkin.compiled.plan import LANES
@@ -26,21 +28,15 @@ from urdfkin.verify.bounds import magnitudes
 from urdfkin.verify.quantities import VELOCITY
 
 #: A planar, a floating and a sliding joint between turning ones, and two followers.
-ODD = """<robot name="odd">
-<link name="l0"/><link name="l1"/><link name="l2"/><link name="l3"/><link name="l4"/>
-<link name="l5"/><link name="l6"/>
-<joint name="a" type="planar"><parent link="l0"/><child link="l1"/>
-  <origin xyz="0.1 0.2 0.3" rpy="0.3 0.4 0.5"/><axis xyz="0 0 1"/></joint>
-<joint name="b" type="continuous"><parent link="l1"/><child link="l2"/>
-  <origin xyz="0.3 -0.2 0.1" rpy="0.1 0.2 0.3"/><axis xyz="1 2 3"/></joint>
-<joint name="c" type="prismatic"><parent link="l2"/><child link="l3"/><origin xyz="0 0 1e-310" rpy="1 2 3"/>
-  <axis xyz="0 1 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
-<joint name="d" type="floating"><parent link="l3"/><child link="l4"/><origin rpy="1 0 0"/></joint>
-<joint name="e" type="continuous"><parent link="l4"/><child link="l5"/><origin xyz="0.3 0 0"/>
-  <axis xyz="0 0 1"/><mimic joint="b" multiplier="-1e-5" offset="0.2"/></joint>
-<joint name="f" type="prismatic"><parent link="l5"/><child link="l6"/><origin xyz="0 0.2 0" rpy="0 1 0"/>
-  <axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/>
-  <mimic joint="c" multiplier="3"/></joint></robot>"""
+ODD = robot_of(
+    joint("a", "planar", "l0", "l1", 'xyz="0.1 0.2 0.3" rpy="0.3 0.4 0.5"'),
+    joint("b", "continuous", "l1", "l2", 'xyz="0.3 -0.2 0.1" rpy="0.1 0.2 0.3"', "1 2 3"),
+    joint("c", "prismatic", "l2", "l3", 'xyz="0 0 1e-310" rpy="1 2 3"', "0 1 1", limit()),
+    joint("d", "floating", "l3", "l4", 'rpy="1 0 0"', ""),
+    joint("e", "continuous", "l4", "l5", 'xyz="0.3 0 0"', more=mimic("b", -1e-5, 0.2)),
+    joint("f", "prismatic", "l5", "l6", 'xyz="0 0.2 0" rpy="0 1 0"', more=limit() + mimic("c", 3)),
+    name="odd",
+)
 pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 #: Coordinates of the robot above that are lengths.
 LENGTHS = [0, 1, 4, 5, 6, 7]
@@ -112,8 +108,7 @@ def test_small_rates_beside_coordinates_of_ordinary_size_are_verified(
     assert everything(robot, q, numbers(rng, rate, robot.nv), numbers(rng, rate, robot.nv), None) == 0
 
 
-PLANAR = """<robot name="t"><link name="a"/><link name="b"/><joint name="f" type="planar"><parent link="a"/>
-<child link="b"/><origin rpy="0.3 0.4 0.5"/><axis xyz="0 0 1"/></joint></robot>"""
+PLANAR = robot_of(joint("f", "planar", "a", "b", 'rpy="0.3 0.4 0.5"'))
 
 
 @pytest.mark.parametrize("size", [1e-323, 1e-310, 1e-200, 1e-170, 1e-154])
@@ -163,11 +158,10 @@ def test_a_scale_of_zero_still_means_equal() -> None:
 
 def two_axes(first: float, second: float) -> str:
     """Two skew axes, at so many metres from the base and from one another."""
-    return f"""<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
-<joint name="x" type="continuous"><parent link="a"/><child link="b"/><origin xyz="{first!r} 0 0.1"
- rpy="1 0.2 0.3"/><axis xyz="0 0 1"/></joint>
-<joint name="y" type="continuous"><parent link="b"/><child link="c"/><origin xyz="{second!r} 0.1 0.2"
- rpy="1 0.2 0.3"/><axis xyz="0 0.6 0.8"/></joint></robot>"""
+    return robot_of(
+        joint("x", "continuous", "a", "b", f'xyz="{first!r} 0 0.1" rpy="1 0.2 0.3"'),
+        joint("y", "continuous", "b", "c", f'xyz="{second!r} 0.1 0.2" rpy="1 0.2 0.3"', "0 0.6 0.8"),
+    )
 
 
 @pytest.mark.parametrize(("first", "second"), [(1e155, 0.3), (0.3, -1e200), (1e300, 1e300)])
@@ -194,9 +188,7 @@ def test_tables_and_tree_parameters_of_lengths_up_to_there_are_verified_and_beyo
     robot.tree_parameters()
 
 
-TINY = """<robot name="r"><link name="a"/><link name="b"/>
-<joint name="x" type="continuous"><parent link="a"/><child link="b"/><origin xyz="1e-195 1e-196 1e-195"
- rpy="1 0.2 0.3"/><axis xyz="0 0.6 0.8"/></joint></robot>"""
+TINY = robot_of(joint("x", "continuous", "a", "b", 'xyz="1e-195 1e-196 1e-195" rpy="1 0.2 0.3"', "0 0.6 0.8"))
 
 
 @pytest.mark.filterwarnings("error::urdfkin.NotVerifiedWarning")
@@ -207,10 +199,10 @@ def test_a_table_of_lengths_whose_squares_vanish_does_not_lose_to_rounding() -> 
     assert urdfkin.validate([TINY.encode()], samples=2).passed
 
 
-FAINT = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
-<joint name="x" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint>
-<joint name="y" type="continuous"><parent link="a"/><child link="c"/><axis xyz="0 1 0"/>
-<mimic joint="x" multiplier="5e-324"/></joint></robot>"""
+FAINT = robot_of(
+    joint("x", "continuous", "a", "b"),
+    joint("y", "continuous", "a", "c", axis="0 1 0", more=mimic("x", "5e-324")),
+)
 
 
 def test_the_judge_counts_in_units_that_do_not_vanish() -> None:
@@ -288,11 +280,8 @@ def test_on_a_base_that_moves_too_fast(ur5: Robot) -> None:
 
 
 def test_of_a_robot_that_is_itself_of_that_size() -> None:
-    robot = urdfkin.load(
-        '<robot name="r"><link name="a"/><link name="b"/><link name="c"/><joint name="j" type="continuous">'
-        '<parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint><joint name="k" type="fixed">'
-        '<parent link="b"/><child link="c"/><origin xyz="1e250 0 0"/></joint></robot>'
-    )
+    far = joint("k", "fixed", "b", "c", 'xyz="1e250 0 0"', "")
+    robot = urdfkin.load(robot_of(joint("j", "continuous", "a", "b"), far))
     fast = robot.prepare("c")
     for rate in (1e30, 1e44):  # of an ordinary robot nobody would look
         with pytest.raises(RangeError):

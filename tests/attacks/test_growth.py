@@ -192,12 +192,7 @@ def test_who_is_nearest_is_found_without_comparing_for_ever() -> None:
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("inside", "filling"),
-    [
-        ("<!--{}-->", "a"),
-        ("<?a {}?>", "a"),
-        ('<material note="{}"/>', "a"),
-        ("<material {}/>", 'a="1" '),
-    ],
+    [("<!--{}-->", "a"), ("<?a {}?>", "a"), ('<material note="{}"/>', "a"), ("<material {}/>", 'a="1" ')],
 )
 def test_markup_that_does_not_end_is_refused_before_it_is_read_again_and_again(
     inside: str, filling: str

@@ -117,7 +117,7 @@ def test_settings_that_are_a_link_to_a_device_are_refused(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "pyproject.toml").symlink_to("/dev/zero")
-    assert "pyproject.toml: not a regular file: found a character device" in refused("check", "ur5")
+    assert "pyproject.toml: not a regular file: found a character device" in refused("check ur5")
 
 
 def test_a_manifest_a_kept_file_or_a_pipe_in_place_of_a_file_is_none(tmp_path: Path) -> None:

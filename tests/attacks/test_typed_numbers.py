@@ -20,18 +20,14 @@ MEANT = {"1": 1.0, "+1.5": 1.5, "-.5": -0.5, "1.": 1.0, "1e-3": 1e-3, " 2E+2 ": 
 
 @pytest.mark.parametrize("text", [text for text in NOT_MEANT if "," not in text])
 def test_it_is_refused_in_a_list_on_the_command_line(text: str) -> None:
-    assert "--q, elbow_joint: not a finite number: found" in refused(
-        "placement", "ur5", "--q", f"0,0,{text},0,0,0"
-    )
+    assert "--q, elbow_joint: not a finite number: found" in refused("placement ur5 --q", f"0,0,{text},0,0,0")
 
 
 @pytest.mark.parametrize("text", NOT_MEANT)
 def test_it_is_refused_in_a_file_with_its_line_and_column(text: str, tmp_path: Path) -> None:
     path = tmp_path / "q.csv"
     path.write_text(f'0,0,0,0,0,0\n# a remark\n0,0,0,"{text}",0,0\n', encoding="utf-8")
-    assert "q.csv:3, wrist_1_joint: not a finite number: found" in refused(
-        "placement", "ur5", "--q", f"@{path}"
-    )
+    assert "q.csv:3, wrist_1_joint: not a finite number: found" in refused("placement ur5 --q", f"@{path}")
 
 
 @pytest.mark.parametrize("text", NOT_MEANT)
@@ -65,13 +61,13 @@ def test_it_is_refused_as_an_option(
 
 @pytest.mark.parametrize("count", ["1_0", "\u0661", "0", "-1", "1.5", ""])
 def test_it_is_refused_as_a_count_of_samples(count: str) -> None:
-    done = urdfkin("placement", "ur5", "--q", f"random:{count}")
+    done = urdfkin("placement ur5 --q", f"random:{count}")
     assert (done.code == 0) is (count == ""), done.err
 
 
 @pytest.mark.parametrize("text", MEANT)
 def test_what_is_a_number_is_taken(text: str) -> None:
-    done = urdfkin("placement", "ur5", "--no-verify", "--format", "json", "--q", f"0,0,{text},0,0,0")
+    done = urdfkin("placement ur5 --no-verify --format json --q", f"0,0,{text},0,0,0")
     assert done.data["q"] == [[0.0, 0.0, MEANT[text], 0.0, 0.0, 0.0]]
 
 
@@ -103,24 +99,21 @@ def test_a_column_too_many_or_missing_is_told_with_file_line_and_name(
     content: str, message: str, tmp_path: Path
 ) -> None:
     (tmp_path / "q.csv").write_text(content)
-    assert message in refused("placement", "ur5", "--q", f"@{tmp_path / 'q.csv'}")
+    assert message in refused("placement ur5 --q", f"@{tmp_path / 'q.csv'}")
 
 
 def test_columns_in_any_order_are_read_by_name_and_a_mistake_is_told_by_name(tmp_path: Path) -> None:
     names = NAMES.split(",")[::-1]
     path = tmp_path / "q.csv"
     path.write_text(",".join(names) + "\n6,5,4,3,2,1\n")
-    done = urdfkin("placement", "ur5", "--no-verify", "--format", "json", "--q", f"@{path}")
+    done = urdfkin("placement ur5 --no-verify --format json --q", f"@{path}")
     assert done.data["q"] == [[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]]
     path.write_text(",".join(names) + "\n6,5,4,3,2,x\n")
-    assert (
-        "q.csv:2, shoulder_pan_joint: not a finite number"
-        in urdfkin("placement", "ur5", "--q", f"@{path}").err
-    )
+    assert "q.csv:2, shoulder_pan_joint: not a finite number" in urdfkin("placement ur5 --q", f"@{path}").err
 
 
 def test_joints_that_are_called_like_numbers_may_head_a_file(tmp_path: Path) -> None:
     text = robot(joint("1", "continuous", "a", "b"), joint("2", "continuous", "b", "c"))
     (tmp_path / "q.csv").write_text("2,1\n0.2,0.1\n")
-    done = urdfkin("placement", "-", "--format", "json", "--q", f"@{tmp_path / 'q.csv'}", stdin=text)
+    done = urdfkin("placement - --format json --q", f"@{tmp_path / 'q.csv'}", stdin=text)
     np.testing.assert_array_equal(done.data["q"], [[0.1, 0.2]])

@@ -10,6 +10,7 @@ import pytest
 
 import urdfkin
 from tests.cli.running import python
+from tests.urdfs import joint, limit, robot
 from urdfkin.compiled import evaluate
 from urdfkin.compiled.plan import compile_tree
 from urdfkin.errors import OracleError
@@ -26,15 +27,11 @@ GB = 10**9
 
 def chain(joints: int, kind: str, leaves: int = 0) -> str:
     """A chain of joints, and fixed leaves at its end."""
-    moves = '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/>'
-    parts = ['<robot name="r"><link name="l0"/>']
-    for i in range(joints + leaves):
-        parent, type_ = (i, kind) if i < joints else (joints, "fixed")
-        parts.append(
-            f'<link name="l{i + 1}"/><joint name="j{i}" type="{type_}"><parent link="l{parent}"/>'
-            f'<child link="l{i + 1}"/><origin xyz="0.1 0 0"/>{moves if type_ != "fixed" else ""}</joint>'
-        )
-    return "".join(parts) + "</robot>"
+    inside = "" if kind == "fixed" else limit()
+    parts = [joint(f"j{i}", kind, f"l{i}", f"l{i + 1}", 'xyz="0.1 0 0"', more=inside) for i in range(joints)]
+    ends = range(joints, joints + leaves)
+    parts += [joint(f"j{i}", "fixed", f"l{joints}", f"l{i + 1}", 'xyz="0.1 0 0"', "") for i in ends]
+    return robot(*parts) if parts else '<robot name="r"><link name="l0"/></robot>'
 
 
 def test_blocks_cover_everything_once_and_keep_to_their_size(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,6 +3,7 @@
 import io
 import json
 import os
+import shlex
 import subprocess
 import sys
 from collections.abc import Collection, Iterator, Sequence
@@ -39,7 +40,11 @@ def _refused(word: str) -> None:
 
 
 def urdfkin(*words: str, stdin: str | bytes = b"") -> Done:
-    """The entry point of the installed command, called here: no new process, the same code."""
+    """The entry point of the installed command, called here: no new process, the same code.
+
+    The first of the words may be a line as one types it: `urdfkin("info ur5 --format", form)`.
+    """
+    words = (*shlex.split(words[0]), *words[1:]) if words and " " in words[0] else words
     data = stdin.encode() if isinstance(stdin, str) else stdin
     out, err = io.BytesIO(), io.StringIO()
     code = 0

@@ -48,7 +48,7 @@ def test_the_exit_code_is_1_for_errors_only_and_strict_makes_errors_of_warnings(
 
 
 def test_an_error_exits_1_with_its_place_and_where_to_read_on(folder: None) -> None:
-    done = urdfkin("check", "good.urdf", "bad.urdf")
+    done = urdfkin("check good.urdf bad.urdf")
     assert done.code == 1
     lines = done.text.splitlines()
     assert lines[0].startswith("bad.urdf:3:9: URDF402 error: link 'a': another link has this name")
@@ -58,21 +58,21 @@ def test_an_error_exits_1_with_its_place_and_where_to_read_on(folder: None) -> N
 
 
 def test_a_missing_file_exits_2_and_the_others_are_checked(folder: None) -> None:
-    done = urdfkin("check", "nowhere.urdf", "bad.urdf")
+    done = urdfkin("check nowhere.urdf bad.urdf")
     assert done.code == 2
     assert "URDF402" in done.text
     assert done.err == "urdfkin: error: nowhere.urdf: no such file; did you mean warned.urdf?\n"
 
 
 def test_an_unknown_code_exits_2_with_the_nearest(folder: None) -> None:
-    assert "did you mean URDF402" in refused("check", "--ignore", "URDF4022", "bad.urdf")
+    assert "did you mean URDF402" in refused("check --ignore URDF4022 bad.urdf")
 
 
 def test_explain_prints_a_page_and_lists_all_codes() -> None:
-    page = good("explain", "urdf502")
+    page = good("explain urdf502")
     assert page.text.startswith("URDF502 axis-without-direction (error)")
     assert urdfkin("explain").text.count("\n") > 60
-    assert urdfkin("explain", "URDF999").code == 2
+    assert urdfkin("explain URDF999").code == 2
 
 
 def test_checking_imports_neither_yourdfpy_nor_pinocchio_nor_a_compiler() -> None:
@@ -99,7 +99,7 @@ def test_a_file_of_any_name_is_named_by_a_uri_that_gives_its_bytes_back(
     place.write_bytes(b"<robot name='r'><link name='a'/><link name='a'/></robot>")
     given = os.fsencode(place) if absolute else name
     monkeypatch.chdir(tmp_path)
-    done = urdfkin("check", "--format", "sarif", os.fsdecode(given))
+    done = urdfkin("check --format sarif", os.fsdecode(given))
     assert done.code == 1, done.err
     (result,) = done.data["runs"][0]["results"]
     uri = result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"]

@@ -404,7 +404,7 @@ def test_where_there_is_no_repository_it_is_told(tmp_path: Path, monkeypatch: py
     monkeypatch.chdir(tmp_path)
     put("arm.urdf")
     monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(tmp_path.parent))
-    assert "not a git repository" in refused("check", "--changed-since", "main")
+    assert "not a git repository" in refused("check --changed-since main")
     monkeypatch.setenv("PATH", "")
     assert "git is not installed" in check("--changed-since", "main").err
 
@@ -558,7 +558,7 @@ def test_findings_go_to_a_file(here: Path, style: str) -> None:
 
 
 def test_what_is_no_file_of_the_users_is_not_mended(here: Path) -> None:
-    done = urdfkin("check", "--fix", "-", stdin=LONG)
+    done = urdfkin("check --fix -", stdin=LONG)
     assert (done.code, "URDF503" in done.text) == (0, True)
     assert check("--fix", "ur5", "--select", "URDF601").code == 0
 

@@ -134,10 +134,7 @@ _PATH = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
 #: How each is started without a person's own settings, and told to complete.
 SHELLS = {
     "bash": (["bash", "--norc", "--noprofile", "-i"], 'eval "$(urdfkin completion bash)"'),
-    "zsh": (
-        ["zsh", "-f", "-i"],
-        'autoload -Uz compinit; compinit -u -D; eval "$(urdfkin completion zsh)"',
-    ),
+    "zsh": (["zsh", "-f", "-i"], 'autoload -Uz compinit; compinit -u -D; eval "$(urdfkin completion zsh)"'),
     "fish": (["fish", "--no-config", "-i"], "urdfkin completion fish | source"),
 }
 

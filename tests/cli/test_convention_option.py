@@ -49,36 +49,36 @@ def test_a_placement_reads_q_of_the_convention_and_says_so() -> None:
 
 
 def test_the_table_names_the_convention_and_what_was_checked() -> None:
-    lines = run("velocity", "ur5", "--convention", "drake", "--v", "random").text.splitlines()
+    lines = run("velocity ur5 --convention drake --v random").text.splitlines()
     assert "convention drake" in lines[0]
     named = [line.split()[0] for line in lines if line.startswith(("linear", "angular"))]
     assert named == ["angular", "linear"]
-    done = run("velocity", "ur5", "--convention", "drake", "--v", "random")
+    done = run("velocity ur5 --convention drake --v random")
     assert "before the conversion to drake" in done.err + done.text
-    assert "before the conversion" not in run("velocity", "ur5", "--v", "random").err
+    assert "before the conversion" not in run("velocity ur5 --v random").err
 
 
 def test_a_users_file_and_its_units_zeros_and_names_are_read(tmp_path: Path) -> None:
     file = tmp_path / "motors.toml"
     file.write_text('joints = ["elbow", "joint_1"]\nangle = "deg"\n[joint.joint_2]\nname = "elbow"\n')
     for q in ("90,0", "elbow=90, joint_1=0"):
-        done = run("placement", "planar_two_link", "--convention", str(file), "--q", q, "--format", "json")
+        done = run("placement planar_two_link --convention", str(file), "--q", q, "--format", "json")
         assert np.allclose(np.array(done.data["result"])[0, :3, 3], [0.5, 0.4, 0.0])
     file = tmp_path / "motors.toml"
     file.write_text('joints = ["joint_2", "joint_1"]\nangle = "deg"\n[joint.joint_1]\nsign = -1\nzero = 5\n')
     space: dict[str, Any] = {"q_from": np.array([1.0, 2.0]), "v_from": np.array([1.0, 2.0]), "np": np}
-    exec(run("order", "planar_two_link", "--to", str(file)).text, space)
+    exec(run("order planar_two_link --to", str(file)).text, space)
     assert np.allclose(space["q_to"], [np.degrees(2), 5 - np.degrees(1)])
     assert np.allclose(space["v_to"], [np.degrees(2), -np.degrees(1)])
 
 
 def test_a_wrong_convention_is_one_line_with_the_nearest(tmp_path: Path) -> None:
-    done = run("jacobian", "ur5", "--convention", "mujocco")
+    done = run("jacobian ur5 --convention mujocco")
     assert (done.code, done.err.count("\n")) == (2, 1)
-    assert "--no-mimic" in refused("jacobian", "panda", "--convention", "mujoco")
-    assert run("jacobian", "panda", "--convention", "mujoco", "--no-mimic").code == 0
-    refused("acceleration", "ur5", "--convention", "mujoco", "--breakdown")
-    assert "unknown convention 'mujocco'; did you mean mujoco" in refused("order", "a1", "--to", "mujocco")
+    assert "--no-mimic" in refused("jacobian panda --convention mujoco")
+    assert run("jacobian panda --convention mujoco --no-mimic").code == 0
+    refused("acceleration ur5 --convention mujoco --breakdown")
+    assert "unknown convention 'mujocco'; did you mean mujoco" in refused("order a1 --to mujocco")
 
 
 @pytest.mark.parametrize(
@@ -123,7 +123,7 @@ def test_a_batch_without_the_option_runs_no_line_of_conventions() -> None:
 
 def test_wxyz_is_the_quaternion_with_its_scalar_first() -> None:
     x, w = (
-        run("placement", "ur5", "--q", "random", "--as", form, "--format", "json").data["result"][0]
+        run("placement ur5 --q random --as", form, "--format", "json").data["result"][0]
         for form in ("quaternion", "wxyz")
     )
     assert w == [*x[:3], x[6], *x[3:6]]
@@ -136,7 +136,7 @@ TOOLS = [name for name in BUILT_IN if name != "idyntree"]
 
 
 def test_a_row_is_a_joint_and_a_column_a_convention() -> None:
-    lines = run("order", "a1", "--root-joint", "floating", "--format", "csv").text.splitlines()
+    lines = run("order a1 --root-joint floating --format csv").text.splitlines()
     table = [line.split(",") for line in lines]
     assert table[0] == ["joint", *TOOLS]
     robot = urdfkin.load("a1", root_joint="floating", verify=False)
@@ -149,7 +149,7 @@ def test_a_row_is_a_joint_and_a_column_a_convention() -> None:
 
 
 def test_tools_with_the_same_indices_share_a_column() -> None:
-    text = run("order", "a1").text
+    text = run("order a1").text
     assert "urdfkin: also pinocchio, kdl, isaacgym" in text
     assert text.splitlines()[1].split() == [
         "joint",
@@ -165,7 +165,7 @@ def test_tools_with_the_same_indices_share_a_column() -> None:
     ("start", "end"), list(itertools.product(("mujoco", "isaaclab", "drake", "pinocchio"), repeat=2))
 )
 def test_the_printed_code_converts(start: str, end: str) -> None:
-    text = run("order", "tiago", "--from", start, "--to", end, "--root-joint", "floating").text
+    text = run("order tiago --from", start, "--to", end, "--root-joint", "floating").text
     robot = urdfkin.load("tiago", root_joint="floating", verify=False)
     rng = np.random.default_rng(0)
     q, v = robot.sample(1)[0], rng.standard_normal(robot.nv)
@@ -185,10 +185,10 @@ def test_the_printed_code_converts(start: str, end: str) -> None:
 
 
 def test_json_has_the_same_numbers_as_the_library() -> None:
-    data = run("order", "a1", "--to", "isaaclab", "--format", "json").data
+    data = run("order a1 --to isaaclab --format json").data
     permutation = urdfkin.load("a1", verify=False).convention("isaaclab").permutation
     assert permutation is not None
     assert data["q"]["reordering"]["index"] == permutation.tolist()
-    every = run("order", "a1", "--format", "json").data["conventions"]
+    every = run("order a1 --format json").data["conventions"]
     assert list(every) == TOOLS
     assert every["isaaclab"]["sources"]

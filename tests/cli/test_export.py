@@ -15,37 +15,35 @@ from tests.cli.running import good, urdfkin
 def test_a_file_is_written_and_checks_itself(tmp_path: Path) -> None:
     path = tmp_path / "elbow.py"
     words = ("--to", "numpy", "--quantity", "jacobian,velocity", "--quantity", "placement", "-o", str(path))
-    done = urdfkin("export", "planar_two_link", *words)
+    done = urdfkin("export planar_two_link", *words)
     assert (done.code, done.out) == (0, b"")
     assert "verified by Pinocchio" in done.err
-    checked = good("export", "--check", str(path))
+    checked = good("export --check", str(path))
     assert re.findall(r"^good (\w+): 4 test vectors", checked.text, re.MULTILINE) == [
         "jacobian",
         "velocity",
         "placement",
     ]
     path.write_text(path.read_text("utf-8").replace("cos(q_", "sin(q_"), "utf-8")
-    wrong = urdfkin("export", "--check", str(path))
+    wrong = urdfkin("export --check", str(path))
     assert wrong.code == 1
     assert "WRONG placement" in wrong.text
 
 
 def test_standard_output_has_the_file_and_commands_nobody() -> None:
-    done = good("export", "planar_two_link", "--to", "c", "--name", "my arm")
+    done = good("export planar_two_link --to c --name", "my arm")
     assert "void my_arm_jacobian_batch(size_t n" in done.text
-    done = urdfkin(
-        "export", "-", "--to", "numpy", "--no-verify", stdin=urdf("x ##vso[task.setvariable]y ::error::")
-    )
+    done = urdfkin("export - --to numpy --no-verify", stdin=urdf("x ##vso[task.setvariable]y ::error::"))
     assert done.code == 3
     assert "##vso[" not in done.text
 
 
 def test_what_was_not_verified_says_so_everywhere(tmp_path: Path) -> None:
     path = tmp_path / "arm.py"
-    done = urdfkin("export", "planar_two_link", "--no-verify", "--to", "numpy", "-o", str(path))
+    done = urdfkin("export planar_two_link --no-verify --to numpy -o", str(path))
     assert done.code == 3
     assert "UNVERIFIED" in path.read_text("utf-8").splitlines()[0]
-    checked = urdfkin("export", "--check", str(path))
+    checked = urdfkin("export --check", str(path))
     assert checked.code == 3
     assert "UNVERIFIED" in checked.err
 
@@ -53,7 +51,7 @@ def test_what_was_not_verified_says_so_everywhere(tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def exported() -> str:
     """A small file of NumPy."""
-    return urdfkin("export", "planar_two_link", "--to", "numpy", "--quantity", "placement").text
+    return urdfkin("export planar_two_link --to numpy --quantity placement").text
 
 
 CHANGES = {
@@ -76,7 +74,7 @@ def test_a_file_whose_head_was_changed_is_not_verified(change: str, exported: st
     assert changed != exported
     path = tmp_path / "arm.py"
     path.write_text(changed, "utf-8")
-    done = urdfkin("export", "--check", str(path))
+    done = urdfkin("export --check", str(path))
     assert done.code == 3
     assert "good placement: 4 test vectors" in done.text
     assert "UNVERIFIED: the file " in done.err
@@ -87,7 +85,7 @@ def test_a_file_whose_head_was_changed_is_not_verified(change: str, exported: st
 def test_a_file_with_other_line_ends_is_still_as_it_was_written(exported: str, tmp_path: Path) -> None:
     path = tmp_path / "arm.py"
     path.write_bytes(exported.replace("\n", "\r\n").encode())
-    assert urdfkin("export", "--check", str(path)).code == 0
+    assert urdfkin("export --check", str(path)).code == 0
 
 
 @pytest.mark.slow
@@ -97,7 +95,7 @@ def test_a_check_runs_nothing_that_lies_beside_the_file(beside: str, exported: s
     planted.parent.mkdir(parents=True)
     planted.write_text(f"open({str(mark)!r}, 'w').close()")
     (tmp_path / "arm" / "arm.py").write_text(exported, "utf-8")
-    good("export", "--check", str(tmp_path / "arm" / "arm.py"))
+    good("export --check", str(tmp_path / "arm" / "arm.py"))
     assert not mark.exists()
 
 
@@ -105,14 +103,12 @@ def test_a_check_runs_nothing_that_lies_beside_the_file(beside: str, exported: s
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 def test_a_check_includes_nothing_that_lies_beside_the_file(tmp_path: Path) -> None:
     path = tmp_path / "arm.c"
-    path.write_text(
-        urdfkin("export", "planar_two_link", "--to", "c", "--quantity", "placement").text, "utf-8"
-    )
+    path.write_text(urdfkin("export planar_two_link --to c --quantity placement").text, "utf-8")
     (tmp_path / "math.h").write_text("#error run by urdfkin")
-    assert urdfkin("export", "--check", str(path)).code == 0
+    assert urdfkin("export --check", str(path)).code == 0
     path.write_text('#include "own.h"\n' + path.read_text("utf-8"), "utf-8")
     (tmp_path / "own.h").write_text("")
-    assert urdfkin("export", "--check", str(path)).code == 2
+    assert urdfkin("export --check", str(path)).code == 2
 
 
 @pytest.mark.slow
@@ -128,8 +124,8 @@ def test_octave_is_told_the_functions_name_and_never_the_files(
     )
     octave.chmod(0o700)
     monkeypatch.setenv("PATH", f"{octave.parent}:{os.environ['PATH']}")
-    text = urdfkin("export", "planar_two_link", "--to", "matlab", "--quantity", "placement").text
+    text = urdfkin("export planar_two_link --to matlab --quantity placement").text
     path.write_text(text, "utf-8")
-    assert urdfkin("export", "--check", str(path)).code == 0
+    assert urdfkin("export --check", str(path)).code == 0
     assert (tmp_path / "said").read_text().splitlines()[-1] == "planar_two_link_tip_kinematics().check();"
     assert (tmp_path / "there").read_text() == "planar_two_link_tip_kinematics.m\n"

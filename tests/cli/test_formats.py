@@ -77,7 +77,7 @@ def test_csv_has_one_width_and_numbers_that_stay_numbers(line: str) -> None:
 )
 def test_the_suffix_of_a_file_selects_the_format_of_a_table(suffix: str, begin: str, tmp_path: Path) -> None:
     path = tmp_path / f"table{suffix}"
-    done = urdfkin("jacobian", "ur5", "-o", str(path))
+    done = urdfkin("jacobian ur5 -o", str(path))
     assert (done.code, done.out, done.err) == (0, b"", "")
     text = path.read_text()
     assert text.startswith(begin)
@@ -85,13 +85,13 @@ def test_the_suffix_of_a_file_selects_the_format_of_a_table(suffix: str, begin: 
 
 
 def test_the_check_is_part_of_json_or_is_printed_beside_the_data() -> None:
-    done = urdfkin("chain", "ur5", "--format", "json")
+    done = urdfkin("chain ur5 --format json")
     assert done.err == ""
     assert done.data["verified"] is True
     assert done.data["check"].startswith("Pinocchio")
-    done = urdfkin("chain", "ur5", "--format", "csv")
+    done = urdfkin("chain ur5 --format csv")
     assert done.err.startswith("Pinocchio")
-    done = urdfkin("chain", "ur5", "--no-verify", "--format", "json")
+    done = urdfkin("chain ur5 --no-verify --format json")
     assert (done.code, done.data["verified"]) == (3, False)
 
 
@@ -144,7 +144,7 @@ def test_the_form_stands_where_the_ending_says_nothing_and_a_breakdown_goes_by_i
 @pytest.mark.slow
 def test_a_table_goes_by_the_ending_too(tmp_path: Path) -> None:
     for ending in ("toml", "json", "csv", "urdf", "tex", "md", "c", "py", "m"):
-        assert urdfkin("dh", "elbow", "-o", str(tmp_path / f"t.{ending}")).code == 0
+        assert urdfkin("dh elbow -o", str(tmp_path / f"t.{ending}")).code == 0
     rows = [read_table(tmp_path / f"t.{ending}").rows for ending in ("toml", "json", "csv")]
     assert rows[0] == rows[1] == rows[2]
     assert tomllib.loads((tmp_path / "t.toml").read_text())["convention"] == "standard"
@@ -157,17 +157,15 @@ def test_a_table_goes_by_the_ending_too(tmp_path: Path) -> None:
     }
     for ending, start in starts.items():
         assert (tmp_path / f"t.{ending}").read_text().startswith(start), ending
-    assert urdfkin("dh", "elbow", "--format", "roboticstoolbox", "-o", str(tmp_path / "r.py")).code == 0
+    assert urdfkin("dh elbow --format roboticstoolbox -o", str(tmp_path / "r.py")).code == 0
     assert "roboticstoolbox" in (tmp_path / "r.py").read_text()
-    assert "contradicts the file's suffix" in refused(
-        "dh", "elbow", "--format", "toml", "-o", str(tmp_path / "t.json")
-    )
+    assert "contradicts the file's suffix" in refused("dh elbow --format toml -o", str(tmp_path / "t.json"))
 
 
 @pytest.mark.slow
 def test_a_validation_names_its_verdict_and_the_files_it_wrote(tmp_path: Path) -> None:
     html, data = str(tmp_path / "r.html"), str(tmp_path / "r.json")
-    done = urdfkin("validate", "elbow", "--samples", "1", "--html", html, "--json", data)
+    done = urdfkin("validate elbow --samples 1 --html", html, "--json", data)
     *_, summary, wrote = done.text.splitlines()
     assert summary.startswith("verified: 1 robot, ")
     assert wrote == f"wrote {data}, {html}"

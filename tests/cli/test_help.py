@@ -49,7 +49,7 @@ def test_the_help_page_has_every_command_the_version_pinocchios_and_the_families
         assert isinstance(cli.get_command(group, name), click.Command)
     done = good("--version")
     assert done.text.strip().endswith(f"Pinocchio {metadata.version('pin')}")
-    page = " ".join(urdfkin("robots", "--help").text.split())
+    page = " ".join(urdfkin("robots --help").text.split())
     named = page.partition("Show only the robots of one family: ")[2].partition(".")[0].split(", ")
     assert named == sorted({entry.family for entry in catalogue().values()})
 
@@ -97,8 +97,8 @@ def test_the_examples_of_validation_run_one_after_the_other(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "my.urdf").write_text(urdf_of("tree_1"))
     for name in ("results", "main", "branch"):
-        assert urdfkin("validate", "ur5", "--samples", "10", "--json", f"{name}.json").code == 0
-    assert urdfkin("validate", "ur5", "--samples", "10", "--store", "nightly").code == 0
+        assert urdfkin("validate ur5 --samples 10 --json", f"{name}.json").code == 0
+    assert urdfkin("validate ur5 --samples 10 --store nightly").code == 0
     for command in AFTER_WORK:
         run_examples(command)
 

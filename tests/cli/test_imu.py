@@ -96,7 +96,7 @@ def test_an_archive_of_anything_else_is_refused_in_one_line(
 ) -> None:
     path = tmp_path / "log.npz"
     save(path, **arrays)
-    err = refused("imu", "ur5", "--trajectory", str(path))
+    err = refused("imu ur5 --trajectory", str(path))
     assert words in err
     assert str(path) in err
     assert len(err.strip().splitlines()) == 1
@@ -106,7 +106,7 @@ def test_an_archive_of_anything_else_is_refused_in_one_line(
 def test_what_is_no_archive_is_refused_too(data: bytes, tmp_path: Path) -> None:
     path = tmp_path / "log.npz"
     path.write_bytes(data)
-    assert "not an .npz file of numbers" in refused("imu", "ur5", "--trajectory", str(path))
+    assert "not an .npz file of numbers" in refused("imu ur5 --trajectory", str(path))
 
 
 def test_options_without_effect_and_half_a_vector_are_refused(
@@ -114,10 +114,10 @@ def test_options_without_effect_and_half_a_vector_are_refused(
 ) -> None:
     save(tmp_path / "log.npz", **motion)
     assert "--v does nothing along a --trajectory" in refused(
-        "imu", "ur5", "--trajectory", str(tmp_path / "log.npz"), "--v", "random"
+        "imu ur5 --trajectory", str(tmp_path / "log.npz"), "--v", "random"
     )
-    assert "none for z" in urdfkin("imu", "ur5", "--gravity", "0,9.81").err
-    assert urdfkin("imu", "ur5", "--no-verify").code == 3
+    assert "none for z" in urdfkin("imu ur5 --gravity 0,9.81").err
+    assert urdfkin("imu ur5 --no-verify").code == 3
 
 
 def test_manipulability_has_the_librarys_numbers_in_every_form(tmp_path: Path) -> None:
@@ -153,11 +153,11 @@ def test_what_is_no_number_is_null_in_json() -> None:
 
 
 def test_a_singularity_is_explained_in_place_of_a_gradient() -> None:
-    text = urdfkin("singular-values", "ur5", "--frame", "tool0", "--q", "neutral").text
+    text = urdfkin("singular-values ur5 --frame tool0 --q neutral").text
     assert "Singular within rounding: rank 5 of 6" in text
     assert "Lost direction: rotation of tool0 about (1, 0, 0), in world axes." in text
     assert "wrist_1_joint are parallel and lie in one plane." in text
     assert "nan" not in text
-    regular = urdfkin("singular-values", "ur5", "--frame", "tool0", "--q", "random").text
+    regular = urdfkin("singular-values ur5 --frame tool0 --q random").text
     assert "ingular within" not in regular
     assert "manipulability changes by" in regular

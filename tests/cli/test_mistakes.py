@@ -3,12 +3,15 @@
 import errno
 import os
 import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from tests.cli.running import process, refused
 from tests.robots.odd_urdfs import urdf_of
+from tests.urdfs import chain
 
 ZEROS = "0,0,0,-1,0,0,0,0"
 NAMED = "panda_joint1=30deg,panda_joint4=-pi/2,panda_joint6=1.5"
@@ -183,15 +186,12 @@ def test_a_report_that_is_read_only_is_not_renamed_over(
     path = tmp_path / "J.csv"
     path.write_text("mine")
     monkeypatch.setattr(os, "access", lambda _, mode: mode != os.W_OK)
-    assert "Permission denied" in refused("jacobian", "ur5", "-o", str(path))
+    assert "Permission denied" in refused("jacobian ur5 -o", str(path))
     assert path.read_text() == "mine"
 
 
 @pytest.mark.slow
 def test_a_reader_that_goes_away_is_no_error() -> None:
-    import subprocess  # noqa: PLC0415
-    import sys  # noqa: PLC0415
-
     words = [sys.executable, "-m", "urdfkin", "velocity", "ur5", "--q", "random:5000", "--format", "csv"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as running:
         assert running.stdout is not None
@@ -203,15 +203,8 @@ def test_a_reader_that_goes_away_is_no_error() -> None:
 
 @pytest.mark.slow
 def test_a_robot_pinocchio_cannot_check_says_so_once_with_exit_3() -> None:
-    chain = "".join(
-        f'<link name="l{i + 1}"/><joint name="j{i}" type="continuous"><parent link="l{i}"/>'
-        f'<child link="l{i + 1}"/><origin xyz="0.1 0 0"/><axis xyz="0 0 1"/></joint>'
-        for i in range(316)
-    )
-    done = process(
-        "placement", "-", "--format", "json",
-        stdin=f'<robot name="snake"><link name="l0"/>{chain}</robot>'.encode(),
-    )  # fmt: skip
+    snake = chain([""] * 316, origin='xyz="0.1 0 0"', name="snake")
+    done = process("placement", "-", "--format", "json", stdin=snake.encode())
     assert done.code == 3
     assert done.data["verified"] is False
     assert "memory grows with nv^3" in done.data["check"]
@@ -220,4 +213,4 @@ def test_a_robot_pinocchio_cannot_check_says_so_once_with_exit_3() -> None:
 
 @pytest.mark.parametrize("stdin", [b"", b"\xff\xfe\x00", b"<robot", urdf_of("single_link").encode()[:-3]])
 def test_standard_input_that_is_no_urdf_is_an_input_error(stdin: bytes) -> None:
-    assert "<stdin>" in refused("placement", "-", stdin=stdin)
+    assert "<stdin>" in refused("placement -", stdin=stdin)

@@ -43,14 +43,14 @@ def test_few_numbers_are_the_same_pose(written: str, relative_to: str | None) ->
 def test_the_table_says_from_where_and_in_which_units_and_a_base_does_nothing_to_a_relative_placement() -> (
     None
 ):
-    text = urdfkin("placement", "ur5", "--relative-to", "forearm_link").text
+    text = urdfkin("placement ur5 --relative-to forearm_link").text
     assert "ur5: placement of tool0, relative to forearm_link" in text
     assert "axis of forearm_link" in text
-    text = urdfkin("placement", "ur5", "--as", "rpy").text
+    text = urdfkin("placement ur5 --as rpy").text
     assert "roll, pitch, yaw [rad]" in text
-    assert "qw" in urdfkin("placement", "ur5", "--as", "quaternion").text
+    assert "qw" in urdfkin("placement ur5 --as quaternion").text
     assert "--base-placement does nothing with --relative-to" in refused(
-        "placement", "ur5", "--relative-to", "base_link", "--base-placement", MOVED
+        "placement ur5 --relative-to base_link --base-placement", MOVED
     )
 
 
@@ -59,7 +59,7 @@ def test_numbers_of_another_rotation_are_a_disagreement(monkeypatch: pytest.Monk
 
     right = rotation.rpy_of
     monkeypatch.setattr(rotation, "rpy_of", lambda R: right(R)[..., ::-1])
-    done = urdfkin("placement", "ur5", "--q", "random", "--as", "rpy")
+    done = urdfkin("placement ur5 --q random --as rpy")
     assert (done.code, done.out) == (1, b"")
     assert "the orientation of tool0 (rpy) disagrees with Pinocchio's" in done.err
     (again,) = [
@@ -75,9 +75,7 @@ def test_where_roll_and_yaw_turn_about_one_axis_the_numbers_are_right_all_the_sa
     """A vertical pitch is where many arms rest: the two angles are not determined, the rotation is."""
     half = "1.5707963267948966"
     done = good(
-        "placement",
-        "ur5",
-        "--base-placement",
+        "placement ur5 --base-placement",
         f"0,0,0,0.3,{half},0.2",
         "--frame",
         "base_link",
@@ -109,7 +107,7 @@ def test_the_analytical_jacobian_is_the_librarys_with_its_rows_named(representat
 
 def test_forms_are_told_apart_every_sequence_is_known_and_a_singularity_is_told_with_the_cure() -> None:
     assert set(REPRESENTATIONS) == {"rpy", "quaternion", *SEQUENCES}
-    err = refused("analytical-jacobian", "planar_two_link", "--q", "0.3,0.4")
+    err = refused("analytical-jacobian planar_two_link --q 0.3,0.4")
     assert "representational singularity" in err
     assert "another sequence or by a quaternion" in err
     labels = [row.labels for row in quantity._FORMS.values()]
@@ -154,7 +152,7 @@ def test_every_quantity_takes_what_it_needs_of_the_bases_motion(command: str) ->
 
 
 def test_an_explained_acceleration_has_the_bases_part() -> None:
-    done = good("acceleration", "ur5", "--breakdown", "--base-acceleration", "0,0,9.81,0,0,0")
+    done = good("acceleration ur5 --breakdown --base-acceleration 0,0,9.81,0,0,0")
     assert [line.split()[-4] for line in done.text.splitlines() if line.startswith("base ")] == ["9.81"]
 
 
@@ -168,11 +166,11 @@ def test_a_batch_of_bases_goes_with_one_configuration_and_with_as_many(tmp_path:
     T[:, :3, :3], T[:, :3, 3] = Rotation.from_quat(rows[:, 3:]).as_matrix(), rows[:, :3]
     robot = library.load("ur5")
     for q in ("neutral", "random:4"):
-        done = good("placement", "ur5", "--q", q, "--base-placement", f"@{path}", "--format", "json")
+        done = good("placement ur5 --q", q, "--base-placement", f"@{path}", "--format", "json")
         expected: FloatArray = robot.placement(done.data["q"], "tool0", base=BaseMotion(T))
         np.testing.assert_allclose(done.data["result"], expected, atol=1e-14)
     assert "batches of q, v, a and the base motion have different lengths: found 3, 3, 3, 4, 1, 1" in refused(
-        "placement", "ur5", "--q", "random:3", "--base-placement", f"@{path}"
+        "placement ur5 --q random:3 --base-placement", f"@{path}"
     )
 
 

@@ -46,22 +46,22 @@ def test_what_was_kept_or_compiled_before_makes_nobody_fast_or_slow() -> None:
 
 
 def test_programs_are_told_in_json_from_before_any_work_to_the_last_chunk() -> None:
-    done = urdfkin("validate", "planar_two_link", "nosuch", "--samples", "50", "--json-progress")
+    done = urdfkin("validate planar_two_link nosuch --samples 50 --json-progress")
     lines = [json.loads(text) for text in done.err.splitlines() if text.startswith("{")]
     assert lines[-1]["chunks_done"] == lines[-1]["chunks"] == 4
     assert (lines[-1]["robots_done"], lines[-1]["failures"]) == (2, 1)
     assert lines[-1]["seconds_left"] == 0.0
     assert set(lines[0]) == {*STANDING.__slots__, "chunks_per_second", "seconds_left"}
-    done = urdfkin("validate", "planar_two_link", "--samples", "50", "--json-progress")
+    done = urdfkin("validate planar_two_link --samples 50 --json-progress")
     first = next(json.loads(text) for text in done.err.splitlines() if text.startswith("{"))
     assert (first["chunks_done"], first["chunks"], first["label"]) == (0, 2, "planar_two_link")
     assert first["chunks_per_second"] is None
 
 
 def test_a_log_gets_a_line_now_and_then_and_a_short_run_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert "chunks" not in urdfkin("validate", "planar_two_link", "--samples", "50").err
+    assert "chunks" not in urdfkin("validate planar_two_link --samples 50").err
     monkeypatch.setattr(campaign, "_LINES", 0.0)
-    done = urdfkin("validate", "planar_two_link", "--samples", "50")
+    done = urdfkin("validate planar_two_link --samples 50")
     assert "urdfkin: 1 of 1 robots, 2 of 2 chunks; " in done.err
     assert done.err.endswith("left, none failed; planar_two_link\n")
 

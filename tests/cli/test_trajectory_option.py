@@ -12,6 +12,8 @@ import pytest
 import urdfkin
 from tests.cli.running import good, refused
 from tests.cli.running import urdfkin as run
+from tests.urdfs import joint
+from tests.urdfs import robot as robot_of
 from urdfkin.cli import cli
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.quantities import by_command
@@ -115,7 +117,7 @@ def test_csv_has_one_row_for_each_time(command: str, motion: dict[str, FloatArra
 def test_every_sample_is_checked_and_a_breakdown_has_the_times_too(
     log: Path, motion: dict[str, FloatArray]
 ) -> None:
-    line = run("velocity", "panda", "--frame", "panda_hand", "--trajectory", str(log)).text.splitlines()[-1]
+    line = run("velocity panda --frame panda_hand --trajectory", str(log)).text.splitlines()[-1]
     assert f"{N} velocity results, worst disagreement " in line
     assert "of the bound" in line
     words = ("acceleration", "panda", "--frame", "panda_hand", "--breakdown", "--trajectory", str(log))
@@ -135,7 +137,7 @@ def test_units_in_a_heading_are_those_of_the_texts_also_in_a_batch_of_q(tmp_path
     assert (along["result"], along["q"], along["v"]) == (one["result"], one["q"], one["v"])
     assert along["t"] == [0.25]
     (tmp_path / "q.csv").write_text("joint_2_deg,joint_1\n90,0.5\n")
-    found = run("placement", "planar_two_link", "--q", f"@{tmp_path / 'q.csv'}", "--format", "json").data
+    found = run("placement planar_two_link --q", f"@{tmp_path / 'q.csv'}", "--format", "json").data
     assert found["q"] == [[0.5, np.pi / 2]]
 
 
@@ -189,10 +191,7 @@ def test_a_placement_needs_no_time_and_keeps_the_angles_of_the_file(tmp_path: Pa
     """Differences need three samples and unwrapped angles; a placement does not."""
     path = tmp_path / "log.csv"
     path.write_text("wheel\n3.1\n")
-    (tmp_path / "w.urdf").write_text(
-        '<robot name="w"><link name="a"/><link name="b"/><joint name="wheel" type="continuous">'
-        '<parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint></robot>'
-    )
+    (tmp_path / "w.urdf").write_text(robot_of(joint("wheel", "continuous", "a", "b"), name="w"))
     words = (str(tmp_path / "w.urdf"), "--trajectory", str(path))
     assert run("placement", *words, "--format", "csv").text.splitlines()[1].startswith("0,")
     assert "at least 3 samples" in run("velocity", *words).err
@@ -242,9 +241,7 @@ def test_a_base_of_the_options_or_of_the_file_moves_the_robot(
 
 @pytest.mark.parametrize("option", ["--q=ready", "--seed=1"])
 def test_a_value_beside_a_trajectory_is_refused(option: str, log: Path) -> None:
-    assert "does nothing along a --trajectory" in refused(
-        "placement", "panda", "--trajectory", str(log), option
-    )
+    assert "does nothing along a --trajectory" in refused("placement panda --trajectory", str(log), option)
 
 
 def _spoiled(log: Path) -> dict[str, tuple[str, str]]:
@@ -275,7 +272,7 @@ def _spoiled(log: Path) -> dict[str, tuple[str, str]]:
 def test_what_is_wrong_with_a_file_is_one_line(what: str, log: Path) -> None:
     text, message = _spoiled(log)[what]
     log.write_text(text)
-    done = run("placement", "panda", "--trajectory", str(log))
+    done = run("placement panda --trajectory", str(log))
     assert (done.code, done.err.count("\n")) == (2, 1)
     assert message in done.err
 
@@ -318,13 +315,13 @@ def test_measured_poses_in_a_convention_and_in_degrees_are_those_in_radians(tmp_
         how = str(tmp_path / "motors.toml")
         more = ["--convention", how] if name == "motors" else []
         done = good(
-            "calibrate", "planar_two_link", "--poses", str(path), "--fit", "base", *more, "--format", "json"
+            "calibrate planar_two_link --poses", str(path), "--fit", "base", *more, "--format", "json"
         )
         found[name] = done.data["origins"]
     for name in ("degrees", "motors"):
-        for joint, T in found["plain"].items():
-            np.testing.assert_allclose(found[name][joint], T, atol=1e-9)
-    table = run("calibrate", "planar_two_link", "--convention", "mujoco")
+        for place, T in found["plain"].items():
+            np.testing.assert_allclose(found[name][place], T, atol=1e-9)
+    table = run("calibrate planar_two_link --convention mujoco")
     assert "--convention does nothing without --poses" in table.err
 
 
@@ -357,8 +354,6 @@ def test_a_hundred_thousand_rows_are_read_computed_and_checked(tmp_path: Path) -
         header=",".join(["time", *robot.coordinate_names]),
     )  # fmt: skip
     out = tmp_path / "v.csv"
-    done = good(
-        "velocity", "ur5", "--frame", "tool0", "--trajectory", str(tmp_path / "log.csv"), "-o", str(out)
-    )
+    done = good("velocity ur5 --frame tool0 --trajectory", str(tmp_path / "log.csv"), "-o", str(out))
     assert f"{n} velocity results" in done.err
     assert len(out.read_text().splitlines()) == n + 1

@@ -66,7 +66,7 @@ def test_changes_name_their_run_and_regressions_come_first(month: Path) -> None:
 def test_a_terminal_shows_runs_robots_and_changes_the_latest_only_unless_all_are_asked_for(
     month: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    done = good("report", "history", str(month))
+    done = good("report history", str(month))
     assert "run 5, REGRESSION panda: verdict: verified -> disagrees" in done.text
     assert "panda        ✓✓✓✓✗✓✓✓  verified" in done.text
     assert done.text.splitlines()[-1] == "8 runs; latest verdict: verified, as in the 2 runs before"
@@ -84,7 +84,7 @@ def test_a_broken_file_is_named_and_the_rest_is_shown(month: Path) -> None:
     edited = arms()
     edited["robots"][0]["failed"] = 7
     put(month / "edited.json", edited)
-    done = urdfkin("report", "history", str(month))
+    done = urdfkin("report history", str(month))
     assert done.code == 2
     assert f"not used: {month / 'broken.json'}: not a JSON file" in done.text
     assert f"not used: {month / 'other.json'}: not a file with the layout urdfkin-validation/1" in done.text
@@ -136,10 +136,10 @@ def test_the_numbers_and_sizes_of_reports_have_limits(month: Path, monkeypatch: 
 
 
 def test_no_report_at_all_is_an_error_with_the_remedy(tmp_path: Path) -> None:
-    err = refused("report", "history", str(tmp_path))
+    err = refused("report history", str(tmp_path))
     assert "no report to show" in err
     assert "urdfkin validate ROBOT --json FILE" in err
-    assert urdfkin("report", "history").code == 2
+    assert urdfkin("report history").code == 2
 
 
 class _Elements(HTMLParser):
@@ -172,7 +172,7 @@ def test_the_page_is_written_by_its_suffix_and_follows_the_latest_verdict(tmp_pa
     pages = []
     for name, words in (("bad", [good, bad]), ("good", [good])):
         path = tmp_path / f"{name}.html"
-        assert urdfkin("report", "history", *map(str, words), "--output", str(path)).code == 0
+        assert urdfkin("report history", *map(str, words), "--output", str(path)).code == 0
         pages.append(path.read_text(encoding="utf-8"))
     assert '<div class="verdict bad">' in pages[0]
     assert "2 runs; latest verdict: disagrees, before: verified" in pages[0]

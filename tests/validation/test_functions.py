@@ -18,6 +18,8 @@ from tests.cli.running import good, refused
 from tests.cli.running import urdfkin as run
 from tests.report.test_junit import junit_of
 from tests.robots.odd_urdfs import random_tree
+from tests.urdfs import joint
+from tests.urdfs import robot as robot_text
 from urdfkin.report.junit import functions_as_junit
 from urdfkin.robot import Robot
 from urdfkin.validation.diagnosis import _HALVES
@@ -373,11 +375,7 @@ def test_a_result_that_is_no_array_of_real_numbers_is_an_error(
 
 
 def test_a_robot_without_a_moving_joint_is_compared() -> None:
-    text = (
-        '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="fixed"><parent link="a"/>'
-        '<child link="b"/><origin xyz="1 0 0"/></joint></robot>'
-    )
-    robot = urdfkin.load(text)
+    robot = urdfkin.load(robot_text(joint("j", "fixed", "a", "b", 'xyz="1 0 0"', "")))
     assert verify_function(lambda q: np.zeros((6, 0)), robot, "jacobian", samples=3).agrees
     assert not verify_function(lambda q: np.eye(4), robot, "placement", samples=3).agrees
 

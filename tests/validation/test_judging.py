@@ -60,7 +60,7 @@ def test_it_goes_on_where_it_was_ended_and_the_report_is_that_of_one_run(
     judge.ends_at = "double_pendulum"
     assert urdfkin(*WORDS, "--store", store).code == 130
     assert stored(store).interrupted
-    assert "accuracy study: 1 of 2 robots" in urdfkin("report", "status", store).text
+    assert "accuracy study: 1 of 2 robots" in urdfkin("report status", store).text
     judge.ends_at = ""
     assert urdfkin(*WORDS, "--store", store, "--json", str(again)).code == 2  # of the robot that is none
     assert judge.asked == ["planar_two_link", "double_pendulum"]
@@ -96,13 +96,13 @@ def test_parts_judge_each_robot_once_and_merge_to_the_report_of_one_run(judge: J
     for shard, store in shards:
         urdfkin(*WORDS, "--store", store, "--shard", shard)
     assert judge.asked == ["planar_two_link", "double_pendulum"]
-    merged = urdfkin("report", "merge", whole, *(store for _, store in shards))
+    merged = urdfkin("report merge", whole, *(store for _, store in shards))
     assert "accuracy study: 2 of 2 robots" in merged.text
     urdfkin("report", whole, "--json", str(again))
     assert judged(again) == expected
     urdfkin(*WORDS[:-1], "2", "--store", shards[1][1], "--shard", "2/2")
     assert "--judge-samples 2 --seed 0, and --judge-samples 1 --seed 0 in" in refused(
-        "report", "merge", whole, *(store for _, store in shards)
+        "report merge", whole, *(store for _, store in shards)
     )
 
 

@@ -13,6 +13,8 @@ import urdfkin
 from tests.cli.running import good
 from tests.cli.running import urdfkin as command
 from tests.robots.odd_urdfs import urdf_of
+from tests.urdfs import joint, limit
+from tests.urdfs import robot as robot_of
 from urdfkin.dh import dh_table
 from urdfkin.robot import Robot
 from urdfkin.validation import robot_summary as chains_module
@@ -119,13 +121,10 @@ def test_what_must_agree_exactly_and_does_not_can_still_be_written(monkeypatch: 
 
 
 #: A link is called as a joint elsewhere, so that a replay line has to say which it means.
-TEXT = """<robot name="r"><link name="base"/><link name="b"/><link name="turn"/>
-<joint name="turn" type="revolute"><parent link="base"/><child link="b"/>
-<origin xyz="0.1 0.2 0.3" rpy="0.4 0.5 0.6"/><axis xyz="0 1 1"/>
-<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
-<joint name="slide" type="prismatic"><parent link="b"/><child link="turn"/>
-<origin xyz="0 0.7 0"/><axis xyz="1 2 0"/>
-<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+TEXT = robot_of(
+    joint("turn", "revolute", "base", "b", 'xyz="0.1 0.2 0.3" rpy="0.4 0.5 0.6"', "0 1 1", limit()),
+    joint("slide", "prismatic", "b", "turn", 'xyz="0 0.7 0"', "1 2 0", limit()),
+)
 
 
 def replayed(report: RobotReport, stdin: str = "") -> int:

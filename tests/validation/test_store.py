@@ -346,10 +346,10 @@ def test_parts_from_several_machines_merge_to_the_report_of_one_run(undisturbed:
         part = validate(ROBOTS, samples=SAMPLES, store=tmp_path / str(i), shard=f"{i}/3")
         assert {robot.verdict for robot in part.robots} <= {Verdict.VERIFIED, Verdict.BAD_INPUT}
     whole = tmp_path / "whole"
-    early = run("report", "merge", str(whole), str(tmp_path / "1"), str(tmp_path / "3"))
+    early = run("report merge", str(whole), str(tmp_path / "1"), str(tmp_path / "3"))
     assert "chunks missing" in early.text
     assert stored(whole).interrupted
-    merged = run("report", "merge", str(whole), *(str(tmp_path / str(i)) for i in (1, 2, 3)))
+    merged = run("report merge", str(whole), *(str(tmp_path / str(i)) for i in (1, 2, 3)))
     assert merged.text.endswith("complete\n"), merged.err
     assert numbers(stored(whole)) == undisturbed
 
@@ -439,9 +439,7 @@ def test_a_client_killed_at_any_time_loses_nothing_that_was_kept(undisturbed: st
     rng, seen = np.random.default_rng(20), 0
     for _ in range(4):
         with subprocess.Popen(
-            [*_COMMAND, str(tmp_path / "s")],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
+            [*_COMMAND, str(tmp_path / "s")], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         ) as process:
             deadline = time.monotonic() + 60
             while len(files(tmp_path / "s")) <= seen and process.poll() is None:
@@ -506,7 +504,7 @@ def test_a_clock_that_is_set_back_changes_nothing(
 
 def test_status_says_what_is_done_what_failed_and_what_is_left(tmp_path: Path) -> None:
     validate(ROBOTS, samples=SAMPLES, store=tmp_path, progress=interrupted_after(5))
-    found = run("report", "status", str(tmp_path))
+    found = run("report status", str(tmp_path))
     assert found.code == 3
     assert "robots: 2 of 3 done, 1 of them failed" in found.text
     assert "chunks: 3 done, 3 missing" in found.text
@@ -514,7 +512,7 @@ def test_status_says_what_is_done_what_failed_and_what_is_left(tmp_path: Path) -
     assert "on one processor" in found.text
     assert "no process is running" in found.text
     validate(ROBOTS, samples=SAMPLES, store=tmp_path)
-    assert "chunks: 6 done, 0 missing" in run("report", "status", str(tmp_path)).text
+    assert "chunks: 6 done, 0 missing" in run("report status", str(tmp_path)).text
 
 
 def test_a_campaign_of_a_robot_from_another_format_is_resumed(tmp_path: Path) -> None:

@@ -27,14 +27,7 @@ from tests.cli.running import urdfkin as run
 from tests.urdf_standard import Robot, mp
 from urdfkin.system.resources import example_robots_dir, robots_dir
 from urdfkin.urdf.catalogue import catalogue
-from urdfkin.validation.vectors import (
-    VECTORS,
-    features,
-    stem,
-    write_features,
-    write_robot,
-    write_sums,
-)
+from urdfkin.validation.vectors import VECTORS, features, stem, write_features, write_robot, write_sums
 from urdfkin.verify.adapters import LIBRARIES
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")]
@@ -130,7 +123,7 @@ def test_an_implementation_written_from_the_standard_agrees_with_all_features(fo
 def test_an_implementation_written_from_the_standard_agrees_for_the_catalogue(
     name: str, tmp_path: Path
 ) -> None:
-    assert run("vectors", "write", str(tmp_path), name, "--samples", "2").code == 0
+    assert run("vectors write", str(tmp_path), name, "--samples", "2").code == 0
     assert agree(tmp_path / f"{name}.json") > 0
 
 
@@ -502,7 +495,7 @@ def test_the_files_are_the_same_in_another_process_with_another_hash_seed(
 def test_all_files_with_the_catalogue_are_written_twice_the_same(tmp_path: Path) -> None:
     first, second = tmp_path / "a", tmp_path / "b"
     for made in (first, second):
-        assert run("vectors", "write", str(made)).code == 0
+        assert run("vectors write", str(made)).code == 0
     assert (first / "SHA256SUMS").read_bytes() == (second / "SHA256SUMS").read_bytes()
     found = [document(path) for path in first.glob("*.json")]
     assert len(found) == len(features()) + len(catalogue())
@@ -555,7 +548,7 @@ def test_a_robot_of_the_catalogue_is_written_by_reference_and_another_one_with_i
 
 def test_bad_arguments_are_explained(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    assert "cannot be written" in refused("vectors", "write", str(tmp_path / "file"), "ur5")
-    assert "name the folder" in run("vectors", "write").err
-    assert "two robots have the same name" in refused("vectors", "write", str(tmp_path), "ur5", "ur5")
-    assert json.loads(run("vectors", "write", "--schema").text)["title"] == VECTORS.name
+    assert "cannot be written" in refused("vectors write", str(tmp_path / "file"), "ur5")
+    assert "name the folder" in run("vectors write").err
+    assert "two robots have the same name" in refused("vectors write", str(tmp_path), "ur5", "ur5")
+    assert json.loads(run("vectors write --schema").text)["title"] == VECTORS.name

@@ -155,9 +155,7 @@ def test_what_does_not_start_any_more_is_done_by_those_that_are_there(
         assert asked >= 2
 
 
-def test_a_worker_runs_nothing_of_the_current_folder(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_worker_runs_nothing_of_the_current_folder(monkeypatch: pytest.MonkeyPatch) -> None:
     codes: list[list[str]] = []
 
     class RecordedError(Exception):

@@ -102,7 +102,7 @@ def test_in_a_browser_the_picture_and_the_motion_are_saved(viewer: Viewer, tmp_p
         behaviour = {"behavior": "allow", "downloadPath": str(saved)}
         browser.chrome.execute_cdp_cmd("Page.setDownloadBehavior", behaviour)
         browser.chrome.get(viewer.server.address)
-        assert _until(lambda: "verified" in browser.js("return document.body.innerText"))
+        browser.wait_for("verified")
         for label, ending, head in (
             ("save a picture (PNG)", "png", b"\x89PNG"),
             ("save the motion (GIF)", "gif", b"GIF89a"),
