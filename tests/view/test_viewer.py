@@ -18,7 +18,7 @@ import pytest
 import urdfkin
 from tests.attacks.test_viewer_gate import free_port
 from tests.report.browser import Browser, opened, require_chromium
-from tests.urdfs import joint
+from tests.urdfs import joint, limit
 from tests.urdfs import robot as robot_of
 from urdfkin.errors import InputError
 from urdfkin.errors.escape import markdown_text
@@ -117,10 +117,10 @@ def test_the_field_of_q_shows_and_reads_the_numbers_of_a_convention() -> None:
 def test_a_slider_ends_where_its_joint_does_and_a_joint_without_a_range_has_none() -> None:
     robot = urdfkin.load("panda")
     rows = {row.name: row for row in coordinate_rows(robot)}
-    limit = robot.tree.joints[[joint.name for joint in robot.tree.joints].index("panda_joint4")].limit
-    assert limit is not None
-    assert (rows["panda_joint4"].lower, rows["panda_joint4"].upper) == (limit.lower, limit.upper)
-    assert within_limits(robot, robot.neutral())[3] == limit.upper < 0.0
+    own = robot.tree.joints[[joint.name for joint in robot.tree.joints].index("panda_joint4")].limit
+    assert own is not None
+    assert (rows["panda_joint4"].lower, rows["panda_joint4"].upper) == (own.lower, own.upper)
+    assert within_limits(robot, robot.neutral())[3] == own.upper < 0.0
     assert [row.name for row in coordinate_rows(urdfkin.load("ur5", root_joint="floating"))][:4] == [
         "root_joint.x", "root_joint.y", "root_joint.z", "shoulder_pan_joint",
     ]  # fmt: skip
@@ -393,7 +393,7 @@ def test_in_a_browser_every_slider_equals_q_and_none_speaks_for_another(
         chromium.chrome.get(viewer.server.address)
         if width < 600:
             chromium.wait_for("show the controls")
-            assert _sliders_in_sight(chromium) == 0, "on a phone the panel is folded at first"
+            assert _until(lambda: _sliders_in_sight(chromium) == 0), "on a phone the panel is folded at first"
             chromium.js(_PRESS, "show the controls")
             assert _until(lambda: _sliders_in_sight(chromium) == n)
         assert _until(equal)
