@@ -27,6 +27,11 @@ def ur5() -> FrameChain:
     return urdfkin.load("ur5").chain("tool0", "base")
 
 
+def with_ends(name: str) -> tuple[urdfkin.Robot, str, str]:
+    robot = urdfkin.load(name)
+    return (robot, "base", "tool0") if name == "ur5" else (robot, robot.base_frame, robot.tip_frame)
+
+
 def with_cell(table: DHTable, row: int, **cells: Any) -> DHTable:
     rows = list(table.rows)
     rows[row] = replace(rows[row], **cells)
@@ -118,8 +123,7 @@ CALIBRATED = [(name, seed) for name in ("ur5", "kinova") for seed in range(3)]
 
 @pytest.mark.parametrize(("name", "seed"), CALIBRATED)
 def test_a_calibrated_strict_table_is_as_far_off_as_its_hayati_form(name: str, seed: int) -> None:
-    robot = urdfkin.load(name)
-    base, tip = ("base", "tool0") if name == "ur5" else (robot.base_frame, robot.tip_frame)
+    robot, base, tip = with_ends(name)
     tree, path = calibrated(robot.tree, seed), robot.chain(tip, base)
     off = {
         form: compare(path, dh_table(tree, tip, base, near_parallel=form)).metres
@@ -131,8 +135,7 @@ def test_a_calibrated_strict_table_is_as_far_off_as_its_hayati_form(name: str, s
 
 @pytest.mark.parametrize(("name", "seed"), CALIBRATED)
 def test_no_cell_of_a_nominal_table_is_blamed_for_more_than_the_tip_is_off(name: str, seed: int) -> None:
-    robot = urdfkin.load(name)
-    base, tip = ("base", "tool0") if name == "ur5" else (robot.base_frame, robot.tip_frame)
+    robot, base, tip = with_ends(name)
     nominal = dh_table(robot.tree, tip, base, snap=1e-4)
     strict = dh_table(calibrated(robot.tree, seed), tip, base, near_parallel="strict")
     assert max(abs(row.d) for row in strict.rows) > 100.0

@@ -209,16 +209,13 @@ def test_a_clean_table_gets_no_hint_at_snapping(name: str) -> None:
 
 
 CHOICES = (
-    ("--snap", "1e-3"),
-    ("--convention", "modified"),
-    ("--near-parallel", "strict"),
-    ("--last", "flange"),
-    ("--parallel-offset", "each"),
-    ("--flip", "nonsense"),
-)
+    "--snap 1e-3", "--convention modified", "--near-parallel strict", "--last flange",
+    "--parallel-offset each", "--flip nonsense",
+)  # fmt: skip
+
+
 IDLE = [
-    *(("ur5", "--compare", "ur5", *choice) for choice in CHOICES),
-    *(("ur5", "--tree", *choice) for choice in CHOICES),
+    *(("ur5", *idle, *choice.split()) for idle in (("--compare", "ur5"), ("--tree",)) for choice in CHOICES),
     ("ur5", "--compare", "ur5", "--no-verify"),
     ("ur5", "--compare", "ur5", "--format", "json", "--millimetres"),
     ("ur5", "--tree", "--base", "base"),

@@ -53,18 +53,13 @@ def numbers(rng: np.random.Generator, exponent: int, size: int) -> FloatArray:
 def everything(robot: Robot, q: FloatArray, v: FloatArray, a: FloatArray, base: BaseMotion | None) -> int:
     """Every quantity of the last link in every reference; how many leave the range of doubles."""
     beyond = 0
+    methods = [(robot.placement, q), *((x, q) for x in (robot.jacobian, robot.hessian))]
+    methods += [(x, q, v) for x in (robot.velocity, robot.jacobian_rate)]
+    methods += [(x, q, v, a) for x in (robot.acceleration, robot.acceleration_breakdown)]
     for reference in REFERENCES:
-        for compute in (
-            lambda reference: robot.placement(q, "l6", base=base),
-            lambda reference: robot.velocity(q, v, "l6", reference, base=base),
-            lambda reference: robot.jacobian(q, "l6", reference, base=base),
-            lambda reference: robot.jacobian_rate(q, v, "l6", reference, base=base),
-            lambda reference: robot.hessian(q, "l6", reference, base=base),
-            lambda reference: robot.acceleration(q, v, a, "l6", reference, base=base),
-            lambda reference: robot.acceleration_breakdown(q, v, a, "l6", reference, base=base),
-        ):
+        for method, *inputs in methods:
             try:
-                compute(reference)
+                method(*inputs, "l6", *([reference] if method != robot.placement else []), base=base)
             except RangeError:
                 beyond += 1
     return beyond

@@ -7,6 +7,7 @@ import ast
 import io
 import os
 import resource
+import subprocess
 import time
 import zipfile
 from collections.abc import Iterator
@@ -26,8 +27,11 @@ from urdfkin.system.files import MOST, read_bytes, read_if_there, read_start
 from urdfkin.system.git import version_before
 from urdfkin.urdf import mjcf, xacro
 from urdfkin.urdf.catalogue import find_package
+from urdfkin.validation.accuracy_store import AccuracyResult
 from urdfkin.validation.campaign import StoreWarning, validate
 from urdfkin.validation.store import Store
+from urdfkin.view import scene
+from urdfkin.view.scene import shapes
 
 PACKAGE = Path(urdfkin.__file__).parent
 
@@ -83,17 +87,24 @@ def test_no_module_but_the_reader_opens_files_that_a_stranger_may_have_put_there
     assert found == set(OTHERS)
 
 
-@pytest.mark.parametrize("kind", ["a device", "a link to a device", "a pipe", "a socket's folder"])
-def test_what_is_no_regular_file_is_refused_at_once(kind: str, tmp_path: Path) -> None:
-    path = tmp_path / "x"
+def odd_file(kind: str, path: Path) -> Path:
+    """What is no regular file, or too large, at a path or elsewhere."""
     if kind == "a device":
-        path = Path("/dev/zero")
-    elif kind == "a link to a device":
+        return Path("/dev/zero")
+    if kind == "a link to a device":
         path.symlink_to("/dev/zero")
     elif kind == "a pipe":
         os.mkfifo(path)
-    else:
+    elif kind == "a folder":
         path.mkdir()
+    else:
+        path.write_bytes(bytes(xacro.MOST_ARGUMENTS + 1))
+    return path
+
+
+@pytest.mark.parametrize("kind", ["a device", "a link to a device", "a pipe", "a folder"])
+def test_what_is_no_regular_file_is_refused_at_once(kind: str, tmp_path: Path) -> None:
+    path = odd_file(kind, tmp_path / "x")
     for read in (read_bytes, read_if_there):
         with pytest.raises(
             SourceError, match=r"not a regular file: found a (character device|pipe)|directory"
@@ -150,8 +161,6 @@ def test_a_stores_file_that_is_a_link_to_a_device_is_not_read(name: str, tmp_pat
             assert validate("planar_two_link", samples=10, store=tmp_path).passed
         assert not place.is_symlink()
         return
-    from urdfkin.validation.accuracy_store import AccuracyResult  # noqa: PLC0415
-
     assert AccuracyResult.of(Store.reading(tmp_path, said.append)) is None
     assert "no accuracy results" in said[0]
 
@@ -208,19 +217,14 @@ XACRO = """<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["a device", "a pipe", "a large file"])
+@pytest.mark.parametrize("kind", ["a link to a device", "a pipe", "a large file"])
 def test_what_a_xacro_file_includes_is_read_nowhere_but_in_the_confined_process(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its arguments are not known then, and nothing is refused."""
-    arm, part = tmp_path / "arm.xacro", tmp_path / "part.xacro"
+    arm = tmp_path / "arm.xacro"
     arm.write_text(XACRO)
-    if kind == "a device":
-        part.symlink_to("/dev/zero")
-    elif kind == "a pipe":
-        os.mkfifo(part)
-    else:
-        part.write_bytes(bytes(xacro.MOST_ARGUMENTS + 1))
+    odd_file(kind, tmp_path / "part.xacro")
 
     def refuse(*_: object, **__: object) -> bytes:
         raise AssertionError("read by the caller's process")
@@ -242,8 +246,6 @@ def test_a_xacro_argument_without_a_name_and_a_value_is_refused(word: str, tmp_p
 def test_an_older_version_that_is_too_large_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import subprocess  # noqa: PLC0415
-
     def git(*words: str) -> None:
         who = ("-c", "user.name=a", "-c", "user.email=a@b")
         subprocess.run(["git", *who, *words], cwd=tmp_path, check=True, capture_output=True)
@@ -285,9 +287,6 @@ def test_what_a_mesh_names_is_read_from_regular_files_of_its_own_folder(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("trimesh")
-    from urdfkin.view import scene  # noqa: PLC0415
-    from urdfkin.view.scene import shapes  # noqa: PLC0415
-
     folder = tmp_path / "mesh"
     folder.mkdir()
     (tmp_path / "outside.mtl").write_text("newmtl m\nKd 1 0 0\n")

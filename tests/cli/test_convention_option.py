@@ -151,14 +151,8 @@ def test_a_row_is_a_joint_and_a_column_a_convention() -> None:
 def test_tools_with_the_same_indices_share_a_column() -> None:
     text = run("order a1").text
     assert "urdfkin: also pinocchio, kdl, isaacgym" in text
-    assert text.splitlines()[1].split() == [
-        "joint",
-        "urdfkin",
-        "urdf",
-        "isaaclab",
-        "isaaclab3",
-        "alphabetical",
-    ]
+    names = ["joint", "urdfkin", "urdf", "isaaclab", "isaaclab3", "alphabetical"]
+    assert text.splitlines()[1].split() == names
 
 
 @pytest.mark.parametrize(

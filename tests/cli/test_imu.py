@@ -4,19 +4,15 @@ import csv
 import io
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 import urdfkin as library
 from tests.cli.running import good, refused, urdfkin
+from tests.cli.test_trajectory_option import write
 from tests.laws.test_imu import moving_base
 from urdfkin.model.tree import FloatArray
-
-
-def save(path: Path, **arrays: Any) -> None:
-    np.savez(path, **arrays)
 
 
 @pytest.fixture
@@ -32,22 +28,10 @@ def test_a_csv_file_and_an_archive_of_the_same_motion_give_the_librarys_numbers(
     robot = library.load("ur5")
     q, v, a = (motion[x] for x in "qva")
     expected = robot.imu(q, v, a, "tool0", gravity=[0.0, 1.0, -9.8])
-    save(tmp_path / "log.npz", **motion)
-    names = ["t", *robot.coordinate_names, *(f"{x}:{name}" for x in "va" for name in robot.rate_names)]
-    table = np.column_stack([motion[x] for x in "tqva"])
-    lines = [",".join(names), *(",".join(map(repr, row)) for row in table.tolist())]
-    (tmp_path / "log.csv").write_text("\n".join(lines))
+    np.savez(tmp_path / "log.npz", **motion)
+    write(tmp_path / "log.csv", robot, motion)
     for log in ("log.csv", "log.npz"):
-        words = [
-            "imu",
-            "ur5",
-            "--frame",
-            "tool0",
-            "--gravity",
-            "0,1,-9.8",
-            "--trajectory",
-            str(tmp_path / log),
-        ]
+        words = ["imu ur5 --frame tool0 --gravity 0,1,-9.8 --trajectory", str(tmp_path / log)]
         document = json.loads(urdfkin(*words, "--format", "json").out)
         assert (document["result"], document["t"]) == (expected.tolist(), motion["t"].tolist())
         assert (document["quantity"], document["verified"]) == ("imu", True)
@@ -65,12 +49,12 @@ def test_a_base_in_the_archive_moves_the_robot_and_rates_are_made_where_there_ar
     base = moving_base(4, 3)
     fields = {f"base_{name}": getattr(base, name) for name in ("placement", "velocity", "acceleration")}
     path = tmp_path / "log.npz"
-    save(path, **motion, **fields)
+    np.savez(path, **motion, **fields)
     words = ["imu", "ur5", "--frame", "tool0", "--trajectory", str(path), "--format", "json"]
     q, v, a = (motion[x] for x in "qva")
     expected = library.load("ur5").imu(q, v, a, "tool0", base=base)
     assert json.loads(urdfkin(*words).out)["result"] == expected.tolist()
-    save(path, q=motion["q"])
+    np.savez(path, q=motion["q"])
     done = good(*words)
     assert "rates by central differences" in done.err
 
@@ -95,7 +79,7 @@ def test_an_archive_of_anything_else_is_refused_in_one_line(
     arrays: dict[str, FloatArray], words: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "log.npz"
-    save(path, **arrays)
+    np.savez(path, **arrays)
     err = refused("imu ur5 --trajectory", str(path))
     assert words in err
     assert str(path) in err
@@ -112,7 +96,7 @@ def test_what_is_no_archive_is_refused_too(data: bytes, tmp_path: Path) -> None:
 def test_options_without_effect_and_half_a_vector_are_refused(
     motion: dict[str, FloatArray], tmp_path: Path
 ) -> None:
-    save(tmp_path / "log.npz", **motion)
+    np.savez(tmp_path / "log.npz", **motion)
     assert "--v does nothing along a --trajectory" in refused(
         "imu ur5 --trajectory", str(tmp_path / "log.npz"), "--v", "random"
     )

@@ -24,17 +24,22 @@ def urdfkin(*words: str | Path) -> Done:
 
 
 @pytest.fixture(scope="module")
-def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("data") / "good.json"
-    path.write_text(json.dumps(arms()))
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two reports, one of them of a run that failed."""
+    path = tmp_path_factory.mktemp("data")
+    for name, document in (("good", arms()), ("bad", failing())):
+        (path / f"{name}.json").write_text(json.dumps(document))
     return path
 
 
-@pytest.fixture(scope="module")
-def bad(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("data") / "bad.json"
-    path.write_text(json.dumps(failing()))
-    return path
+@pytest.fixture
+def good(folder: Path) -> Path:
+    return folder / "good.json"
+
+
+@pytest.fixture
+def bad(folder: Path) -> Path:
+    return folder / "bad.json"
 
 
 @pytest.mark.slow

@@ -21,32 +21,22 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.urdf.catalogue import catalogue
 
 QUANTITIES = {
-    "placement": "q",
-    "velocity": "qv",
-    "jacobian": "q",
-    "jacobian-rate": "qv",
-    "hessian": "q",
+    "placement": "q", "velocity": "qv", "jacobian": "q", "jacobian-rate": "qv", "hessian": "q",
     "acceleration": "qva",
-}
+}  # fmt: skip
 Q = (0.1, -0.5, 1 / 3, -2.0, 2**-0.5, 1.5, 0.8, 0.02)
 
 
 def expected(quantity: str, n: int, reference: str) -> FloatArray:
     """What the library computes for samples 0 to n-1 of seed 7, drawn as the command draws them."""
-    robot = library.load("panda")
-    rng = np.random.default_rng(7)
-    q = sample(robot.tree, n, rng)
-    v = rng.standard_normal((n, robot.nv)) if "v" in QUANTITIES[quantity] else q
-    a = rng.standard_normal((n, robot.nv)) if "a" in QUANTITIES[quantity] else q
-    frame = "panda_hand"
-    return {
-        "placement": lambda: robot.placement(q, frame),
-        "velocity": lambda: robot.velocity(q, v, frame, reference),
-        "jacobian": lambda: robot.jacobian(q, frame, reference),
-        "jacobian-rate": lambda: robot.jacobian_rate(q, v, frame, reference),
-        "hessian": lambda: robot.hessian(q, frame, reference),
-        "acceleration": lambda: robot.acceleration(q, v, a, frame, reference),
-    }[quantity]()
+    robot, rng = library.load("panda"), np.random.default_rng(7)
+    inputs = [
+        sample(robot.tree, n, rng),
+        *(rng.standard_normal((n, robot.nv)) for _ in QUANTITIES[quantity][1:]),
+    ]
+    how = {} if quantity == "placement" else {"reference": reference}
+    result: FloatArray = getattr(robot, quantity.replace("-", "_"))(*inputs, "panda_hand", **how)
+    return result
 
 
 def command(quantity: str, n: int, reference: str, format_: str) -> bytes:

@@ -2,12 +2,12 @@
 
 import json
 import os
-from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
 
 from tests.cli.running import good, refused, urdfkin
+from tests.markup import Page
 from tests.report.documents import HOSTILE_ROBOT, arms, failing, hostile, months_runs, run_on
 from urdfkin.errors import InputError
 from urdfkin.report import history as module
@@ -142,26 +142,14 @@ def test_no_report_at_all_is_an_error_with_the_remedy(tmp_path: Path) -> None:
     assert urdfkin("report history").code == 2
 
 
-class _Elements(HTMLParser):
-    """The tags of a page, and the addresses in it."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.tags, self.addresses = set[str](), list[str]()
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.add(tag)
-        self.addresses += [value or "" for name, value in attrs if name in ("href", "src", "action")]
-
-
 def test_the_page_has_no_script_no_address_and_no_hostile_element(tmp_path: Path) -> None:
     reports = [run_on(1, hostile()), run_on(2, hostile())]
     reports[1]["robots"][1]["source"] = '"><img src=x onerror=hacked()>'
     page = as_html(history([put(tmp_path / f"{i}.json", one) for i, one in enumerate(reports)]), "<b>command")
-    elements = _Elements()
-    elements.feed(page)
-    assert elements.tags.isdisjoint({"script", "img", "iframe", "object", "form", "base"})
-    assert all(address.startswith(("#robot-", "data:,")) for address in elements.addresses)
+    elements = Page(page).elements
+    assert {tag for tag, _ in elements}.isdisjoint({"script", "img", "iframe", "object", "form", "base"})
+    addresses = [attributes.get(name) for _, attributes in elements for name in ("href", "src", "action")]
+    assert all((address or "#robot-").startswith(("#robot-", "data:,")) for address in addresses)
     assert HOSTILE_ROBOT not in page
     assert "&lt;script&gt;" in page
     assert "default-src &#39;none&#39;" in page or "default-src 'none'" in page

@@ -5,11 +5,11 @@ import hashlib
 import json
 import re
 from functools import cache
-from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
 
+from tests.markup import Page
 from tests.report.documents import HOSTILE_JOINT, HOSTILE_LINK, HOSTILE_ROBOT, arms, failing, hostile
 from urdfkin.report import html as html_module
 from urdfkin.report import pages
@@ -24,31 +24,6 @@ from urdfkin.validation.document import Document
 pytestmark = pytest.mark.slow
 
 ASSETS = Path(html_module.__file__).parent / "assets"
-
-
-class Page(HTMLParser):
-    """Elements, attributes, ids, and the text outside scripts and styles."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__(convert_charrefs=True)
-        self.elements: list[tuple[str, dict[str, str | None]]] = []
-        self.words: list[str] = []
-        self.scripts: list[str] = []
-        self.feed(text)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.elements.append((tag, dict(attrs)))
-
-    def handle_data(self, data: str) -> None:
-        inside = self.elements[-1][0] if self.elements else ""
-        (self.scripts if inside in ("script", "style") else self.words).append(data)
-
-    @property
-    def text(self) -> str:
-        return " ".join(" ".join(self.words).split())
-
-    def all(self, tag: str) -> list[dict[str, str | None]]:
-        return [attributes for name, attributes in self.elements if name == tag]
 
 
 @cache

@@ -71,9 +71,9 @@ def test_no_line_but_a_replay_line_is_wider_than_the_terminal(make: Any, width: 
 
 def test_without_a_terminal_there_is_no_escape_no_markup_and_no_colour() -> None:
     assert "\x1b" not in printed(arms(), 80)
-    document = arms()
-    document["robots"][0]["source"] = "[bold red]name[/]"
-    assert "[bold" in printed(document, 80)
+    named = arms()
+    named["robots"][0]["source"] = "[bold red]name[/]"
+    assert "[bold" in printed(named, 80)
     stream = io.StringIO()
     old, new = arms(), failing()
     print_document(Console(file=stream, width=80, markup=False), document(old, new, compare(old, new)))

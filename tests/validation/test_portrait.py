@@ -2,6 +2,7 @@
 
 import json
 import shlex
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -52,36 +53,36 @@ def test_a_floating_root_has_no_table_and_no_trouble() -> None:
     assert report.command == "urdfkin validate ur5 --samples 0 --seed 0 --root-joint floating"
 
 
-def test_a_wrong_table_fails_its_robot(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = dh_table
-
-    def wrong(*args: str) -> object:
-        table = right(*args)  # type: ignore[arg-type]
-        return replace(table, tool=table.tool @ shifted)
-
-    shifted = np.eye(4)
+@pytest.fixture
+def shift(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Shift the tips of the tables that are made from now on, or of those of a convention."""
+    shifted, right = np.eye(4), dh_table
     shifted[0, 3] = 1e-9
-    monkeypatch.setattr(chains_module, "dh_table", wrong)
+
+    def wrong_from_now_on(*conventions: str) -> None:
+        def wrong(*args: str) -> object:
+            table = right(*args)  # type: ignore[arg-type]
+            changed = replace(table, tool=table.tool @ shifted)
+            return changed if not conventions or args[-1] in conventions else table
+
+        monkeypatch.setattr(chains_module, "dh_table", wrong)
+
+    return wrong_from_now_on
+
+
+def test_a_wrong_table_fails_its_robot(shift: Callable[..., None]) -> None:
+    shift()
     robot = validate("ur5", samples=0).robots[0]
     assert robot.failed == 0
     assert robot.verdict is Verdict.DISAGREES
 
 
 @pytest.mark.parametrize("convention", ["standard", "modified"])
-def test_of_both_conventions_the_worse_table_is_told(
-    convention: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    robot, right = urdfkin.load("ur5"), dh_table
+def test_of_both_conventions_the_worse_table_is_told(convention: str, shift: Callable[..., None]) -> None:
+    robot = urdfkin.load("ur5")
     good: Any
     (good,) = chains_of(robot, robot.verifier.oracle())
-
-    def wrong(*args: str) -> object:
-        table = right(*args)  # type: ignore[arg-type]
-        return replace(table, tool=table.tool @ shifted) if args[-1] == convention else table
-
-    shifted = np.eye(4)
-    shifted[0, 3] = 1e-9
-    monkeypatch.setattr(chains_module, "dh_table", wrong)
+    shift(convention)
     bad: Any
     (bad,) = chains_of(robot, robot.verifier.oracle())
     assert bad["metres"] == pytest.approx(1e-9, rel=1e-3)

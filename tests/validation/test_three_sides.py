@@ -31,19 +31,15 @@ def asked(ours: float, pinocchios: float, second_oracle: float) -> ThreeSides:
     return three_sides("mujoco", one[0], one[1], one[2], FIRST, SECOND)
 
 
-@pytest.mark.parametrize(
-    ("answers", "alone", "undecided"),
-    [
-        ((0, 4, 16), (0, 0, 0), 0),
-        ((100, 0, 0), (1, 0, 0), 0),
-        ((0, 100, 0), (0, 1, 0), 0),
-        ((0, 0, 100), (0, 0, 1), 0),
-        ((0, 100, 300), (0, 0, 0), 1),
-        ((0, 8, 16), (0, 0, 0), 1),
-        ((0, np.nan, 0), (0, 1, 0), 0),
-        ((0, 0, np.inf), (0, 0, 1), 0),
-    ],
-)
+#: Three answers, who stands alone, and how many cases are undecided.
+ALONE = [
+    ((0, 4, 16), (0, 0, 0), 0), ((100, 0, 0), (1, 0, 0), 0), ((0, 100, 0), (0, 1, 0), 0),
+    ((0, 0, 100), (0, 0, 1), 0), ((0, 100, 300), (0, 0, 0), 1), ((0, 8, 16), (0, 0, 0), 1),
+    ((0, np.nan, 0), (0, 1, 0), 0), ((0, 0, np.inf), (0, 0, 1), 0),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("answers", "alone", "undecided"), ALONE)
 def test_who_disagrees_with_two_that_agree_stands_alone(
     answers: tuple[float, float, float], alone: tuple[int, int, int], undecided: int
 ) -> None:
