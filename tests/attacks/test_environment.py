@@ -192,7 +192,7 @@ def test_an_odd_name_is_told_in_a_line(name: str) -> None:
 # -- pipes -------------------------------------------------------------------------------------------------
 
 
-def test_a_named_pipe_that_nobody_writes_to_is_given_up(
+def test_a_pipe_that_nobody_writes_to_is_given_up_and_reading_ends_where_it_is_told_to(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(files, "PATIENCE", 0.1)
@@ -203,6 +203,10 @@ def test_a_named_pipe_that_nobody_writes_to_is_given_up(
     for take in (urdfkin.load, urdfkin.check):
         with pytest.raises(SourceError, match=r"a pipe without a writer: found nothing in 0.1 s"):
             take(tmp_path / "pipe.urdf")
+    (tmp_path / "file").write_bytes(bytes(5000))
+    assert len(read_start(tmp_path / "file", 1000)) == 1000
+    assert len(read_start(Path("/dev/zero"), 3_000_000, pipes=True)) == 3_000_000
+    assert len(read_bytes(tmp_path / "file", 5000)) == 5000
 
 
 @pytest.mark.parametrize("pause", [0.0, 0.3])
@@ -225,13 +229,6 @@ def test_a_named_pipe_is_read_as_soon_as_somebody_writes_however_slowly(pause: f
         assert read_bytes(path, pipes=True) == content
     finally:
         writer.join()
-
-
-def test_reading_ends_where_it_is_told_to(tmp_path: Path) -> None:
-    (tmp_path / "file").write_bytes(bytes(5000))
-    assert len(read_start(tmp_path / "file", 1000)) == 1000
-    assert len(read_start(Path("/dev/zero"), 3_000_000, pipes=True)) == 3_000_000
-    assert len(read_bytes(tmp_path / "file", 5000)) == 5000
 
 
 def test_a_process_substitution_is_a_file(arm: Path) -> None:

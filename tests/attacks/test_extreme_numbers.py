@@ -132,13 +132,10 @@ def test_a_place_whose_square_overflows_is_verified(size: float) -> None:
     assert robot.certificate().verified
 
 
-def test_a_product_counts_as_the_smallest_normal_number_unless_a_factor_is_zero() -> None:
+def test_a_scale_of_zero_means_equal_and_a_product_of_others_is_at_least_the_smallest_number() -> None:
     x = np.array([0.0, 1e-200, 1e-200, 5e-324, 1.0, 0.0])
     y = np.array([1e-200, 1e-200, 1e-50, 5e-324, 2.0, 0.0])
     assert product(x, y).tolist() == [0.0, SMALLEST, 1e-200 * 1e-50, SMALLEST, 2.0, 0.0]
-
-
-def test_a_scale_of_zero_still_means_equal() -> None:
     robot = urdfkin.load("panda")
     q = robot.neutral()
     robot.velocity(q, np.zeros(robot.nv), "panda_hand")
@@ -187,23 +184,20 @@ TINY = robot_of(joint("x", "continuous", "a", "b", 'xyz="1e-195 1e-196 1e-195" r
 
 
 @pytest.mark.filterwarnings("error::urdfkin.NotVerifiedWarning")
-def test_a_table_of_lengths_whose_squares_vanish_does_not_lose_to_rounding() -> None:
+def test_lengths_whose_squares_vanish_do_not_lose_to_rounding_and_the_judges_units_do_not_vanish() -> None:
     robot = urdfkin.load(TINY)
     for convention in ("standard", "modified"):
         robot.dh("b", "a", convention)
     assert urdfkin.validate([TINY.encode()], samples=2).passed
+    for line in judge(urdfkin.load(FAINT), samples=2).lines:
+        assert line.urdfkin.worst < 100.0, line
+        assert line.pinocchio.worst < 100.0, line
 
 
 FAINT = robot_of(
     joint("x", "continuous", "a", "b"),
     joint("y", "continuous", "a", "c", axis="0 1 0", more=mimic("x", "5e-324")),
 )
-
-
-def test_the_judge_counts_in_units_that_do_not_vanish() -> None:
-    for line in judge(urdfkin.load(FAINT), samples=2).lines:
-        assert line.urdfkin.worst < 100.0, line
-        assert line.pinocchio.worst < 100.0, line
 
 
 # -- results that leave the range of doubles -------------------------------------------------------
@@ -380,7 +374,9 @@ def disagreement(robot: Robot, base: BaseMotion | None) -> urdfkin.VerificationE
     return caught.value
 
 
-def test_on_a_moving_base_the_replay_line_computes_the_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_replay_line_computes_the_parts_on_a_moving_base_and_explains_them_elsewhere(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     spoiled(monkeypatch)
     base = base_at(1e5, np.arange(12.0))
     line = disagreement(urdfkin.load("panda"), base).reproduce
@@ -389,9 +385,6 @@ def test_on_a_moving_base_the_replay_line_computes_the_parts(monkeypatch: pytest
         eval(line)
     monkeypatch.undo()
     assert isinstance(eval(line), AccelerationBreakdown)
-
-
-def test_without_one_the_replay_line_is_the_command_that_explains(monkeypatch: pytest.MonkeyPatch) -> None:
     spoiled(monkeypatch)
     words = shlex.split(disagreement(urdfkin.load("panda"), None).reproduce)
     assert words[:3] == ["urdfkin", "acceleration", "--breakdown"]

@@ -172,7 +172,7 @@ def test_a_reader_that_loses_every_rule_is_not_verified() -> None:
     assert free.certificate().verified
 
 
-def test_joints_in_another_order_are_not_verified() -> None:
+def test_joints_in_another_order_and_a_coordinate_of_another_joint_are_found() -> None:
     text = robot_of(joint("x", "continuous", "a", "b"), joint("y", "continuous", "a", "c"))
     tree = tree_of(text.replace('"x"', '"z"').encode())  # read so, x stands after y
     for one in tree.joints:
@@ -182,9 +182,6 @@ def test_joints_in_another_order_are_not_verified() -> None:
     assert robot.joint_names == ("y", "x")
     with pytest.warns(urdfkin.NotVerifiedWarning, match="other joints .* found the same in another order"):
         robot.placement([0.1, 0.2], "b")
-
-
-def test_a_coordinate_that_is_given_to_another_joint_is_found() -> None:
     # Both sides once took from the tree which number of q is whose.
     robot = urdfkin.load("ur5")
     first, second, *_ = (i for i, joint in enumerate(robot.tree.joints) if joint.nq)

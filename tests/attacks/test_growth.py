@@ -174,15 +174,12 @@ def test_many_on_one_line_are_counted_and_a_warning_speaks_for_those_on_its_own_
     assert "(4 more on this line and line 9)" in str(finding)
 
 
-def test_an_attribute_among_many_is_found_on_its_line_and_column() -> None:
+def test_who_is_nearest_and_an_attribute_among_many_are_found_in_time() -> None:
     attributes = "".join(f'\n  a{i}="ä" b{i}="1"' for i in range(50))
     findings = urdfkin.check(f'<robot name="r"><link name="l"{attributes}/></robot>')
     assert [(f.line, f.column) for f in findings] == [
         place for i in range(50) for place in ((i + 2, 3), (i + 2, 9 + len(str(i))))
     ]
-
-
-def test_who_is_nearest_is_found_without_comparing_for_ever() -> None:
     known = ["ab" * 60 + str(i) for i in range(100_000)]
     with at_most(ENOUGH):
         assert len(nearest("ba" * 60, known)) == 3

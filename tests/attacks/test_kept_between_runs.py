@@ -236,7 +236,9 @@ def made(root: Path, *words: str, kind: str = "kernels") -> Path:
     return folder
 
 
-def test_a_folder_of_ones_own_is_closed_to_others(tmp_path: Path) -> None:
+def test_a_folder_of_ones_own_is_closed_to_others_and_may_be_of_a_group_of_ones_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     before = os.umask(0)
     try:
         folder = kept_folder("kernels", [], root=tmp_path / "urdfkin")
@@ -244,6 +246,12 @@ def test_a_folder_of_ones_own_is_closed_to_others(tmp_path: Path) -> None:
         os.umask(before)
     assert folder is not None
     assert [stat.S_IMODE(place.stat().st_mode) for place in (folder, folder.parent)] == [0o700, 0o700]
+    folder = made(tmp_path)
+    folder.chmod(0o770)
+    monkeypatch.setattr(cache, "_is_private", lambda group: True)
+    assert kept_folder("kernels", [], root=tmp_path) == folder
+    monkeypatch.setattr(cache, "_is_private", lambda group: False)
+    refused(tmp_path, "a group can write to")
 
 
 @pytest.mark.parametrize("mode", [0o777, 0o1777, 0o702])
@@ -265,17 +273,6 @@ def test_a_folder_in_which_everybody_could_put_another_or_of_a_root_without_writ
     (tmp_path / "file").write_text("")
     with pytest.warns(CacheWarning, match="the cache cannot be written in .*file: .*set XDG_CACHE_HOME"):
         assert kept_folder("kernels", [], root=tmp_path / "file") is None
-
-
-def test_a_folder_of_a_group_is_refused_but_not_that_of_a_users_own_group(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    folder = made(tmp_path)
-    folder.chmod(0o770)
-    monkeypatch.setattr(cache, "_is_private", lambda group: True)
-    assert kept_folder("kernels", [], root=tmp_path) == folder
-    monkeypatch.setattr(cache, "_is_private", lambda group: False)
-    refused(tmp_path, "a group can write to")
 
 
 @pytest.mark.parametrize("whose", ["the folder", "the one above", "the file behind a link"])
@@ -302,7 +299,7 @@ def test_a_folder_of_another_user_is_refused(
     refused(root, "belongs to another user; set XDG_CACHE_HOME to a folder of your own")
 
 
-def test_a_planted_kernel_of_another_user_is_not_unpickled(
+def test_a_planted_kernel_of_another_user_is_not_unpickled_and_an_old_folder_left_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if os.geteuid() != 0:
@@ -316,6 +313,11 @@ def test_a_planted_kernel_of_another_user_is_not_unpickled(
     with pytest.warns(CacheWarning, match="belongs to another user"):
         assert ask(fresh()) == 7
     assert not Planted.ran
+    old = made(tmp_path / "others", "old")
+    os.utime(old / ".used", (0.0, 0.0))
+    os.chown(old / ".used", 12345, 12345)
+    made(tmp_path / "others", "new")
+    assert old.exists()
 
 
 class Planted:
@@ -329,16 +331,6 @@ class Planted:
 
 def run_planted() -> None:
     Planted.ran = True
-
-
-def test_the_month_old_folder_of_another_user_is_left_alone(tmp_path: Path) -> None:
-    if os.geteuid() != 0:
-        pytest.skip("only the superuser can give a folder away")
-    old = made(tmp_path, "old")
-    os.utime(old / ".used", (0.0, 0.0))
-    os.chown(old / ".used", 12345, 12345)
-    kept_folder("kernels", [], "new", root=tmp_path)
-    assert old.exists()
 
 
 def test_a_folder_that_can_only_be_read_is_still_read(

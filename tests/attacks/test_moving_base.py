@@ -72,7 +72,7 @@ def test_both_sides_take_the_nearest_rotation_to_rounding() -> None:
     assert max(theirs) < 8.0
 
 
-def test_the_numbers_are_kept_as_they_were_given() -> None:
+def test_the_numbers_are_kept_as_they_were_given_and_a_free_flyers_are_in_its_own_axes() -> None:
     T = at(orientations(200, 2))
     base = BaseMotion(T, np.arange(6.0))
     assert (base.placement == T).all()
@@ -80,9 +80,6 @@ def test_the_numbers_are_kept_as_they_were_given() -> None:
         assert (again.placement == T).all()
         assert (again.state((200,)) == base.state((200,))).all()
         assert not again.placement.flags.writeable
-
-
-def test_a_free_flyers_rates_are_the_bases_in_its_own_axes() -> None:
     generator = np.random.default_rng(4)
     R, six = orientations(50, 3), generator.normal(size=(50, 6))
     expected = np.einsum("nji,npj->npi", nearest_rotation(R), six.reshape(50, 2, 3)).reshape(50, 6)

@@ -34,12 +34,19 @@ def chain(joints: int, kind: str, leaves: int = 0) -> str:
     return robot(*parts) if parts else '<robot name="r"><link name="l0"/></robot>'
 
 
-def test_blocks_cover_everything_once_and_keep_to_their_size(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_blocks_cover_everything_once_and_processes_share_what_is_free(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(comparison, "BLOCK_BYTES", 1000)
     for count, size, most in ((10, 300, 3), (9, 300, 3), (1, 300, 1), (5, 2000, 1), (0, 300, 0)):
         found = list(comparison.blocks(count, size))
         assert [i for block in found for i in range(count)[block]] == list(range(count))
         assert max(block.stop - block.start for block in found) == most
+    monkeypatch.setattr(memory, "_free", lambda: iter([12 * GB, 8 * GB]))
+    assert memory.share() == 4 * GB
+    assert memory.share(4) == GB
+    monkeypatch.setattr(memory, "_free", lambda: iter([]))
+    assert memory.share() is None
 
 
 @pytest.mark.long
@@ -124,14 +131,6 @@ def test_a_robot_that_does_not_fit_is_not_verified_and_pinocchio_is_not_asked(
     )
     assert "GB needed, 0.002 GB allowed for each process" in robot.reason
     assert robot.portrait.model is not None
-
-
-def test_processes_share_what_is_free(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(memory, "_free", lambda: iter([12 * GB, 8 * GB]))
-    assert memory.share() == 4 * GB
-    assert memory.share(4) == GB
-    monkeypatch.setattr(memory, "_free", lambda: iter([]))
-    assert memory.share() is None
 
 
 @pytest.mark.long

@@ -184,17 +184,15 @@ def test_junit_tells_a_failure_from_an_error(monkeypatch: pytest.MonkeyPatch) ->
     assert len(checks) == 1
 
 
-def test_the_traceback_of_a_crash_is_in_the_data_and_in_junit(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_crash_has_its_traceback_and_a_partly_compared_robot_its_samples_in_the_data(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     document = _crashed(monkeypatch)
     error = document["robots"][0].get("error")
     assert error is not None
     assert error.startswith("Traceback (most recent call last)")
     assert "in crash" in (read(document).findtext(".//failure") or "")
-
-
-def test_a_partly_compared_robot_says_how_many_samples_and_keeps_its_figures(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch.undo()
     robot = _interrupted(monkeypatch)["robots"][1]
     assert (robot["samples"], robot["results"] > 0) == (28, True)
     assert robot["reason"] == "interrupted: 28 of 53 samples were compared"

@@ -79,7 +79,7 @@ def test_the_viewer_listens_to_this_machine_alone_unless_told_otherwise(server: 
     ]
 
 
-def test_the_page_is_for_who_holds_the_key(server: Any) -> None:
+def test_the_page_and_a_connection_are_for_who_holds_the_key(server: Any) -> None:
     assert ask(server, "/KEY/").status == 200
     assert ask(server, "/KEY/?darkMode").status == 200
     for path in STRANGE_PATHS:
@@ -88,9 +88,6 @@ def test_the_page_is_for_who_holds_the_key(server: Any) -> None:
     other = new_server(port=free_port())
     other.stop()
     assert key_of(other) != key_of(server)
-
-
-def test_a_connection_needs_the_key_and_the_viewers_own_page(server: Any) -> None:
     assert connect(server, Origin="http://OWN") == 101
     assert connect(server, "/", Origin="http://OWN") == 403
     for origin in (*STRANGE_ORIGINS, None):

@@ -146,9 +146,12 @@ def test_files_of_others_are_not_read(expanded: Expand, secret: Path, tmp_path: 
         refused(expanded, f"<xacro:include {how.format(name)}/>")
 
 
-def test_a_folder_becomes_a_package_only_by_its_manifest_or_a_search_path(
+def test_a_file_is_read_that_the_user_names_or_a_package_or_search_path_holds(
     expanded: Expand, secret: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    inside = '<xacro:arg name="file" default=""/>' + link("${xacro.load_yaml('$(arg file)')['password']}")
+    assert SECRET in expanded(inside, file=str(secret))
+    refused(expanded, inside.replace('default=""', f'default="{secret}"'))
     inside = '<xacro:include filename="$(find neighbour)/secret.xacro"/>'
     assert "package 'neighbour' is not found" in refused(expanded, inside)
     refused(expanded, '<xacro:include filename="$(find etc)/passwd"/>')
@@ -157,12 +160,6 @@ def test_a_folder_becomes_a_package_only_by_its_manifest_or_a_search_path(
     monkeypatch.delenv("ROS_PACKAGE_PATH")
     (secret.parent / "package.xml").write_text("<package><name>neighbour</name></package>")
     assert SECRET in expanded(inside)
-
-
-def test_a_file_that_the_user_names_is_read(expanded: Expand, secret: Path) -> None:
-    inside = '<xacro:arg name="file" default=""/>' + link("${xacro.load_yaml('$(arg file)')['password']}")
-    assert SECRET in expanded(inside, file=str(secret))
-    refused(expanded, inside.replace('default=""', f'default="{secret}"'))
 
 
 def test_hidden_files_and_entities_are_not_read(expanded: Expand, tmp_path: Path, secret: Path) -> None:

@@ -72,12 +72,9 @@ def test_a_chain_that_is_elsewhere_is_a_disagreement(slip: str, monkeypatch: pyt
     assert "the chain's axes disagree" in done.err
 
 
-def test_without_a_check_it_says_so_and_a_batch_is_refused() -> None:
+def test_without_a_check_it_says_so_and_a_batch_or_a_floating_joint_is_refused() -> None:
     done = urdfkin("chain ur5 --no-verify")
     assert done.code == 3
     assert "NOT VERIFIED" in done.text
     assert "the chain needs exactly one configuration" in refused("chain ur5 --q random:2")
-
-
-def test_a_floating_joint_on_the_way_is_told() -> None:
     assert "a floating joint has no single axis" in refused("chain a1 --root-joint floating --base universe")

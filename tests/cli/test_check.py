@@ -47,7 +47,7 @@ def test_the_exit_code_is_1_for_errors_only_and_strict_makes_errors_of_warnings(
         assert done.data, "one document"
 
 
-def test_an_error_exits_1_with_its_place_and_where_to_read_on(folder: None) -> None:
+def test_an_error_exits_1_with_its_place_a_missing_file_or_an_unknown_code_2(folder: None) -> None:
     done = urdfkin("check good.urdf bad.urdf")
     assert done.code == 1
     lines = done.text.splitlines()
@@ -55,16 +55,10 @@ def test_an_error_exits_1_with_its_place_and_where_to_read_on(folder: None) -> N
     assert lines[1:3] == ['  3 |   <link name="a"/>', "    |         ^^^^^^^^"]
     assert lines[3] == "1 error in 2 files"
     assert lines[4].startswith("run 'urdfkin explain URDF402'")
-
-
-def test_a_missing_file_exits_2_and_the_others_are_checked(folder: None) -> None:
     done = urdfkin("check nowhere.urdf bad.urdf")
     assert done.code == 2
     assert "URDF402" in done.text
     assert done.err == "urdfkin: error: nowhere.urdf: no such file; did you mean warned.urdf?\n"
-
-
-def test_an_unknown_code_exits_2_with_the_nearest(folder: None) -> None:
     assert "did you mean URDF402" in refused("check --ignore URDF4022 bad.urdf")
 
 

@@ -90,7 +90,7 @@ def test_a_folder_or_pattern_without_a_urdf_is_an_error_not_a_success(here: Path
 # -- what is told --------------------------------------------------------------------------------------
 
 
-def test_the_line_stands_below_its_finding_with_carets_below_what_is_meant(here: Path) -> None:
+def test_carets_stand_below_what_is_meant_and_of_a_long_line_the_part_around_is_shown(here: Path) -> None:
     put("arm.urdf", LONG.replace("    <axis", "\t<!-- \u6c49 --><axis"))
     lines = check("arm.urdf").text.splitlines()
     assert lines[0].startswith("arm.urdf:5:18: URDF503 [*] warning: joint 'j': the axis has length 2")
@@ -98,9 +98,6 @@ def test_the_line_stands_below_its_finding_with_carets_below_what_is_meant(here:
     assert lines[2] == "    | " + " " * (4 + len("<!-- ") + 2 + len(" --><axis ")) + "^" * len('xyz="0 0 2"')
     assert lines[3:] == ["1 warning in 1 file", "[*] --fix fixes these findings; --diff prints the changes"]
     assert check("arm.urdf", "--format", "concise").text.splitlines() == [lines[0], *lines[3:]]
-
-
-def test_of_a_long_line_the_part_around_is_shown(here: Path) -> None:
     put("arm.urdf", " ".join(LONG.replace("<joint", f"<!-- {'x' * 5000} --><joint").split()))
     _, line, caret, *_ = check("arm.urdf").text.splitlines()
     assert len(line) < 120
@@ -218,13 +215,20 @@ def test_what_a_baseline_knows_blocks_nobody_and_what_is_new_does(here: Path) ->
     )
 
 
-def test_a_second_finding_of_a_known_kind_is_new(here: Path) -> None:
+def test_a_second_finding_of_a_known_kind_is_new_and_a_setting_names_the_baseline(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     joint = '<joint name="j" type="fixed"><parent link="a"/><child link="b"/><a/>{}</joint>'
     text = f'<robot name="r"><link name="a"/><link name="b"/>{joint}</robot>'
     put("arm.urdf", text.format(""))
     check("--write-baseline", "known.json")
     put("arm.urdf", text.format("<a/>"))
     assert found("--baseline", "known.json") == [("arm.urdf", "URDF207")]
+    put("robots/arm.urdf")
+    check("--write-baseline", "known.json")
+    settings('baseline = "known.json"')
+    monkeypatch.chdir("robots")
+    assert found() == found(str(here)) == []
 
 
 def test_a_baseline_written_for_some_files_keeps_what_it_knows_of_others(here: Path) -> None:
@@ -236,16 +240,6 @@ def test_a_baseline_written_for_some_files_keeps_what_it_knows_of_others(here: P
     two.unlink()
     check("--write-baseline", "known.json", "one.urdf")
     assert json.loads(Path("known.json").read_text())["findings"] == []
-
-
-def test_a_baseline_is_named_from_its_own_folder_by_a_setting_too(
-    here: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    put("robots/arm.urdf")
-    check("--write-baseline", "known.json")
-    settings('baseline = "known.json"')
-    monkeypatch.chdir("robots")
-    assert found() == found(str(here)) == []
 
 
 @pytest.mark.parametrize(
@@ -557,13 +551,10 @@ def test_findings_go_to_a_file(here: Path, style: str) -> None:
     assert Path("fix.patch").read_bytes() == patch.out
 
 
-def test_what_is_no_file_of_the_users_is_not_mended(here: Path) -> None:
+def test_a_rounded_pi_says_how_far_it_turns_and_a_strangers_file_is_not_mended(here: Path) -> None:
     done = urdfkin("check --fix -", stdin=LONG)
     assert (done.code, "URDF503" in done.text) == (0, True)
     assert check("--fix", "ur5", "--select", "URDF601").code == 0
-
-
-def test_a_rounded_pi_says_how_far_it_turns(here: Path) -> None:
     arm = put("arm.urdf", GOOD.replace("<axis", '<origin rpy="1.5708 0 0"/><axis'))
     assert (
         check("--fix", "--unsafe-fixes").err
@@ -587,7 +578,7 @@ def test_sarif_fixes_are_the_edits(here: Path) -> None:
 PAGE = (Path(__file__).parents[2] / "docs" / "check.md").read_text("utf-8")
 
 
-def test_what_is_on_the_page_is_what_one_sees(here: Path) -> None:
+def test_what_is_on_the_page_is_what_one_sees_and_it_lists_the_codes_that_have_cures(here: Path) -> None:
     put("arm.urdf")
     (shown,) = re.findall(r"```console\n\$ urdfkin check arm.urdf\n(.*?)```", PAGE, re.DOTALL)
     assert check("arm.urdf").text == shown
@@ -598,9 +589,6 @@ def test_what_is_on_the_page_is_what_one_sees(here: Path) -> None:
     put("urdfkin-baseline.json", '{"schema": "urdfkin-baseline", "version": 1, "findings": []}')
     done = check()
     assert (done.code, done.text) == (0, "no findings in 1 file (silenced by comments: 1)\n")
-
-
-def test_the_page_lists_the_codes_that_have_cures() -> None:
     rows = set(re.findall(r"^\| (URDF\d+) \|", PAGE, re.MULTILINE))
     cured = {f.code for case in CASES for f in lint(case.data) if f.fix}
     assert rows == cured

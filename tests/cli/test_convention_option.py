@@ -39,13 +39,18 @@ def test_a_result_is_that_of_the_robot_in_the_convention(command: str, name: str
     assert done.data["rows"][0] == ("wx" if name == "drake" else "vx")
 
 
-def test_a_placement_reads_q_of_the_convention_and_says_so() -> None:
+def test_a_placement_reads_q_of_the_convention_and_wxyz_has_its_scalar_first() -> None:
     robot = urdfkin.load("a1", root_joint="floating", verify=False)
     q = robot.sample(1, 3)[0]
     text = _text(robot.convention("mujoco").to(q))
     done = run("placement", *DOG, "mujoco", "--q", text, "--format", "json")
     assert np.allclose(done.data["result"][0], robot.placement(q, "FL_foot"), 0, 1e-14)
     assert "convention mujoco" in run("placement", *DOG, "mujoco", "--q", text).text
+    x, w = (
+        run("placement ur5 --q random --as", form, "--format", "json").data["result"][0]
+        for form in ("quaternion", "wxyz")
+    )
+    assert w == [*x[:3], x[6], *x[3:6]]
 
 
 def test_the_table_names_the_convention_and_what_was_checked() -> None:
@@ -121,14 +126,6 @@ def test_a_batch_without_the_option_runs_no_line_of_conventions() -> None:
     assert done.stdout == "0 True []\n"
 
 
-def test_wxyz_is_the_quaternion_with_its_scalar_first() -> None:
-    x, w = (
-        run("placement ur5 --q random --as", form, "--format", "json").data["result"][0]
-        for form in ("quaternion", "wxyz")
-    )
-    assert w == [*x[:3], x[6], *x[3:6]]
-
-
 # -- urdfkin order ---------------------------------------------------------------------------------
 
 
@@ -148,11 +145,18 @@ def test_a_row_is_a_joint_and_a_column_a_convention() -> None:
             assert robot.convention(name).rate_names[first].split(".")[0] == row[0]
 
 
-def test_tools_with_the_same_indices_share_a_column() -> None:
+def test_tools_with_the_same_indices_share_a_column_and_json_has_the_librarys_numbers() -> None:
     text = run("order a1").text
     assert "urdfkin: also pinocchio, kdl, isaacgym" in text
     names = ["joint", "urdfkin", "urdf", "isaaclab", "isaaclab3", "alphabetical"]
     assert text.splitlines()[1].split() == names
+    data = run("order a1 --to isaaclab --format json").data
+    permutation = urdfkin.load("a1", verify=False).convention("isaaclab").permutation
+    assert permutation is not None
+    assert data["q"]["reordering"]["index"] == permutation.tolist()
+    every = run("order a1 --format json").data["conventions"]
+    assert list(every) == TOOLS
+    assert every["isaaclab"]["sources"]
 
 
 @pytest.mark.parametrize(
@@ -176,13 +180,3 @@ def test_the_printed_code_converts(start: str, end: str) -> None:
     assert np.allclose(space["q_to"], q_to, 0, 1e-14)
     assert np.allclose(space["v_to"], v_to, 0, 1e-14)
     assert ("six_to" in text) == ((start == "drake") != (end == "drake"))
-
-
-def test_json_has_the_same_numbers_as_the_library() -> None:
-    data = run("order a1 --to isaaclab --format json").data
-    permutation = urdfkin.load("a1", verify=False).convention("isaaclab").permutation
-    assert permutation is not None
-    assert data["q"]["reordering"]["index"] == permutation.tolist()
-    every = run("order a1 --format json").data["conventions"]
-    assert list(every) == TOOLS
-    assert every["isaaclab"]["sources"]

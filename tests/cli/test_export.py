@@ -82,10 +82,20 @@ def test_a_file_whose_head_was_changed_is_not_verified(change: str, exported: st
 
 
 @pytest.mark.slow
-def test_a_file_with_other_line_ends_is_still_as_it_was_written(exported: str, tmp_path: Path) -> None:
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+def test_line_ends_change_nothing_and_a_check_includes_nothing_that_lies_beside_the_file(
+    exported: str, tmp_path: Path
+) -> None:
     path = tmp_path / "arm.py"
     path.write_bytes(exported.replace("\n", "\r\n").encode())
     assert urdfkin("export --check", str(path)).code == 0
+    path = tmp_path / "arm.c"
+    path.write_text(urdfkin("export planar_two_link --to c --quantity placement").text, "utf-8")
+    (tmp_path / "math.h").write_text("#error run by urdfkin")
+    assert urdfkin("export --check", str(path)).code == 0
+    path.write_text('#include "own.h"\n' + path.read_text("utf-8"), "utf-8")
+    (tmp_path / "own.h").write_text("")
+    assert urdfkin("export --check", str(path)).code == 2
 
 
 @pytest.mark.slow
@@ -97,18 +107,6 @@ def test_a_check_runs_nothing_that_lies_beside_the_file(beside: str, exported: s
     (tmp_path / "arm" / "arm.py").write_text(exported, "utf-8")
     good("export --check", str(tmp_path / "arm" / "arm.py"))
     assert not mark.exists()
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
-def test_a_check_includes_nothing_that_lies_beside_the_file(tmp_path: Path) -> None:
-    path = tmp_path / "arm.c"
-    path.write_text(urdfkin("export planar_two_link --to c --quantity placement").text, "utf-8")
-    (tmp_path / "math.h").write_text("#error run by urdfkin")
-    assert urdfkin("export --check", str(path)).code == 0
-    path.write_text('#include "own.h"\n' + path.read_text("utf-8"), "utf-8")
-    (tmp_path / "own.h").write_text("")
-    assert urdfkin("export --check", str(path)).code == 2
 
 
 @pytest.mark.slow

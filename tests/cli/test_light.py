@@ -57,16 +57,13 @@ def test_the_hooks_command_needs_what_the_hook_installs(style: str) -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_so_does_the_command_that_explains_what_it_found(tmp_path: Path) -> None:
+def test_so_does_the_command_that_explains_and_one_that_needs_more_says_so(tmp_path: Path) -> None:
     bad = tmp_path / "bad.urdf"
     bad.write_text('<robot name="r"><link name="a"/><link name="b"/></robot>')
     done = bare("check", str(bad))
     assert done.returncode == 1, done.stderr
     assert "run 'urdfkin explain URDF411' for details" in done.stdout
     assert bare("explain", "URDF411").returncode == 0
-
-
-def test_a_command_that_needs_more_says_so() -> None:
     done = bare("placement", ROBOT)
     assert done.returncode == 2
     found = re.fullmatch(

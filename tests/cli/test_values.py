@@ -279,7 +279,7 @@ def test_odd_robots_pass_through_the_command(quantity: str, name: str) -> None:
         assert done.out
 
 
-def test_without_verification_exit_3_says_so() -> None:
+def test_a_table_is_a_robot_to_every_command_and_without_verification_exit_3_says_so() -> None:
     done = urdfkin("jacobian panda --no-verify")
     assert done.code == 3
     assert "NOT VERIFIED" in done.text
@@ -287,9 +287,6 @@ def test_without_verification_exit_3_says_so() -> None:
     done = urdfkin("jacobian panda --no-verify --format json")
     assert done.code == 3
     assert done.data["verified"] is False
-
-
-def test_a_table_is_a_robot_to_every_command() -> None:
     path = str(references()["ur5"])
     done = good("jacobian", path, "--q", "0.1,0.2,0.3,0.4,0.5,0.6", "--format", "json")
     robot = library.load(read_table(path))

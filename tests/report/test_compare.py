@@ -91,7 +91,7 @@ def test_a_run_that_passed_and_does_not_and_fewer_samples_are_regressions() -> N
     assert (False, "samples: 2 -> 6") in words(new, arms())
 
 
-def test_a_robot_that_moves_otherwise_is_told_joint_by_joint_and_is_no_regression() -> None:
+def test_a_robot_that_moves_otherwise_is_told_joint_by_joint_however_little_it_is() -> None:
     new: Any = arms()
     joint = new["robots"][1]["model"]["joints"][2]
     axis = joint["axis"]
@@ -106,9 +106,6 @@ def test_a_robot_that_moves_otherwise_is_told_joint_by_joint_and_is_no_regressio
     assert changed[start + "axis"].new == "-z, rotated by 3.142 rad"
     assert changed[start + "origin"].new.endswith(": moved by 250 mm, rotated by 0 rad")
     assert changed[start + "upper limit"].new == "1.5"
-
-
-def test_a_change_too_small_for_the_words_of_a_pose_is_told_by_how_far_it_is() -> None:
     new: Any = arms()
     joint = new["robots"][1]["model"]["joints"][2]
     joint["placement"][2][3] += 1e-11
@@ -118,7 +115,7 @@ def test_a_change_too_small_for_the_words_of_a_pose_is_told_by_how_far_it_is() -
     assert told["axis"].endswith("rotated by 10 prad")
 
 
-def test_a_joint_that_follows_another_way_is_told_as_a_rule() -> None:
+def test_a_joint_that_follows_another_way_is_gone_or_new_is_told() -> None:
     old: Any = arms()
     new: Any = arms()
     for document, mimic in ((old, None), (new, {"leader": "wheel", "multiplier": -2.0, "offset": 0.25})):
@@ -126,9 +123,6 @@ def test_a_joint_that_follows_another_way_is_told_as_a_rule() -> None:
     (told,) = model_changes(old["robots"][1]["model"], new["robots"][1]["model"])
     assert told[0].endswith(", mimic rule")
     assert told[1:] == ("none", "-2 * wheel +0.25")
-
-
-def test_a_joint_that_is_gone_or_new_is_told_by_its_name() -> None:
     old: Any = arms()
     new: Any = arms()
     new["robots"][1]["model"]["joints"][2]["name"] = "other"
@@ -138,7 +132,7 @@ def test_a_joint_that_is_gone_or_new_is_told_by_its_name() -> None:
     assert (False, "ur5: joint other: nothing -> revolute") in lines
 
 
-def test_a_bound_that_is_wider_for_the_same_joints_is_a_regression() -> None:
+def test_a_wider_bound_and_tables_that_are_compared_no_more_are_regressions() -> None:
     new: Any = arms()
     check = new["robots"][0]["checks"][1]
     check["bound"][1] *= 3.0
@@ -150,9 +144,6 @@ def test_a_bound_that_is_wider_for_the_same_joints_is_a_regression() -> None:
     assert compare(new, arms()).exit_code == 0
     new["robots"][0]["joints"].append("another")
     assert not any("bound" in str(change) for change in compare(arms(), new).regressions)
-
-
-def test_tables_that_are_compared_no_more_are_a_regression() -> None:
     new = arms()
     chain = new["robots"][0]["chains"][0]
     chain["samples"] = 0
@@ -190,7 +181,7 @@ def test_versions_settings_and_new_robots_are_changes_and_no_regressions() -> No
     assert compare(old, new).exit_code == 0
 
 
-def test_the_markdown_leads_with_regressions_and_fits_a_comment() -> None:
+def test_the_markdown_leads_with_regressions_and_counts_what_does_not_fit() -> None:
     found = compare(arms(), failing())
     markdown = markdown_of(arms(), failing(), found)
     lines = [line for line in markdown.splitlines() if "→" in line or line.startswith("| ")]
@@ -199,6 +190,18 @@ def test_the_markdown_leads_with_regressions_and_fits_a_comment() -> None:
     assert markdown_of(arms(), arms(), same).startswith("## ✅ No regression, 0 changes\n")
     assert "❌ regression" in lines[lines.index("| --- | --- | --- | --- |") + 1]
     assert len(markdown_of(arms(), failing(), found, limit=900)) <= 900
+    old: Any = arms()
+    new = copy.deepcopy(old)
+    for check in new["robots"][0]["checks"]:
+        check["failed"] = 2
+    found = compare(old, new)
+    whole = markdown_of(old, new, found)
+    room = len(whole) + 100  # what is kept free for the last line
+    assert markdown_of(old, new, found, room) == whole
+    assert markdown_of(old, new, found, room - 1).endswith(
+        "\n1 further change left out: the comment is full.\n"
+    )
+    assert len(markdown_of(old, new, found, room - 1)) <= room - 1
 
 
 def test_robots_that_were_given_several_times_are_told_apart_by_number() -> None:
@@ -224,18 +227,3 @@ def test_findings_of_one_code_are_counted_with_their_other_places_and_notes_are_
     found = [line for _, line in words(old, new) if "URDF99" in line]
     expected = f"panda: warning URDF999: {before or 'nothing'} -> {after or 'nothing'}"
     assert found == ([] if before == after else [expected])
-
-
-def test_what_fits_is_shown_and_what_does_not_is_counted() -> None:
-    old: Any = arms()
-    new = copy.deepcopy(old)
-    for check in new["robots"][0]["checks"]:
-        check["failed"] = 2
-    found = compare(old, new)
-    whole = markdown_of(old, new, found)
-    room = len(whole) + 100  # what is kept free for the last line
-    assert markdown_of(old, new, found, room) == whole
-    assert markdown_of(old, new, found, room - 1).endswith(
-        "\n1 further change left out: the comment is full.\n"
-    )
-    assert len(markdown_of(old, new, found, room - 1)) <= room - 1

@@ -78,20 +78,6 @@ def test_a_terminal_shows_runs_robots_and_changes_the_latest_only_unless_all_are
     assert "more: --all" not in everything
 
 
-def test_a_broken_file_is_named_and_the_rest_is_shown(month: Path) -> None:
-    (month / "broken.json").write_text(json.dumps(arms())[:500])
-    (month / "other.json").write_text('{"schema": "other/1"}')
-    edited = arms()
-    edited["robots"][0]["failed"] = 7
-    put(month / "edited.json", edited)
-    done = urdfkin("report history", str(month))
-    assert done.code == 2
-    assert f"not used: {month / 'broken.json'}: not a JSON file" in done.text
-    assert f"not used: {month / 'other.json'}: not a file with the layout urdfkin-validation/1" in done.text
-    assert f"not used: {month / 'edited.json'}: the report contradicts itself" in done.text
-    assert "8 runs;" in done.text
-
-
 def test_a_renamed_file_continues_the_history_of_its_robot(tmp_path: Path) -> None:
     before, after = run_on(1, arms()), run_on(2, arms())
     after["robots"][0]["source"] = "robots/panda.urdf"
@@ -113,12 +99,23 @@ def test_a_store_is_a_run(tmp_path: Path) -> None:
     assert found.exit_code == 0
 
 
-def test_a_pipe_in_a_folder_is_named_and_not_waited_for(month: Path) -> None:
+def test_a_broken_file_or_a_pipe_is_named_and_the_rest_is_shown(month: Path) -> None:
     os.mkfifo(month / "pipe.json")
     found = history([month])
     assert [(Path(one["file"]).name, one["reason"][:18]) for one in found.unusable] == [
         ("pipe.json", "not a regular file")
     ]
+    (month / "broken.json").write_text(json.dumps(arms())[:500])
+    (month / "other.json").write_text('{"schema": "other/1"}')
+    edited = arms()
+    edited["robots"][0]["failed"] = 7
+    put(month / "edited.json", edited)
+    done = urdfkin("report history", str(month))
+    assert done.code == 2
+    assert f"not used: {month / 'broken.json'}: not a JSON file" in done.text
+    assert f"not used: {month / 'other.json'}: not a file with the layout urdfkin-validation/1" in done.text
+    assert f"not used: {month / 'edited.json'}: the report contradicts itself" in done.text
+    assert "8 runs;" in done.text
 
 
 def test_the_numbers_and_sizes_of_reports_have_limits(month: Path, monkeypatch: pytest.MonkeyPatch) -> None:

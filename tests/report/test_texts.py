@@ -10,7 +10,7 @@ from rich.console import Console
 
 from tests.report.documents import HOSTILE_ROBOT, arms, failing, hostile
 from urdfkin.errors.escape import markdown_code, markdown_text
-from urdfkin.report.compare import compare
+from urdfkin.report.compare import compare, document
 from urdfkin.report.listing import print_document
 from urdfkin.report.markdown import LIMIT, as_markdown, fenced
 from urdfkin.report.terminal import print_report

@@ -374,13 +374,10 @@ def test_a_result_that_is_no_array_of_real_numbers_is_an_error(
     assert words in found.first_errors[0].message
 
 
-def test_a_robot_without_a_moving_joint_is_compared() -> None:
+def test_a_robot_without_a_moving_joint_is_compared_and_a_locked_ones_missing_column_named() -> None:
     robot = urdfkin.load(robot_text(joint("j", "fixed", "a", "b", 'xyz="1 0 0"', "")))
     assert verify_function(lambda q: np.zeros((6, 0)), robot, "jacobian", samples=3).agrees
     assert not verify_function(lambda q: np.eye(4), robot, "placement", samples=3).agrees
-
-
-def test_a_missing_mimic_column_of_a_locked_robot_is_named() -> None:
     robot = urdfkin.load("panda", lock={"panda_joint3": 0.5})
     free = urdfkin.load("panda", mimic=False, lock={"panda_joint3": 0.5}, verify=False)
     own = [free.rate_names.index(x) for x in robot.rate_names]
@@ -438,16 +435,13 @@ def test_a_broken_program_is_reported_and_the_check_goes_on(fault: str, tmp_path
     assert data["compared"] >= 10 - 3
 
 
-def test_a_file_with_the_name_of_a_library_hides_no_library(tmp_path: Path) -> None:
+def test_a_file_called_as_a_library_hides_none_and_a_program_is_told_of_locked_joints(tmp_path: Path) -> None:
     file = tmp_path / "mujoco.py"
     file.write_text("def jacobian(q):\n    return q\n")
     pytest.importorskip("mujoco")
     done = run("verify", f"{file}:jacobian", "planar_two_link", "--oracle", "mujoco", "--samples", "3")
     assert done.code == 1, done.err
     assert "shape (2,)" in done.text
-
-
-def test_a_program_is_told_of_locked_joints(tmp_path: Path) -> None:
     kept = tmp_path / "request"
     command = f"sed -u 's/.*/&/w {kept}'"
     options = "--lock", "joint_1=1", "--samples", "0"

@@ -47,10 +47,17 @@ def test_another_robots_chains_are_its_leaves_one_for_each_set_of_joints() -> No
     assert all(chain["limb"] is None and chain["samples"] == 0 for chain in chains)
 
 
-def test_a_floating_root_has_no_table_and_no_trouble() -> None:
+def test_a_floating_root_has_no_table_and_time_is_told_by_whose_work_it_was() -> None:
     report = validate("ur5", samples=0, root_joint="floating")
     assert report.passed
     assert report.command == "urdfkin validate ur5 --samples 0 --seed 0 --root-joint floating"
+    robot = validate("ur5", samples=10).robots[0]
+    assert robot.clock is not None
+    parts = robot.clock.as_dict()
+    assert all(seconds > 0.0 for seconds in parts.values())
+    np.testing.assert_allclose(sum(parts.values()), robot.seconds, rtol=0.02, atol=1e-3)
+    both = total([Clock(1.0, 2.0, 3.0, 4.0), Clock(10.0, 20.0, 30.0, 40.0)])
+    assert both == Clock(11.0, 22.0, 33.0, 44.0)
 
 
 @pytest.fixture
@@ -88,16 +95,6 @@ def test_of_both_conventions_the_worse_table_is_told(convention: str, shift: Cal
     assert bad["metres"] == pytest.approx(1e-9, rel=1e-3)
     assert bad["worst"] > 1e4 * good["worst"]
     assert bad["share_of_bound"] > 1.0 > good["share_of_bound"]
-
-
-def test_time_is_told_by_whose_work_it_was() -> None:
-    robot = validate("ur5", samples=10).robots[0]
-    assert robot.clock is not None
-    parts = robot.clock.as_dict()
-    assert all(seconds > 0.0 for seconds in parts.values())
-    np.testing.assert_allclose(sum(parts.values()), robot.seconds, rtol=0.02, atol=1e-3)
-    both = total([Clock(1.0, 2.0, 3.0, 4.0), Clock(10.0, 20.0, 30.0, 40.0)])
-    assert both == Clock(11.0, 22.0, 33.0, 44.0)
 
 
 def test_what_must_agree_exactly_and_does_not_can_still_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -177,7 +174,8 @@ def test_a_file_called_as_a_robot_of_the_catalogue_stays_a_file(
     assert replayed(report.robots[0]) > 10
 
 
-def test_the_run_is_repeated_by_a_command_for_robots_with_the_same_options() -> None:
+@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
+def test_a_command_repeats_the_run_for_robots_with_the_same_options_and_for_a_text(tmp_path: Path) -> None:
     floating = urdfkin.load("ur5", root_joint="floating")
     report = validate(
         ["planar_two_link", floating, "ur3", urdf_of("single_link"), urdf_of("odd_names")], samples=0
@@ -187,10 +185,6 @@ def test_the_run_is_repeated_by_a_command_for_robots_with_the_same_options() -> 
         "urdfkin validate ur5 --samples 0 --seed 0 --root-joint floating",
         "urdfkin validate - --samples 0 --seed 0",
     ]
-
-
-@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
-def test_the_command_of_a_run_over_a_text_repeats_it(tmp_path: Path) -> None:
     first = validate(["planar_two_link", TEXT], samples=3, seed=5)
     path = tmp_path / "again.json"
     good(*shlex.split(first.command)[1:], "--json", str(path), stdin=TEXT)

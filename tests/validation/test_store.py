@@ -111,7 +111,9 @@ def test_a_store_of_other_settings_is_refused_and_both_are_shown(
     assert said in str(error.value)
 
 
-def test_changed_code_never_meets_old_results(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_changed_code_never_meets_old_results_and_its_digest_is_of_what_computes(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     validate(ROBOTS, samples=SAMPLES, store=tmp_path, progress=interrupted_after(1))
     before = Store.reading(tmp_path, pytest.fail).manifest
     changed = results.provenance() | {"code": "0" * 64}
@@ -120,25 +122,21 @@ def test_changed_code_never_meets_old_results(monkeypatch: pytest.MonkeyPatch, t
         validate(ROBOTS, samples=SAMPLES, store=tmp_path)
     after = replace(before, provenance=changed)
     assert {before.key(0, i) for i in range(2)}.isdisjoint(after.key(0, i) for i in range(2))
-
-
-def test_the_digest_of_the_code_is_of_what_computes_and_not_of_what_shows(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+    package = tmp_path / "package"
     for place in ("kinematics/equations.py", "cli/validate.py", "urdf/lint/rules/joints.toml"):
-        (tmp_path / place).parent.mkdir(parents=True)
-        (tmp_path / place).write_text("1")
-    monkeypatch.setattr(results, "_PACKAGE", tmp_path)
+        (package / place).parent.mkdir(parents=True)
+        (package / place).write_text("1")
+    monkeypatch.setattr(results, "_PACKAGE", package)
     before = results._code()
-    (tmp_path / "cli" / "validate.py").write_text("2")
+    (package / "cli" / "validate.py").write_text("2")
     assert results._code() == before
     for place in ("kinematics/equations.py", "urdf/lint/rules/joints.toml"):
-        (tmp_path / place).write_text("2")
+        (package / place).write_text("2")
         assert results._code() != before
         before = results._code()
 
 
-def test_a_file_that_has_changed_is_not_taken_for_what_it_was(tmp_path: Path) -> None:
+def test_a_changed_file_is_not_taken_for_what_it_was_and_another_folder_is_left_alone(tmp_path: Path) -> None:
     robot = tmp_path / "a.urdf"
     robot.write_text('<robot name="a"><link name="l"/></robot>')
     old = subject(str(robot))
@@ -148,6 +146,11 @@ def test_a_file_that_has_changed_is_not_taken_for_what_it_was(tmp_path: Path) ->
     with pytest.raises(InputError, match="has changed since the validation began"):
         old.carried()
     assert subject(str(robot)).carried().read().name == "b"
+    (tmp_path / "thesis.tex").write_text("")
+    with pytest.raises(InputError, match="not empty and is not a store"):
+        validate("ur5", samples=0, store=tmp_path)
+    with pytest.raises(SourceError):
+        stored(tmp_path)
 
 
 def test_what_failed_is_tried_again_when_asked_for_and_may_be_another_text(tmp_path: Path) -> None:
@@ -311,14 +314,6 @@ def test_a_tampered_manifest_is_refused_with_the_place(entry: str, value: object
     with pytest.raises(
         InputError, match=rf"manifest.json: does not conform .* found \$\.{entry}.*write it again"
     ):
-        stored(tmp_path)
-
-
-def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
-    (tmp_path / "thesis.tex").write_text("")
-    with pytest.raises(InputError, match="not empty and is not a store"):
-        validate("ur5", samples=0, store=tmp_path)
-    with pytest.raises(SourceError):
         stored(tmp_path)
 
 

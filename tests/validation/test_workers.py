@@ -229,7 +229,7 @@ def step(deal: WorkQueue, row: Row | None) -> tuple[tuple[int, int] | None, Row 
     return (task.robot, task.chunk.index), row
 
 
-def test_two_have_a_robot_each_and_share_the_last() -> None:
+def test_two_have_a_robot_each_and_share_the_last_and_what_is_put_back_is_dealt_again() -> None:
     deal, rows = WorkQueue(work(3)), list[Row | None]([None, None])
     seen = [list[tuple[int, int]](), list[tuple[int, int]]()]
     for turn in (0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1):
@@ -240,6 +240,18 @@ def test_two_have_a_robot_each_and_share_the_last() -> None:
     assert {robot for robot, _ in seen[1]} == {1, 2}
     assert sorted(seen[0] + seen[1]) == [(i, k) for i in range(3) for k in range(4)]
     assert deal.first() is None
+    for shared in (True, False):
+        deal = WorkQueue(work(2), shared=shared)
+        found = deal.first()
+        assert found is not None
+        task, row = found
+        deal.put_back(task, row)
+        again = deal.first()
+        assert again is not None
+        assert again[0] == task
+        assert [left.chunk.index for left in deal.withdraw(0)] == [1, 2, 3]
+        assert deal.next(row) is None
+        assert [(step(deal, None)[0] or (0, 0))[0]] == [1]
 
 
 def test_help_goes_to_the_robot_of_which_most_is_left_and_nobody_helps_where_each_is_alone() -> None:
@@ -254,18 +266,3 @@ def test_help_goes_to_the_robot_of_which_most_is_left_and_nobody_helps_where_eac
     deal = WorkQueue(work(1), shared=False)
     assert deal.first() is not None
     assert deal.first() is None
-
-
-def test_what_is_put_back_is_dealt_again_and_what_is_withdrawn_is_not() -> None:
-    for shared in (True, False):
-        deal = WorkQueue(work(2), shared=shared)
-        found = deal.first()
-        assert found is not None
-        task, row = found
-        deal.put_back(task, row)
-        again = deal.first()
-        assert again is not None
-        assert again[0] == task
-        assert [left.chunk.index for left in deal.withdraw(0)] == [1, 2, 3]
-        assert deal.next(row) is None
-        assert [(step(deal, None)[0] or (0, 0))[0]] == [1]

@@ -50,7 +50,7 @@ def test_the_time_slider_shows_the_nearest_sample_and_its_checked_numbers(viewer
     np.testing.assert_allclose(viewer.sliders.handles[0].value, np.rad2deg(x.q[5, 0]), rtol=1e-14)
 
 
-def test_it_plays_to_the_end_at_the_chosen_speed_and_stops(viewer: Viewer) -> None:
+def test_it_plays_to_the_end_at_the_chosen_speed_and_a_pause_keeps_the_sample(viewer: Viewer) -> None:
     player(viewer).show(0)
     player(viewer).speed.value = "0.5"
     begin = time.perf_counter()
@@ -60,9 +60,6 @@ def test_it_plays_to_the_end_at_the_chosen_speed_and_stops(viewer: Viewer) -> No
     assert player(viewer).sample == 8
     assert time.perf_counter() - begin > 0.7, "0.4 s at half the speed"
     player(viewer).speed.value = "1"
-
-
-def test_a_pause_keeps_the_sample(viewer: Viewer) -> None:
     player(viewer).show(0)
     player(viewer).speed.value = "0.1"
     player(viewer).play()

@@ -25,7 +25,7 @@ URDF = """<robot name="r">
 </robot>"""
 
 
-def test_primitives_come_with_size_place_and_colour() -> None:
+def test_primitives_come_with_size_place_and_colour_and_a_broken_mesh_is_left_out(tmp_path: Path) -> None:
     box, cylinder, sphere, missing = shapes(urdfkin.load(URDF))
     assert (box.kind, box.size, box.colour) == ("box", (1.0, 2.0, 3.0), (0.0, 0.0, 1.0, 0.5))
     np.testing.assert_array_equal(box.T_link_shape[:3, :3], rotation_from_rpy((0.1, 0.2, 0.3)))
@@ -34,6 +34,12 @@ def test_primitives_come_with_size_place_and_colour() -> None:
     assert (sphere.kind, sphere.size, sphere.colour) == ("sphere", (0.25,), (1.0, 0.0, 0.0, 1.0))
     assert missing.missing
     assert mesh(missing) is None
+    (tmp_path / "x.stl").write_text("solid nothing\nfacet what")
+    path = tmp_path / "r.urdf"
+    path.write_text(URDF.replace("package://nowhere/x.stl", "x.stl"))
+    *_, broken = shapes(urdfkin.load(path))
+    assert not broken.missing
+    assert mesh(broken) is None
 
 
 def test_meshes_are_found_by_package_by_file_and_beside_the_urdf(tmp_path: Path) -> None:
@@ -62,15 +68,6 @@ def test_every_mesh_of_the_catalogues_robots_is_found(name: str) -> None:
     assert [shape for shape in found if shape.missing] == []
 
 
-def test_a_broken_mesh_is_left_out(tmp_path: Path) -> None:
-    (tmp_path / "x.stl").write_text("solid nothing\nfacet what")
-    path = tmp_path / "r.urdf"
-    path.write_text(URDF.replace("package://nowhere/x.stl", "x.stl"))
-    *_, broken = shapes(urdfkin.load(path))
-    assert not broken.missing
-    assert mesh(broken) is None
-
-
 @pytest.fixture(scope="module")
 def x() -> FrameMotion:
     robot = urdfkin.load("panda")
@@ -97,11 +94,14 @@ def test_velocities_of_unit_rates_touch_the_ellipsoid_and_none_leaves_it(
     np.testing.assert_allclose(tips, 1.0, rtol=1e-12)
 
 
-def test_a_flat_ellipsoid_can_still_be_seen() -> None:
+def test_a_flat_ellipsoid_can_still_be_seen_and_the_words_say_the_numbers(x: FrameMotion) -> None:
     robot = urdfkin.load("ur5")
     zero = np.zeros((1, 6))
     shape = velocity_ellipsoid(frame_motion(robot, (zero, zero, zero), "base_link"), 2.0)
     np.testing.assert_array_equal(shape.half, 0.004)
+    words = numbers(x)
+    assert "**✓ verified** by Pinocchio" in words
+    assert f"{x.placement[0, 0, 3]:.4g}" in words
 
 
 def test_arrows_are_the_columns_and_parts_at_one_scale(x: FrameMotion) -> None:
@@ -116,9 +116,3 @@ def test_arrows_are_the_columns_and_parts_at_one_scale(x: FrameMotion) -> None:
     assert parts.names[-1] == "sum"
     ends = parts.points[:, 1] - parts.points[:, 0]
     np.testing.assert_allclose(ends[:-1].sum(axis=0), ends[-1], atol=1e-12)
-
-
-def test_the_words_say_the_numbers_and_what_pinocchio_says(x: FrameMotion) -> None:
-    words = numbers(x)
-    assert "**✓ verified** by Pinocchio" in words
-    assert f"{x.placement[0, 0, 3]:.4g}" in words

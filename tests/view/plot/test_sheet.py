@@ -116,14 +116,20 @@ def test_a_sheet_fits_a_page_and_no_curve_touches_the_top(panels: list[str], cas
             assert upper - largest > 0.03 * (upper - lower), axes.get_ylabel()
 
 
-def test_where_a_limit_is_left_a_cross_stands(case: Case) -> None:
-    robot, *_ = case
+def test_a_cross_stands_where_a_limit_is_left_and_the_bound_beside_what_it_bounds(case: Case) -> None:
+    robot, motion, trajectory = case
     x = line(robot, robot.poses["ready"], robot.poses["neutral"], 1.0, 21)
     (axes, _) = sheet(robot, frame_motion(robot, x, robot.tip_frame), x, ["q"]).axes
     crosses = next(drawn for drawn in axes.lines if drawn.get_label() == "outside the limits")
     outside = x.q[:, 3] > robot.limits[1, 3]
     assert outside.any()
     np.testing.assert_array_equal(crosses.get_ydata(), x.q[outside, 3])
+    (bounded,) = sheet(robot, motion, trajectory, ["disagreement"]).axes
+    for check in motion.checks.values():
+        assert (check.bound > 0.0).all()
+        np.testing.assert_allclose(check.units, check.share * check.bound, rtol=1e-12)
+        assert any(np.array_equal(drawn.get_ydata(), check.bound) for drawn in bounded.lines)
+    assert bounded.get_ylim()[1] > max(check.bound.max() for check in motion.checks.values())
 
 
 def test_no_axis_mixes_metres_and_radians(case: Case) -> None:
@@ -150,16 +156,6 @@ def test_a_floating_base_is_plotted_with_its_place_and_its_quaternion(tmp_path: 
         "q [rad]", "q [m]", "q [quaternion]", "v [rad/s]", "v [m/s]"
     ]  # fmt: skip
     assert save(sheet(robot, motion, x), tmp_path / "a.svg")
-
-
-def test_the_bound_is_drawn_beside_what_it_bounds(case: Case) -> None:
-    robot, x, trajectory = case
-    (axes,) = sheet(robot, x, trajectory, ["disagreement"]).axes
-    for check in x.checks.values():
-        assert (check.bound > 0.0).all()
-        np.testing.assert_allclose(check.units, check.share * check.bound, rtol=1e-12)
-        assert any(np.array_equal(drawn.get_ydata(), check.bound) for drawn in axes.lines)
-    assert axes.get_ylim()[1] > max(check.bound.max() for check in x.checks.values())
 
 
 @pytest.mark.slow
